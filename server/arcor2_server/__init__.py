@@ -1,0 +1,1 @@
+"""ARServer, Project, Scene, Build and Execution services in one ASGI application, and the command line."""
