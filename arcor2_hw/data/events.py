@@ -1,0 +1,313 @@
+"""Every event that the server sends: its data, and the least role that may receive it."""
+
+import enum
+from typing import Any, Final
+
+from msgspec import Struct, field
+
+from arcor2_hw.data.base import UNSET, Data, Unset
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.object_type import ObjectTypeMeta
+from arcor2_hw.data.package import CollisionModels, PackageStateEnum, PackageSummary
+from arcor2_hw.data.parameter import Parameter
+from arcor2_hw.data.project import (
+    BareAction,
+    BareActionPoint,
+    BareProject,
+    LogicItem,
+    NamedOrientation,
+    Project,
+    ProjectParameter,
+    ProjectRobotJoints,
+)
+from arcor2_hw.data.robot import EefPose, Joint
+from arcor2_hw.data.role import Role
+from arcor2_hw.data.scene import BareScene, Scene, SceneObject
+
+
+class EventType(Struct, frozen=True):
+    """Declares one event: the type of its data (None: it has none) and the least role that gets it."""
+
+    name: str
+    data: Any
+    role: Role
+
+
+class Event(Data, frozen=True):
+    """The envelope of an event."""
+
+    event: str
+    change_type: "ChangeType | Unset" = UNSET
+    parent_id: str | Unset = UNSET
+    data: Any = UNSET
+
+
+class ActionExecutionData(Data, frozen=True):
+    """What the event ActionExecution carries."""
+
+    action_id: str = ""
+
+
+class ActionResultData(Data, frozen=True):
+    """What the event ActionResult carries."""
+
+    action_id: str
+    results: list[str] | Unset = UNSET
+    error: str | Unset = UNSET
+
+
+class ProcessStateEnum(enum.StrEnum):
+    """Values of StateEnum in ProcessState."""
+
+    STARTED = "started"
+    FINISHED = "finished"
+    FAILED = "failed"
+
+
+class ProcessStateData(Data, frozen=True):
+    """What the event ProcessState carries."""
+
+    id: str
+    state: ProcessStateEnum
+    message: str | Unset = UNSET
+
+
+class MainScreen(enum.StrEnum):
+    """Values of WhatEnum in ShowMainScreen."""
+
+    SCENES_LIST = "ScenesList"
+    PROJECTS_LIST = "ProjectsList"
+    PACKAGES_LIST = "PackagesList"
+
+
+class ShowMainScreenData(Data, frozen=True):
+    """What the event ShowMainScreen carries."""
+
+    what: MainScreen
+    highlight: str | Unset = UNSET
+
+
+class LockData(Data, frozen=True):
+    """What ObjectsLocked and ObjectsUnlocked carry."""
+
+    object_ids: list[str]
+    owner: str
+
+
+class OpenProjectData(Data, frozen=True):
+    """What the event OpenProject carries."""
+
+    scene: Scene
+    project: Project
+
+
+class HandTeachingModeData(Data, frozen=True):
+    """What the event HandTeachingMode carries."""
+
+    robot_id: str
+    enabled: bool
+    arm_id: str | Unset = UNSET
+
+
+class MoveEventType(enum.StrEnum):
+    """Phases of a motion."""
+
+    START = "start"
+    END = "end"
+    FAILED = "failed"
+
+
+class RobotMoveToActionPointJointsData(Data, frozen=True):
+    """What the event RobotMoveToActionPointJoints carries."""
+
+    move_event_type: MoveEventType
+    robot_id: str
+    joints_id: str
+    safe: bool
+    message: str | Unset = UNSET
+    arm_id: str | Unset = UNSET
+
+
+class RobotMoveToActionPointOrientationData(Data, frozen=True):
+    """What the event RobotMoveToActionPointOrientation carries."""
+
+    move_event_type: MoveEventType
+    robot_id: str
+    end_effector_id: str
+    orientation_id: str
+    safe: bool
+    linear: bool
+    message: str | Unset = UNSET
+    arm_id: str | Unset = UNSET
+
+
+class RobotMoveToJointsData(Data, frozen=True):
+    """What the event RobotMoveToJoints carries."""
+
+    move_event_type: MoveEventType
+    robot_id: str
+    target_joints: list[Joint]
+    safe: bool
+    message: str | Unset = UNSET
+    arm_id: str | Unset = UNSET
+
+
+class RobotMoveToPoseData(Data, frozen=True):
+    """What the event RobotMoveToPose carries."""
+
+    move_event_type: MoveEventType
+    robot_id: str
+    end_effector_id: str
+    target_pose: Pose
+    safe: bool
+    linear: bool
+    message: str | Unset = UNSET
+    arm_id: str | Unset = UNSET
+
+
+class OpenSceneData(Data, frozen=True):
+    """What the event OpenScene carries."""
+
+    scene: Scene
+
+
+class SceneStateEnum(enum.StrEnum):
+    """Values of StateEnum in SceneState."""
+
+    STOPPED = "stopped"
+    STARTING = "starting"
+    STARTED = "started"
+    STOPPING = "stopping"
+
+
+class SceneStateData(Data, frozen=True):
+    """What the event SceneState carries."""
+
+    state: SceneStateEnum
+    message: str | Unset = UNSET
+
+
+class RobotEefData(Data, frozen=True):
+    """What the event RobotEef carries."""
+
+    robot_id: str
+    end_effectors: list[EefPose] = field(default_factory=list)
+
+
+class RobotJointsData(Data, frozen=True):
+    """What the event RobotJoints carries."""
+
+    robot_id: str
+    joints: list[Joint]
+
+
+class ActionStateAfterData(Data, frozen=True):
+    """What the event ActionStateAfter carries."""
+
+    action_id: str
+    results: list[str] | Unset = UNSET
+
+
+class ActionStateBeforeData(Data, frozen=True):
+    """What the event ActionStateBefore carries."""
+
+    action_id: str | Unset = UNSET
+    parameters: list[str] | Unset = UNSET
+    action_point_ids: set[str] | Unset = UNSET
+    thread_id: int | Unset = UNSET
+
+
+class NotificationLevel(enum.StrEnum):
+    """Values of Level in Notification."""
+
+    INFO = "Info"
+    WARN = "Warn"
+    ERROR = "Error"
+
+
+class NotificationData(Data, frozen=True):
+    """What the event Notification carries."""
+
+    message: str
+    level: NotificationLevel
+
+
+class PackageInfoData(Data, frozen=True):
+    """What the event PackageInfo carries."""
+
+    package_id: str
+    package_name: str
+    scene: Scene
+    project: Project
+    collision_models: CollisionModels = field(default_factory=CollisionModels)
+
+
+class PackageStateData(Data, frozen=True):
+    """What the event PackageState carries."""
+
+    state: PackageStateEnum = PackageStateEnum.UNDEFINED
+    package_id: str | Unset = UNSET
+
+
+class ProjectExceptionData(Data, frozen=True):
+    """What the event ProjectException carries."""
+
+    message: str
+    type: str
+    handled: bool = False
+
+
+class ChangeType(enum.StrEnum):
+    """What happened to the item that an event carries."""
+
+    ADD = "add"
+    UPDATE = "update"
+    REMOVE = "remove"
+    UPDATE_BASE = "update_base"
+
+
+EVENTS: Final = {
+    event.name: event
+    for event in (
+        EventType("ActionCancelled", None, Role.OPERATOR),
+        EventType("ActionExecution", ActionExecutionData, Role.OPERATOR),
+        EventType("ActionResult", ActionResultData, Role.OPERATOR),
+        EventType("ProcessState", ProcessStateData, Role.OPERATOR),
+        EventType("ShowMainScreen", ShowMainScreenData, Role.OPERATOR),
+        EventType("ObjectsLocked", LockData, Role.OPERATOR),
+        EventType("ObjectsUnlocked", LockData, Role.OPERATOR),
+        EventType("ChangedObjectTypes", list[ObjectTypeMeta], Role.OPERATOR),
+        EventType("OverrideUpdated", Parameter, Role.OPERATOR),
+        EventType("ActionChanged", BareAction, Role.OPERATOR),
+        EventType("ActionPointChanged", BareActionPoint, Role.OPERATOR),
+        EventType("JointsChanged", ProjectRobotJoints, Role.OPERATOR),
+        EventType("LogicItemChanged", LogicItem, Role.OPERATOR),
+        EventType("OpenProject", OpenProjectData, Role.OPERATOR),
+        EventType("OrientationChanged", NamedOrientation, Role.OPERATOR),
+        EventType("ProjectChanged", BareProject, Role.OPERATOR),
+        EventType("ProjectClosed", None, Role.OPERATOR),
+        EventType("ProjectParameterChanged", ProjectParameter, Role.OPERATOR),
+        EventType("ProjectSaved", None, Role.OPERATOR),
+        EventType("HandTeachingMode", HandTeachingModeData, Role.OPERATOR),
+        EventType("RobotMoveToActionPointJoints", RobotMoveToActionPointJointsData, Role.OPERATOR),
+        EventType("RobotMoveToActionPointOrientation", RobotMoveToActionPointOrientationData, Role.OPERATOR),
+        EventType("RobotMoveToJoints", RobotMoveToJointsData, Role.OPERATOR),
+        EventType("RobotMoveToPose", RobotMoveToPoseData, Role.OPERATOR),
+        EventType("OpenScene", OpenSceneData, Role.OPERATOR),
+        EventType("SceneChanged", BareScene, Role.OPERATOR),
+        EventType("SceneClosed", None, Role.OPERATOR),
+        EventType("SceneObjectChanged", SceneObject, Role.OPERATOR),
+        EventType("SceneSaved", None, Role.OPERATOR),
+        EventType("SceneState", SceneStateData, Role.OPERATOR),
+        EventType("PackageChanged", PackageSummary, Role.OPERATOR),
+        EventType("RobotEef", RobotEefData, Role.OPERATOR),
+        EventType("RobotJoints", RobotJointsData, Role.OPERATOR),
+        EventType("ActionStateAfter", ActionStateAfterData, Role.OPERATOR),
+        EventType("ActionStateBefore", ActionStateBeforeData, Role.OPERATOR),
+        EventType("Notification", NotificationData, Role.OPERATOR),
+        EventType("PackageInfo", PackageInfoData, Role.OPERATOR),
+        EventType("PackageState", PackageStateData, Role.OPERATOR),
+        EventType("ProjectException", ProjectExceptionData, Role.OPERATOR),
+    )
+}
+"""Every event of the protocol by name."""

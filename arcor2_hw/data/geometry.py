@@ -1,0 +1,159 @@
+"""Position, orientation and pose, with the algebra of rigid motion (quaternions x, y, z, w; metres)."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+from msgspec import field
+from transforms3d.quaternions import mat2quat, qconjugate, qmult, quat2mat, rotate_vector
+
+from arcor2_hw.data.base import MutableData
+
+Vector = npt.NDArray[np.float64]
+
+
+class Position(MutableData):
+    """A point, or a displacement, in metres."""
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+
+    def __iter__(self) -> Iterator[float]:
+        return iter((self.x, self.y, self.z))
+
+    def __getitem__(self, index: int) -> float:
+        return (self.x, self.y, self.z)[index]
+
+    def __add__(self, other: "Position") -> "Position":
+        return Position(self.x + other.x, self.y + other.y, self.z + other.z)
+
+    def __sub__(self, other: "Position") -> "Position":
+        return Position(self.x - other.x, self.y - other.y, self.z - other.z)
+
+    def distance_to(self, other: "Position") -> float:
+        """Give the Euclidean distance to `other`, m."""
+        return math.dist((self.x, self.y, self.z), (other.x, other.y, other.z))
+
+    def rotated(self, by: "Orientation") -> "Position":
+        """Give this vector rotated by `by`."""
+        return Position(*map(float, rotate_vector((self.x, self.y, self.z), by.wxyz(), is_normalized=True)))
+
+
+class Orientation(MutableData):
+    """A unit quaternion x, y, z, w. It is normalised whenever it is constructed.
+
+    Raises ValueError for the zero quaternion and for numbers that are not finite.
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    w: float = 1.0
+
+    def __post_init__(self) -> None:
+        square = self.x * self.x + self.y * self.y + self.z * self.z + self.w * self.w
+        if not math.isfinite(square) or square < 1e-24:
+            raise ValueError("an orientation needs a finite quaternion other than zero")
+        if abs(square - 1.0) > 1e-12:
+            norm = math.sqrt(square)
+            self.x /= norm
+            self.y /= norm
+            self.z /= norm
+            self.w /= norm
+
+    def __iter__(self) -> Iterator[float]:
+        return iter((self.x, self.y, self.z, self.w))
+
+    def __getitem__(self, index: int) -> float:
+        return (self.x, self.y, self.z, self.w)[index]
+
+    def __mul__(self, other: "Orientation") -> "Orientation":
+        return Orientation.from_wxyz(qmult(self.wxyz(), other.wxyz()))
+
+    def wxyz(self) -> tuple[float, float, float, float]:
+        """Give the components with the scalar first, as transforms3d wants them."""
+        return self.w, self.x, self.y, self.z
+
+    @classmethod
+    def from_wxyz(cls, quaternion: "Vector | tuple[float, ...]") -> "Orientation":
+        """Make an orientation from four components, scalar first."""
+        w, x, y, z = map(float, quaternion)
+        return cls(x, y, z, w)
+
+    def inverted(self) -> "Orientation":
+        """Give the inverse rotation."""
+        return Orientation.from_wxyz(qconjugate(self.wxyz()))
+
+    def matrix(self) -> Vector:
+        """Give the rotation matrix, shape (3, 3)."""
+        return np.asarray(quat2mat(self.wxyz()), dtype=np.float64)
+
+    @classmethod
+    def from_matrix(cls, matrix: Vector) -> "Orientation":
+        """Make an orientation from a rotation matrix, shape (3, 3)."""
+        return cls.from_wxyz(mat2quat(matrix))
+
+    @classmethod
+    def from_rotation_vector(cls, x: float, y: float, z: float) -> "Orientation":
+        """Make an orientation from axis times angle, rad."""
+        angle = math.sqrt(x * x + y * y + z * z)
+        if angle < 1e-12:
+            return cls(x / 2, y / 2, z / 2, 1.0)
+        s = math.sin(angle / 2) / angle
+        return cls(x * s, y * s, z * s, math.cos(angle / 2))
+
+    def rotation_vector(self) -> tuple[float, float, float]:
+        """Give axis times angle, rad, with the angle in 0..pi."""
+        sign = -1.0 if self.w < 0 else 1.0
+        x, y, z, w = sign * self.x, sign * self.y, sign * self.z, sign * self.w
+        s = math.sqrt(x * x + y * y + z * z)
+        factor = 2.0 if s < 1e-12 else 2.0 * math.atan2(s, w) / s
+        return x * factor, y * factor, z * factor
+
+    def angle_to(self, other: "Orientation") -> float:
+        """Give the angle of the rotation between the two, rad, 0..pi."""
+        return math.hypot(*(self.inverted() * other).rotation_vector())
+
+
+class Pose(MutableData):
+    """Position and orientation of a frame in its parent frame."""
+
+    position: Position = field(default_factory=Position)
+    orientation: Orientation = field(default_factory=Orientation)
+
+    def __mul__(self, other: "Pose") -> "Pose":
+        """Compose: with self = a_from_b and other = b_from_c, give a_from_c."""
+        return Pose(
+            self.position + other.position.rotated(self.orientation),
+            self.orientation * other.orientation,
+        )
+
+    def inverted(self) -> "Pose":
+        """Give the inverse motion: of a_from_b, b_from_a."""
+        back = self.orientation.inverted()
+        p = self.position
+        return Pose(Position(-p.x, -p.y, -p.z).rotated(back), back)
+
+    def matrix(self) -> Vector:
+        """Give the homogeneous matrix, shape (4, 4)."""
+        result = np.eye(4)
+        result[:3, :3] = self.orientation.matrix()
+        result[:3, 3] = tuple(self.position)
+        return result
+
+    @classmethod
+    def from_matrix(cls, matrix: Vector) -> "Pose":
+        """Make a pose from a homogeneous matrix, shape (4, 4)."""
+        return cls(Position(*map(float, matrix[:3, 3])), Orientation.from_matrix(matrix[:3, :3]))
+
+
+def make_pose_abs(parent: Pose, child: Pose) -> Pose:
+    """Give the pose of `child`, stated in the frame `parent`, in the frame in which `parent` is stated."""
+    return parent * child
+
+
+def make_pose_rel(parent: Pose, child: Pose) -> Pose:
+    """Give the pose of `child` in the frame `parent`; both are stated in the same frame."""
+    return parent.inverted() * child

@@ -1,0 +1,164 @@
+"""Object types as clients see them: metadata, actions, collision models."""
+
+import enum
+
+from msgspec import field
+
+from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
+from arcor2_hw.data.geometry import Pose
+
+
+class Model3dType(enum.StrEnum):
+    """Kinds of collision model."""
+
+    NONE = "None"
+    BOX = "Box"
+    CYLINDER = "Cylinder"
+    SPHERE = "Sphere"
+    MESH = "Mesh"
+
+
+class Model(Data, frozen=True):
+    """A collision model; its id is the object type's name."""
+
+    id: str
+
+    def type(self) -> Model3dType:
+        """Give the kind of this model."""
+        return Model3dType(self.__class__.__name__)
+
+
+def _positive(model: Data, *names: str) -> None:
+    for name in names:
+        if not getattr(model, name) > 0:
+            raise ValueError(f"{type(model).__name__}: {name} must be greater than zero")
+
+
+class Box(Model, frozen=True):
+    """A box around its origin, edges in m."""
+
+    size_x: float
+    size_y: float
+    size_z: float
+
+    def __post_init__(self) -> None:
+        _positive(self, "size_x", "size_y", "size_z")
+
+
+class Cylinder(Model, frozen=True):
+    """A cylinder around its origin along z, m."""
+
+    radius: float
+    height: float
+
+    def __post_init__(self) -> None:
+        _positive(self, "radius", "height")
+
+
+class Sphere(Model, frozen=True):
+    """A sphere around its origin, m."""
+
+    radius: float
+
+    def __post_init__(self) -> None:
+        _positive(self, "radius")
+
+
+class Mesh(Model, frozen=True):
+    """A mesh kept as an asset, with points by which a robot can be pointed at it."""
+
+    asset_id: str
+    focus_points: list[Pose] | Unset = UNSET
+
+
+Models = Box | Cylinder | Sphere | Mesh
+
+
+class ObjectModel(Data, frozen=True):
+    """One model, named by its kind. Raises ValueError unless exactly the field of that kind is set."""
+
+    type: Model3dType
+    box: Box | Unset = UNSET
+    cylinder: Cylinder | Unset = UNSET
+    sphere: Sphere | Unset = UNSET
+    mesh: Mesh | Unset = UNSET
+
+    def __post_init__(self) -> None:
+        given = {name for name in ("box", "cylinder", "sphere", "mesh") if getattr(self, name) is not UNSET}
+        wanted = set() if self.type is Model3dType.NONE else {self.type.value.lower()}
+        if given != wanted:
+            raise ValueError(f"a model of type {self.type.value} needs exactly the field {', '.join(wanted) or 'none'}")
+
+    def model(self) -> Models:
+        """Give the model itself; ValueError when the type is None."""
+        for model in (self.box, self.cylinder, self.sphere, self.mesh):
+            if not isinstance(model, Unset):
+                return model
+        raise ValueError("there is no model")
+
+    @classmethod
+    def of(cls, model: Models) -> "ObjectModel":
+        """Wrap a model."""
+        kind = model.type()
+        return cls(kind, **{kind.value.lower(): model})  # type: ignore[arg-type]
+
+
+class ParameterMeta(Data, frozen=True):
+    """One parameter of an action or setting; `extra` and `default_value` are JSON in strings."""
+
+    name: str
+    type: str
+    dynamic_value: bool = False
+    dynamic_value_parents: set[str] | Unset = UNSET
+    description: str | Unset = UNSET
+    default_value: str | Unset = UNSET
+    extra: str | Unset = UNSET
+
+
+class ActionMetadata(Data, frozen=True):
+    """How an action is treated. `composite` actions may call others; `hidden` ones are not offered."""
+
+    composite: bool = False
+    hidden: bool = False
+    cancellable: bool = False
+
+
+class ObjectAction(Data, frozen=True):
+    """One action of an object type."""
+
+    name: str
+    description: str | Unset = UNSET
+    parameters: list[ParameterMeta] = field(default_factory=list)
+    meta: ActionMetadata = ActionMetadata()
+    origins: str | Unset = UNSET
+    returns: list[str] = field(default_factory=list)
+    disabled: bool = False
+    problem: str | Unset = UNSET
+
+
+class ObjectTypeMeta(Data, frozen=True):
+    """What clients know of an object type."""
+
+    type: str
+    description: str = ""
+    built_in: bool = False
+    base: str = ""
+    object_model: ObjectModel | Unset = UNSET
+    needs_parent_type: str | Unset = UNSET
+    has_pose: bool = False
+    abstract: bool = False
+    disabled: bool = False
+    problem: str | Unset = UNSET
+    settings: list[ParameterMeta] = field(default_factory=list)
+    modified: Timestamp | Unset = UNSET
+
+
+class ObjectTypeSource(Data, frozen=True):
+    """A stored object type: its whole Python module and the model that belongs to it."""
+
+    id: str
+    source: str
+    description: str | Unset = UNSET
+    model: ObjectModel | Unset = UNSET
+    created: Timestamp | Unset = UNSET
+    modified: Timestamp | Unset = UNSET

@@ -1,0 +1,189 @@
+"""A project: action points with orientations, joints and actions, the logic between actions, parameters."""
+
+import enum
+
+from msgspec import field
+
+from arcor2_hw.data.base import UNSET, Data, MutableData, Timestamp, Unset
+from arcor2_hw.data.geometry import Orientation, Position
+from arcor2_hw.data.parameter import Parameter, Range
+from arcor2_hw.data.robot import Joint
+from arcor2_hw.data.scene import SceneObjectOverride
+
+START = "START"
+END = "END"
+
+
+class FlowTypes(enum.StrEnum):
+    """Kinds of flow that leave an action."""
+
+    DEFAULT = "default"
+
+
+class Flow(Data, frozen=True):
+    """Names for the results of an action; empty outputs mean that results are not kept.
+
+    Raises ValueError when an output name occurs twice.
+    """
+
+    type: FlowTypes = FlowTypes.DEFAULT
+    outputs: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        if len(self.outputs) != len(set(self.outputs)):
+            raise ValueError("the outputs of a flow need names of their own")
+
+
+class ActionParameterType(enum.StrEnum):
+    """What an action parameter's `type` may be beside a parameter type's name."""
+
+    PROJECT_PARAMETER = "project_parameter"
+    LINK = "link"
+
+
+class ActionParameter(Parameter, frozen=True):
+    """A literal, a project parameter or a link to a result, told apart by `type`."""
+
+
+class BareAction(Data, frozen=True):
+    """An action without parameters and flows; `type` is `<object id>/<action name>`."""
+
+    name: str
+    type: str
+    id: str = ""
+
+
+class Action(BareAction, frozen=True):
+    """An action on an action point."""
+
+    parameters: list[ActionParameter] = field(default_factory=list)
+    flows: list[Flow] = field(default_factory=list)
+
+    def parse_type(self) -> tuple[str, str]:
+        """Give the object id and the method's name; ValueError when `type` is not of that form."""
+        object_id, slash, method = self.type.partition("/")
+        if not slash or not object_id or not method or "/" in method:
+            raise ValueError(f"action {self.name}: type {self.type!r} is not <object id>/<action>")
+        return object_id, method
+
+    def outputs(self) -> list[str]:
+        """Give the names of the results in the default flow, empty when they are not kept."""
+        return next((flow.outputs for flow in self.flows if flow.type is FlowTypes.DEFAULT), [])
+
+
+class NamedOrientation(Data, frozen=True):
+    """An orientation of an action point."""
+
+    name: str
+    orientation: Orientation
+    id: str = ""
+
+
+class ProjectRobotJoints(MutableData):
+    """Joint values of one robot, kept at an action point; rad, m where prismatic."""
+
+    name: str
+    robot_id: str
+    joints: list[Joint]
+    is_valid: bool = False
+    arm_id: str | Unset = UNSET
+    end_effector_id: str | Unset = UNSET
+    id: str = ""
+
+
+class BareActionPoint(Data, frozen=True):
+    """An action point without its lists; the position is relative to the parent, or global without one."""
+
+    name: str
+    position: Position
+    parent: str | Unset = UNSET
+    display_name: str | Unset = UNSET
+    description: str | Unset = UNSET
+    id: str = ""
+
+
+class ActionPoint(BareActionPoint, frozen=True):
+    """An action point with orientations, joints and actions."""
+
+    orientations: list[NamedOrientation] = field(default_factory=list)
+    robot_joints: list[ProjectRobotJoints] = field(default_factory=list)
+    actions: list[Action] = field(default_factory=list)
+
+
+class ProjectLogicIf(Data, frozen=True):
+    """A condition: `what` is `<action id>/default/<output index>`, `value` JSON in a string."""
+
+    what: str
+    value: str
+
+    def parse_what(self) -> tuple[str, str, int]:
+        """Give action id, flow and output index; ValueError when `what` is not of that form."""
+        return parse_link(self.what)
+
+
+def parse_link(link: str) -> tuple[str, str, int]:
+    """Take `<action id>/<flow>/<output index>` apart; ValueError when it is not of that form."""
+    parts = link.split("/")
+    if len(parts) != 3 or not parts[0] or not parts[2].isdecimal():
+        raise ValueError(f"{link!r} is not <action id>/<flow>/<output index>")
+    return parts[0], parts[1], int(parts[2])
+
+
+class LogicItem(Data, frozen=True):
+    """A step from one action to the next, taken when its condition holds."""
+
+    start: str
+    end: str
+    condition: ProjectLogicIf | Unset = UNSET
+    id: str = ""
+
+
+class ProjectParameter(Parameter, frozen=True):
+    """A constant of the project."""
+
+    range: Range | Unset = UNSET
+    display_name: str | Unset = UNSET
+    description: str | Unset = UNSET
+    id: str = ""
+
+
+class FunctionReturns(Data, frozen=True):
+    """A result of a project function."""
+
+    type: str
+    link: str
+
+
+class ProjectFunction(Data, frozen=True):
+    """A named group of actions with logic of its own."""
+
+    name: str
+    actions: list[Action] = field(default_factory=list)
+    logic: list[LogicItem] = field(default_factory=list)
+    parameters: list[ActionParameter] = field(default_factory=list)
+    returns: list[FunctionReturns] = field(default_factory=list)
+    id: str = ""
+
+
+class BareProject(Data, frozen=True):
+    """A project without its content."""
+
+    name: str
+    scene_id: str
+    description: str = ""
+    has_logic: bool = True
+    created: Timestamp | Unset = UNSET
+    modified: Timestamp | Unset = UNSET
+    int_modified: Timestamp | Unset = UNSET
+    id: str = ""
+
+
+class Project(BareProject, frozen=True):
+    """A project with all that belongs to it."""
+
+    action_points: list[ActionPoint] = field(default_factory=list)
+    parameters: list[ProjectParameter] = field(default_factory=list)
+    functions: list[ProjectFunction] = field(default_factory=list)
+    logic: list[LogicItem] = field(default_factory=list)
+    object_overrides: list[SceneObjectOverride] = field(default_factory=list)
+    project_objects_ids: list[str] | Unset = UNSET

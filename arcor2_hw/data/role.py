@@ -1,0 +1,18 @@
+"""Roles of people, as in the paper's table: each may do what the ones before may."""
+
+import enum
+
+
+class Role(enum.IntEnum):
+    """The least role is declared where a request, event or route is defined."""
+
+    OPERATOR = 1
+    """Runs, pauses and stops programs."""
+    STANDARD_USER = 2
+    """Adapts programs: values of parameters and points, tries actions."""
+    ADVANCED_USER = 3
+    """Creates programs: points, actions, logic, packages."""
+    TECHNICIAN = 4
+    """Sets up workplaces: objects, poses, calibration."""
+    PROGRAMMER = 5
+    """Brings in object types."""

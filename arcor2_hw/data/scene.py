@@ -1,0 +1,41 @@
+"""A scene: the objects of a workplace, where they stand and how they are set."""
+
+from msgspec import field
+
+from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.parameter import Parameter
+
+
+class SceneObject(Data, frozen=True):
+    """One object; `pose` is set exactly when its type has one."""
+
+    name: str
+    type: str
+    pose: Pose | Unset = UNSET
+    parameters: list[Parameter] = field(default_factory=list)
+    id: str = ""
+
+
+class BareScene(Data, frozen=True):
+    """A scene without its objects."""
+
+    name: str
+    description: str = ""
+    created: Timestamp | Unset = UNSET
+    modified: Timestamp | Unset = UNSET
+    int_modified: Timestamp | Unset = UNSET
+    id: str = ""
+
+
+class Scene(BareScene, frozen=True):
+    """A scene with its objects."""
+
+    objects: list[SceneObject] = field(default_factory=list)
+
+
+class SceneObjectOverride(Data, frozen=True):
+    """Settings of one scene object that a project replaces."""
+
+    id: str
+    parameters: list[Parameter]
