@@ -1,0 +1,53 @@
+"""The life of a fake's process: ready line, orderly end on SIGTERM and SIGINT, no survival of the parent."""
+
+import asyncio
+import logging
+import os
+import signal
+import sys
+from collections.abc import Awaitable, Callable
+
+import msgspec
+import uvloop
+
+_PARENT_WATCH_PERIOD = 0.2  # s
+
+
+def announce(**addresses: object) -> None:
+    """Prints the one line on standard output: ``ready {json}``."""
+    sys.stdout.write(f"ready {msgspec.json.encode(addresses).decode()}\n")
+    sys.stdout.flush()
+
+
+async def until_told_to_end() -> None:
+    """Returns on SIGTERM, SIGINT, or when the parent process has gone.
+
+    The parent is watched by its id, not by PR_SET_PDEATHSIG: that one fires when the *thread* that started us ends.
+    """
+    end = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        loop.add_signal_handler(number, end.set)
+    parent = os.getppid()
+    while os.getppid() == parent:
+        try:
+            async with asyncio.timeout(_PARENT_WATCH_PERIOD):
+                await end.wait()
+        except TimeoutError:
+            continue
+        return
+
+
+def run(main: Callable[[], Awaitable[None]], name: str) -> int:
+    """Runs a fake to its end and gives the exit status: 0, or 1 with one line on standard error (a port is taken)."""
+    logging.basicConfig(stream=sys.stderr, level=logging.INFO, format=f"{name}: %(message)s")
+
+    async def body() -> None:
+        await main()
+
+    try:
+        uvloop.run(body())
+    except OSError as e:
+        sys.stderr.write(f"{name}: {e}\n")
+        return 1
+    return 0

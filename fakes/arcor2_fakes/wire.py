@@ -1,0 +1,204 @@
+"""A device's TCP port that can be told to fail: silence, reset, half a frame, garbage, slow, refuse, and to heal."""
+
+import asyncio
+import contextlib
+import os
+import socket
+import struct
+from collections.abc import Callable
+from typing import Any, Protocol, cast
+
+from arcor2_fakes.control import ControlServer
+
+FAULTS = ("silence", "reset", "half_frame", "garbage", "slow", "refuse", "heal")
+_RESET_ON_CLOSE = struct.pack("ii", 1, 0)  # struct linger: on, 0 s: closing sends RST
+_MAX_UNSENT = (
+    1 << 20
+)  # a client that does not read must not fill the fake's memory; frames are dropped as a full device would
+
+
+class Faults:
+    """What a wire was told to do wrong, applied to what goes out. For any transport: TCP, pty, CAN hub."""
+
+    def __init__(self) -> None:
+        self.silent = False
+        self.half_next = False
+        self.garbage = False
+        self.delay = 0.0
+
+    def outgoing(self, frame: bytes) -> bytes:
+        """What really leaves instead of `frame`; b"" for nothing. `delay` is for the caller to keep."""
+        if self.silent:
+            return b""
+        if self.half_next:
+            self.half_next, self.silent = False, True
+            return frame[: max(1, len(frame) // 2)]
+        if self.garbage:
+            return os.urandom(len(frame))
+        return frame
+
+    def set(self, fault: str, seconds: float = 1.0) -> None:
+        """Applies one of `FAULTS`; reset and refuse belong to the transport and change nothing here."""
+        if fault not in FAULTS:
+            raise ValueError(f"no fault {fault!r}; there are {', '.join(FAULTS)}")
+        if fault == "silence":
+            self.silent = True
+        elif fault == "half_frame":
+            self.half_next = True
+        elif fault == "garbage":
+            self.garbage = True
+        elif fault == "slow":
+            if not 0.0 <= seconds <= 600.0:
+                raise ValueError("seconds is 0 to 600")
+            self.delay = seconds
+        elif fault == "heal":
+            self.silent = self.half_next = self.garbage = False
+            self.delay = 0.0
+
+
+class Faulty(Protocol):
+    """A wire as the control channel sees it: a TCP port here, a pty or a hub elsewhere."""
+
+    async def fault(self, kind: str, seconds: float = 1.0) -> None:
+        """Applies one of `FAULTS`."""
+        ...
+
+
+def register_faults(control: ControlServer, wires: dict[str, Faulty]) -> None:
+    """Makes each fault a command: ``{"do": "slow", "wire": "rtde", "seconds": 2}``; without a wire it is applied to all."""
+
+    async def apply(kind: str, wire: str | None, seconds: float) -> None:
+        if wire is not None and wire not in wires:
+            raise ValueError(f"no wire {wire!r}; there are {', '.join(wires)}")
+        for name, faulty in wires.items():
+            if wire in (None, name):
+                await faulty.fault(kind, seconds)
+
+    def command(kind: str) -> Callable[..., Any]:
+        return lambda wire=None, seconds=1.0: apply(kind, wire, seconds)
+
+    for kind in FAULTS:
+        control.command(kind, command(kind))
+
+
+class Connection(asyncio.Protocol):
+    """One client on a `TcpWire`. The device sets `received` and `closed` when told of it, and sends whole frames."""
+
+    def __init__(self, wire: "TcpWire") -> None:
+        self.wire = wire
+        self.received: Callable[[bytes], None] = lambda _: None
+        self.closed: Callable[[], None] = lambda: None
+        self.alive = False
+        self._torn = False  # half a frame went out: nothing sensible can follow
+        self._transport: asyncio.Transport
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Called by the event loop."""
+        self._transport = cast("asyncio.Transport", transport)
+        self.alive = True
+        self.wire.connections.add(self)
+        self.wire.opened(self)
+
+    def data_received(self, data: bytes) -> None:
+        """Called by the event loop. A cut cable carries nothing in either direction."""
+        if not self.wire.faults.silent:
+            self.received(data)
+
+    def connection_lost(self, _exc: Exception | None) -> None:
+        """Called by the event loop."""
+        self.alive = False
+        self.wire.connections.discard(self)
+        self.closed()
+
+    def send(self, frame: bytes) -> bool:
+        """Sends one frame, or what the wire's faults make of it. False if it was lost."""
+        faults = self.wire.faults
+        if not self.alive or self._torn or self._transport.get_write_buffer_size() > _MAX_UNSENT:
+            return False
+        data = faults.outgoing(frame)
+        if len(data) < len(frame):
+            self._torn = bool(data)
+            if data:
+                self._transport.write(data)
+            return False
+        if faults.delay > 0.0:
+            asyncio.get_running_loop().call_later(faults.delay, self._late, data)
+        else:
+            self._transport.write(data)
+        return True
+
+    def close(self) -> None:
+        """Closes when everything is sent."""
+        if self.alive:
+            self._transport.close()
+
+    def reset(self) -> None:
+        """Sends RST."""
+        if self.alive:
+            raw: socket.socket = self._transport.get_extra_info("socket")
+            with contextlib.suppress(OSError):
+                raw.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET_ON_CLOSE)
+            self._transport.abort()
+
+    def heal(self) -> None:
+        """Drops a connection that half a frame went out on; there is no way back into step."""
+        if self._torn:
+            self.reset()
+
+    def _late(self, data: bytes) -> None:
+        if self.alive and not self._torn and not self.wire.faults.silent:
+            self._transport.write(data)
+
+
+class TcpWire:
+    """A listening TCP port of a device. `opened` is called with each new `Connection`."""
+
+    def __init__(self, name: str, host: str, port: int, opened: Callable[[Connection], None]) -> None:
+        self.name = name
+        self.faults = Faults()
+        self.connections: set[Connection] = set()
+        self.opened = opened
+        self._host, self._port = host, port
+        self._server: asyncio.Server | None = None
+
+    @property
+    def address(self) -> str:
+        """``host:port``; the real port once `listen` has returned."""
+        return f"{self._host}:{self._port}"
+
+    async def listen(self) -> str:
+        """Opens the port and returns the address. Raises `OSError` when it is taken."""
+        if self._server is None:
+            loop = asyncio.get_running_loop()
+            self._server = await loop.create_server(lambda: Connection(self), self._host, self._port)
+            self._port = self._server.sockets[0].getsockname()[1]
+        return self.address
+
+    def refuse(self) -> None:
+        """Closes the listening port; connections stay."""
+        if self._server is not None:
+            self._server.close()
+            self._server = None
+
+    def reset(self) -> None:
+        """Sends RST on every connection."""
+        for connection in tuple(self.connections):
+            connection.reset()
+
+    async def fault(self, kind: str, seconds: float = 1.0) -> None:
+        """Applies one of `FAULTS`."""
+        self.faults.set(kind, seconds)
+        if kind == "reset":
+            self.reset()
+        elif kind == "refuse":
+            self.refuse()
+        elif kind == "heal":
+            for connection in tuple(self.connections):
+                connection.heal()
+            await self.listen()
+
+    def close(self) -> None:
+        """Closes the port and every connection."""
+        self.refuse()
+        for connection in tuple(self.connections):
+            connection.close()
