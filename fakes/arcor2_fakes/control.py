@@ -326,7 +326,7 @@ class BlockingControlClient:
             raise ControlError(f"{command}: {self.address}: {e}") from e
 
     def wait_until(self, holds: Callable[[Any], bool], within: float = 5.0, command: str = "truth") -> Any:
-        """Asks until the answer satisfies `holds` and returns it. Raises `ControlError` with the last answer if late."""
+        """Asks until the answer satisfies `holds`; returns it. Raises `ControlError`, with the last answer, if late."""
         deadline = time.monotonic() + within
         while not holds(data := self.do(command)):
             if time.monotonic() > deadline:

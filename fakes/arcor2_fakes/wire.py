@@ -65,7 +65,7 @@ class Faulty(Protocol):
 
 
 def register_faults(control: ControlServer, wires: dict[str, Faulty]) -> None:
-    """Makes each fault a command: ``{"do": "slow", "wire": "rtde", "seconds": 2}``; without a wire it is applied to all."""
+    """Makes each fault a command: ``{"do": "slow", "wire": "rtde", "seconds": 2}``; without a wire: to all."""
 
     async def apply(kind: str, wire: str | None, seconds: float) -> None:
         if wire is not None and wire not in wires:
