@@ -1,0 +1,62 @@
+"""The mark that makes a method of an object type an action."""
+
+import enum
+from collections.abc import Callable
+from typing import Final, TypeVar, overload
+
+from arcor2_hw.data.object_type import ActionMetadata
+
+DEFAULT_DEADLINE: Final = 120.0
+"""Seconds after which a call that has not returned is given up; longer than any single motion of the demo cell."""
+
+F = TypeVar("F", bound=Callable[..., object])
+
+
+class StrEnum(enum.StrEnum):
+    """Base of enumerations of text that an action parameter may have as its type."""
+
+
+class IntEnum(enum.IntEnum):
+    """Base of enumerations of numbers that an action parameter may have as its type."""
+
+
+@overload
+def action(method: F, /) -> F: ...
+@overload
+def action(
+    *, composite: bool = False, hidden: bool = False, deadline: float | None = DEFAULT_DEADLINE
+) -> Callable[[F], F]: ...
+
+
+def action(
+    method: F | None = None,
+    /,
+    *,
+    composite: bool = False,
+    hidden: bool = False,
+    deadline: float | None = DEFAULT_DEADLINE,
+) -> F | Callable[[F], F]:
+    """Mark a method as an action.
+
+    composite: it may call other actions. hidden: it is not offered to users.
+    deadline: seconds after which the call is given up as failed; None for one that ends only when it is stopped.
+    """
+
+    def mark(function: F) -> F:
+        function.__action__ = ActionMetadata(composite=composite, hidden=hidden)  # type: ignore[attr-defined]
+        function.__deadline__ = deadline  # type: ignore[attr-defined]
+        return function
+
+    return mark if method is None else mark(method)
+
+
+def metadata_of(method: object) -> ActionMetadata | None:
+    """Give the metadata of an action, None for a method that is none."""
+    found = getattr(method, "__action__", None)
+    return found if isinstance(found, ActionMetadata) else None
+
+
+def deadline_of(method: object) -> float | None:
+    """Give the deadline of a call of `method`, s; None: it has none."""
+    found: float | None = getattr(method, "__deadline__", DEFAULT_DEADLINE)
+    return found

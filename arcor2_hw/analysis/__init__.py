@@ -1,0 +1,1 @@
+"""Object type source to metadata, from text alone: what is read is never imported."""

@@ -1,0 +1,131 @@
+"""A project looked up by id, with the geometry of its action points (protocol, section 10.1)."""
+
+import copy
+from collections.abc import Iterable
+from typing import Protocol
+
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.geometry import Orientation, Pose
+from arcor2_hw.data.project import (
+    Action,
+    BareActionPoint,
+    NamedOrientation,
+    Project,
+    ProjectParameter,
+    ProjectRobotJoints,
+)
+from arcor2_hw.data.scene import Scene, SceneObject
+from arcor2_hw.exceptions import InvalidProject, NotFound
+
+
+class ProjectLookup(Protocol):
+    """What parameter types need to know of a project. Each raises NotFound for an unknown id."""
+
+    def scene_object(self, object_id: str) -> SceneObject:
+        """Give an object of the scene."""
+
+    def action_point(self, action_point_id: str) -> BareActionPoint:
+        """Give an action point."""
+
+    def orientation(self, orientation_id: str) -> tuple[BareActionPoint, NamedOrientation]:
+        """Give an orientation with its action point."""
+
+    def joints(self, joints_id: str) -> tuple[BareActionPoint, ProjectRobotJoints]:
+        """Give joints with their action point."""
+
+    def action(self, action_id: str) -> tuple[BareActionPoint, Action]:
+        """Give an action with its action point."""
+
+    def parameter(self, parameter_id: str) -> ProjectParameter:
+        """Give a project parameter."""
+
+
+def _chain(lookup: ProjectLookup, point: BareActionPoint) -> Iterable[Pose]:
+    """Give the frames in which the point is stated, nearest first. A parent action point only translates."""
+    seen = {point.id}
+    parent = point.parent
+    while not isinstance(parent, Unset):
+        try:
+            above = lookup.action_point(parent)
+        except NotFound:
+            obj = lookup.scene_object(parent)
+            if isinstance(obj.pose, Unset):
+                raise InvalidProject(f"{obj.name} has no pose and can be no parent of {point.name}") from None
+            yield obj.pose
+            return
+        if above.id in seen:
+            raise InvalidProject(f"action point {point.name} is its own ancestor")
+        seen.add(above.id)
+        yield Pose(above.position)
+        parent = above.parent
+
+
+def global_pose(lookup: ProjectLookup, point: BareActionPoint, orientation: Orientation | None = None) -> Pose:
+    """Give the pose in the world of an action point with one of its orientations."""
+    pose = Pose(copy.copy(point.position), orientation if orientation is not None else Orientation())
+    for frame in _chain(lookup, point):
+        pose = frame * pose
+    return pose
+
+
+def relative_pose(lookup: ProjectLookup, point: BareActionPoint, pose: Pose) -> Pose:
+    """Give a pose in the world in the frame in which the point's position is stated."""
+    for frame in reversed(list(_chain(lookup, point))):
+        pose = frame.inverted() * pose
+    return pose
+
+
+class ProjectIndex:
+    """Lookup over a project and its scene that do not change."""
+
+    def __init__(self, scene: Scene, project: Project) -> None:
+        self.scene = scene
+        self.project = project
+        self._objects = {obj.id: obj for obj in scene.objects}
+        self._points = {point.id: point for point in project.action_points}
+        self._orientations = {o.id: (p, o) for p in project.action_points for o in p.orientations}
+        self._joints = {j.id: (p, j) for p in project.action_points for j in p.robot_joints}
+        self._actions = {a.id: (p, a) for p in project.action_points for a in p.actions}
+        self._parameters = {parameter.id: parameter for parameter in project.parameters}
+
+    def scene_object(self, object_id: str) -> SceneObject:
+        """Give an object of the scene."""
+        try:
+            return self._objects[object_id]
+        except KeyError:
+            raise NotFound(f"the scene has no object {object_id}") from None
+
+    def action_point(self, action_point_id: str) -> BareActionPoint:
+        """Give an action point."""
+        try:
+            return self._points[action_point_id]
+        except KeyError:
+            raise NotFound(f"the project has no action point {action_point_id}") from None
+
+    def orientation(self, orientation_id: str) -> tuple[BareActionPoint, NamedOrientation]:
+        """Give an orientation with its action point."""
+        try:
+            return self._orientations[orientation_id]
+        except KeyError:
+            raise NotFound(f"the project has no orientation {orientation_id}") from None
+
+    def joints(self, joints_id: str) -> tuple[BareActionPoint, ProjectRobotJoints]:
+        """Give joints with their action point."""
+        try:
+            return self._joints[joints_id]
+        except KeyError:
+            raise NotFound(f"the project has no joints {joints_id}") from None
+
+    def action(self, action_id: str) -> tuple[BareActionPoint, Action]:
+        """Give an action with its action point."""
+        try:
+            return self._actions[action_id]
+        except KeyError:
+            raise NotFound(f"the project has no action {action_id}") from None
+
+    def parameter(self, parameter_id: str) -> ProjectParameter:
+        """Give a project parameter."""
+        try:
+            return self._parameters[parameter_id]
+        except KeyError:
+            raise NotFound(f"the project has no parameter {parameter_id}") from None

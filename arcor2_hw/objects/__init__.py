@@ -1,0 +1,34 @@
+"""The abstract bases of object types."""
+
+from arcor2_hw.objects.camera import Camera
+from arcor2_hw.objects.generic import CollisionObject, Generic, GenericWithPose, VirtualCollisionObject
+from arcor2_hw.objects.machine import Machine, MachineCommand, MachineState, UnitMode
+from arcor2_hw.objects.robot import MultiArmRobot, Robot, RobotException
+from arcor2_hw.objects.settings import Settings
+from arcor2_hw.objects.small import Axis, Code, Gripper, GripResult, IOBlock, NoRead, Printer, Reader, Scale, Suction
+
+__all__ = [
+    "Axis",
+    "Camera",
+    "Code",
+    "CollisionObject",
+    "Generic",
+    "GenericWithPose",
+    "GripResult",
+    "Gripper",
+    "IOBlock",
+    "Machine",
+    "MachineCommand",
+    "MachineState",
+    "MultiArmRobot",
+    "NoRead",
+    "Printer",
+    "Reader",
+    "Robot",
+    "RobotException",
+    "Scale",
+    "Settings",
+    "Suction",
+    "UnitMode",
+    "VirtualCollisionObject",
+]

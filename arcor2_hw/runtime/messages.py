@@ -1,0 +1,242 @@
+"""What server and cell host say to each other: one tagged union per direction, length-prefixed msgpack.
+
+Arguments and results of calls travel as JSON documents in bytes, exactly as they stand in scenes, projects and events.
+"""
+
+import struct
+from typing import Any, Final
+
+import msgspec
+from msgspec import Struct, field
+
+from arcor2_hw.data.device import Alarm, Connection, Health
+from arcor2_hw.data.object_type import ObjectModel
+from arcor2_hw.data.project import Project
+from arcor2_hw.data.scene import Scene, SceneObjectOverride
+
+MAX_MESSAGE: Final = 64 * 1024 * 1024
+HEARTBEAT_PERIOD: Final = 0.25
+"""Seconds between two heartbeats of the host."""
+SILENCE_LIMIT: Final = 1.0
+"""Seconds without a word after which the host is reported as not answering."""
+
+
+class ErrorData(Struct, frozen=True):
+    """An error as it crosses the process border: the code of its class, and the device to blame."""
+
+    code: str
+    type: str
+    message: str
+    detail: str = ""
+    object_id: str = ""
+
+
+class TypeCode(Struct, frozen=True):
+    """How the host gets at an object type: entry point ("module:Class") if installed, else module and source."""
+
+    name: str
+    entry_point: str = ""
+    module: str = ""
+    source: str = ""
+
+
+# ------------------------------------------------------------------------------------------------ server to host
+class ToHost(Struct, frozen=True, tag=True):
+    """Base of everything the server says."""
+
+
+class OpenScene(ToHost, frozen=True):
+    """Create and connect all objects at once. Answer: SceneOpened or SceneFailed."""
+
+    scene: Scene
+    types: list[TypeCode]
+    models: dict[str, ObjectModel] = field(default_factory=dict)
+    overrides: list[SceneObjectOverride] = field(default_factory=list)
+    streaming_period: float = 0.1
+    project: Project | None = None
+
+
+class RunPackage(ToHost, frozen=True):
+    """Run script.py of a package directory. The script's life is told by ProgramChanged and ProgramEvent."""
+
+    package_id: str
+    directory: str
+    start_paused: bool = False
+    breakpoints: list[str] = field(default_factory=list)
+    streaming_period: float = 0.1
+
+
+class Call(ToHost, frozen=True):
+    """Call a method on its device's executor. Answer: CallDone or CallFailed with this id.
+
+    control: take control first when it is not ours. deadline: seconds; None: the method's own.
+    """
+
+    id: int
+    object_id: str
+    method: str
+    arguments: dict[str, bytes] = field(default_factory=dict)
+    control: bool = False
+    deadline: float | None = None
+
+
+class StopMotion(ToHost, frozen=True):
+    """Call `stop` on the stop lane of one device, or of all (empty id). Answer: CallDone or CallFailed with this id."""
+
+    id: int
+    object_id: str = ""
+
+
+class Subscribe(ToHost, frozen=True):
+    """Send, or no longer send, joints or end effector poses of a robot at the streaming period."""
+
+    object_id: str
+    joints: bool
+    eef: bool
+
+
+class Pause(ToHost, frozen=True):
+    """Pause the program before its next action."""
+
+
+class Resume(ToHost, frozen=True):
+    """Go on."""
+
+
+class Step(ToHost, frozen=True):
+    """Go on for one action."""
+
+
+class StopProgram(ToHost, frozen=True):
+    """Stop lane of all devices, then an exception in the script."""
+
+
+class CloseScene(ToHost, frozen=True):
+    """Disconnect all objects, answer SceneClosed and exit."""
+
+
+# ------------------------------------------------------------------------------------------------ host to server
+class ToServer(Struct, frozen=True, tag=True):
+    """Base of everything the host says."""
+
+
+class Ready(ToServer, frozen=True):
+    """The host is up, the common imports are done."""
+
+    pid: int
+
+
+class Heartbeat(ToServer, frozen=True):
+    """Sent every HEARTBEAT_PERIOD from a thread of its own."""
+
+
+class SceneOpened(ToServer, frozen=True):
+    """All objects are there and connected."""
+
+
+class SceneFailed(ToServer, frozen=True):
+    """An object could not be created or connected; those that could are closed again. The host exits."""
+
+    error: ErrorData
+
+
+class SceneClosed(ToServer, frozen=True):
+    """All objects are closed; `error` when one could not be closed cleanly."""
+
+    error: ErrorData | None = None
+
+
+class CallDone(ToServer, frozen=True):
+    """The method returned; `value` is the result as JSON, empty for None."""
+
+    id: int
+    value: bytes = b""
+
+
+class CallFailed(ToServer, frozen=True):
+    """The method raised, was refused or ran out of time."""
+
+    id: int
+    error: ErrorData
+
+
+class StreamEvent(ToServer, frozen=True):
+    """RobotJoints or RobotEef of the protocol, as the whole encoded event, for subscribers (or all, from a program)."""
+
+    event: str
+    object_id: str
+    encoded: bytes
+
+
+class ProgramEvent(ToServer, frozen=True):
+    """PackageInfo, ActionStateBefore, ActionStateAfter, ProjectException: the whole encoded event."""
+
+    event: str
+    encoded: bytes
+
+
+class ProgramChanged(ToServer, frozen=True):
+    """The program is now running, pausing, paused, or has ended (`stopped`).
+
+    With `stopped`, `finished` tells an end as meant (flow action or end of script), `error` what went wrong.
+    """
+
+    state: str
+    finished: bool = False
+    error: ErrorData | None = None
+
+
+class DeviceChanged(ToServer, frozen=True):
+    """A device's connection, health, alarms or owner of control changed."""
+
+    object_id: str
+    connection: Connection
+    health: Health
+    alarms: list[Alarm] = field(default_factory=list)
+    control_owner: str | None = None
+
+
+class LogLine(ToServer, frozen=True):
+    """A line that the script or a driver printed or logged."""
+
+    level: str
+    text: str
+    object_id: str = ""
+
+
+HostBound = OpenScene | RunPackage | Call | StopMotion | Subscribe | Pause | Resume | Step | StopProgram | CloseScene
+ServerBound = (
+    Ready
+    | Heartbeat
+    | SceneOpened
+    | SceneFailed
+    | SceneClosed
+    | CallDone
+    | CallFailed
+    | StreamEvent
+    | ProgramEvent
+    | ProgramChanged
+    | DeviceChanged
+    | LogLine
+)
+
+_PREFIX = struct.Struct("<I")
+PREFIX_SIZE: Final = _PREFIX.size
+
+decode_host_bound: Any = msgspec.msgpack.Decoder(HostBound).decode
+decode_server_bound: Any = msgspec.msgpack.Decoder(ServerBound).decode
+_encode = msgspec.msgpack.Encoder().encode
+
+
+def encode(message: ToHost | ToServer) -> bytes:
+    """Give a message with its length in front."""
+    body = _encode(message)
+    return _PREFIX.pack(len(body)) + body
+
+
+def body_length(prefix: bytes) -> int:
+    """Read the length prefix; ValueError beyond MAX_MESSAGE."""
+    (length,) = _PREFIX.unpack(prefix)
+    if length > MAX_MESSAGE:
+        raise ValueError(f"a message of {length} bytes is longer than {MAX_MESSAGE}")
+    return int(length)

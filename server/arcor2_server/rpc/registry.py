@@ -1,0 +1,90 @@
+"""How a request finds its handler, and what a handler is given."""
+
+from collections.abc import Awaitable, Callable
+from typing import TYPE_CHECKING, Any, Final
+
+from arcor2_hw.data.base import UNSET
+from arcor2_hw.data.events import EVENTS, ChangeType, Event
+from arcor2_hw.data.rpc import RPCS
+from arcor2_hw.exceptions import Arcor2Error
+
+if TYPE_CHECKING:
+    from arcor2_server.client import Client
+    from arcor2_server.services import Services
+
+
+class RequestRefused(Arcor2Error):
+    """A request that cannot be granted; the text is the answer's message.
+
+    `data` goes into the answer (only DeleteScene and DeleteObjectTypes answer data with result=false).
+    """
+
+    code = "request_refused"
+
+    def __init__(self, message: str, data: Any = UNSET) -> None:
+        super().__init__(message)
+        self.data = data
+
+
+def make_event(name: str, data: Any = UNSET, change: ChangeType | None = None, parent: str | None = None) -> Event:
+    """Make an event of the protocol; KeyError for a name that is none."""
+    declared = EVENTS[name]
+    return Event(
+        declared.name,
+        UNSET if change is None else change,
+        UNSET if parent is None else parent,
+        data,
+    )
+
+
+class Context:
+    """What a handler is given beside its arguments.
+
+    Events: `emit` sends to all clients after the response, `emit_first` before it (protocol, section 2).
+    """
+
+    __slots__ = ("client", "dry_run", "events_after", "events_before", "services")
+
+    def __init__(self, services: "Services", client: "Client", dry_run: bool = False) -> None:
+        self.services = services
+        self.client = client
+        self.dry_run = dry_run
+        self.events_before: list[Event] = []
+        self.events_after: list[Event] = []
+
+    @property
+    def user(self) -> str:
+        """Give the registered name of the caller; RequestRefused when there is none."""
+        if self.client.user is None:
+            raise RequestRefused("You are not logged in: send RegisterUser first.")
+        return self.client.user
+
+    def emit(self, name: str, data: Any = UNSET, change: ChangeType | None = None, parent: str | None = None) -> None:
+        """Send an event to all clients once the response is out."""
+        self.events_after.append(make_event(name, data, change, parent))
+
+    def emit_first(
+        self, name: str, data: Any = UNSET, change: ChangeType | None = None, parent: str | None = None
+    ) -> None:
+        """Send an event to all clients before the response."""
+        self.events_before.append(make_event(name, data, change, parent))
+
+
+Handler = Callable[[Context, Any], Awaitable[Any]]
+"""Takes the context and the decoded arguments (None when the request has none); gives the answer's data or None."""
+
+HANDLERS: Final[dict[str, Handler]] = {}
+
+
+def rpc(name: str) -> Callable[[Handler], Handler]:
+    """Register the handler of a request that the protocol declares (arcor2_hw.data.rpc: arguments, answer, role)."""
+    if name not in RPCS:
+        raise KeyError(f"{name} is no request of the protocol")
+
+    def register(handler: Handler) -> Handler:
+        if name in HANDLERS:
+            raise KeyError(f"{name} has two handlers")
+        HANDLERS[name] = handler
+        return handler
+
+    return register

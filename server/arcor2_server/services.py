@@ -1,0 +1,37 @@
+"""The parts of the server, each made once, known to each other through this one object."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from arcor2_server.build.service import BuildService
+    from arcor2_server.cell.online import OnlineCell
+    from arcor2_server.execution import Execution
+    from arcor2_server.hub import Hub
+    from arcor2_server.locks import Locks
+    from arcor2_server.object_types import ObjectTypes
+    from arcor2_server.session import Session
+    from arcor2_server.settings import ServerSettings
+    from arcor2_server.storage import Storage
+    from arcor2_server.users import Users
+
+
+@dataclass(slots=True)
+class Services:
+    """What handlers work with.
+
+    hub: the connected clients. users: who is logged in. locks: who holds what. storage: saved documents.
+    types: what is known of object types. session: the open scene or project. cell: the scene when online.
+    execution: packages and the running program. build: project to package.
+    """
+
+    settings: "ServerSettings"
+    hub: "Hub"
+    users: "Users"
+    locks: "Locks"
+    storage: "Storage"
+    types: "ObjectTypes"
+    session: "Session"
+    cell: "OnlineCell"
+    execution: "Execution"
+    build: "BuildService"
