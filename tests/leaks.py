@@ -1,0 +1,133 @@
+"""Fails a test that leaves a task, a thread, a process or a socket behind.
+
+What a fixture of wider scope than one test brings up is allowed to live on; everything else must be gone, at the latest
+GRACE seconds after the test's own fixtures are torn down.
+"""
+
+import asyncio
+import functools
+import gc
+import inspect
+import threading
+import time
+from collections.abc import Generator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+
+GRACE = 2.0
+"""Seconds: threads and children need a moment to end after they were told to."""
+
+
+@dataclass
+class Holdings:
+    """What this process holds: threads by ident, children by pid and start, sockets by inode."""
+
+    threads: dict[int, str] = field(default_factory=dict)
+    children: dict[tuple[int, float], str] = field(default_factory=dict)
+    sockets: set[str] = field(default_factory=set)
+
+    @classmethod
+    def now(cls) -> "Holdings":
+        sockets = set()
+        for fd in Path("/proc/self/fd").iterdir():
+            try:
+                target = str(fd.readlink())
+            except OSError:
+                continue
+            if target.startswith("socket:"):
+                sockets.add(target)
+        children: dict[tuple[int, float], str] = {}
+        for child in psutil.Process().children(recursive=True):
+            try:
+                if child.status() != psutil.STATUS_ZOMBIE:
+                    children[child.pid, child.create_time()] = " ".join(child.cmdline()[:4])
+            except psutil.NoSuchProcess:
+                continue
+        return cls({t.ident or 0: t.name for t in threading.enumerate()}, children, sockets)
+
+    def beyond(self, other: "Holdings") -> list[str]:
+        """Name what is here and not in `other`."""
+        found = [f"thread {name}" for ident, name in self.threads.items() if ident not in other.threads]
+        found += [f"process {key[0]}: {cmd}" for key, cmd in self.children.items() if key not in other.children]
+        found += [f"socket {s}" for s in sorted(self.sockets - other.sockets)]
+        return found
+
+    def add(self, other: "Holdings") -> None:
+        self.threads |= other.threads
+        self.children |= other.children
+        self.sockets |= other.sockets
+
+
+_before = pytest.StashKey[Holdings]()
+_allowed = Holdings()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_fixture_setup(fixturedef: Any) -> Generator[None, object, object]:
+    """Allow what a fixture of module, class, package or session scope brings up."""
+    if fixturedef.scope == "function":
+        return (yield)
+    before = Holdings.now()
+    result = yield
+    after = Holdings.now()
+    _allowed.add(
+        Holdings(
+            {k: v for k, v in after.threads.items() if k not in before.threads},
+            {k: v for k, v in after.children.items() if k not in before.children},
+            after.sockets - before.sockets,
+        )
+    )
+    return result
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> Generator[None, None, None]:
+    item.stash[_before] = Holdings.now()
+    yield
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_teardown(item: pytest.Item) -> Generator[None, None, None]:
+    yield
+    if _before not in item.stash:
+        return
+    allowed = item.stash[_before]
+    allowed.add(_allowed)
+    deadline = time.monotonic() + GRACE
+    leaked = Holdings.now().beyond(allowed)
+    while leaked and time.monotonic() < deadline:
+        gc.collect()
+        time.sleep(0.02)
+        leaked = Holdings.now().beyond(allowed)
+    if leaked:
+        pytest.fail("left behind: " + "; ".join(leaked), pytrace=False)
+
+
+def _checked(function: Any) -> Any:
+    @functools.wraps(function)
+    async def run(*args: Any, **kwargs: Any) -> None:
+        before = asyncio.all_tasks()
+        await function(*args, **kwargs)
+        leaked = asyncio.all_tasks() - before
+        deadline = time.monotonic() + GRACE
+        while leaked and time.monotonic() < deadline:
+            await asyncio.sleep(0.01)
+            leaked = {task for task in asyncio.all_tasks() - before if not task.done()}
+        if leaked:
+            for task in leaked:
+                task.cancel()
+            await asyncio.wait(leaked, timeout=1)
+            pytest.fail("left behind: " + "; ".join(f"task {task.get_coro()}" for task in leaked), pytrace=False)
+
+    return run
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        function = getattr(item, "obj", None)
+        if inspect.iscoroutinefunction(function) and not hasattr(function, "hypothesis"):
+            item.obj = _checked(function)  # type: ignore[attr-defined]
