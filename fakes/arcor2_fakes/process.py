@@ -6,11 +6,14 @@ import os
 import signal
 import sys
 from collections.abc import Awaitable, Callable
+from contextvars import ContextVar
 
 import msgspec
 import uvloop
 
 _PARENT_WATCH_PERIOD = 0.2  # s
+_PARENT = os.getppid()
+_told_to_end: ContextVar[asyncio.Event] = ContextVar("told_to_end")
 
 
 def announce(**addresses: object) -> None:
@@ -20,16 +23,12 @@ def announce(**addresses: object) -> None:
 
 
 async def until_told_to_end() -> None:
-    """Returns on SIGTERM, SIGINT, or when the parent process has gone.
+    """Returns on SIGTERM, SIGINT, or when the parent process has gone. To be called within `run`.
 
     The parent is watched by its id, not by PR_SET_PDEATHSIG: that one fires when the *thread* that started us ends.
     """
-    end = asyncio.Event()
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        loop.add_signal_handler(number, end.set)
-    parent = os.getppid()
-    while os.getppid() == parent:
+    end = _told_to_end.get()
+    while os.getppid() == _PARENT:
         try:
             async with asyncio.timeout(_PARENT_WATCH_PERIOD):
                 await end.wait()
@@ -43,6 +42,11 @@ def run(main: Callable[[], Awaitable[None]], name: str) -> int:
     logging.basicConfig(stream=sys.stderr, level=logging.INFO, format=f"{name}: %(message)s")
 
     async def body() -> None:
+        end = asyncio.Event()
+        _told_to_end.set(end)
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGTERM, signal.SIGINT):  # before anything is announced: a signal may follow at once
+            loop.add_signal_handler(number, end.set)
         await main()
 
     try:

@@ -1,0 +1,147 @@
+"""Starts the fake functional tester: `python -m arcor2_fakes.functional_tester`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Annotated, Any, TypeVar
+
+import msgspec
+from cyclopts import App, Parameter, validators
+
+from arcor2_fakes.control import ControlServer, parse_address
+from arcor2_fakes.functional_tester.board import Board
+from arcor2_fakes.functional_tester.modbus import ModbusPort
+from arcor2_fakes.functional_tester.registers import RegisterMap
+from arcor2_fakes.functional_tester.station import Command, Fault, Refusal, Station
+from arcor2_fakes.process import announce, run, until_told_to_end
+from arcor2_fakes.wire import register_faults
+
+_MODES = {"produce": 1, "maintenance": 2, "manual": 3}
+
+T = TypeVar("T")
+
+app = App(name="arcor2_fakes.functional_tester", help="Fake functional tester on Modbus TCP.", version_flags=[])
+
+Positive = Annotated[float, Parameter(validator=validators.Number(gt=0))]
+
+
+def truth(station: Station, registers: RegisterMap, port: ModbusPort) -> dict[str, Any]:
+    """Give what is really so in the station, whatever the wire says."""
+    station.advance()
+    results = [msgspec.to_builtins(result) for result in station.results]
+    passed = sum(result.result == "pass" for result in station.results)
+    return {
+        "state": station.state.name.capitalize(),
+        "door": station.door,
+        "board": None if station.board is None else station.board.code,
+        "clamped": station.clamped,
+        "emergency_stop": station.emergency_stop_pressed,
+        "fault": int(station.fault),
+        "mode": next(name for name, number in _MODES.items() if number == station.mode),
+        "watchdog_ms": station.watchdog_ms,
+        "last_command": registers.last_command,
+        "tested": len(results),
+        "passed": passed,
+        "failed": len(results) - passed,
+        "results": results,
+        "frames": list(port.frames),
+    }
+
+
+def register_commands(control: ControlServer, station: Station) -> None:
+    """Make what the world and a test can do to the station known to the control channel."""
+
+    def put_board(code: str, defect: str | None = None) -> None:
+        board = msgspec.convert({"code": code, "defect": defect}, Board)
+        _or_refuse(lambda: station.put_board(board))
+
+    def take_board() -> str:
+        return _or_refuse(lambda: station.take_board().code)
+
+    def fault(code: int, armed: bool = False) -> None:
+        station.inject(_fault(code), armed=armed)
+
+    def mode(mode: str) -> None:
+        if mode not in _MODES:
+            raise ValueError(f"mode is one of {', '.join(_MODES)}")
+        station.mode = _MODES[mode]
+
+    def command(name: str) -> str:
+        """Press a button at the station itself."""
+        try:
+            number = Command[name.upper()]
+        except KeyError:
+            raise ValueError(f"command is one of {', '.join(c.name.lower() for c in Command)}") from None
+        return station.command(number).name.lower()
+
+    control.command("put_board", put_board)
+    control.command("take_board", take_board)
+    control.command("fault", fault)
+    control.command("emergency_stop", lambda pressed=True: station.press_emergency_stop(pressed=bool(pressed)))
+    control.command("push_door", lambda opening: station.push_door(opening=bool(opening)))
+    control.command("command", command)
+    control.command("mode", mode)
+
+
+def _or_refuse(act: Callable[[], T]) -> T:
+    try:
+        return act()
+    except Refusal as e:
+        raise ValueError(str(e)) from e
+
+
+def _fault(code: int) -> Fault:
+    real = [int(fault) for fault in Fault if fault is not Fault.NONE]
+    if code not in real:
+        raise ValueError(f"fault code is one of {', '.join(map(str, real))}")
+    return Fault(code)
+
+
+@app.default
+def main(
+    *,
+    host: str = "127.0.0.1",
+    port: int = 0,
+    control: str = "127.0.0.1:0",
+    seed: int = 0,
+    test_time: Positive = 1.5,
+    time_scale: Positive = 1.0,
+) -> int:
+    """Start the fake; it prints one line `ready {json}` with its addresses and ends on SIGTERM.
+
+    Args:
+        host: address to serve Modbus TCP on.
+        port: port to serve Modbus TCP on; 0 takes a free one.
+        control: HOST:PORT of the control channel; port 0 takes a free one.
+        seed: decides the noise of the measured values.
+        test_time: how long a test takes, s.
+        time_scale: how many times faster than real the station moves.
+    """
+    try:
+        control_host, control_port = parse_address(control)
+    except ValueError as e:
+        sys.stderr.write(f"functional_tester: {e}\n")
+        return 2
+
+    async def body() -> None:
+        station = Station(seed=seed, test_time=test_time, time_scale=time_scale)
+        registers = RegisterMap(station)
+        modbus = ModbusPort(host, port, station, registers)
+        channel = ControlServer(control_host, control_port)
+        register_commands(channel, station)
+        register_faults(channel, {"modbus": modbus.wire})
+        channel.source("truth", lambda: truth(station, registers, modbus))
+        await modbus.wire.listen()
+        try:
+            announce(name="functional_tester", modbus=modbus.wire.address, control=await channel.start())
+            await until_told_to_end()
+        finally:
+            modbus.wire.close()
+            await channel.close()
+
+    return run(body, "functional_tester")
+
+
+if __name__ == "__main__":
+    sys.exit(app())

@@ -1,0 +1,352 @@
+"""The fake tester as a host sees it: pymodbus against the process, registers as the device page says."""
+
+import logging
+import struct
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from pymodbus.client import ModbusTcpClient
+from pymodbus.exceptions import ModbusException
+
+RESET, START, STOP, HOLD, UNHOLD, ABORT, CLEAR = 1, 2, 3, 4, 5, 8, 9
+STOPPED, IDLE, EXECUTE, ABORTED, HELD, COMPLETE = 2, 4, 6, 9, 11, 17
+
+
+class Host:
+    """A minimal host, written from the page."""
+
+    def __init__(self, address: str, timeout: float = 2.0) -> None:
+        logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
+        host, port = address.split(":")
+        self.client = ModbusTcpClient(host, port=int(port), timeout=timeout, retries=0)
+        assert self.client.connect()
+
+    def inputs(self) -> list[int]:
+        answer = self.client.read_input_registers(0, count=17, device_id=1)
+        assert not answer.isError(), answer
+        return answer.registers
+
+    @property
+    def state(self) -> int:
+        return self.inputs()[0]
+
+    @property
+    def switches(self) -> list[bool]:
+        answer = self.client.read_discrete_inputs(0, count=5, device_id=1)
+        assert not answer.isError(), answer
+        return answer.bits[:5]
+
+    def _write_pair(self, address: int, value: int) -> int:
+        sequence = self.client.read_holding_registers(address + 1, count=1, device_id=1).registers[0]
+        sequence = (sequence + 1) & 0xFFFF
+        answer = self.client.write_registers(address, [value, sequence], device_id=1)
+        assert not answer.isError(), answer
+        return sequence
+
+    def command(self, code: int) -> int:
+        sequence = self._write_pair(0, code)
+        words = self.inputs()
+        assert words[1] == sequence
+        return words[2]
+
+    def door(self, code: int) -> None:
+        self._write_pair(3, code)
+
+    def floats(self) -> tuple[float, ...]:
+        return struct.unpack(">3f", struct.pack(">6H", *self.inputs()[6:12]))
+
+
+@pytest.fixture
+def tester(start_fake: Callable[..., Any]) -> Any:
+    return start_fake("functional_tester", "--time-scale", "20", "--test-time", "2", "--seed", "7")
+
+
+@pytest.fixture
+def host(tester: Any) -> Iterator[Host]:
+    host = Host(tester.ready["modbus"])
+    yield host
+    host.client.close()
+
+
+def load(tester: Any, host: Host, wait_for: Callable[..., Any], code: str, defect: str | None = None) -> None:
+    host.door(1)
+    wait_for(lambda: host.switches[0])
+    if tester.truth()["board"] is not None:
+        tester.control.do("take_board")
+    tester.control.do("put_board", code=code, defect=defect)
+    host.door(2)
+    wait_for(lambda: host.switches[1])
+
+
+def ready_to_start(tester: Any, host: Host, wait_for: Callable[..., Any], defect: str | None = None) -> None:
+    load(tester, host, wait_for, "B1", defect)
+    assert host.command(RESET) == 0
+    wait_for(lambda: host.state, lambda state: state == IDLE)
+
+
+def test_the_result_follows_from_the_board(tester: Any, host: Host, wait_for: Callable[..., Any]) -> None:
+    assert host.state == STOPPED
+    assert host.switches == [False, True, False, False, False]
+    values = {}
+    for number, (code, defect) in enumerate([("G1", None), ("S1", "short"), ("O1", "open"), ("L1", "leakage")], 1):
+        load(tester, host, wait_for, code, defect)
+        assert host.command(RESET) == 0
+        wait_for(lambda: host.state, lambda state: state == IDLE)
+        assert host.command(START) == 0
+        wait_for(lambda: host.switches[3])
+        wait_for(lambda: host.state, lambda state: state == COMPLETE)
+        words = host.inputs()
+        assert words[4] == (1 if defect is None else 2)
+        assert words[5] == words[12] == number
+        values[code] = host.floats()
+    assert words[12:15] == [4, 1, 3]
+    assert host.switches == [False, True, True, False, False]
+    assert 4.75 < values["G1"][0] < 5.25
+    assert 0.1 < values["G1"][1] < 0.15
+    assert values["S1"][1] > 1.0 > values["S1"][0] - 3.0
+    assert values["O1"][2] > 10.0
+    assert 0.15 < values["L1"][1] < 0.25
+    results = tester.truth()["results"]
+    assert [(r["code"], r["result"]) for r in results] == [
+        ("G1", "pass"),
+        ("S1", "fail"),
+        ("O1", "fail"),
+        ("L1", "fail"),
+    ]
+    assert results[0]["measured"]["supply_current"] == pytest.approx(values["G1"][1], rel=1e-6)
+
+
+def test_results_come_together_before_complete(tester: Any, host: Host, wait_for: Callable[..., Any]) -> None:
+    ready_to_start(tester, host, wait_for)
+    host.command(START)
+    seen = []
+    deadline = time.monotonic() + 5.0
+    while not seen or seen[-1][0] != COMPLETE:
+        assert time.monotonic() < deadline
+        words = host.inputs()
+        seen.append((words[0], words[4:12]))
+    for state, results in seen:
+        assert (results[0] != 0) == (results[1] != 0) == any(results[2:])
+        assert state != COMPLETE or results[0]
+
+
+def test_a_seed_gives_the_same_values_again(start_fake: Callable[..., Any], wait_for: Callable[..., Any]) -> None:
+    measured = []
+    for seed in ("3", "3", "4"):
+        fake = start_fake("functional_tester", "--time-scale", "50", "--seed", seed)
+        host = Host(fake.ready["modbus"])
+        ready_to_start(fake, host, wait_for)
+        host.command(START)
+        wait_for(lambda: host.state, lambda state: state == COMPLETE)  # noqa: B023
+        measured.append(host.floats())
+        host.client.close()
+    assert measured[0] == measured[1] != measured[2]
+
+
+def test_refusals_name_their_reason(tester: Any, host: Host, wait_for: Callable[..., Any]) -> None:
+    assert host.command(START) == 1
+    assert host.command(7) == 2
+    assert host.command(HOLD) == 1
+    assert host.command(UNHOLD) == 1
+    assert host.command(CLEAR) == 1
+    assert host.command(RESET) == 0
+    wait_for(lambda: host.state, lambda state: state == IDLE)
+    assert host.command(START) == 4
+    host.door(1)
+    assert host.command(START) == 3
+    wait_for(lambda: host.switches[0])
+    tester.control.do("put_board", code="B1")
+    host.door(2)
+    wait_for(lambda: host.switches[1])
+    host.client.write_register(2, 10, device_id=1)
+    assert host.command(START) == 5
+    host.client.write_register(2, 9, device_id=1)
+    assert host.command(RESET) == 1
+    assert host.command(START) == 0
+    wait_for(lambda: host.state, lambda state: state == COMPLETE)
+    assert tester.truth()["results"][0]["program"] == 9
+
+
+def test_a_command_is_taken_only_when_the_sequence_changes(host: Host) -> None:
+    host.command(RESET)
+    before = host.inputs()[1]
+    host.client.write_register(0, ABORT, device_id=1)
+    host.client.write_registers(0, [ABORT, before], device_id=1)
+    assert host.state not in (8, ABORTED)
+    host.client.write_register(1, (before + 1) & 0xFFFF, device_id=1)
+    assert host.state in (8, ABORTED)
+
+
+def test_hold_stop_and_abort_give_no_result(tester: Any, host: Host, wait_for: Callable[..., Any]) -> None:
+    ready_to_start(tester, host, wait_for)
+    host.command(START)
+    wait_for(lambda: host.state, lambda state: state == EXECUTE)
+    assert host.command(HOLD) == 0
+    wait_for(lambda: host.state, lambda state: state == HELD)
+    assert host.command(STOP) == 0
+    wait_for(lambda: host.state, lambda state: state == STOPPED)
+    assert host.command(ABORT) == 0
+    wait_for(lambda: host.state, lambda state: state == ABORTED)
+    assert host.command(STOP) == 1
+    words = host.inputs()
+    assert (words[3], words[4], words[5], words[12]) == (0, 0, 0, 0)
+    assert not host.switches[3]
+
+
+def test_the_door_stays_shut_during_a_test(tester: Any, host: Host, wait_for: Callable[..., Any]) -> None:
+    ready_to_start(tester, host, wait_for)
+    host.command(START)
+    wait_for(lambda: host.state, lambda state: state == EXECUTE)
+    result = host.inputs()[2]
+    host.door(1)
+    assert host.switches[:2] == [False, True]
+    assert host.inputs()[2] == result
+    with pytest.raises(Exception, match="door is closed"):
+        tester.control.do("take_board")
+    tester.control.do("push_door", opening=True)
+    wait_for(lambda: host.state, lambda state: state == ABORTED)
+    assert host.inputs()[3] == 102
+    assert tester.truth()["tested"] == 0
+
+
+def test_a_board_goes_in_only_through_an_open_door(tester: Any, host: Host, wait_for: Callable[..., Any]) -> None:
+    with pytest.raises(Exception, match="door is closed"):
+        tester.control.do("put_board", code="B1")
+    host.door(1)
+    wait_for(lambda: host.switches[0])
+    with pytest.raises(Exception, match="defect"):
+        tester.control.do("put_board", code="B1", defect="melted")
+    tester.control.do("put_board", code="B1")
+    with pytest.raises(Exception, match="B1 lies in the fixture"):
+        tester.control.do("put_board", code="B2")
+    assert tester.control.do("take_board") == "B1"
+    assert not host.switches[2]
+
+
+@pytest.mark.parametrize("fault", [101, 102, 103, 104, 105])
+def test_a_fault_ends_the_test_without_a_result(
+    tester: Any, host: Host, wait_for: Callable[..., Any], fault: int
+) -> None:
+    ready_to_start(tester, host, wait_for)
+    tester.control.do("fault", code=fault, armed=True)
+    host.command(START)
+    wait_for(lambda: host.state, lambda state: state == ABORTED)
+    assert host.inputs()[3:6] == [fault, 0, 0]
+    assert host.switches == [fault == 102, fault != 102, fault != 101, False, False]
+    assert host.command(RESET) == 1
+    assert host.command(CLEAR) == 0
+    wait_for(lambda: host.state, lambda state: state == STOPPED)
+    assert host.inputs()[3] == 0
+
+
+def test_emergency_stop_cannot_be_cleared_while_pressed(tester: Any, host: Host, wait_for: Callable[..., Any]) -> None:
+    tester.control.do("emergency_stop")
+    wait_for(lambda: host.state, lambda state: state == ABORTED)
+    assert host.switches[4]
+    assert host.inputs()[3] == 106
+    assert host.command(CLEAR) == 1
+    host.door(1)
+    assert tester.truth()["door"] == "closed"
+    tester.control.do("emergency_stop", pressed=False)
+    assert host.command(CLEAR) == 0
+    wait_for(lambda: host.state, lambda state: state == STOPPED)
+
+
+def test_the_watchdog_notices_a_host_that_fell_silent(
+    start_fake: Callable[..., Any], wait_for: Callable[..., Any]
+) -> None:
+    tester = start_fake("functional_tester", "--time-scale", "20", "--test-time", "100")
+    host = Host(tester.ready["modbus"])
+    host.client.write_register(5, 300, device_id=1)
+    ready_to_start(tester, host, wait_for)
+    host.command(START)
+    end = time.monotonic() + 0.9
+    while time.monotonic() < end:
+        assert host.state in (3, EXECUTE)  # each request keeps it alive
+    silent_since = time.monotonic()
+    tester.control.wait_until(lambda truth: truth["state"] == "Aborted")
+    assert 0.25 < time.monotonic() - silent_since < 1.0
+    assert tester.truth()["fault"] == 105
+    host.client.close()
+
+
+def test_life_counts_ten_times_a_second_in_real_time(host: Host) -> None:
+    first, began = host.inputs()[15], time.monotonic()
+    time.sleep(0.6)
+    assert host.inputs()[15] - first == pytest.approx((time.monotonic() - began) * 10.0, abs=1.5)
+
+
+def test_identification(host: Host) -> None:
+    from pymodbus.pdu.mei_message import ReadDeviceInformationRequest
+
+    answer = host.client.execute(False, ReadDeviceInformationRequest(read_code=1, object_id=0))
+    assert list(answer.information.values()) == [b"Fake Test Systems", b"FT-100", b"1.2"]
+
+
+def test_illegal_requests_get_exceptions(host: Host) -> None:
+    client = host.client
+    assert client.read_input_registers(10, count=8, device_id=1).exception_code == 2
+    assert client.read_input_registers(17, count=1, device_id=1).exception_code == 2
+    assert client.read_holding_registers(6, count=1, device_id=1).exception_code == 2
+    assert client.read_discrete_inputs(0, count=6, device_id=1).exception_code == 2
+    assert client.read_discrete_inputs(5, count=1, device_id=1).exception_code == 2
+    assert client.write_registers(5, [0, 0], device_id=1).exception_code == 2
+    assert client.write_registers(3, [3, 1], device_id=1).exception_code == 3
+    assert client.read_coils(0, count=1, device_id=1).exception_code == 1
+    assert client.write_coil(3000, True, device_id=1).exception_code == 1
+    assert client.read_holding_registers(3, count=2, device_id=1).registers == [0, 0]
+    assert client.read_holding_registers(0, count=1, device_id=9).isError()
+
+
+@pytest.mark.parametrize("fault", ["silence", "reset", "half_frame", "garbage"])
+def test_a_bad_wire_gives_no_answer_and_heals(tester: Any, fault: str) -> None:
+    host = Host(tester.ready["modbus"], timeout=0.3)
+    assert host.state == STOPPED
+    tester.control.do(fault)
+    with pytest.raises(ModbusException):
+        host.inputs()
+    tester.control.do("heal")
+    host.client.close()
+    host = Host(tester.ready["modbus"])
+    assert host.state == STOPPED
+    host.client.close()
+
+
+def test_refuse_closes_the_port_and_slow_delays(tester: Any) -> None:
+    host = Host(tester.ready["modbus"])
+    tester.control.do("slow", seconds=0.3)
+    began = time.monotonic()
+    assert host.state == STOPPED
+    assert time.monotonic() - began > 0.28
+    host.client.close()
+    tester.control.do("refuse")
+    assert not host.client.connect()
+    tester.control.do("heal")
+    assert host.client.connect()
+    assert host.state == STOPPED
+    host.client.close()
+
+
+def test_commands_under_silence_do_not_arrive(tester: Any) -> None:
+    host = Host(tester.ready["modbus"], timeout=0.2)
+    tester.control.do("silence")
+    with pytest.raises(ModbusException):
+        host.client.write_registers(0, [ABORT, 1], device_id=1)
+    assert tester.truth()["state"] == "Stopped"
+    host.client.close()
+
+
+def test_it_ends_on_sigterm_and_says_what_is_wrong(start_fake: Callable[..., Any], tester: Any) -> None:
+    assert tester.terminate() == 0
+    import subprocess
+    import sys
+
+    taken = start_fake("functional_tester").ready["modbus"].split(":")[1]
+    base = [sys.executable, "-m", "arcor2_fakes.functional_tester"]
+    for arguments, status in ((["--port", taken], 1), (["--control", "nowhere"], 2)):
+        ended = subprocess.run([*base, *arguments], capture_output=True, text=True, timeout=20, check=False)
+        assert ended.returncode == status
+        assert ended.stderr.startswith("functional_tester: ")
+        assert len(ended.stderr.strip().splitlines()) == 1
