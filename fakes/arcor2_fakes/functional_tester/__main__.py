@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 import msgspec
 from cyclopts import App, Parameter, validators
@@ -13,13 +12,11 @@ from arcor2_fakes.control import ControlServer, parse_address
 from arcor2_fakes.functional_tester.board import Board
 from arcor2_fakes.functional_tester.modbus import ModbusPort
 from arcor2_fakes.functional_tester.registers import RegisterMap
-from arcor2_fakes.functional_tester.station import Command, Fault, Refusal, Station
+from arcor2_fakes.functional_tester.station import Command, Fault, Station
 from arcor2_fakes.process import announce, run, until_told_to_end
 from arcor2_fakes.wire import register_faults
 
 _MODES = {"produce": 1, "maintenance": 2, "manual": 3}
-
-T = TypeVar("T")
 
 app = App(name="arcor2_fakes.functional_tester", help="Fake functional tester on Modbus TCP.", version_flags=[])
 
@@ -54,10 +51,10 @@ def register_commands(control: ControlServer, station: Station) -> None:
 
     def put_board(code: str, defect: str | None = None) -> None:
         board = msgspec.convert({"code": code, "defect": defect}, Board)
-        _or_refuse(lambda: station.put_board(board))
+        station.put_board(board)
 
     def take_board() -> str:
-        return _or_refuse(lambda: station.take_board().code)
+        return station.take_board().code
 
     def fault(code: int, armed: bool = False) -> None:
         station.inject(_fault(code), armed=armed)
@@ -82,13 +79,6 @@ def register_commands(control: ControlServer, station: Station) -> None:
     control.command("push_door", lambda opening: station.push_door(opening=bool(opening)))
     control.command("command", command)
     control.command("mode", mode)
-
-
-def _or_refuse(act: Callable[[], T]) -> T:
-    try:
-        return act()
-    except Refusal as e:
-        raise ValueError(str(e)) from e
 
 
 def _fault(code: int) -> Fault:

@@ -66,7 +66,7 @@ class Fault(IntEnum):
     EMERGENCY_STOP = 106
 
 
-class Refusal(Exception):
+class Refusal(ValueError):
     """The physical world can't do that now, e.g. put a board through a closed door."""
 
 

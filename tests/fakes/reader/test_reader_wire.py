@@ -1,0 +1,255 @@
+"""The fake barcode reader as a host sees it: pyserial against the process, bytes as the device page says."""
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import serial
+
+from arcor2_fakes.control import ControlError
+
+
+class Host:
+    """A minimal host, written from the page."""
+
+    def __init__(self, port: str, timeout: float = 2.0) -> None:
+        self.serial = serial.serial_for_url(port, baudrate=9600, timeout=timeout)
+
+    def say(self, command: str) -> None:
+        self.serial.write(command.encode() + b"\r")
+
+    def hear(self) -> bytes:
+        return self.serial.read_until(b"\r")
+
+    def ask(self, command: str) -> bytes:
+        self.say(command)
+        return self.hear()
+
+    def close(self) -> None:
+        below = getattr(self.serial, "_socket", None)
+        self.serial.close()
+        if below is not None:
+            below.close()  # pyserial 3.5 forgets the socket unclosed when the other end has reset it
+
+    def silent_for(self, seconds: float) -> bool:
+        self.serial.timeout = seconds
+        return self.serial.read(1) == b""
+
+
+@pytest.fixture
+def reader(start_fake: Callable[..., Any], tmp_path: Path) -> Any:
+    return start_fake("barcode_reader", "--link", str(tmp_path / "reader"))
+
+
+@pytest.fixture(params=["pty", "tcp"])
+def any_reader(request: pytest.FixtureRequest, start_fake: Callable[..., Any]) -> Any:
+    return start_fake("barcode_reader", *(["--tcp", "127.0.0.1:0"] if request.param == "tcp" else []))
+
+
+@pytest.fixture
+def host(reader: Any) -> Iterator[Host]:
+    host = Host(reader.ready["port"])
+    yield host
+    host.close()
+
+
+def test_it_reads_what_lies_in_front(any_reader: Any) -> None:
+    host = Host(any_reader.ready["port"])
+    any_reader.control.do("present", code="PCB-0001")
+    for _ in range(3):
+        began = time.monotonic()
+        assert host.ask("LON") == b"PCB-0001\r"
+        assert 0.05 <= time.monotonic() - began < 0.3
+    assert host.silent_for(0.2)  # a code is sent once
+    assert any_reader.truth()["received"] == ["LON"] * 3
+    host.close()
+
+
+def test_a_board_that_comes_into_view_while_reading(reader: Any, host: Host) -> None:
+    host.say("LON")
+    reader.control.wait_until(lambda truth: truth["reading"])
+    reader.control.do("present", code="LATE-1")
+    assert host.hear() == b"LATE-1\r"
+    host.say("LON")
+    reader.control.wait_until(lambda truth: truth["reading"])
+    reader.control.do("present", code=None)
+    reader.control.do("present", code="NEXT-2")
+    assert host.hear() == b"NEXT-2\r"
+
+
+def test_no_read_is_told_after_the_readers_own_time(start_fake: Callable[..., Any]) -> None:
+    reader = start_fake("barcode_reader", "--timeout", "0.4")
+    host = Host(reader.ready["port"])
+    began = time.monotonic()
+    assert host.ask("LON") == b"ERROR\r"
+    assert 0.38 < time.monotonic() - began < 0.8
+    host.close()
+
+
+def test_loff_ends_reading_without_an_answer(reader: Any, host: Host) -> None:
+    host.say("LON")
+    host.say("LOFF")
+    reader.control.wait_until(lambda truth: truth["received"] == ["LON", "LOFF"])
+    reader.control.do("present", code="PCB-1")
+    assert host.silent_for(1.2)
+
+
+def test_a_code_decoded_before_loff_still_comes(reader: Any, host: Host) -> None:
+    reader.control.do("present", code="PCB-1")
+    reader.control.do("late", seconds=0.5)
+    host.say("LON")
+    reader.control.wait_until(lambda truth: truth["received"] == ["LON"] and not truth["reading"])
+    host.say("LOFF")
+    assert host.ask("STAT") == b"STAT,1,OK\r"
+    assert host.hear() == b"PCB-1\r"
+    reader.control.do("late", seconds=0.5)
+    host.say("LON")
+    reader.control.wait_until(lambda truth: truth["received"][-1] == "LON" and not truth["reading"])
+    assert host.ask("RST") == b"OK,RST\r"
+    assert host.silent_for(0.8)  # a reset clears the buffer
+
+
+@pytest.mark.parametrize(
+    ("options", "answer"),
+    [
+        (["--cr"], b"A1\r"),
+        (["--crlf"], b"A1\r\n"),
+        (["--stx"], b"\x02A1\x03\r"),
+        (["--stx", "--crlf"], b"\x02A1\x03\r\n"),
+    ],
+)
+def test_framing(start_fake: Callable[..., Any], options: list[str], answer: bytes) -> None:
+    reader = start_fake("barcode_reader", *options)
+    host = Host(reader.ready["port"])
+    reader.control.do("present", code="A1")
+    host.say("LON")
+    assert host.serial.read(len(answer)) == answer
+    assert host.silent_for(0.1)
+    host.close()
+
+
+def test_identification_status_and_unknown_commands(reader: Any, host: Host) -> None:
+    fields = host.ask("VER").decode().rstrip("\r").split(",")
+    assert len(fields) == 5
+    assert fields[0] == "VER"
+    assert all(fields)
+    assert host.ask("STAT") == b"STAT,1,OK\r"
+    reader.control.do("health", value="DIRTY")
+    assert host.ask("STAT") == b"STAT,1,DIRTY\r"
+    reader.control.do("health", value="FAIL")
+    assert host.ask("STAT") == b"STAT,0,FAIL\r"
+    reader.control.do("present", code="PCB-1")
+    assert host.ask("LON") == b"ERROR\r"
+    assert host.ask("lon") == b"ERR,lon,00\r"
+    host.serial.write(b"\r\n" + b"x" * 5000 + b"\rSTAT\r\n")
+    assert host.hear() == b"STAT,0,FAIL\r"
+
+
+def test_a_code_that_no_reader_could_send_is_refused(reader: Any) -> None:
+    for code in ("", "x" * 129, "ř", "A\rB", "ERROR", 7):
+        with pytest.raises(ControlError):
+            reader.control.do("present", code=code)
+    assert reader.truth()["code"] is None
+    with pytest.raises(ControlError, match="health is one of"):
+        reader.control.do("health", value="TIRED")
+
+
+def test_pulling_the_cable(reader: Any, host: Host) -> None:
+    link = Path(reader.ready["port"])
+    assert link.is_symlink()
+    reader.control.do("unplug")
+    assert not link.exists()
+    with pytest.raises((serial.SerialException, OSError)):
+        host.ask("STAT")
+    with pytest.raises(serial.SerialException):
+        Host(str(link))
+    assert reader.control.do("plug") == str(link)
+    again = Host(str(link))
+    assert again.ask("STAT") == b"STAT,1,OK\r"
+    again.close()
+    assert reader.terminate() == 0
+    assert not link.is_symlink()
+
+
+def test_unplugging_tcp(start_fake: Callable[..., Any]) -> None:
+    reader = start_fake("barcode_reader", "--tcp", "127.0.0.1:0")
+    host = Host(reader.ready["port"])
+    assert host.ask("STAT") == b"STAT,1,OK\r"
+    reader.control.do("unplug")
+    with pytest.raises(serial.SerialException):
+        host.ask("STAT")
+    with pytest.raises(serial.SerialException):
+        Host(reader.ready["port"])
+    host.close()
+    reader.control.do("plug")
+    again = Host(reader.ready["port"])
+    assert again.ask("STAT") == b"STAT,1,OK\r"
+    newest = Host(reader.ready["port"])
+    assert newest.ask("STAT") == b"STAT,1,OK\r"
+    again.close()
+    newest.close()
+
+
+@pytest.mark.parametrize(
+    ("fault", "answer"), [("silence", b""), ("half_frame", b"STAT,"), ("garbage", None), ("slow", b"")]
+)
+def test_a_bad_line(any_reader: Any, fault: str, answer: bytes | None) -> None:
+    host = Host(any_reader.ready["port"], timeout=0.3)
+    any_reader.control.do(fault, seconds=0.5)
+    heard = host.ask("STAT")
+    assert heard == answer if answer is not None else heard != b"STAT,1,OK\r"
+    host.close()
+    any_reader.control.do("heal")
+    host = Host(any_reader.ready["port"])
+    assert host.ask("STAT") == b"STAT,1,OK\r"
+    host.close()
+
+
+@pytest.mark.parametrize("fault", ["reset", "refuse"])
+def test_a_line_that_goes_away(any_reader: Any, fault: str) -> None:
+    host = Host(any_reader.ready["port"], timeout=0.3)
+    assert host.ask("STAT") == b"STAT,1,OK\r"
+    any_reader.control.do(fault)
+    if fault == "reset" or not any_reader.ready["port"].startswith(
+        "socket"
+    ):  # a refusing TCP port keeps its connection
+        with pytest.raises((serial.SerialException, OSError)):
+            host.ask("STAT")
+    if fault == "refuse":
+        with pytest.raises(serial.SerialException):
+            Host(any_reader.ready["port"])
+    host.close()
+    any_reader.control.do("heal")
+    again = Host(any_reader.truth()["port"])
+    assert again.ask("STAT") == b"STAT,1,OK\r"
+    again.close()
+
+
+def test_a_line_nobody_reads_does_not_stall_the_reader(reader: Any) -> None:
+    host = Host(reader.ready["port"])
+    for _ in range(20):
+        host.serial.write(b"VER\r" * 100)
+        reader.control.wait_until(lambda truth: truth["received"][-1:] == ["VER"])
+    assert reader.truth()["health"] == "OK"
+    host.serial.reset_input_buffer()
+    host.close()
+
+
+def test_what_is_in_the_way_of_the_link_is_kept(tmp_path: Path) -> None:
+    import subprocess
+    import sys
+
+    (tmp_path / "precious").write_text("mine")
+    ended = subprocess.run(
+        [sys.executable, "-m", "arcor2_fakes.barcode_reader", "--link", str(tmp_path / "precious")],
+        capture_output=True,
+        text=True,
+        timeout=20,
+        check=False,
+    )
+    assert ended.returncode == 1
+    assert len(ended.stderr.splitlines()) == 1
+    assert "precious" in ended.stderr
+    assert (tmp_path / "precious").read_text() == "mine"
