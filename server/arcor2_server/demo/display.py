@@ -1,0 +1,136 @@
+"""What the demo shows in the terminal: devices, the current action, boards done."""
+
+import asyncio
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import httpx
+from rich.console import Console, Group
+from rich.live import Live
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+from rich.text import Text
+
+_CONNECTION = {"online": "green", "back": "yellow", "connecting": "yellow", "lost": "red", "failed": "red"}
+_HISTORY = 6
+
+
+class Display:
+    """A live view on a terminal, one line per happening elsewhere."""
+
+    def __init__(self, console: Console, boards: int) -> None:
+        self._console = console
+        self._live: Live | None = None
+        self._begin = time.monotonic()
+        self._where: dict[str, str] = {}
+        self._devices: list[dict[str, Any]] = []
+        self._history: list[Text] = []
+        self._now = ""
+        self._progress = Progress(
+            TextColumn("[bold]boards"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[result]}"),
+            TimeElapsedColumn(), console=console,
+        )  # fmt: skip
+        self._task = self._progress.add_task("boards", total=boards, result="")
+        self._passed = 0
+        self._failed = 0
+
+    def __enter__(self) -> "Display":
+        if self._console.is_terminal:
+            self._live = Live(self._view(), console=self._console, refresh_per_second=8, transient=False)
+            self._live.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._live is not None:
+            self._live.update(self._view())
+            self._live.stop()
+            self._live = None
+
+    # ------------------------------------------------------------------------------------------------ happenings
+    def note(self, text: str) -> None:
+        """Say what is being done."""
+        self._now = text
+        self._line(Text(text))
+
+    def addresses(self, url: str, devices: Mapping[str, str]) -> None:
+        """Say where everything is."""
+        self._where = dict(devices)
+        self._line(Text(f"server at {url}; " + ", ".join(f"{name} at {at}" for name, at in devices.items())))
+
+    def action(self, name: str) -> None:
+        """Say which action runs."""
+        self._now = name
+        self._line(Text(f"  {name}"))
+
+    def board(self, number: int, of: int, passed: bool) -> None:
+        """Say what became of a board."""
+        self._passed += passed
+        self._failed += not passed
+        self._progress.update(self._task, completed=number, result=f"{self._passed} passed, {self._failed} failed")
+        verdict = Text("passed", "green") if passed else Text("failed", "red")
+        self._line(Text.assemble(f"board {number} of {of}: ", verdict))
+
+    def finish(self, summary: str, misplaced: list[str]) -> None:
+        """Say how the cycle ended."""
+        self._now = ""
+        for line in misplaced:
+            self._out(Text(line, "red"))
+        self._out(Text(summary, "bold"))
+
+    def serving(self, url: str) -> None:
+        """Say that the server goes on."""
+        self._out(Text(f"serving at {url} until Ctrl-C"))
+
+    async def follow_devices(self, url: str, period: float) -> None:
+        """Ask the server for its devices again and again, until cancelled."""
+        base = url.replace("ws://", "http://", 1).replace("wss://", "https://", 1)
+        async with httpx.AsyncClient(base_url=base, timeout=2.0) as client:
+            while True:
+                try:
+                    answer = await client.get("/api/devices")
+                    if answer.is_success:
+                        self._devices = answer.json()
+                        self._refresh()
+                except httpx.HTTPError:
+                    self._devices = []
+                await asyncio.sleep(period)
+
+    # ------------------------------------------------------------------------------------------------ drawing
+    def _out(self, text: Text) -> None:
+        (self._live.console if self._live is not None else self._console).print(text, highlight=False)
+
+    def _line(self, text: Text) -> None:
+        stamped = Text.assemble((f"{time.monotonic() - self._begin:6.1f} s  ", "dim"), text)
+        if self._live is None:
+            self._out(stamped)
+            return
+        self._history = [*self._history, stamped][-_HISTORY:]
+        self._refresh()
+
+    def _refresh(self) -> None:
+        if self._live is not None:
+            self._live.update(self._view())
+
+    def _view(self) -> Group:
+        devices = Table(box=None, pad_edge=False, show_edge=False)
+        for heading in ("device", "type", "address", "connection", "health", "says"):
+            devices.add_column(heading, header_style="dim")
+        known = {device["name"]: device for device in self._devices}
+        for name in {**self._where, **known}:
+            device = known.get(name)
+            if device is None:
+                devices.add_row(name, "", self._where.get(name, ""), Text("offline", "dim"), "", "")
+                continue
+            alarms = "; ".join(alarm["text"] for alarm in device.get("alarms", []))
+            connection = device["connection"]
+            devices.add_row(
+                name,
+                device["type"],
+                self._where.get(name, ""),
+                Text(connection, _CONNECTION.get(connection, "dim")),
+                device["health"],
+                Text(alarms, "yellow"),
+            )
+        now = Text.assemble(("now  ", "dim"), (self._now, "bold cyan")) if self._now else Text("")
+        return Group(Text("ARCOR2-HW demo workplace", "bold"), devices, *self._history, now, self._progress)

@@ -1,0 +1,103 @@
+"""Child processes of the demo: started together, known by the line they print when ready, ended in order."""
+
+import asyncio
+import contextlib
+import signal
+import sys
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+
+from arcor2_hw.exceptions import Arcor2Error
+
+READY_TIMEOUT: Final = 20.0
+"""Seconds for a child to say that it is ready: interpreters start slowly on a busy machine."""
+END_TIMEOUT: Final = 5.0
+
+
+class ChildFailed(Arcor2Error):
+    """A process of the demo did not come up, or ended before it should."""
+
+    code = "child_failed"
+
+
+class Child:
+    """One child process. Its standard error goes to a log file; its standard output is read for the ready line."""
+
+    def __init__(self, name: str, command: list[str], log: Path) -> None:
+        self.name = name
+        self._command = command
+        self._log = log
+        self._process: asyncio.subprocess.Process | None = None
+        self._drain: asyncio.Task[None] | None = None
+
+    @property
+    def ended(self) -> bool:
+        """Tell whether it has ended."""
+        return self._process is not None and self._process.returncode is not None
+
+    async def start(self) -> str:
+        """Start it and give the rest of its ready line. Raises ChildFailed with the end of its log."""
+        with self._log.open("wb") as log:
+            # A session of its own: Ctrl-C in the terminal reaches the demo alone, which then ends all in order.
+            self._process = await asyncio.create_subprocess_exec(
+                *self._command,
+                stdin=asyncio.subprocess.DEVNULL,
+                stdout=asyncio.subprocess.PIPE,
+                stderr=log,
+                start_new_session=True,
+            )
+        assert self._process.stdout is not None
+        try:
+            async with asyncio.timeout(READY_TIMEOUT):
+                while line := await self._process.stdout.readline():
+                    text = line.decode(errors="replace").strip()
+                    if text.startswith("ready"):
+                        self._drain = asyncio.create_task(self._drain_output(self._process.stdout))
+                        return text.removeprefix("ready").strip()
+        except TimeoutError:
+            await self.stop()
+            raise ChildFailed(f"{self.name} was not ready within {READY_TIMEOUT:g} s.", self._last_words()) from None
+        await self._process.wait()
+        raise ChildFailed(f"{self.name} did not start: {self._last_words() or 'it said nothing'}")
+
+    async def start_json(self) -> dict[str, Any]:
+        """Start it and give the addresses of its ready line."""
+        addresses: dict[str, Any] = msgspec.json.decode(await self.start())
+        return addresses
+
+    @staticmethod
+    async def _drain_output(stream: asyncio.StreamReader) -> None:
+        while await stream.read(65536):
+            pass
+
+    def _last_words(self) -> str:
+        with contextlib.suppress(OSError):
+            lines = [line.strip() for line in self._log.read_text(errors="replace").splitlines() if line.strip()]
+            return lines[-1] if lines else ""
+        return ""
+
+    async def stop(self) -> None:
+        """End it: SIGTERM, and SIGKILL after END_TIMEOUT."""
+        process = self._process
+        if process is None:
+            return
+        if process.returncode is None:
+            with contextlib.suppress(ProcessLookupError):
+                process.send_signal(signal.SIGTERM)
+            try:
+                async with asyncio.timeout(END_TIMEOUT):
+                    await process.wait()
+            except TimeoutError:
+                with contextlib.suppress(ProcessLookupError):
+                    process.kill()
+                await process.wait()
+        if self._drain is not None:
+            await self._drain
+            self._drain = None
+
+
+def python_module(name: str, *arguments: str) -> list[str]:
+    """Give the command that runs a module with this interpreter."""
+    return [sys.executable, "-m", name, *arguments]

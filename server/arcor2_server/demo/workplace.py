@@ -1,0 +1,262 @@
+"""The demo workplace: read from workplace.toml, and created through the protocol as any client would."""
+
+from importlib.resources import files
+from typing import Any, Final
+
+import msgspec
+from msgspec import UNSET, Struct, field
+
+from arcor2_hw.client import Client
+from arcor2_hw.data import rpc
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.events import Event
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.object_type import Box, Model3dType, ObjectAction, ObjectModel
+from arcor2_hw.data.parameter import Parameter
+from arcor2_hw.data.project import Action, ActionParameter, Flow, Project, ProjectLogicIf
+from arcor2_hw.data.scene import Scene
+from arcor2_hw.exceptions import InvalidData
+
+Vector3 = tuple[float, float, float]
+Scalar = bool | int | float | str
+
+
+class Object(Struct, frozen=True, forbid_unknown_fields=True):
+    """An object of the scene. `rotation` is a rotation vector, rad; a setting "$name" is filled in at start."""
+
+    name: str
+    type: str
+    position: Vector3 | None = None
+    rotation: Vector3 = (0.0, 0.0, 0.0)
+    settings: dict[str, Scalar] = field(default_factory=dict)
+
+
+class Obstacle(Struct, frozen=True, forbid_unknown_fields=True):
+    """A box that nothing may run into; edges in m."""
+
+    name: str
+    position: Vector3
+    size: Vector3
+
+
+class Point(Struct, frozen=True, forbid_unknown_fields=True):
+    """An action point with one orientation named default."""
+
+    name: str
+    position: Vector3
+    rotation: Vector3
+    parent: str = ""
+
+
+class Step(Struct, frozen=True, forbid_unknown_fields=True):
+    """An action: on a point, by an object. A parameter "@point" is that point's pose, "$name" a project parameter."""
+
+    name: str
+    point: str
+    object: str
+    action: str
+    parameters: dict[str, Scalar] = field(default_factory=dict)
+    results: list[str] = field(default_factory=list)
+
+
+class Link(Struct, frozen=True, forbid_unknown_fields=True):
+    """A step of the logic, `when` the named result has the value."""
+
+    start: str
+    end: str
+    result: str = ""
+    value: bool = True
+
+
+class Workplace(Struct, frozen=True, forbid_unknown_fields=True):
+    """Scene and project of the demo."""
+
+    scene: str
+    project: str
+    description: str
+    objects: list[Object]
+    obstacles: list[Obstacle]
+    points: list[Point]
+    steps: list[Step]
+    logic: list[Link]
+    constants: dict[str, Scalar]
+
+
+def load() -> Workplace:
+    """Read the workplace that comes with the product."""
+    return msgspec.toml.decode((files(__package__) / "workplace.toml").read_bytes(), type=Workplace)
+
+
+def layout_file() -> Any:
+    """Give the file that tells the small world where things physically stand."""
+    return files(__package__) / "layout.json"
+
+
+_KINDS: Final = {bool: "boolean", int: "integer", float: "double", str: "string"}
+
+
+def _json(value: object) -> str:
+    return msgspec.json.encode(value).decode()
+
+
+def _pose(position: Vector3, rotation: Vector3) -> Pose:
+    return Pose(Position(*position), Orientation.from_rotation_vector(*rotation))
+
+
+class Creation:
+    """Makes the scene and the project where they are missing, and keeps addresses and constants up to date."""
+
+    def __init__(self, client: Client, workplace: Workplace, addresses: dict[str, Scalar]) -> None:
+        self._client = client
+        self._workplace = workplace
+        self._addresses = addresses
+
+    # ------------------------------------------------------------------------------------------------ scene
+    def _settings(self, obj: Object) -> list[Parameter]:
+        settings = []
+        for name, value in obj.settings.items():
+            if isinstance(value, str) and value.startswith("$"):
+                value = self._addresses[value[1:]]
+            settings.append(Parameter(name, _KINDS[type(value)], _json(value)))
+        return settings
+
+    async def open_scene(self) -> Scene:
+        """Open the scene, made where it is missing, with the objects' addresses of this run; saved."""
+        known = {entry.name: entry.id for entry in await self._client.call("ListScenes")}
+        if self._workplace.scene in known:
+            await self._client.call("OpenScene", rpc.IdArgs(known[self._workplace.scene]))
+        else:
+            await self._client.call("NewScene", rpc.NewSceneArgs(self._workplace.scene, self._workplace.description))
+        event = await self._client.next_event("OpenScene")
+        scene: Scene = event.data.scene
+        present = {obj.name: obj for obj in scene.objects}
+        for obj in self._workplace.objects:
+            settings = self._settings(obj)
+            found = present.get(obj.name)
+            if found is None:
+                pose = UNSET if obj.position is None else _pose(obj.position, obj.rotation)
+                await self._client.call(
+                    "AddObjectToScene", rpc.AddObjectToSceneArgs(obj.name, obj.type, pose, settings)
+                )
+            elif found.parameters != settings:
+                await self._client.call("WriteLock", rpc.WriteLockArgs(found.id))
+                await self._client.call("UpdateObjectParameters", rpc.UpdateObjectParametersArgs(found.id, settings))
+                await self._client.call("WriteUnlock", rpc.WriteUnlockArgs(found.id))
+        for box in self._workplace.obstacles:
+            if box.name not in present:
+                model = ObjectModel(Model3dType.BOX, box=Box(box.name, *box.size))
+                await self._client.call(
+                    "AddVirtualCollisionObjectToScene",
+                    rpc.AddVirtualCollisionObjectToSceneArgs(box.name, _pose(box.position, (0.0, 0.0, 0.0)), model),
+                )
+        await self._client.call("SaveScene")
+        saved: Scene = await self._client.call("GetScene", rpc.IdArgs(scene.id))
+        return saved
+
+    # ------------------------------------------------------------------------------------------------ project
+    async def open_project(self, scene: Scene, constants: dict[str, Scalar]) -> Project:
+        """Open the project in the open scene, made where it is missing, with these constants; saved."""
+        known = {entry.name: entry.id for entry in await self._client.call("ListProjects")}
+        if self._workplace.project in known:
+            await self._client.call("OpenProject", rpc.IdArgs(known[self._workplace.project]))
+        else:
+            await self._client.call(
+                "NewProject", rpc.NewProjectArgs(scene.id, self._workplace.project, self._workplace.description)
+            )
+        event = await self._client.next_event("OpenProject")
+        project: Project = event.data.project
+        if self._workplace.project not in known:
+            await self._fill(scene, constants)
+            changed = True
+        else:
+            changed = await self._set_constants(project, constants)
+        if changed:
+            await self._client.call("SaveProject")
+        saved: Project = await self._client.call("GetProject", rpc.IdArgs(project.id))
+        return saved
+
+    async def _added(self, name: str) -> Event:
+        return await self._client.next_event(name)
+
+    async def _set_constants(self, project: Project, constants: dict[str, Scalar]) -> bool:
+        changed = False
+        for parameter in project.parameters:
+            wanted = constants.get(parameter.name)
+            if wanted is None or parameter.value == _json(wanted):
+                continue
+            await self._client.call("WriteLock", rpc.WriteLockArgs(parameter.id))
+            await self._client.call(
+                "UpdateProjectParameter", rpc.UpdateProjectParameterArgs(parameter.id, value=_json(wanted))
+            )
+            changed = True
+        return changed
+
+    async def _fill(self, scene: Scene, constants: dict[str, Scalar]) -> None:
+        objects = {obj.name: obj for obj in scene.objects}
+        parameters: dict[str, str] = {}
+        for name, value in (self._workplace.constants | constants).items():
+            await self._client.call(
+                "AddProjectParameter", rpc.AddProjectParameterArgs(name, _KINDS[type(value)], _json(value))
+            )
+            parameters[name] = (await self._added("ProjectParameterChanged")).data.id
+        points: dict[str, str] = {}
+        orientations: dict[str, str] = {}
+        for point in self._workplace.points:
+            parent = objects[point.parent].id if point.parent else UNSET
+            await self._client.call(
+                "AddActionPoint", rpc.AddActionPointArgs(point.name, Position(*point.position), parent)
+            )
+            points[point.name] = (await self._added("ActionPointChanged")).data.id
+            await self._client.call("WriteLock", rpc.WriteLockArgs(points[point.name]))
+            await self._client.call(
+                "AddActionPointOrientation",
+                rpc.AddActionPointOrientationArgs(
+                    points[point.name], Orientation.from_rotation_vector(*point.rotation)
+                ),
+            )
+            orientations[point.name] = (await self._added("OrientationChanged")).data.id
+            await self._client.call("WriteUnlock", rpc.WriteUnlockArgs(points[point.name]))
+        actions: dict[str, Action] = {}
+        declared = {
+            obj.type: {action.name: action for action in await self._client.call("GetActions", rpc.TypeArgs(obj.type))}
+            for obj in self._workplace.objects
+        }
+        for step in self._workplace.steps:
+            obj = objects[step.object]
+            given = [
+                self._parameter(step, name, value, declared[obj.type][step.action], orientations, parameters)
+                for name, value in step.parameters.items()
+            ]
+            await self._client.call(
+                "AddAction",
+                rpc.AddActionArgs(
+                    points[step.point], step.name, f"{obj.id}/{step.action}", given, [Flow(outputs=step.results)]
+                ),
+            )
+            actions[step.name] = (await self._added("ActionChanged")).data
+        results = {result: step.name for step in self._workplace.steps for result in step.results}
+        for link in self._workplace.logic:
+            condition: ProjectLogicIf | Unset = UNSET
+            if link.result:
+                condition = ProjectLogicIf(f"{actions[results[link.result]].id}/default/0", _json(link.value))
+            start = link.start if link.start == "START" else actions[link.start].id
+            end = link.end if link.end == "END" else actions[link.end].id
+            await self._client.call("AddLogicItem", rpc.AddLogicItemArgs(start, end, condition))
+
+    @staticmethod
+    def _parameter(
+        step: Step,
+        name: str,
+        value: Scalar,
+        action: ObjectAction,
+        orientations: dict[str, str],
+        parameters: dict[str, str],
+    ) -> ActionParameter:
+        meta = next((meta for meta in action.parameters if meta.name == name), None)
+        if meta is None:
+            raise InvalidData(f"Step {step.name}: {step.action} has no parameter {name}.")
+        if isinstance(value, str) and value.startswith("@"):
+            return ActionParameter(name, meta.type, _json(orientations[value[1:]]))
+        if isinstance(value, str) and value.startswith("$"):
+            return ActionParameter(name, "project_parameter", _json(parameters[value[1:]]))
+        return ActionParameter(name, meta.type, _json(value))
