@@ -1,0 +1,1 @@
+"""Figures of the whole product, measured on the machine at hand: `make bench`."""

@@ -1,0 +1,79 @@
+"""A figure, how it is printed, and the goals."""
+
+import statistics
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import msgspec
+from rich.console import Console
+from rich.table import Table
+
+GOALS: Final[dict[str, tuple[str, str]]] = {
+    # name: unit, goal
+    "cold_start_s": ("s", "<= 1.0"),
+    "idle_memory_mib": ("MiB", "<= 150"),
+    "rpc_ratio_system_info": ("x echo", "<= 1.3"),
+    "rpc_ratio_list_scenes": ("x echo", "<= 1.3"),
+    "rpc_ratio_object_types": ("x echo", "<= 1.3"),
+    "add_action_10_ms": ("ms beyond echo and fdatasync", "<= 0.3"),
+    "add_action_1000_ms": ("ms beyond echo and fdatasync", "<= 0.3"),
+    "run_first_action_ms": ("ms", "<= 150"),
+    "action_overhead_ms": ("ms", "<= 0.1"),
+    "scene_start_20_s": ("s", "<= 0.55"),
+    "stop_latency_p99_ms": ("ms", "<= 100"),
+    "ur_stream_lost": ("%", "<= 0.5"),
+    "ur_stream_core_percent": ("% of a core", "<= 10"),
+    "build_1000_ms": ("ms", "linear"),
+}
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One measured value; `n` is the number of samples behind it, `note` what else was seen."""
+
+    name: str
+    value: float
+    n: int
+    note: str = ""
+
+    def reached(self) -> bool | None:
+        """Tell whether the goal is reached; None when it is no number."""
+        goal = GOALS.get(self.name, ("", ""))[1]
+        return self.value <= float(goal[2:]) if goal.startswith("<=") else None
+
+
+class Report:
+    """Prints each figure as a JSON line on standard output, and all as a table on standard error at the end."""
+
+    def __init__(self) -> None:
+        self._figures: list[Figure] = []
+
+    def add(self, figure: Figure) -> None:
+        """Print a figure."""
+        unit, goal = GOALS.get(figure.name, ("", ""))
+        self._figures.append(figure)
+        line = {"name": figure.name, "value": round(figure.value, 4), "unit": unit, "n": figure.n, "goal": goal}
+        sys.stdout.write(msgspec.json.encode(line).decode() + "\n")
+        sys.stdout.flush()
+
+    def table(self) -> None:
+        """Print the table."""
+        table = Table("figure", "value", "unit", "n", "goal", "", "note")
+        for f in self._figures:
+            unit, goal = GOALS.get(f.name, ("", ""))
+            mark = {True: "[green]reached", False: "[red]missed", None: ""}[f.reached()]
+            table.add_row(f.name, f"{f.value:.4g}", unit, str(f.n), goal, mark, f.note)
+        Console(stderr=True).print(table)
+
+
+def median(samples: Sequence[float]) -> float:
+    """Give the median."""
+    return statistics.median(samples)
+
+
+def percentile(samples: Sequence[float], percent: float) -> float:
+    """Give a percentile by the nearest rank."""
+    ordered = sorted(samples)
+    return ordered[min(len(ordered) - 1, max(0, round(percent / 100 * len(ordered) + 0.5) - 1))]
