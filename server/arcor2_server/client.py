@@ -1,0 +1,152 @@
+"""One connected client: who it is, and what waits to be sent to it."""
+
+import asyncio
+import enum
+import itertools
+import time
+from collections import deque
+from typing import Final, Protocol
+
+import structlog
+
+from arcor2_hw.data.role import Role
+from arcor2_server.settings import ServerSettings
+
+log = structlog.get_logger(__name__)
+_numbers = itertools.count(1)
+
+
+class CloseCode(enum.IntEnum):
+    """Why the server closes a connection (RFC 6455 section 7.4; 4000 and above are ours)."""
+
+    GOING_AWAY = 1012
+    """The server ends."""
+    TOO_BIG = 1009
+    """A message was longer than can be drained."""
+    TOO_SLOW = 4008
+    """The client did not take what was sent to it."""
+
+
+class Wire(Protocol):
+    """What a client needs of its connection."""
+
+    async def send(self, message: bytes) -> None:
+        """Send one text message; returns when the connection takes more. ConnectionError when it is closed."""
+
+    async def ping(self) -> None:
+        """Return when the other side has answered a ping."""
+
+    async def close(self, code: int, reason: str) -> None:
+        """Send a close frame and end the connection."""
+
+    def abort(self) -> None:
+        """Drop the connection at once."""
+
+
+ABORT_AFTER: Final = 1.0
+"""Seconds a close frame may take to get out before the connection is dropped."""
+
+
+class Client:
+    """A connection. Messages leave in the order in which they were put; of a stream only the newest waits."""
+
+    def __init__(self, wire: Wire, settings: ServerSettings) -> None:
+        self.number = next(_numbers)
+        self.user: str | None = None
+        self.role: Role = settings.default_role
+        self._wire = wire
+        self._settings = settings
+        self._waiting: deque[bytes | str] = deque()  # a str stands for the newest message of that stream
+        self._newest: dict[str, bytes] = {}
+        self._bytes = 0
+        self._wake = asyncio.Event()
+        self._sending_since: float | None = None
+        self._closing: tuple[int, str] | None = None
+
+    def __repr__(self) -> str:
+        return f"<Client {self.number} {self.user or 'not logged in'}>"
+
+    @property
+    def closed(self) -> bool:
+        """Tell whether nothing more will be sent."""
+        return self._closing is not None
+
+    def put(self, message: bytes) -> None:
+        """Queue an encoded message; a client that lags too far behind is closed instead."""
+        if self._closing is not None:
+            return
+        self._waiting.append(message)
+        self._bytes += len(message)
+        if len(self._waiting) > 1 and self._lagging():
+            self.close(CloseCode.TOO_SLOW, "too slow: messages were not taken")
+        self._wake.set()
+
+    def put_newest(self, stream: str, message: bytes) -> None:
+        """Queue the newest message of a stream in place of the one that still waits."""
+        if self._closing is not None:
+            return
+        previous = self._newest.get(stream)
+        self._newest[stream] = message
+        if previous is None:
+            self._waiting.append(stream)
+            self._bytes += len(message)
+        else:
+            self._bytes += len(message) - len(previous)
+        if len(self._waiting) > 1 and self._lagging():
+            self.close(CloseCode.TOO_SLOW, "too slow: messages were not taken")
+        self._wake.set()
+
+    def _lagging(self) -> bool:
+        limits = self._settings
+        stuck = self._sending_since is not None and time.monotonic() - self._sending_since > limits.outgoing_age
+        return stuck or self._bytes > limits.outgoing_bytes or len(self._waiting) > limits.outgoing_messages
+
+    def close(self, code: int, reason: str) -> None:
+        """End the connection; what waits is dropped."""
+        if self._closing is not None:
+            return
+        self._closing = (code, reason)
+        self._waiting.clear()
+        self._newest.clear()
+        self._bytes = 0
+        self._wake.set()
+        if self._sending_since is not None:
+            # The writer hangs in a full connection: no close frame gets through either.
+            asyncio.get_running_loop().call_later(ABORT_AFTER, self._wire.abort)
+
+    async def ping(self, within: float) -> bool:
+        """Tell whether the other side answers a ping within that many seconds."""
+        try:
+            async with asyncio.timeout(within):
+                await self._wire.ping()
+        except (TimeoutError, ConnectionError):
+            return False
+        return True
+
+    async def write(self) -> None:
+        """Send what is queued until the connection ends. Runs as a task of its own."""
+        waiting, newest = self._waiting, self._newest
+        try:
+            while True:
+                while waiting:
+                    item = waiting.popleft()
+                    message = newest.pop(item) if isinstance(item, str) else item
+                    self._sending_since = time.monotonic()
+                    await self._wire.send(message)
+                    self._sending_since = None
+                    self._bytes = max(0, self._bytes - len(message))
+                if self._closing is not None:
+                    await self._close_wire(*self._closing)
+                    return
+                self._wake.clear()
+                await self._wake.wait()
+        except ConnectionError:
+            self._closing = self._closing or (1006, "connection lost")
+
+    async def _close_wire(self, code: int, reason: str) -> None:
+        log.info("client closed", client=self.number, user=self.user, code=code, reason=reason)
+        try:
+            async with asyncio.timeout(ABORT_AFTER):
+                await self._wire.close(code, reason)
+        except TimeoutError:
+            self._wire.abort()

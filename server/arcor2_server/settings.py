@@ -1,0 +1,100 @@
+"""Settings of the server: where it listens, where it keeps data, its limits; from the command line and environment."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final, Self
+
+import msgspec
+
+from arcor2_hw.data.role import Role
+from arcor2_hw.exceptions import InvalidData
+
+MIB: Final = 1024 * 1024
+
+
+class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
+    """Everything that can be set; times in seconds, sizes in bytes."""
+
+    data_dir: Path
+    host: str = "127.0.0.1"
+    port: int = 6789
+    database_url: str = ""
+    """SQLAlchemy URL of an asynchronous driver; empty: SQLite in the data directory."""
+    lock_timeout: float = 300.0
+    """Locks of a user who left are released after this time."""
+    lock_retries: int = 13
+    lock_retry_wait: float = 0.15
+    streaming_period: float = 0.1
+    history_limit: int = 1000
+    """Steps of undo that the journal keeps."""
+    default_role: Role = Role.PROGRAMMER
+    """Role of a client that has not shown another one (nobody can show one before there are accounts)."""
+    served_size: int = 16 * MIB
+    drained_size: int = 32 * MIB
+    requests_in_flight: int = 256
+    """Requests of one client that are worked on at once; further ones wait unread."""
+    outgoing_bytes: int = 64 * MIB
+    outgoing_messages: int = 20_000
+    outgoing_age: float = 10.0
+    """A client that takes nothing for so long is closed, as is one with more than the two numbers above waiting."""
+    ping_interval: float = 20.0
+
+    @property
+    def documents_database(self) -> Path:
+        """Give the file of the documents when they are in SQLite."""
+        return self.data_dir / "documents.sqlite"
+
+    @property
+    def journal_database(self) -> Path:
+        """Give the file of the journal of the open document."""
+        return self.data_dir / "journal.sqlite"
+
+    @property
+    def packages_dir(self) -> Path:
+        """Give the directory of execution packages."""
+        return self.data_dir / "packages"
+
+    @classmethod
+    def from_environment(cls, environment: Mapping[str, str] = os.environ, **given: Any) -> Self:
+        """Take what is not given from the environment (docs/protocol.md names the variables).
+
+        Raises InvalidData naming the variable whose value makes no sense.
+        """
+        values: dict[str, Any] = {}
+        types = {field.name: field.type for field in msgspec.structs.fields(cls)}
+        for variable, name in _VARIABLES.items():
+            if (text := environment.get(variable)) is None or name in given:
+                continue
+            try:
+                values[name] = msgspec.convert(text, types[name], strict=False)
+            except msgspec.ValidationError as error:
+                raise InvalidData(f"{variable}={text!r}: {error}") from None
+        values.update((name, value) for name, value in given.items() if value is not None)
+        if values.get("streaming_period", 1) <= 0:
+            values["streaming_period"] = 0.1
+        if "data_dir" not in values:
+            values["data_dir"] = default_data_dir(environment)
+        return cls(**values)
+
+
+_VARIABLES: Final = {
+    "ARCOR2_ARSERVER_PORT": "port",
+    "ARCOR2_ARSERVER_LOCK_TIMEOUT": "lock_timeout",
+    "ARCOR2_ARSERVER_LOCK_RETRIES": "lock_retries",
+    "ARCOR2_ARSERVER_LOCK_RETRY_WAIT": "lock_retry_wait",
+    "ARCOR2_STREAMING_PERIOD": "streaming_period",
+    "ARCOR2_HW_HOST": "host",
+    "ARCOR2_HW_DATABASE_URL": "database_url",
+    "ARCOR2_HW_HISTORY_LIMIT": "history_limit",
+    "ARCOR2_HW_OUTGOING_BYTES": "outgoing_bytes",
+    "ARCOR2_HW_OUTGOING_AGE": "outgoing_age",
+    "ARCOR2_HW_PING_INTERVAL": "ping_interval",
+}
+
+
+def default_data_dir(environment: Mapping[str, str] = os.environ) -> Path:
+    """Give the user's data directory (XDG base directory specification) with our own folder in it."""
+    base = environment.get("XDG_DATA_HOME") or ""
+    root = Path(base) if base.startswith("/") else Path.home() / ".local" / "share"
+    return root / "arcor2-hw"

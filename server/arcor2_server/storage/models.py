@@ -1,0 +1,68 @@
+"""The tables. A document is kept whole as JSON; what lists and look-ups need stands in columns beside it."""
+
+from sqlalchemy import Boolean, ForeignKey, LargeBinary, String, Text
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+
+
+class Base(DeclarativeBase):
+    """The metadata that migrations are compared with."""
+
+
+class SceneRow(Base):
+    """A saved scene."""
+
+    __tablename__ = "scene"
+
+    id: Mapped[str] = mapped_column(String(255), primary_key=True)
+    name: Mapped[str] = mapped_column(Text, index=True)
+    description: Mapped[str] = mapped_column(Text, default="")
+    created: Mapped[str] = mapped_column(String(40))
+    modified: Mapped[str] = mapped_column(String(40))
+    document: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class ProjectRow(Base):
+    """A saved project. Its scene may be deleted under it by other means than ours, hence no foreign key."""
+
+    __tablename__ = "project"
+
+    id: Mapped[str] = mapped_column(String(255), primary_key=True)
+    scene_id: Mapped[str] = mapped_column(String(255), index=True)
+    name: Mapped[str] = mapped_column(Text, index=True)
+    description: Mapped[str] = mapped_column(Text, default="")
+    has_logic: Mapped[bool] = mapped_column(Boolean, default=True)
+    created: Mapped[str] = mapped_column(String(40))
+    modified: Mapped[str] = mapped_column(String(40))
+    document: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class ProjectSourceRow(Base):
+    """The script of a project that has no logic of its own."""
+
+    __tablename__ = "project_source"
+
+    id: Mapped[str] = mapped_column(ForeignKey("project.id", ondelete="CASCADE"), primary_key=True)
+    script: Mapped[str] = mapped_column(Text)
+
+
+class ObjectTypeRow(Base):
+    """An uploaded object type: its whole module. `model_kind` tells that the model of the same id belongs to it."""
+
+    __tablename__ = "object_type"
+
+    id: Mapped[str] = mapped_column(String(255), primary_key=True)
+    description: Mapped[str | None] = mapped_column(Text)
+    source: Mapped[str] = mapped_column(Text)
+    model_kind: Mapped[str | None] = mapped_column(String(20))
+    created: Mapped[str] = mapped_column(String(40))
+    modified: Mapped[str] = mapped_column(String(40))
+
+
+class ModelRow(Base):
+    """A collision model; one per id."""
+
+    __tablename__ = "model"
+
+    id: Mapped[str] = mapped_column(String(255), primary_key=True)
+    kind: Mapped[str] = mapped_column(String(20))
+    document: Mapped[bytes] = mapped_column(LargeBinary)

@@ -1,0 +1,90 @@
+"""Who is logged in at which connection, and what happens to the locks of one who left."""
+
+import asyncio
+from typing import Final
+
+import structlog
+
+from arcor2_hw.data.events import Event, LockData
+from arcor2_server.client import Client
+from arcor2_server.hub import Hub
+from arcor2_server.locks import Locks
+from arcor2_server.rpc.registry import RequestRefused, make_event
+from arcor2_server.settings import ServerSettings
+
+log = structlog.get_logger(__name__)
+
+PONG_WITHIN: Final = 1.0
+"""Seconds in which the other connection of a name has to answer to keep it (protocol, section 3)."""
+
+
+class Users:
+    """Names of people, each at one connection."""
+
+    def __init__(self, hub: Hub, locks: Locks, settings: ServerSettings) -> None:
+        self._hub = hub
+        self._locks = locks
+        self._timeout = settings.lock_timeout
+        self._clients: dict[str, Client] = {}
+        self._releases: dict[str, asyncio.TimerHandle] = {}
+
+    def client_of(self, user: str) -> Client | None:
+        """Give the connection of a user."""
+        return self._clients.get(user)
+
+    def names(self) -> list[str]:
+        """Give who is logged in."""
+        return list(self._clients)
+
+    async def register(self, client: Client, name: str) -> list[Event]:
+        """Log in; gives the events that tell this connection alone who holds which locks.
+
+        RequestRefused for an empty name, and for one whose other connection is alive.
+        """
+        if not name:
+            raise RequestRefused("The user name must not be empty.")
+        holder = self._clients.get(name)
+        if holder is not None and holder is not client:
+            if await holder.ping(PONG_WITHIN):
+                raise RequestRefused(f"The user name {name!r} is already in use.")
+            if self._clients.get(name) not in (holder, None):
+                raise RequestRefused(f"The user name {name!r} is already in use.")
+            holder.user = None
+        if client.user is not None and client.user != name:
+            self._leave(client.user)
+        self._clients[name] = client
+        client.user = name
+        if (handle := self._releases.pop(name, None)) is not None:
+            handle.cancel()
+        log.info("user registered", user=name, client=client.number)
+        events = [
+            make_event("ObjectsLocked", LockData(ids, owner))
+            for owner, ids in self._locks.announced().items()
+            if owner != name
+        ]
+        if own := self._locks.written_by(name):
+            events.append(make_event("ObjectsLocked", LockData(own, name)))
+        return events
+
+    def disconnected(self, client: Client) -> None:
+        """Log out the user of a connection that is gone; his locks are released after the time-out."""
+        if client.user is not None and self._clients.get(client.user) is client:
+            self._leave(client.user)
+
+    def _leave(self, name: str) -> None:
+        del self._clients[name]
+        if (handle := self._releases.pop(name, None)) is not None:
+            handle.cancel()
+        self._releases[name] = asyncio.get_running_loop().call_later(self._timeout, self._release, name)
+
+    def _release(self, name: str) -> None:
+        self._releases.pop(name, None)
+        if ids := self._locks.release_all(name):
+            log.info("locks released after time-out", user=name, ids=ids)
+            self._hub.broadcast(make_event("ObjectsUnlocked", LockData(ids, name)))
+
+    def close(self) -> None:
+        """Cancel the pending releases."""
+        for handle in self._releases.values():
+            handle.cancel()
+        self._releases.clear()
