@@ -2,7 +2,7 @@
 .PHONY: run test bench lint types layers check lock clean
 .DEFAULT_GOAL := run
 
-PYTHON ?= python3.11
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
@@ -33,7 +33,7 @@ layers: .make/dev
 # A stamp per set of wheels: a set is installed once, and again only when its lock or the project's own metadata changes.
 .make/venv:
 	@mkdir -p .make
-	$(PYTHON) -m venv $(VENV)
+	@$(PYTHON) -m venv $(VENV) || { test "$$(id -u)" = 0 && apt-get update -qq && apt-get install -y -qq python3-venv && $(PYTHON) -m venv $(VENV); }
 	@touch $@
 
 .make/run: requirements/run.txt pyproject.toml | .make/venv

@@ -42,6 +42,10 @@ class Display:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Leave the terminal as it is; harmless when done before."""
         if self._live is not None:
             self._live.update(self._view())
             self._live.stop()

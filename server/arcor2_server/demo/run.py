@@ -153,6 +153,13 @@ class Demo:
         server = self._child("server", python_module("arcor2_server.cli.main", *server_arguments))
         world_at, url = await asyncio.gather(world.start_json(), server.start())
         self._display.addresses(url, {"robot": robot, "tester": tester_at["modbus"], "reader": reader_at["port"]})
+        (self._data_dir / "demo.json").write_bytes(
+            msgspec.json.format(
+                msgspec.json.encode(
+                    {"url": url, "robot": ur_at, "tester": tester_at, "reader": reader_at, "world": world_at}
+                )
+            )
+        )
         tester_host, _, tester_port = str(tester_at["modbus"]).rpartition(":")
         addresses: dict[str, Scalar] = {
             "robot": robot,

@@ -1,0 +1,184 @@
+"""The whole workplace for tests: fakes, small world and server, each a process, and hands on all of them."""
+
+import asyncio
+import contextlib
+import os
+import signal
+import time
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import psutil
+
+from arcor2_hw.client import Client
+from arcor2_hw.data import rpc
+from arcor2_hw.data.events import Event, SceneStateEnum
+from arcor2_hw.data.project import Project
+from arcor2_hw.data.scene import Scene
+from arcor2_server.demo.processes import Child, python_module
+from arcor2_server.demo.run import free_loopback_address
+from arcor2_server.demo.workplace import Creation, Scalar, Workplace, layout_file, load
+
+
+async def until(ask: Callable[[], Any], what: str, timeout: float = 10.0) -> Any:
+    """Ask again and again until the answer is true; fails naming what was waited for."""
+    end = time.monotonic() + timeout
+    while True:
+        answer = ask()
+        if asyncio.iscoroutine(answer):
+            answer = await answer
+        if answer:
+            return answer
+        assert time.monotonic() < end, f"not within {timeout} s: {what}"
+        await asyncio.sleep(0.02)
+
+
+class Cell:
+    """Everything that runs. `tell` speaks to a fake, `client` connects to the server."""
+
+    def __init__(self, directory: Path) -> None:
+        self.directory = directory
+        self.data_dir = directory / "data"
+        self.logs = directory / "logs"
+        self.logs.mkdir(parents=True, exist_ok=True)
+        self.at: dict[str, dict[str, Any]] = {}
+        self.url = ""
+        self.children: dict[str, Child] = {}
+        self._exit = contextlib.AsyncExitStack()
+        self.robot_host = free_loopback_address()
+
+    # ------------------------------------------------------------------------------------------------ processes
+    async def _start(self, name: str, command: list[str]) -> str:
+        child = Child(name, command, self.logs / f"{name}-{len(self.children)}.log")
+        self.children[name] = child
+        return await child.start()
+
+    async def start_fake(self, name: str, module: str, *arguments: str) -> None:
+        self.at[name] = msgspec.json.decode(
+            await self._start(name, python_module(module, *arguments, "--control", "127.0.0.1:0"))
+        )
+
+    async def start_robot(self) -> None:
+        await self.start_fake("robot", "arcor2_fakes.ur", "--host", self.robot_host)
+
+    async def start_devices(self) -> None:
+        await asyncio.gather(
+            self.start_robot(),
+            self.start_fake("tester", "arcor2_fakes.functional_tester"),
+            self.start_fake("reader", "arcor2_fakes.barcode_reader"),
+        )
+
+    async def start_world(self, boards: int, seed: int) -> None:
+        await self.start_fake(
+            "world",
+            "arcor2_fakes.cell",
+            *("--layout", str(layout_file())),
+            *("--robot", self.at["robot"]["control"]),
+            *("--tester", self.at["tester"]["control"]),
+            *("--reader", self.at["reader"]["control"]),
+            *("--boards", str(boards), "--seed", str(seed)),
+        )
+
+    async def start_server(self, port: int = 0) -> None:
+        self.url = await self._start(
+            "server",
+            python_module("arcor2_server.cli.main", "serve", "--port", str(port), "--data-dir", str(self.data_dir)),
+        )
+
+    async def kill(self, name: str) -> None:
+        """End a process as a power cut would."""
+        process = self.children[name]._process
+        assert process is not None
+        process.kill()
+        await process.wait()
+        await self.children[name].stop()
+
+    def hosts(self) -> list[psutil.Process]:
+        """The cell hosts below the server, youngest last."""
+        server = self.children["server"]._process
+        assert server is not None
+        with contextlib.suppress(psutil.NoSuchProcess):
+            found = [p for p in psutil.Process(server.pid).children() if "arcor2_hw.runtime" in " ".join(p.cmdline())]
+            return sorted(found, key=lambda p: p.create_time())
+        return []
+
+    async def stop(self) -> None:
+        await self._exit.aclose()
+        for name in reversed(self.children):
+            await self.children[name].stop()
+
+    # ------------------------------------------------------------------------------------------------ hands
+    async def client(self, name: str) -> Client:
+        """A connected, registered client that is closed with the cell."""
+        return await self._exit.enter_async_context(Client(self.url, name))
+
+    async def tell(self, name: str, do: str, **arguments: Any) -> Any:
+        """Tell a fake over its control channel."""
+        host, _, port = self.at[name]["control"].rpartition(":")
+        reader, writer = await asyncio.open_connection(host, int(port), limit=1 << 22)
+        try:
+            writer.write(msgspec.json.encode({"id": 1, "do": do, **arguments}) + b"\n")
+            answer = msgspec.json.decode(await asyncio.wait_for(reader.readline(), 5))
+        finally:
+            writer.close()
+            with contextlib.suppress(OSError):
+                await writer.wait_closed()
+        assert answer["ok"], f"{name} refuses {do}: {answer}"
+        return answer.get("data")
+
+    def addresses(self) -> dict[str, Scalar]:
+        host, _, port = self.at["tester"]["modbus"].rpartition(":")
+        return {
+            "robot": self.robot_host,
+            "tester_host": host,
+            "tester_port": int(port),
+            "reader": self.at["reader"]["port"],
+        }
+
+    async def open(self, client: Client, boards: int = 2, workplace: Workplace | None = None) -> tuple[Scene, Project]:
+        """Open the demo's scene and project, made where they are missing."""
+        creation = Creation(client, workplace or load(), self.addresses())
+        scene = await creation.open_scene()
+        return scene, await creation.open_project(scene, {"boards": boards})
+
+    async def build(self, client: Client, project: Project) -> str:
+        """Build the open project and close it; gives the package's id."""
+        built = await client.call("BuildProject", rpc.BuildProjectArgs(project.id, project.name))
+        await client.call("CloseProject")
+        package_id: str = built.package_id
+        return package_id
+
+
+async def scene_state(client: Client, wanted: SceneStateEnum, timeout: float = 15.0) -> Event:
+    """The next SceneState with that state."""
+    while True:
+        event = await client.next_event("SceneState", timeout=timeout)
+        if event.data.state is wanted:
+            return event
+
+
+def alive(pid: int) -> bool:
+    """Whether a process lives (a zombie does not)."""
+    try:
+        return psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False
+
+
+def kill(pid: int) -> None:
+    os.kill(pid, signal.SIGKILL)
+
+
+@contextlib.asynccontextmanager
+async def running_cell(directory: Path, *, boards: int = 0, seed: int = 0) -> AsyncIterator[Cell]:
+    """All fakes and the server; with boards also the small world."""
+    cell = Cell(directory)
+    try:
+        await asyncio.gather(cell.start_devices(), cell.start_server())
+        if boards:
+            await cell.start_world(boards, seed)
+        yield cell
+    finally:
+        await cell.stop()
