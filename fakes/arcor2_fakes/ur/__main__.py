@@ -1,0 +1,108 @@
+"""Runs the fake controller: ``python -m arcor2_fakes.ur --host 127.0.1.1``."""
+
+import argparse
+import gc
+import logging
+import re
+import sys
+
+from arcor2_fakes.control import ControlServer, parse_address
+from arcor2_fakes.process import announce, run, until_told_to_end
+from arcor2_fakes.ur.controller import Controller
+from arcor2_fakes.ur.dashboard import Dashboard
+from arcor2_fakes.ur.kinematics import MODELS
+from arcor2_fakes.ur.rtde_server import RtdeServer
+from arcor2_fakes.ur.script_port import ScriptPort
+from arcor2_fakes.ur.supervision import register
+from arcor2_fakes.ur.timer import PeriodicTimer
+from arcor2_fakes.ur.urscript import ForeignProgram
+from arcor2_fakes.wire import TcpWire, register_faults
+
+log = logging.getLogger("main")
+
+_POLYSCOPE_X = 10  # has no dashboard server
+_MOST_AT_ONCE = 250  # control cycles made up for after the process was held up
+
+
+def _version(text: str) -> tuple[int, ...]:
+    if not re.fullmatch(r"\d+\.\d+(\.\d+){0,2}", text):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a version such as 5.25")
+    return (*map(int, text.split(".")), 0, 0)[:4]
+
+
+def _address(text: str) -> tuple[str, int]:
+    try:
+        return parse_address(text)
+    except ValueError as e:
+        raise argparse.ArgumentTypeError(str(e)) from e
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not value > 0.0:
+        raise argparse.ArgumentTypeError("must be above zero")
+    return value
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m arcor2_fakes.ur", description="A fake UR e-series controller.")
+    add = parser.add_argument
+    add("--host", default="127.0.0.1", help="address of all ports; each fake needs its own, for clients fix the ports")
+    add("--rtde-port", type=int, default=30004)
+    add("--script-port", type=int, default=30003)
+    add("--dashboard-port", type=int, default=29999)
+    add("--control", type=_address, default=("127.0.0.1", 0), metavar="HOST:PORT", help="control channel, port 0: free")
+    add("--model", choices=MODELS, default="ur5e")
+    add("--controller-version", type=_version, default="5.25", help="5.x; 10.x has no dashboard server")
+    add("--frequency", type=_positive, default=500.0, help="control cycles and RTDE samples per second")
+    add("--time-scale", type=_positive, default=1.0, help="factor on booting, power-on, brake release and unlock wait")
+    add("--powered-off", action="store_true", help="start without power on the arm")
+    return parser.parse_args()
+
+
+async def _serve(options: argparse.Namespace) -> None:
+    controller = Controller(options.model, options.controller_version, options.frequency, options.time_scale)
+    controller.load_program = lambda name: ForeignProgram(controller, name)
+    if options.powered_off:
+        controller.power_off()
+    rtde, script, dashboard = RtdeServer(controller), ScriptPort(controller), Dashboard(controller)
+    wires = {
+        "rtde": TcpWire("rtde", options.host, options.rtde_port, rtde.opened),
+        "script": TcpWire("script", options.host, options.script_port, script.opened),
+    }
+    if options.controller_version[0] < _POLYSCOPE_X:
+        wires["dashboard"] = TcpWire("dashboard", options.host, options.dashboard_port, dashboard.opened)
+    control = ControlServer(*options.control)
+    register_faults(control, dict(wires))
+    register(control, controller, rtde, script, dashboard)
+
+    def tick(periods: int) -> None:
+        if periods > _MOST_AT_ONCE:
+            log.warning("held up for %.2f s", periods * controller.period)
+        for _ in range(min(periods, _MOST_AT_ONCE)):
+            controller.tick()
+            rtde.tick()
+
+    timer = PeriodicTimer(controller.period, tick)
+    try:
+        addresses = {name: await wire.listen() for name, wire in wires.items()}
+        addresses["control"] = await control.start()
+        timer.start()
+        gc.freeze()
+        announce(host=options.host, **{"dashboard": None, **addresses})
+        await until_told_to_end()
+    finally:
+        timer.close()
+        for wire in wires.values():
+            wire.close()
+        await control.close()
+
+
+def main() -> int:
+    """Runs until told to end; the exit status."""
+    options = _arguments()
+    return run(lambda: _serve(options), "ur")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

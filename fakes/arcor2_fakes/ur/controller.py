@@ -1,0 +1,356 @@
+"""The controller: power, safety, the program that runs, registers and I/O, advanced one control cycle at a time."""
+
+import logging
+import math
+import time
+from collections import deque
+from collections.abc import Callable, Generator
+from typing import Any
+
+from arcor2_fakes.ur.kinematics import Chain
+from arcor2_fakes.ur.motion import Arm, MotionRefused
+from arcor2_fakes.ur.states import MAY_MOVE, SAFETY_BITS, JointMode, RobotMode, Runtime, SafetyMode
+
+log = logging.getLogger("controller")
+
+HOME = (0.0, -math.pi / 2, math.pi / 2, -math.pi / 2, -math.pi / 2, 0.0)
+UNLOCK_WAIT = 5.0  # s after a protective stop before it may be unlocked
+REDUCED_JOINT_SPEED = 1.0  # rad/s
+_EMERGENCY_DECELERATION = 24.0  # rad/s^2
+_POWER_ON_TIME = 4.0  # s
+_BRAKE_RELEASE_TIME = 3.0  # s
+_KEPT = 200  # commands and stops remembered for the truth
+
+Steps = Generator[None, None, None]
+"""A running piece of program: each step ends where the real one waits for the next control cycle."""
+
+
+class Refused(Exception):
+    """The controller does not do that in its present state; the text is the dashboard's answer."""
+
+
+class Program:
+    """Something that plays on the controller."""
+
+    name = "program"
+    register_offset: int | None = None
+    """Where ur_rtde's command registers start; None for a program that has none."""
+
+    def run(self) -> Steps:
+        """The program's main thread; it ends when this does."""
+        raise NotImplementedError
+
+    def ended(self) -> None:
+        """Called once when the program is over, whatever ended it."""
+
+
+class Controller:
+    """State shared by the ports. Everything runs in the event loop's thread; `tick` is one control cycle."""
+
+    def __init__(self, model: str, version: tuple[int, ...], frequency: float, time_scale: float = 1.0) -> None:
+        self.model, self.version, self.frequency = model, version, frequency
+        self.period = 1.0 / frequency
+        self.chain = Chain(model)
+        self.arm = Arm(self.chain, HOME)
+        self.time_scale = time_scale
+        self.cycles = 0
+        self.robot_mode = RobotMode.RUNNING
+        self.safety = SafetyMode.NORMAL
+        self.runtime = Runtime.STOPPED
+        self.remote = True
+        self.operational_mode = "AUTOMATIC"
+        self.program: Program | None = None
+        self.loaded: str | None = None
+        self.load_program: Callable[[str], Program] | None = None
+        self.freedrive = False
+        self.contact = False
+        self.payload, self.payload_cog, self.payload_inertia = 0.0, (0.0, 0.0, 0.0), (0.0,) * 6
+        self.tcp_offset: tuple[float, ...] = (0.0,) * 6
+        self.input_ints, self.input_doubles = [0] * 48, [0.0] * 48
+        self.output_ints, self.output_doubles = [0] * 48, [0.0] * 48
+        self.input_bits, self.output_bits = 0, 0  # 128 bits each
+        self.digital_inputs, self.digital_outputs = 0, 0  # 0-7 standard, 8-15 configurable, 16-17 tool
+        self.analog_outputs = [0.0, 0.0]
+        self.commands: deque[dict[str, Any]] = deque(maxlen=_KEPT)
+        self.stops: deque[dict[str, Any]] = deque(maxlen=_KEPT)
+        self.watchdog_trips = 0
+        self.programs_killed = 0
+        self.changed: Callable[[], None] = lambda: None
+        self._steps: Steps | None = None
+        self._conditions: dict[SafetyMode, bool] = dict.fromkeys(SafetyMode, False)
+        self._unlockable = 0  # cycle from which a protective stop may be unlocked
+        self._goes_on = False  # a safeguard stop paused the program: it goes on by itself
+        self._watchdog: tuple[int, float] | None = None  # input register and the longest silence
+        self._written = [0] * 48  # cycle of the last write of each integer register
+        self._due: list[tuple[int, Callable[[], None]]] = []  # (cycle, what)
+
+    # ------------------------------------------------------------------------------------------------ control cycle
+    def tick(self) -> None:
+        """One control cycle."""
+        self.cycles += 1
+        if self._due:
+            self._run_due()
+        if self._watchdog is not None:
+            self._check_watchdog()
+        runtime = self.runtime
+        if runtime is Runtime.PLAYING and self._steps is not None:
+            try:
+                next(self._steps)
+            except StopIteration:
+                self.stop_program("ended")
+            except MotionRefused as e:
+                self.protective_stop(str(e))
+        elif runtime is Runtime.STOPPING and not self.arm.busy:
+            self.runtime = Runtime.STOPPED
+        elif runtime is Runtime.PAUSING and not self.arm.moving:
+            self.runtime = Runtime.PAUSED
+        elif runtime is Runtime.RESUMING:
+            self.runtime = Runtime.PLAYING
+        if self.arm.motion is not None:
+            try:
+                self.arm.step(self.period)
+            except MotionRefused as e:
+                self.arm.halt()
+                self.protective_stop(str(e))
+        elif self.arm.rate != (0.0 if self.arm.held else self.arm.slider):
+            self.arm.step(self.period)
+
+    def after(self, seconds: float, do: Callable[[], None]) -> None:
+        """Does something so much later, in the controller's time and by `time_scale`."""
+        self._due.append((self.cycles + max(1, round(seconds * self.time_scale * self.frequency)), do))
+
+    def _run_due(self) -> None:
+        due = [do for cycle, do in self._due if cycle <= self.cycles]
+        if due:
+            self._due = [entry for entry in self._due if entry[0] > self.cycles]
+            for do in due:
+                do()
+            self.changed()
+
+    # -------------------------------------------------------------------------------------------------------- safety
+    @property
+    def safety_bits(self) -> int:
+        """RTDE safety_status_bits."""
+        return SAFETY_BITS[self.safety]
+
+    @property
+    def robot_bits(self) -> int:
+        """RTDE robot_status_bits: power on, program running, teach button."""
+        powered = self.robot_mode >= RobotMode.POWER_ON
+        return int(powered) | int(self.program is not None) << 1 | int(self.freedrive) << 2
+
+    @property
+    def joint_mode(self) -> JointMode:
+        """RTDE joint_mode, the same for all joints."""
+        if self.safety is SafetyMode.FAULT:
+            return JointMode.FAULT
+        if self.safety is SafetyMode.VIOLATION:
+            return JointMode.VIOLATION
+        if self.robot_mode is RobotMode.RUNNING:
+            return JointMode.BACKDRIVE if self.freedrive else JointMode.RUNNING
+        return JointMode.IDLE if self.robot_mode is RobotMode.IDLE else JointMode.POWER_OFF
+
+    def _condition(self, mode: SafetyMode, on: bool) -> None:
+        self._conditions[mode] = on
+        # The worst prevails; the numbers rise with it but for recovery.
+        rank = [m for m in SafetyMode if self._conditions[m] and m is not SafetyMode.RECOVERY]
+        before, self.safety = self.safety, max(rank, default=SafetyMode.NORMAL)
+        self.arm.speed_limit = REDUCED_JOINT_SPEED if self._conditions[SafetyMode.REDUCED] else math.pi
+        if self.safety is not before:
+            log.info("safety %s", self.safety.name)
+        self.changed()
+
+    def protective_stop(self, why: str) -> None:
+        """Stops on the path and pauses the program until a person unlocks it."""
+        log.info("protective stop: %s", why)
+        self._unlockable = self.cycles + round(UNLOCK_WAIT * self.time_scale * self.frequency)
+        self._pause(protective=True)
+        self._goes_on = False
+        self._condition(SafetyMode.PROTECTIVE_STOP, True)
+
+    def unlock_protective_stop(self) -> None:
+        """Raises `Refused` in the first seconds, with the controller's text. The program stays paused."""
+        if not self._conditions[SafetyMode.PROTECTIVE_STOP]:
+            return
+        if self.cycles < self._unlockable:
+            raise Refused(
+                "Cannot unlock protective stop until 5s after occurrence. "
+                "Always inspect cause of protective stop before unlocking"
+            )
+        self._condition(SafetyMode.PROTECTIVE_STOP, False)
+
+    def safeguard_stop(self, on: bool) -> None:
+        """The door. Pauses a playing program, which goes on by itself when the door closes: there is no reset input."""
+        if on and not self._conditions[SafetyMode.SAFEGUARD_STOP]:
+            self._goes_on = self.runtime in (Runtime.PLAYING, Runtime.RESUMING)
+            self._pause()
+        self._condition(SafetyMode.SAFEGUARD_STOP, on)
+        if not on and self._goes_on and self.safety in MAY_MOVE:
+            self._resume()
+        if not on and self.program is None:
+            self.arm.go_on()
+
+    def emergency_stop(self, on: bool, system: bool = False) -> None:
+        """The mushroom button. Ends the program; the arm loses power when it stands."""
+        mode = SafetyMode.SYSTEM_EMERGENCY_STOP if system else SafetyMode.ROBOT_EMERGENCY_STOP
+        if on:
+            self._cut(mode)
+        else:
+            self._condition(SafetyMode.SYSTEM_EMERGENCY_STOP, False)
+            self._condition(SafetyMode.ROBOT_EMERGENCY_STOP, False)
+
+    def fault(self, violation: bool) -> None:
+        """A violation of a safety limit, or a fault; only `restart_safety` leads out of it."""
+        self._cut(SafetyMode.VIOLATION if violation else SafetyMode.FAULT)
+
+    def reduced(self, on: bool) -> None:
+        """Reduced mode: lower limits from the next motion on."""
+        self._condition(SafetyMode.REDUCED, on)
+
+    def restart_safety(self) -> None:
+        """Clears violation and fault; the arm is left without power."""
+        for mode in (SafetyMode.VIOLATION, SafetyMode.FAULT, SafetyMode.PROTECTIVE_STOP):
+            self._condition(mode, False)
+        self.power_off()
+
+    def _cut(self, mode: SafetyMode) -> None:
+        self.stop_program(mode.name)
+        self.arm.halt(_EMERGENCY_DECELERATION)
+        self._condition(mode, True)
+        if self.robot_mode >= RobotMode.POWER_ON:
+            self._when_still(self.power_off)
+
+    def _when_still(self, do: Callable[[], None]) -> None:
+        if self.arm.moving:
+            self._due.append((self.cycles + 1, lambda: self._when_still(do)))
+        else:
+            do()
+
+    # --------------------------------------------------------------------------------------------------------- power
+    def power_on(self) -> None:
+        """From off to idle with brakes on. Raises `Refused` in an emergency stop or fault."""
+        if self.safety >= SafetyMode.SYSTEM_EMERGENCY_STOP:
+            raise Refused(f"Command is not allowed in safety mode {self.safety.name}")
+        if self.robot_mode is RobotMode.POWER_OFF:
+            self._mode(RobotMode.POWER_ON)
+            self.after(_POWER_ON_TIME, lambda: self._mode_from(RobotMode.POWER_ON, RobotMode.IDLE))
+
+    def power_off(self) -> None:
+        """Ends the program, brakes on, arm without power."""
+        self.stop_program("power off")
+        self.arm.teleport(self.arm.q)
+        self.freedrive = False
+        self._mode(RobotMode.POWER_OFF)
+
+    def brake_release(self) -> None:
+        """To running, from idle or, with the time it takes, from off. Raises `Refused`."""
+        self.power_on()
+        if self.robot_mode is RobotMode.POWER_ON:
+            self.after(_POWER_ON_TIME + _BRAKE_RELEASE_TIME, lambda: self._mode_from(RobotMode.IDLE, RobotMode.RUNNING))
+        elif self.robot_mode is RobotMode.IDLE:
+            self.after(_BRAKE_RELEASE_TIME, lambda: self._mode_from(RobotMode.IDLE, RobotMode.RUNNING))
+
+    def boot(self) -> None:
+        """The controller has just been switched on: booting, then off."""
+        self.power_off()
+        self._mode(RobotMode.BOOTING)
+        self.after(_POWER_ON_TIME, lambda: self._mode_from(RobotMode.BOOTING, RobotMode.POWER_OFF))
+
+    def _mode(self, mode: RobotMode) -> None:
+        self.robot_mode = mode
+        self.changed()
+
+    def _mode_from(self, expected: RobotMode, mode: RobotMode) -> None:
+        if self.robot_mode is expected:  # else something else came between
+            self._mode(mode)
+
+    # ------------------------------------------------------------------------------------------------------- program
+    def start_program(self, program: Program) -> None:
+        """Replaces what runs. Raises `Refused` when the arm can't move now."""
+        if self.robot_mode is not RobotMode.RUNNING or self.safety not in MAY_MOVE:
+            raise Refused(f"Command is not allowed: {self.robot_mode.name}, {self.safety.name}")
+        self.stop_program("replaced")
+        self.program, self._steps = program, program.run()
+        self.runtime = Runtime.PLAYING
+        self.arm.go_on()
+        log.info("program %s plays", program.name)
+        self.changed()
+
+    def stop_program(self, why: str) -> None:
+        """Ends the program for good; the arm decelerates. Does nothing without a program."""
+        if self.program is None:
+            return
+        log.info("program %s: %s", self.program.name, why)
+        if why != "ended":
+            self.programs_killed += 1
+        program, steps = self.program, self._steps
+        self.program, self._steps, self._watchdog, self._goes_on = None, None, None, False
+        self.freedrive = False
+        self.arm.halt()
+        if self.safety in MAY_MOVE:
+            self.arm.go_on()
+        self.runtime = Runtime.STOPPING
+        if steps is not None:
+            steps.close()
+        program.ended()
+        self.changed()
+
+    def pause_program(self) -> None:
+        """Pauses on the path. Raises `Refused` when nothing plays."""
+        if self.runtime is not Runtime.PLAYING:
+            raise Refused("Failed to execute: pause")
+        self._pause()
+
+    def play_program(self) -> None:
+        """Continues a paused program, or starts the loaded one. Raises `Refused`."""
+        if self.robot_mode is not RobotMode.RUNNING or self.safety not in MAY_MOVE:
+            raise Refused("Failed to execute: play")
+        if self.runtime in (Runtime.PAUSED, Runtime.PAUSING):
+            self._resume()
+        elif self.program is None and self.loaded is not None and self.load_program is not None:
+            self.start_program(self.load_program(self.loaded))
+        elif self.program is None:
+            raise Refused("Failed to execute: play")
+
+    def _pause(self, protective: bool = False) -> None:
+        self.arm.hold(protective)
+        if self.runtime in (Runtime.PLAYING, Runtime.RESUMING):
+            self.runtime = Runtime.PAUSING
+
+    def _resume(self) -> None:
+        self._goes_on = False
+        self.arm.go_on()
+        if self.program is not None:
+            self.runtime = Runtime.RESUMING
+        self.changed()
+
+    # ---------------------------------------------------------------------------------------------------- watchdog
+    def integer_written(self, index: int) -> None:
+        """An RTDE client has just written an integer input register."""
+        self._written[index] = self.cycles
+
+    def set_watchdog(self, register: int, minimum_frequency: float) -> None:
+        """Stops the program when the register is written less often than that; 0 Hz disarms."""
+        self._watchdog = (register, 1.0 / minimum_frequency) if minimum_frequency > 0.0 else None
+        self._written[register] = self.cycles
+
+    @property
+    def watchdog(self) -> float | None:
+        """The longest silence it tolerates in s, or None when it is not armed."""
+        return None if self._watchdog is None else self._watchdog[1]
+
+    def _check_watchdog(self) -> None:
+        assert self._watchdog is not None
+        register, silence = self._watchdog
+        if (self.cycles - self._written[register]) * self.period > silence:
+            self.watchdog_trips += 1
+            self.stop_program("watchdog")
+
+    # --------------------------------------------------------------------------------------------------- what happened
+    def note_command(self, kind: str, **details: Any) -> None:
+        """Remembers a motion command for the truth."""
+        self.commands.append({"t": time.monotonic(), "kind": kind, **details})
+
+    def note_stop(self, via: str, code: int | str) -> None:
+        """Remembers a frame that asks for a stop, at its arrival."""
+        self.stops.append({"t": time.monotonic(), "via": via, "code": code})

@@ -1,0 +1,320 @@
+"""How the arm moves in time: trapezoidal motions in joint and Cartesian space, velocity control, servoing, stopping.
+
+One `Arm.step` per control cycle. Motions along a path (movej, movel) are functions of a path time that runs at
+`Arm.rate`: the speed slider, a pause and a protective stop only slow that time down, so that the arm stays on its path
+and can go on.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Protocol
+
+from arcor2_fakes.ur.kinematics import Chain, Transform, compose, difference, from_pose, to_pose
+
+MAX_JOINT_SPEED = math.pi  # rad/s, UR5e data sheet: 180 degrees per second on every joint
+MAX_JOINT_ACCELERATION = 40.0  # rad/s^2, beyond what any program may ask for
+MAX_TCP_SPEED = 3.0  # m/s
+JOINT_RANGE = math.tau  # rad either way
+PROGRAM_STOP_DECELERATION = 14.0  # rad/s^2, when a program ends or a thread is killed in mid-move
+_PAUSE_TIME = 0.2  # s from full speed to rest on the path
+_PROTECTIVE_TIME = 0.08  # s, the same for a protective stop
+
+Joints = Sequence[float]
+
+
+class MotionRefused(Exception):
+    """The controller's own supervision refuses to go on; it ends in a protective stop."""
+
+
+class Motion(Protocol):
+    """What the arm is doing; `step` gives the next joint positions."""
+
+    done: bool
+    along_path: bool
+    """Whether a pause may slow it down on its path; if not, it ends by itself or by a halt."""
+
+    def step(self, arm: "Arm", dt: float, /) -> Joints:
+        """Positions after `dt` seconds of this motion's own time."""
+        ...
+
+
+class Profile:
+    """A trapezoidal (or triangular) velocity profile over `length`, at rest at both ends."""
+
+    def __init__(self, length: float, velocity: float, acceleration: float) -> None:
+        self.length = length
+        self.acceleration = acceleration
+        self.peak = min(velocity, math.sqrt(length * acceleration)) if length > 0.0 else 0.0
+        self.ramp = self.peak / acceleration
+        cruise = (length - self.peak * self.ramp) / self.peak if self.peak > 0.0 else 0.0
+        self.duration = 2.0 * self.ramp + cruise
+
+    def position(self, t: float) -> float:
+        """Distance covered after `t` seconds."""
+        if t >= self.duration:
+            return self.length
+        if t < self.ramp:
+            return 0.5 * self.acceleration * t * t
+        left = self.duration - t
+        if left < self.ramp:
+            return self.length - 0.5 * self.acceleration * left * left
+        return self.peak * (t - 0.5 * self.ramp)
+
+
+class JointMove:
+    """movej: all joints start and end together, the one with the longest way keeps the limits."""
+
+    along_path = True
+
+    def __init__(self, start: Joints, goal: Joints, velocity: float, acceleration: float) -> None:
+        self._start, self._goal = tuple(start), tuple(goal)
+        self._way = tuple(g - s for s, g in zip(start, goal, strict=True))
+        self.profile = Profile(max(map(abs, self._way)), velocity, acceleration)
+        self._t = 0.0
+        self.done = self.profile.length == 0.0
+
+    def step(self, _: "Arm", dt: float) -> Joints:
+        """Positions after `dt` seconds."""
+        self._t += dt
+        if self.done or self._t >= self.profile.duration:
+            self.done = True
+            return self._goal
+        f = self.profile.position(self._t) / self.profile.length
+        return [s + f * w for s, w in zip(self._start, self._way, strict=True)]
+
+
+class LinearMove:
+    """movel: the TCP on a straight line at the given speed, turning at an even rate."""
+
+    along_path = True
+
+    def __init__(self, arm: "Arm", goal: Transform, velocity: float, acceleration: float) -> None:
+        self._start = arm.chain.forward(arm.q)
+        self._shift, self._turn = difference(self._start, goal)
+        length = math.dist((0.0, 0.0, 0.0), self._shift)
+        if length < 1e-6:  # turning only: the limits then count in rad
+            length = math.dist((0.0, 0.0, 0.0), self._turn)
+        self.profile = Profile(length, velocity, acceleration)
+        self._t = 0.0
+        self.done = length < 1e-9
+
+    def step(self, arm: "Arm", dt: float) -> Joints:
+        """Positions after `dt` seconds. Raises `MotionRefused` in a singularity or out of reach."""
+        if self.done or dt == 0.0:
+            return arm.q
+        self._t += dt
+        self.done = self._t >= self.profile.duration
+        f = self.profile.position(self._t) / self.profile.length
+        x, y, z, origin = self._start
+        turned = compose(from_pose((0.0, 0.0, 0.0, *(f * r for r in self._turn))), (x, y, z, (0.0, 0.0, 0.0)))
+        there = (origin[0] + f * self._shift[0], origin[1] + f * self._shift[1], origin[2] + f * self._shift[2])
+        q = arm.chain.follow((turned[0], turned[1], turned[2], there), arm.q)
+        if q is None:
+            raise MotionRefused("the line leaves the reach of the arm")
+        return q
+
+
+class JointSpeed:
+    """speedj: a joint velocity reached under an acceleration and kept until something else comes."""
+
+    along_path = False
+    done = False
+
+    def __init__(self, target: Joints, acceleration: float) -> None:
+        self.target, self.acceleration = tuple(target), acceleration
+
+    def step(self, arm: "Arm", dt: float) -> Joints:
+        """Positions after `dt` seconds."""
+        return _toward(arm.qd, [v * arm.rate for v in self.target], self.acceleration, arm.q, dt)
+
+
+class LinearSpeed:
+    """speedl: a TCP velocity reached under an acceleration and kept until something else comes."""
+
+    along_path = False
+    done = False
+
+    def __init__(self, arm: "Arm", target: Sequence[float], acceleration: float) -> None:
+        self.target, self.acceleration = tuple(target), acceleration
+        self._twist = arm.twist()
+
+    def step(self, arm: "Arm", dt: float) -> Joints:
+        """Positions after `dt` seconds."""
+        gap = [t * arm.rate - v for t, v in zip(self.target, self._twist, strict=True)]
+        most = max(math.dist((0.0, 0.0, 0.0), gap[:3]), math.dist((0.0, 0.0, 0.0), gap[3:]))
+        f = min(1.0, self.acceleration * dt / most) if most > 0.0 else 0.0
+        self._twist = [v + f * g for v, g in zip(self._twist, gap, strict=True)]
+        rates = arm.chain.joint_rates(arm.q, self._twist)
+        return [a + b * dt for a, b in zip(arm.q, rates, strict=True)]
+
+
+class LinearHalt(LinearSpeed):
+    """stopl: the TCP's velocity goes to zero in its direction."""
+
+    def __init__(self, arm: "Arm", deceleration: float) -> None:
+        super().__init__(arm, (0.0,) * 6, deceleration)
+
+    def step(self, arm: "Arm", dt: float) -> Joints:
+        """Positions after `dt` seconds."""
+        q = super().step(arm, dt)
+        self.done = max(map(abs, self._twist)) < 1e-9
+        return arm.q if self.done else q
+
+
+class JointHalt:
+    """stopj: all joint velocities go to zero together."""
+
+    along_path = False
+
+    def __init__(self, arm: "Arm", deceleration: float) -> None:
+        self._deceleration = deceleration
+        self.done = not any(arm.qd)
+
+    def step(self, arm: "Arm", dt: float) -> Joints:
+        """Positions after `dt` seconds."""
+        q = _toward(arm.qd, (0.0,) * 6, self._deceleration, arm.q, dt)
+        self.done = max(abs(a - b) for a, b in zip(q, arm.q, strict=True)) < 1e-12
+        return q
+
+
+class Servo:
+    """servoj: follows a target that is renewed all the time, with the lag of the look-ahead time."""
+
+    along_path = False
+    done = False
+
+    def __init__(self, target: Joints, lookahead: float) -> None:
+        self.target, self.lookahead = tuple(target), min(0.2, max(0.03, lookahead))
+
+    def step(self, arm: "Arm", dt: float) -> Joints:
+        """Positions after `dt` seconds: a critically damped follower within the joints' limits."""
+        omega = 2.0 / self.lookahead
+        q = []
+        for a, v, target in zip(arm.q, arm.qd, self.target, strict=True):
+            pull = omega * omega * (target - a) - 2.0 * omega * v
+            v += max(-MAX_JOINT_ACCELERATION, min(MAX_JOINT_ACCELERATION, pull)) * dt
+            q.append(a + max(-MAX_JOINT_SPEED, min(MAX_JOINT_SPEED, v)) * dt)
+        return q
+
+
+class Guided:
+    """A person moves the arm by hand in freedrive: straight to a configuration, slowly."""
+
+    along_path = False
+
+    def __init__(self, start: Joints, goal: Joints, speed: float) -> None:
+        self._move = JointMove(start, goal, speed, 2.0)
+        self.done = self._move.done
+
+    def step(self, arm: "Arm", dt: float) -> Joints:
+        """Positions after `dt` seconds."""
+        q = self._move.step(arm, dt)
+        self.done = self._move.done
+        return q
+
+
+def _toward(qd: Joints, target: Joints, acceleration: float, q: Joints, dt: float) -> Joints:
+    """Joint positions one step on, the velocity vector drawn straight towards `target`."""
+    gap = [t - v for t, v in zip(target, qd, strict=True)]
+    most = max(map(abs, gap))
+    f = min(1.0, acceleration * dt / most) if most > 0.0 else 0.0
+    return [a + (v + f * g) * dt for a, v, g in zip(q, qd, gap, strict=True)]
+
+
+class Arm:
+    """Position and velocity of the six joints, and the one motion going on."""
+
+    def __init__(self, chain: Chain, q: Joints) -> None:
+        self.chain = chain
+        self.q: tuple[float, ...] = tuple(q)
+        self.qd: tuple[float, ...] = (0.0,) * 6
+        self.motion: Motion | None = None
+        self.rate = 1.0
+        """How fast path time runs now: the speed slider, or on its way to or from zero in a pause."""
+        self.slider = 1.0
+        self.held = False
+        """Path time is brought to a stand: paused, or stopped by the safety system."""
+        self.speed_limit = MAX_JOINT_SPEED
+        self._ramp = _PAUSE_TIME
+        self._pose: tuple[float, ...] | None = None
+
+    @property
+    def pose(self) -> tuple[float, ...]:
+        """The TCP as x, y, z and rotation vector."""
+        if self._pose is None:
+            self._pose = to_pose(self.chain.forward(self.q))
+        return self._pose
+
+    @property
+    def moving(self) -> bool:
+        """Whether a joint has a velocity."""
+        return any(self.qd)
+
+    @property
+    def busy(self) -> bool:
+        """Whether there is a motion that has not come to its end."""
+        return self.motion is not None
+
+    def twist(self) -> list[float]:
+        """TCP velocity in base axes."""
+        if not self.moving:
+            return [0.0] * 6
+        twist: list[float] = (self.chain.jacobian(self.q) @ self.qd).tolist()
+        return twist
+
+    def set_tcp(self, offset: Sequence[float]) -> None:
+        """Mounts another TCP."""
+        self.chain.set_tcp(offset)
+        self._pose = None
+
+    def move_joints(self, goal: Joints, velocity: float, acceleration: float) -> None:
+        """Starts a movej. Velocity and acceleration beyond the arm's own are cut, as the controller does."""
+        if max(map(abs, goal)) > JOINT_RANGE:
+            raise MotionRefused("the goal is beyond the joint limits")
+        velocity, acceleration = min(velocity, self.speed_limit), min(acceleration, MAX_JOINT_ACCELERATION)
+        self.motion = JointMove(self.q, goal, velocity, acceleration)
+
+    def move_linear(self, goal: Transform, velocity: float, acceleration: float) -> None:
+        """Starts a movel."""
+        self.motion = LinearMove(self, goal, min(velocity, MAX_TCP_SPEED), acceleration)
+
+    def halt(self, deceleration: float = PROGRAM_STOP_DECELERATION, linear: bool = False) -> None:
+        """Ends the present motion and brings the arm to rest; it will not go on afterwards."""
+        if not self.moving:
+            self.motion = None
+        else:
+            self.motion = LinearHalt(self, deceleration) if linear else JointHalt(self, deceleration)
+
+    def hold(self, protective: bool = False) -> None:
+        """Brings the arm to rest on its path; `go_on` continues. What has no path is ended."""
+        self.held = True
+        self._ramp = _PROTECTIVE_TIME if protective else _PAUSE_TIME
+        if self.motion is not None and not self.motion.along_path:
+            self.halt()
+
+    def go_on(self) -> None:
+        """Lets path time run again."""
+        self.held, self._ramp = False, _PAUSE_TIME
+
+    def teleport(self, q: Joints) -> None:
+        """Puts the arm elsewhere at rest; for a test's set-up."""
+        self.motion, self.qd, self.q, self._pose = None, (0.0,) * 6, tuple(q), None
+
+    def step(self, dt: float) -> None:
+        """One control cycle. Raises `MotionRefused` when a limit would be passed; the arm is then as before."""
+        wanted = 0.0 if self.held else self.slider
+        if self.rate != wanted:
+            change = dt / self._ramp
+            self.rate = min(wanted, self.rate + change) if self.rate < wanted else max(wanted, self.rate - change)
+        motion = self.motion
+        if motion is None:
+            return
+        q = motion.step(self, dt * self.rate if motion.along_path else dt)
+        qd = tuple([(a - b) / dt for a, b in zip(q, self.q, strict=True)])
+        if max(map(abs, qd)) > self.speed_limit * 1.05 and not isinstance(motion, JointHalt):
+            raise MotionRefused("a joint would be too fast")
+        if max(map(abs, q)) > JOINT_RANGE + 1e-9:
+            raise MotionRefused("a joint would leave its limits")
+        if motion.done:
+            self.motion, qd = None, (0.0,) * 6
+        self.q, self.qd, self._pose = tuple(q), qd, None

@@ -1,0 +1,55 @@
+"""The script port: a program comes in as text and replaces the one that plays."""
+
+import logging
+
+from arcor2_fakes.ur.control_script import ControlScript
+from arcor2_fakes.ur.controller import Controller, Program, Refused
+from arcor2_fakes.ur.urscript import Interpreter, ScriptProgram, Splitter, calls
+from arcor2_fakes.wire import Connection
+
+log = logging.getLogger("script")
+
+
+class ScriptPort:
+    """All clients of the script port."""
+
+    def __init__(self, controller: Controller) -> None:
+        self.controller = controller
+        self.scripts_taken = 0
+        self.scripts_ignored = 0
+
+    def opened(self, connection: Connection) -> None:
+        """A client has connected."""
+        splitter = Splitter()
+
+        def received(data: bytes) -> None:
+            try:
+                for kind, name, text in splitter.feed(data):
+                    self.take(kind, name, text)
+            except ValueError as e:
+                log.info("client dropped: %s", e)
+                connection.close()
+
+        connection.received = received
+
+    def take(self, kind: str, name: str, text: str) -> None:
+        """Plays a script; the port has no answer to say why it does not."""
+        if not self.controller.remote:
+            self.scripts_ignored += 1
+            log.info("not in remote control: script %s ignored", name)
+            return
+        self.scripts_taken += 1
+        if kind == "sec":  # a secondary program runs beside and takes no time
+            interpreter = Interpreter(self.controller)
+            for call in calls(text):
+                interpreter.at_once(call)
+            return
+        program: Program
+        if ControlScript.is_one(text):
+            program = ControlScript(self.controller, text)
+        else:
+            program = ScriptProgram(self.controller, name, text)
+        try:
+            self.controller.start_program(program)
+        except Refused as e:
+            log.info("script %s ignored: %s", name, e)

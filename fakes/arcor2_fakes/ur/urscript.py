@@ -1,0 +1,249 @@
+"""URScript, as far as clients send it: programs told apart, calls with literal arguments, run one after another.
+
+Not a URScript interpreter: no variables, conditions or loops. A statement it does not know is logged and passed over.
+"""
+
+import ast
+import logging
+import operator
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from arcor2_fakes.ur.controller import Controller, Program, Steps
+from arcor2_fakes.ur.kinematics import from_pose
+from arcor2_fakes.ur.motion import MotionRefused
+
+log = logging.getLogger("script")
+
+_DEFINITION = re.compile(r"^(def|sec)\s+(\w+)\s*\(\s*\)\s*:")
+MAX_SCRIPT = 4 << 20
+
+
+class Pose(tuple[float, ...]):
+    """``p[x, y, z, rx, ry, rz]``, told apart from a list of joints."""
+
+
+@dataclass(frozen=True)
+class Call:
+    """One statement: a function with its arguments."""
+
+    name: str
+    arguments: tuple[Any, ...] = ()
+    named: dict[str, Any] = field(default_factory=dict)
+
+    def get(self, name: str, position: int, default: Any) -> Any:
+        """An argument by name, else by position."""
+        if name in self.named:
+            return self.named[name]
+        return self.arguments[position] if position < len(self.arguments) else default
+
+
+_OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+}
+
+
+def _literal(node: ast.expr) -> Any:
+    """The value of a literal, of a pose, or of arithmetic on numbers (clients write offsets as sums)."""
+    if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and node.value.id == "p":
+        return Pose(_literal(node.slice))
+    if isinstance(node, ast.List | ast.Tuple):
+        return tuple(_literal(element) for element in node.elts)
+    if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
+        return _OPERATORS[type(node.op)](_literal(node.left), _literal(node.right))
+    return ast.literal_eval(node)
+
+
+def parse_call(line: str) -> Call | None:
+    """The call on a line; None if the line is none or has arguments that are not literal."""
+    try:
+        node = ast.parse(line.strip(), mode="eval").body
+        if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name):
+            return None
+        named = {k.arg: _literal(k.value) for k in node.keywords if k.arg}
+        return Call(node.func.id, tuple(_literal(a) for a in node.args), named)
+    except (SyntaxError, ValueError, TypeError, ZeroDivisionError, RecursionError):
+        return None
+
+
+def calls(text: str) -> list[Call]:
+    """The calls of a program's body in order."""
+    found = []
+    for line in text.splitlines():
+        bare = line.split("#", 1)[0].strip()
+        if not bare or bare == "end" or _DEFINITION.match(bare):
+            continue
+        call = parse_call(bare)
+        if call is None:
+            log.info("not understood: %s", bare)
+        else:
+            found.append(call)
+    return found
+
+
+class Splitter:
+    """Cuts what comes in on the script port into programs: from ``def`` or ``sec`` to ``end``, or a line by itself."""
+
+    def __init__(self) -> None:
+        self._rest = b""
+        self._lines: list[str] = []
+
+    def feed(self, data: bytes) -> Iterator[tuple[str, str, str]]:
+        """The programs completed by `data`, as (kind, name, text); kind is def, sec or line. `ValueError`: too long."""
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        if len(self._rest) + sum(map(len, self._lines)) > MAX_SCRIPT:
+            raise ValueError("the script is too long")
+        for raw in lines:
+            line = raw.decode("utf-8", "replace").rstrip("\r")
+            if self._lines:
+                self._lines.append(line)
+                if line == "end":
+                    text = "\n".join(self._lines)
+                    definition = _DEFINITION.match(text)
+                    assert definition is not None
+                    self._lines = []
+                    yield definition[1], definition[2], text
+            elif _DEFINITION.match(line):
+                self._lines = [line]
+            elif line.strip():
+                yield "line", line.strip(), line
+
+
+class Interpreter:
+    """Runs calls on the controller. Motions take their time; everything else is done at once."""
+
+    def __init__(self, controller: Controller) -> None:
+        self.controller = controller
+
+    def run(self, statements: Sequence[Call]) -> Steps:
+        """All of them in order. Raises `MotionRefused`."""
+        for call in statements:
+            yield from self.statement(call)
+
+    def statement(self, call: Call) -> Steps:
+        """One of them."""
+        match call.name:
+            case "movej":
+                goal = call.get("q", 0, None)
+                q = self.joints(goal) if isinstance(goal, Pose) else goal
+                yield from self.move_joints(q, call.get("v", 2, 1.05), call.get("a", 1, 1.4))
+            case "movel" | "movep":
+                goal = call.get("pose", 0, None)
+                yield from self.move_linear(goal, call.get("v", 2, 0.25), call.get("a", 1, 1.2), isinstance(goal, Pose))
+            case "stopj" | "stopl":
+                yield from self.stop(call.get("a", 0, 2.0), linear=call.name == "stopl")
+            case "sleep":
+                for _ in range(round(call.get("t", 0, 0.0) * self.controller.frequency)):
+                    yield
+            case "sync":
+                yield
+            case _:
+                self.at_once(call)
+
+    def at_once(self, call: Call) -> None:
+        """What takes no time: outputs, registers, payload, TCP."""
+        c = self.controller
+        first, second = call.get("n", 0, 0), call.get("b", 1, 0)
+        match call.name:
+            case "set_standard_digital_out" | "set_digital_out":
+                self._output(first, second)
+            case "set_configurable_digital_out":
+                self._output(8 + first, second)
+            case "set_tool_digital_out":
+                self._output(16 + first, second)
+            case "write_output_integer_register":
+                c.output_ints[first] = second
+            case "write_output_float_register":
+                c.output_doubles[first] = second
+            case "set_tcp":
+                c.tcp_offset = tuple(first)
+                c.arm.set_tcp(first)
+            case "set_payload":
+                c.payload, c.payload_cog = float(first), tuple(second or c.payload_cog)
+            case "textmsg" | "popup":
+                log.info("message: %s", call.arguments)
+            case _:
+                log.info("not modelled: %s", call.name)
+
+    def _output(self, bit: int, on: bool) -> None:
+        c = self.controller
+        c.digital_outputs = c.digital_outputs & ~(1 << bit) | int(bool(on)) << bit
+        c.changed()
+
+    def joints(self, pose: Sequence[float], near: Sequence[float] | None = None) -> tuple[float, ...]:
+        """get_inverse_kin. Raises `NoSolution`."""
+        return self.controller.chain.inverse(from_pose(pose), near or self.controller.arm.q)
+
+    def move_joints(self, q: Sequence[float], velocity: float, acceleration: float) -> Steps:
+        """movej: to its end, or until another motion has taken its place."""
+        arm = self.controller.arm
+        self._check(velocity, acceleration)
+        self.controller.note_command("movej", q=list(q), v=velocity, a=acceleration)
+        while arm.moving:  # a motion that was cut off ends first
+            yield
+        arm.move_joints(q, velocity, acceleration)
+        yield from self._to_end()
+
+    def move_linear(self, goal: Sequence[float], velocity: float, acceleration: float, is_pose: bool) -> Steps:
+        """movel to a pose, or to where joints have the TCP."""
+        arm = self.controller.arm
+        self._check(velocity, acceleration)
+        target = from_pose(goal) if is_pose else self.controller.chain.forward(goal)
+        self.controller.note_command("movel", goal=list(goal), v=velocity, a=acceleration)
+        while arm.moving:
+            yield
+        arm.move_linear(target, velocity, acceleration)
+        yield from self._to_end()
+
+    def stop(self, deceleration: float, linear: bool) -> Steps:
+        """stopl or stopj: until the arm stands."""
+        arm = self.controller.arm
+        self.controller.note_command("stopl" if linear else "stopj", a=deceleration)
+        arm.halt(max(0.01, deceleration), linear)
+        yield from self._to_end()
+
+    def _to_end(self) -> Steps:
+        arm = self.controller.arm
+        motion = arm.motion
+        while motion is not None and arm.motion is motion:
+            yield
+
+    @staticmethod
+    def _check(velocity: float, acceleration: float) -> None:
+        if velocity <= 0.0 or acceleration <= 0.0:
+            raise MotionRefused("a motion needs a velocity and an acceleration above zero")
+
+
+class ScriptProgram(Program):
+    """A program sent by a client, such as a custom script."""
+
+    def __init__(self, controller: Controller, name: str, text: str) -> None:
+        self.name = name
+        self._interpreter = Interpreter(controller)
+        self._calls = calls(text)
+
+    def run(self) -> Steps:
+        """The calls in order."""
+        yield from self._interpreter.run(self._calls)
+
+
+class ForeignProgram(Program):
+    """What the integrator's own program might be: to and fro between two configurations for ever."""
+
+    def __init__(self, controller: Controller, name: str = "production.urp") -> None:
+        self.name = name
+        self._controller = controller
+        self._interpreter = Interpreter(controller)
+
+    def run(self) -> Steps:
+        """Plays until it is stopped."""
+        here = self._controller.arm.q
+        there = (here[0] + 0.4, *here[1:])
+        while True:
+            yield from self._interpreter.move_joints(there, 0.6, 1.2)
+            yield from self._interpreter.move_joints(here, 0.6, 1.2)
