@@ -1,5 +1,18 @@
 """Actions: what marks a method as one, and the kinds of parameter it may take."""
 
 from arcor2_hw.actions.marking import DEFAULT_DEADLINE, IntEnum, StrEnum, action, deadline_of, metadata_of
+from arcor2_hw.actions.parameter_types import PARAMETER_TYPES, ParameterType, ScriptNames, by_annotation, parameter_type
 
-__all__ = ["DEFAULT_DEADLINE", "IntEnum", "StrEnum", "action", "deadline_of", "metadata_of"]
+__all__ = [
+    "DEFAULT_DEADLINE",
+    "PARAMETER_TYPES",
+    "IntEnum",
+    "ParameterType",
+    "ScriptNames",
+    "StrEnum",
+    "action",
+    "by_annotation",
+    "deadline_of",
+    "metadata_of",
+    "parameter_type",
+]
