@@ -1,0 +1,120 @@
+"""The world's side of the fakes' control channels: what it hears of the robot and does to tester, reader and sensor."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import msgspec
+
+from arcor2_fakes.cell.boards import Board
+from arcor2_fakes.cell.world import Robot
+from arcor2_fakes.control import ControlClient, ControlError
+
+_RETRY_PERIOD = 0.1
+_CONNECT_WITHIN = 1.0
+
+
+class DeviceGone(Exception):
+    """A fake can't be reached, has ended, or speaks of something else; the text names it and its address."""
+
+
+class Fake:
+    """The control channel of one fake, by the name the operator knows it by."""
+
+    def __init__(self, name: str, address: str, client: ControlClient) -> None:
+        self.name = name
+        self.address = address
+        self.client = client
+
+    @classmethod
+    async def connect(cls, name: str, address: str, patience: float) -> Fake:
+        """Connect, waiting for a fake that is still starting.
+
+        Raises:
+            DeviceGone: nobody listens there within `patience` seconds.
+        """
+        deadline = asyncio.get_running_loop().time() + patience
+        while True:
+            try:
+                return cls(name, address, await ControlClient.connect(address, within=_CONNECT_WITHIN))
+            except ControlError as e:
+                if asyncio.get_running_loop().time() >= deadline:
+                    raise DeviceGone(f"the {name} can't be reached: {e}") from e
+                await asyncio.sleep(_RETRY_PERIOD)
+
+    async def gone(self) -> str:
+        """Return, with a sentence that says so, when the fake has gone."""
+        await self.client.wait_closed()
+        return f"the {self.name} at {self.address} has gone"
+
+
+class FakeDevices:
+    """Does to the fakes what the world does to the devices."""
+
+    def __init__(self, robot: Fake, tester: Fake, reader: Fake, sensor: int | None) -> None:
+        self._robot, self._tester, self._reader = robot, tester, reader
+        self._sensor = sensor
+
+    async def put_into_tester(self, board: Board) -> str | None:
+        """Lay a board into the fixture; gives the reason if that is impossible."""
+        return await self._try(self._tester, "put_board", code=board.code, defect=board.defect)
+
+    async def take_from_tester(self) -> str | None:
+        """Take the board out of the fixture; gives the reason if that is impossible."""
+        return await self._try(self._tester, "take_board")
+
+    async def present(self, code: str | None) -> None:
+        """Show the reader a code, or nothing."""
+        await self._do(self._reader, "present", code=code)
+
+    async def set_sensor(self, held: bool) -> None:
+        """Set the gripper's sensor, if there is one."""
+        if self._sensor is not None:
+            await self._do(self._robot, "set_input", bit=self._sensor, on=held)
+
+    @staticmethod
+    async def _try(fake: Fake, command: str, **arguments: Any) -> str | None:
+        try:
+            await fake.client.do(command, **arguments)
+        except ControlError as e:
+            return str(e)
+        return None
+
+    @staticmethod
+    async def _do(fake: Fake, command: str, **arguments: Any) -> None:
+        try:
+            await fake.client.do(command, **arguments)
+        except ControlError as e:
+            raise DeviceGone(f"the {fake.name} at {fake.address}: {e}") from e
+
+
+class RobotFeed:
+    """The newest sample of the robot, and every one in between at which the outputs changed."""
+
+    def __init__(self) -> None:
+        self._samples: list[Robot] = []
+        self._arrived = asyncio.Event()
+        self._problem: DeviceGone | None = None
+
+    def take(self, truth: Any) -> None:
+        """Take what the fake controller has pushed."""
+        try:
+            sample = msgspec.convert(truth, Robot)
+        except msgspec.ValidationError as e:
+            self._problem = DeviceGone(f"the robot's truth is not that of a controller: {e}")
+        else:
+            # The world may be busy with a device: positions in between don't matter, switching does.
+            if self._samples and self._samples[-1].digital_outputs == sample.digital_outputs:
+                self._samples.pop()
+            self._samples.append(sample)
+        self._arrived.set()
+
+    async def next(self) -> Robot:
+        """Give the next sample. Raises `DeviceGone` if the robot sends something else."""
+        while not self._samples:
+            if self._problem is not None:
+                raise self._problem
+            self._arrived.clear()
+            await self._arrived.wait()
+        return self._samples.pop(0)

@@ -1,0 +1,158 @@
+"""The layout of a cell: a JSON file of places in world coordinates, in metres and radians.
+
+    {
+      "robot": {"base": POSE},
+      "gripper": {"output": 0, "sensor": 0, "tip": POSE, "close_time": 0.1, "open_time": 0.1},
+      "feeder": {PLACE, "refill_time": 0.3},
+      "reader": {PLACE},
+      "tester": {PLACE},
+      "good_box": {PLACE},
+      "bad_box": {PLACE},
+      "table_height": 0.0
+    }
+
+POSE is ``{"position": [x, y, z], "orientation": [x, y, z, w]}``, the orientation a unit quaternion, by default
+[0, 0, 0, 1].
+PLACE is ``"pose": POSE, "tolerance": {"position": 0.005, "height": 0.01, "tilt": 0.1, "turn": 0.2}``.
+
+- `robot.base` is the robot's `base_link` in the world. The controller's own base is turned by 180° about z from it; the
+  world knows that.
+- `gripper.output` is the number of the digital output of the controller that closes the gripper, `gripper.sensor` the
+  digital input that says that something is held (null: no such sensor), `gripper.tip` the pose of the grip point on the
+  flange, z pointing out. It is a fact of the cell; which TCP the controller has been told does not matter.
+- The pose of a place is that of a board lying there: origin where it is gripped, z up. The tip's z points against it.
+- A board let go, or a tip that is to grip, is at a place when it is no more than `position` away from it sideways, no
+  more than `position` below and `height` above it, when its z deviates by `tilt` at most and, if `turn` is given, when
+  it is turned about z by `turn` at most.
+- `reader` is the place where a board, held or on the feeder, is in the reader's view; `tester` is the fixture.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+from msgspec import Meta
+from transforms3d.affines import compose
+from transforms3d.axangles import axangle2mat
+from transforms3d.quaternions import quat2mat
+
+Matrix = npt.NDArray[np.float64]
+"""A rigid transform as a homogeneous 4 × 4 matrix."""
+
+Length = Annotated[float, Meta(gt=0.0, le=10.0)]
+Angle = Annotated[float, Meta(gt=0.0, le=math.pi)]
+Duration = Annotated[float, Meta(ge=0.0, le=60.0)]
+Bit = Annotated[int, Meta(ge=0, le=17)]
+
+
+class LayoutError(ValueError):
+    """The layout can't be read or describes no cell; the text names the file and the field."""
+
+
+class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A pose in the world or on the flange."""
+
+    position: tuple[float, float, float]
+    orientation: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        if abs(math.hypot(*self.orientation) - 1.0) > 1e-3:
+            raise ValueError("orientation is no unit quaternion x, y, z, w")
+
+    def matrix(self) -> Matrix:
+        """Give the pose as a transform."""
+        x, y, z, w = self.orientation
+        return _transform(self.position, quat2mat((w, x, y, z)))
+
+
+class Tolerance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How far from a place something may be and still be there."""
+
+    position: Length
+    height: Length
+    tilt: Angle
+    turn: Angle | None = None
+
+
+class Place(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Somewhere a board can be."""
+
+    pose: Pose
+    tolerance: Tolerance
+
+    def holds(self, world_from_board: Matrix) -> bool:
+        """Say whether a board at this pose is at this place."""
+        board = np.linalg.inv(self.pose.matrix()) @ world_from_board
+        x, y, z = board[:3, 3]
+        tolerance = self.tolerance
+        if math.hypot(x, y) > tolerance.position or not -tolerance.position <= z <= tolerance.height:
+            return False
+        if math.acos(max(-1.0, min(1.0, board[2, 2]))) > tolerance.tilt:
+            return False
+        return tolerance.turn is None or abs(math.atan2(board[1, 0], board[0, 0])) <= tolerance.turn
+
+
+class Feeder(Place, frozen=True, forbid_unknown_fields=True):
+    """A magazine that brings the next board to the same pick place."""
+
+    refill_time: Duration = 0.3
+
+
+class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Where the robot stands."""
+
+    base: Pose
+
+
+class Gripper(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A gripper on the flange, switched by one output."""
+
+    output: Bit
+    sensor: Bit | None = None
+    tip: Pose = Pose((0.0, 0.0, 0.0))
+    close_time: Duration = 0.1
+    open_time: Duration = 0.1
+
+
+class Layout(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A cell."""
+
+    robot: Robot
+    gripper: Gripper
+    feeder: Feeder
+    reader: Place
+    tester: Place
+    good_box: Place
+    bad_box: Place
+    table_height: float = 0.0
+
+
+def read_layout(path: Path) -> Layout:
+    """Read a layout from a JSON file.
+
+    Raises:
+        LayoutError: there is no such file, it is no JSON, or a field is missing, unknown or out of range.
+    """
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=Layout)
+    except OSError as e:
+        raise LayoutError(f"layout {path}: {e.strerror}") from e
+    except msgspec.DecodeError as e:
+        raise LayoutError(f"layout {path}: {e}") from e
+
+
+def from_rotation_vector(pose: tuple[float, float, float, float, float, float]) -> Matrix:
+    """Give the transform of a controller's pose: position and rotation vector."""
+    angle = math.hypot(*pose[3:])
+    rotation = np.eye(3) if angle < 1e-12 else axangle2mat(pose[3:], angle)
+    return _transform(pose[:3], rotation)
+
+
+def _transform(position: tuple[float, float, float], rotation: Matrix) -> Matrix:
+    matrix: Matrix = compose(position, rotation, np.ones(3))
+    return matrix
