@@ -1,0 +1,1 @@
+"""The open scene or project: its content, its checks, its journal."""

@@ -1,0 +1,133 @@
+"""What the open document is made of, and the one way in which it changes."""
+
+import enum
+from typing import Any, Final
+
+import msgspec
+from msgspec import Raw, Struct
+
+from arcor2_hw.data.project import (
+    Action,
+    BareActionPoint,
+    LogicItem,
+    NamedOrientation,
+    Project,
+    ProjectParameter,
+    ProjectRobotJoints,
+)
+from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
+
+
+class Kind(enum.StrEnum):
+    """Kinds of item. SCENE and PROJECT carry the document's own fields, their lists stay empty."""
+
+    SCENE = "scene"
+    OBJECT = "object"
+    PROJECT = "project"
+    POINT = "action_point"
+    ORIENTATION = "orientation"
+    JOINTS = "joints"
+    ACTION = "action"
+    PARAMETER = "parameter"
+    LOGIC = "logic"
+    OVERRIDE = "override"
+
+
+VALUE_TYPES: Final[dict[Kind, type]] = {
+    Kind.SCENE: Scene,
+    Kind.OBJECT: SceneObject,
+    Kind.PROJECT: Project,
+    Kind.POINT: BareActionPoint,
+    Kind.ORIENTATION: NamedOrientation,
+    Kind.JOINTS: ProjectRobotJoints,
+    Kind.ACTION: Action,
+    Kind.PARAMETER: ProjectParameter,
+    Kind.LOGIC: LogicItem,
+    Kind.OVERRIDE: SceneObjectOverride,
+}
+
+OF_SCENE: Final = frozenset({Kind.SCENE, Kind.OBJECT})
+"""Kinds that belong to the scene; all others belong to the project."""
+
+
+class Item(Struct, frozen=True, array_like=True):
+    """One item. `parent` is the action point that an orientation, joints or action belongs to, else empty.
+
+    `rank` orders items of one kind: what is put back takes its old place. Values are never changed in place.
+    """
+
+    kind: Kind
+    id: str
+    parent: str
+    rank: int
+    value: Any
+
+
+class Change(Struct, frozen=True, array_like=True):
+    """An item appears (`before` is None), gets another value, or goes (`after` is None)."""
+
+    kind: Kind
+    id: str
+    parent: str
+    rank: int
+    before: Any
+    after: Any
+
+    def inverse(self) -> "Change":
+        """Give the change that takes this one back."""
+        return Change(self.kind, self.id, self.parent, self.rank, self.after, self.before)
+
+
+class Edit(Struct, frozen=True):
+    """The changes of one request, which are made, undone and kept together. `number` grows by one with each edit."""
+
+    number: int
+    time: str
+    user: str
+    changes: list[Change]
+
+
+class _Row(Struct, frozen=True, array_like=True):
+    kind: Kind
+    id: str
+    parent: str
+    rank: int
+    value: Raw
+
+
+class _ChangeRow(Struct, frozen=True, array_like=True):
+    kind: Kind
+    id: str
+    parent: str
+    rank: int
+    before: Raw
+    after: Raw
+
+
+_encode = msgspec.json.Encoder().encode
+_decode_items = msgspec.json.Decoder(list[_Row]).decode
+_decode_changes = msgspec.json.Decoder(list[_ChangeRow]).decode
+_values: Final = {kind: msgspec.json.Decoder(of | None).decode for kind, of in VALUE_TYPES.items()}
+
+
+def encode_items(items: list[Item]) -> bytes:
+    """Write items for the journal."""
+    return _encode(items)
+
+
+def decode_items(data: bytes) -> list[Item]:
+    """Read what `encode_items` wrote; msgspec.DecodeError when it is damaged."""
+    return [Item(row.kind, row.id, row.parent, row.rank, _values[row.kind](row.value)) for row in _decode_items(data)]
+
+
+def encode_changes(changes: list[Change]) -> bytes:
+    """Write changes for the journal."""
+    return _encode(changes)
+
+
+def decode_changes(data: bytes) -> list[Change]:
+    """Read what `encode_changes` wrote; msgspec.DecodeError when it is damaged."""
+    return [
+        Change(row.kind, row.id, row.parent, row.rank, _values[row.kind](row.before), _values[row.kind](row.after))
+        for row in _decode_changes(data)
+    ]

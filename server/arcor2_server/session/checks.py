@@ -1,0 +1,332 @@
+"""What is wrong with an object, an action, a scene or a project: pure functions over data and object types."""
+
+from collections.abc import Callable, Iterable
+from typing import Any, Protocol
+
+import msgspec
+from msgspec import UNSET
+from msgspec.structs import replace
+
+from arcor2_hw.actions.parameter_types import PARAMETER_TYPES
+from arcor2_hw.data.base import Unset, is_valid_name
+from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ParameterMeta
+from arcor2_hw.data.parameter import Parameter
+from arcor2_hw.data.project import (
+    Action,
+    ActionParameter,
+    ActionParameterType,
+    BareActionPoint,
+    Flow,
+    FlowTypes,
+    NamedOrientation,
+    Project,
+    ProjectParameter,
+    ProjectRobotJoints,
+    parse_link,
+)
+from arcor2_hw.data.project_index import ProjectLookup
+from arcor2_hw.data.robot import RobotMeta
+from arcor2_hw.data.scene import Scene, SceneObject
+from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound
+from arcor2_server.session.document import Document
+from arcor2_server.session.placing import check_parent
+
+
+class Types(Protocol):
+    """What the checks need to know of object types (arcor2_server.object_types.ObjectTypes)."""
+
+    def meta(self, name: str) -> ObjectTypeMeta:
+        """Give one type; NotFound."""
+
+    def action(self, type_name: str, name: str) -> ObjectAction:
+        """Give one action; NotFound."""
+
+    def robot_meta(self, name: str) -> RobotMeta:
+        """Give the features of a robot type; NotFound when it is none."""
+
+
+def check_name(name: str, what: str) -> None:
+    """Refuse what cannot become a name in a program; `what` says what it names ("action point")."""
+    if not is_valid_name(name):
+        raise InvalidData(
+            f"{name!r} cannot name an {what}: use letters, digits and _, no digit first, no Python word."
+            if what[0] in "aeiou"
+            else f"{name!r} cannot name a {what}: use letters, digits and _, no digit first, no Python word."
+        )
+
+
+# ---------------------------------------------------------------------------------------------- scene
+def object_problems(obj: SceneObject, types: Types) -> list[str]:
+    """Give what is wrong with an object of a scene, empty when all is well."""
+    problems = []
+    if not is_valid_name(obj.name):
+        problems.append(f"{obj.name!r} is no valid name for an object.")
+    try:
+        meta = types.meta(obj.type)
+    except NotFound:
+        return [*problems, f"{obj.name}: the object type {obj.type} is not known."]
+    if meta.disabled:
+        why = "" if isinstance(meta.problem, Unset) else f" ({meta.problem})"
+        return [*problems, f"{obj.name}: the object type {obj.type} cannot be used{why}."]
+    if meta.abstract:
+        problems.append(f"{obj.name}: {obj.type} is abstract; use a type derived from it.")
+    if meta.has_pose and isinstance(obj.pose, Unset):
+        problems.append(f"{obj.name}: {obj.type} needs a pose.")
+    if not meta.has_pose and not isinstance(obj.pose, Unset):
+        problems.append(f"{obj.name}: {obj.type} has no pose.")
+    return problems + settings_problems(obj.name, obj.parameters, meta)
+
+
+def settings_problems(name: str, given: Iterable[Parameter], meta: ObjectTypeMeta) -> list[str]:
+    """Give what is wrong with the settings of the object `name`."""
+    known = {setting.name: setting for setting in meta.settings}
+    problems = []
+    seen = set()
+    for parameter in given:
+        if parameter.name in seen:
+            problems.append(f"{name}: the setting {parameter.name} is given twice.")
+        seen.add(parameter.name)
+        if (setting := known.get(parameter.name)) is None:
+            problems.append(f"{name}: {meta.type} has no setting {parameter.name}.")
+            continue
+        try:
+            check_setting(parameter, setting)
+        except InvalidData as error:
+            problems.append(f"{name}: {error}")
+    missing = [s.name for s in meta.settings if s.name not in seen and isinstance(s.default_value, Unset)]
+    return problems + [f"{name}: the setting {setting} is missing." for setting in missing]
+
+
+def check_setting(parameter: Parameter, meta: ParameterMeta) -> None:
+    """Refuse a setting of a wrong type or value."""
+    if (kind := PARAMETER_TYPES.get(meta.type)) is not None:
+        kind.check(parameter, meta)
+    elif parameter.type != meta.type:
+        raise InvalidData(f"setting {parameter.name} must be of type {meta.type}, not {parameter.type}")
+
+
+def scene_problems(scene: Scene, types: Types) -> list[str]:
+    """Give what is wrong with a scene."""
+    problems = [problem for obj in scene.objects for problem in object_problems(obj, types)]
+    return problems + _twice((obj.name for obj in scene.objects), "object")
+
+
+def _twice(names: Iterable[str], what: str) -> list[str]:
+    seen: set[str] = set()
+    twice: dict[str, None] = {}
+    for name in names:
+        if name in seen:
+            twice[name] = None
+        seen.add(name)
+    return [f"The name {name} is given to more than one {what}." for name in twice]
+
+
+# ---------------------------------------------------------------------------------------------- actions
+class _Unparented:
+    """A lookup that shows action points without parents: whether a reference exists does not hang on them."""
+
+    def __init__(self, lookup: ProjectLookup) -> None:
+        self._lookup = lookup
+        self.scene_object = lookup.scene_object
+        self.action = lookup.action
+        self.parameter = lookup.parameter
+
+    def action_point(self, action_point_id: str) -> BareActionPoint:
+        return replace(self._lookup.action_point(action_point_id), parent=UNSET)
+
+    def orientation(self, orientation_id: str) -> tuple[BareActionPoint, NamedOrientation]:
+        point, orientation = self._lookup.orientation(orientation_id)
+        return replace(point, parent=UNSET), orientation
+
+    def joints(self, joints_id: str) -> tuple[BareActionPoint, ProjectRobotJoints]:
+        point, joints = self._lookup.joints(joints_id)
+        return replace(point, parent=UNSET), joints
+
+
+def action_meta(action: Action, lookup: ProjectLookup, types: Types) -> ObjectAction:
+    """Give the action of the object type that an action calls; InvalidData, NotFound say what is wrong."""
+    try:
+        object_id, method = action.parse_type()
+    except ValueError as error:
+        raise InvalidData(f"{error}.") from None
+    obj = lookup.scene_object(object_id)
+    meta = types.action(obj.type, method)
+    if meta.disabled:
+        why = "" if isinstance(meta.problem, Unset) else f" ({meta.problem})"
+        raise InvalidData(f"{obj.type}.{method} cannot be used{why}.")
+    return meta
+
+
+def check_flows(action: Action, meta: ObjectAction) -> None:
+    """Refuse flows that do not fit what the action returns."""
+    flows: list[Flow] = action.flows
+    if [flow.type for flow in flows] != [FlowTypes.DEFAULT]:
+        raise InvalidData(f"{action.name}: exactly one flow is needed, of type default.")
+    outputs = flows[0].outputs
+    for output in outputs:
+        check_name(output, "result")
+    if outputs and len(outputs) != len(meta.returns):
+        raise InvalidData(
+            f"{action.name}: {meta.name} returns {len(meta.returns)} values, {len(outputs)} names are given."
+        )
+
+
+def check_outputs_unique(document: Document, action: Action) -> None:
+    """Refuse names of results that another action of the project uses: they become variables of one program."""
+    for output in action.outputs():
+        other = document.named("output", output)
+        if other is not None and other != action.id:
+            raise InvalidData(f"{document.action(other)[1].name} names a result {output} already: choose another name.")
+
+
+def complete_parameters(action: Action, meta: ObjectAction) -> Action:
+    """Give the action with what is missing filled in from the defaults of the method."""
+    given = {parameter.name: parameter for parameter in action.parameters}
+    if len(given) != len(action.parameters):
+        raise InvalidData(f"{action.name}: a parameter is given twice.")
+    if unknown := given.keys() - {parameter.name for parameter in meta.parameters}:
+        raise InvalidData(f"{action.name}: {meta.name} has no parameter {', '.join(sorted(unknown))}.")
+    filled = list(action.parameters)
+    for parameter in meta.parameters:
+        if parameter.name in given:
+            continue
+        if isinstance(parameter.default_value, Unset):
+            raise InvalidData(f"{action.name}: the parameter {parameter.name} is missing.")
+        filled.append(ActionParameter(parameter.name, parameter.type, parameter.default_value))
+    return action if len(filled) == len(action.parameters) else replace(action, parameters=filled)
+
+
+def check_parameters(action: Action, meta: ObjectAction, lookup: ProjectLookup, types: Types) -> None:
+    """Refuse parameters that the method cannot take. All of them have to be there (see complete_parameters)."""
+    declared = {parameter.name: parameter for parameter in meta.parameters}
+    robot_id = action.parse_type()[0]
+    unparented = _Unparented(lookup)
+    for parameter in action.parameters:
+        wanted = declared[parameter.name]
+        try:
+            match parameter.type:
+                case ActionParameterType.PROJECT_PARAMETER:
+                    _check_project_parameter(parameter, wanted, lookup)
+                case ActionParameterType.LINK:
+                    _check_link(action, parameter, wanted, lookup, types)
+                case _ if wanted.type in PARAMETER_TYPES:
+                    PARAMETER_TYPES[wanted.type].check(parameter, wanted, unparented, robot_id)
+                case _:
+                    raise InvalidData(f"parameter {wanted.name} is of the unknown type {wanted.type}")
+        except Arcor2Error as error:
+            raise InvalidData(f"{action.name}: {error}") from error
+
+
+def _text(parameter: Parameter) -> str:
+    try:
+        return msgspec.json.decode(parameter.value, type=str)
+    except msgspec.DecodeError:
+        raise InvalidData(f"parameter {parameter.name}: {parameter.value[:80]} is not a JSON string.") from None
+
+
+def _check_project_parameter(parameter: Parameter, wanted: ParameterMeta, lookup: ProjectLookup) -> None:
+    source = lookup.parameter(_text(parameter))
+    if source.type != wanted.type:
+        raise InvalidData(
+            f"parameter {wanted.name} is {wanted.type}, the project parameter {source.name} is {source.type}."
+        )
+
+
+def _check_link(
+    action: Action, parameter: Parameter, wanted: ParameterMeta, lookup: ProjectLookup, types: Types
+) -> None:
+    try:
+        source_id, flow, index = parse_link(_text(parameter))
+    except ValueError as error:
+        raise InvalidData(f"parameter {wanted.name}: {error}.") from None
+    if source_id == action.id:
+        raise InvalidData(f"parameter {wanted.name} cannot be linked to a result of the same action.")
+    _, source = lookup.action(source_id)
+    returns, outputs = action_meta(source, lookup, types).returns, source.outputs()
+    if flow != FlowTypes.DEFAULT or len(outputs) != len(returns) or index >= len(returns):
+        raise InvalidData(f"parameter {wanted.name}: {source.name} keeps no result number {index}; name its results.")
+    if returns[index] != wanted.type:
+        raise InvalidData(f"parameter {wanted.name} is {wanted.type}, the result {outputs[index]} is {returns[index]}.")
+
+
+# ---------------------------------------------------------------------------------------------- project
+def check_project_parameter(parameter: ProjectParameter) -> None:
+    """Refuse a project parameter with a bad name, or a value that is not JSON of a bool, number or string."""
+    check_name(parameter.name, "project parameter")
+    expected = {"boolean": bool, "integer": int, "double": float, "string": str}.get(parameter.type)
+    try:
+        value = msgspec.json.decode(parameter.value, type=bool | int | float | str)
+    except msgspec.DecodeError:
+        raise InvalidData(
+            f"{parameter.name}: the value {parameter.value[:80]} is not JSON of a truth value, number or text."
+        ) from None
+    if expected is not None and type(value) is not expected:
+        raise InvalidData(f"{parameter.name}: {parameter.value[:80]} is not of type {parameter.type}.")
+
+
+def project_problems(scene: Scene, project: Project, types: Types) -> list[str]:
+    """Give what is wrong with a project on its scene. The cost grows with their size, not with its square."""
+    if project.scene_id != scene.id:
+        return [f"The project {project.name} belongs to another scene than {scene.name}."]
+    problems = scene_problems(scene, types)
+    document = Document.of(scene, project)
+    for parameter in project.parameters:
+        problems += _problem(check_project_parameter, parameter)
+    problems += _parent_problems(document, project)
+    for point in project.action_points:
+        if not is_valid_name(point.name):
+            problems.append(f"{point.name!r} is no valid name for an action point.")
+        for joints in point.robot_joints:
+            problems += _problem(_check_joints, point.name, joints, document, types)
+        for action in point.actions:
+            problems += _problem(check_action, action, document, types)
+    problems += _twice((point.name for point in project.action_points), "action point")
+    return problems + _twice((a.name for point in project.action_points for a in point.actions), "action")
+
+
+def check_action(action: Action, lookup: ProjectLookup, types: Types) -> None:
+    """Refuse an action that is not complete and right; whether its names are free is left to the caller."""
+    meta = action_meta(action, lookup, types)
+    check_flows(action, meta)
+    complete = complete_parameters(action, meta)
+    check_parameters(complete, meta, lookup, types)
+
+
+def _problem(check: Callable[..., None], *args: Any) -> list[str]:
+    try:
+        check(*args)
+    except Arcor2Error as error:
+        # A lookup that fails does not know who asked.
+        name = next((arg.name for arg in args if isinstance(arg, Action | ProjectParameter)), "")
+        text = str(error)
+        return [text if not name or text.startswith(name) else f"{name}: {text}"]
+    return []
+
+
+def _check_joints(point: str, joints: ProjectRobotJoints, lookup: ProjectLookup, types: Types) -> None:
+    try:
+        types.robot_meta(lookup.scene_object(joints.robot_id).type)
+    except NotFound:
+        raise InvalidData(f"{point}: the joints {joints.name} belong to no robot of the scene.") from None
+
+
+def _parent_problems(document: Document, project: Project) -> list[str]:
+    problems = []
+    parents = {point.id: point for point in project.action_points}
+    sound: set[str] = set()
+    for point in project.action_points:
+        path: dict[str, None] = {}
+        at = point
+        while at.id not in sound:
+            if at.id in path:
+                problems.append(f"The action point {at.name} hangs on itself.")
+                break
+            path[at.id] = None
+            if isinstance(at.parent, Unset):
+                break
+            if (above := parents.get(at.parent)) is None:
+                problems += _problem(check_parent, document, at.parent, at.name)
+                break
+            at = above
+        sound.update(path)
+    return problems

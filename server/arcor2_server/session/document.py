@@ -1,0 +1,348 @@
+"""The open scene and project as items, with the lookups that make every edit cost the same at any size."""
+
+import operator
+from collections.abc import Iterable, Iterator
+from typing import Any, Final
+
+import msgspec
+from msgspec.structs import replace
+
+from arcor2_hw.data.project import (
+    Action,
+    ActionParameterType,
+    ActionPoint,
+    BareActionPoint,
+    LogicItem,
+    NamedOrientation,
+    Project,
+    ProjectParameter,
+    ProjectRobotJoints,
+    parse_link,
+)
+from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
+from arcor2_hw.exceptions import NotFound
+from arcor2_server.session.changes import OF_SCENE, Change, Item, Kind
+
+OWNED: Final = (Kind.ORIENTATION, Kind.JOINTS, Kind.ACTION)
+"""Kinds that belong to an action point."""
+
+ROOTS: Final = (Kind.OBJECT, Kind.PARAMETER, Kind.SCENE, Kind.PROJECT)
+"""Kinds that are roots of lock trees, beside action points without a parent."""
+
+REFERRING: Final = frozenset({"pose", "position", "joints", *ActionParameterType})
+"""Types of action parameter whose value is the id of something in the project."""
+
+_by_rank = operator.attrgetter("rank")
+
+
+def action_of(end: str) -> str:
+    """Give the action id (or START, END) of the start or end of a logic item: it may carry the name of the flow."""
+    return end.partition("/")[0]
+
+
+def reference(kind: str, value: str) -> str | None:
+    """Give the id that an action parameter refers to, None when it is a plain literal or makes no sense."""
+    if kind not in REFERRING:
+        return None
+    try:
+        target = msgspec.json.decode(value, type=str)
+        return parse_link(target)[0] if kind == ActionParameterType.LINK else target
+    except (msgspec.DecodeError, ValueError):
+        return None
+
+
+class Document:
+    """Items by kind and id. `apply` is the only way to change it; an item's value is replaced, never altered.
+
+    Gives what `arcor2_hw.data.project_index.ProjectLookup` asks for; a lookup of an unknown id raises NotFound.
+    """
+
+    def __init__(self, items: Iterable[Item] = ()) -> None:
+        self._items: dict[Kind, dict[str, Item]] = {kind: {} for kind in Kind}
+        self._unordered: set[Kind] = set()
+        self._next_rank = 0
+        self._owned: dict[str, dict[Kind, dict[str, None]]] = {}
+        self._points: dict[str, dict[str, None]] = {}
+        self._names: dict[tuple[str, str], dict[str, None]] = {}
+        self._users: dict[str, dict[str, None]] = {}
+        self._leaving: dict[str, dict[str, None]] = {}
+        self._arriving: dict[str, dict[str, None]] = {}
+        self._scene: Scene | None = None
+        self._project: Project | None = None
+        for item in items:
+            self._put(item)
+
+    @classmethod
+    def of(cls, scene: Scene, project: Project | None = None) -> "Document":
+        """Make a document of a scene, and a project on it."""
+        document = cls()
+        document.apply(document.changes_to_fill(scene, project))
+        return document
+
+    def changes_to_fill(self, scene: Scene, project: Project | None = None) -> list[Change]:
+        """Give the changes that put a scene and project into an empty document."""
+        add = self.add
+        changes = [add(Kind.SCENE, scene.id, replace(scene, objects=[]))]
+        changes += [add(Kind.OBJECT, obj.id, obj) for obj in scene.objects]
+        if project is None:
+            return changes
+        bare = replace(project, action_points=[], parameters=[], logic=[], object_overrides=[])
+        changes.append(add(Kind.PROJECT, project.id, bare))
+        for point in project.action_points:
+            changes.append(add(Kind.POINT, point.id, bare_point(point)))
+            changes += [add(Kind.ORIENTATION, o.id, o, point.id) for o in point.orientations]
+            changes += [add(Kind.JOINTS, j.id, j, point.id) for j in point.robot_joints]
+            changes += [add(Kind.ACTION, a.id, a, point.id) for a in point.actions]
+        changes += [add(Kind.PARAMETER, p.id, p) for p in project.parameters]
+        changes += [add(Kind.LOGIC, i.id, i) for i in project.logic]
+        changes += [add(Kind.OVERRIDE, o.id, o) for o in project.object_overrides]
+        return changes
+
+    # ------------------------------------------------------------------------------------------ changing
+    def add(self, kind: Kind, item_id: str, value: Any, parent: str = "") -> Change:
+        """Give the change that adds an item at the end of its kind; nothing happens before `apply`."""
+        self._next_rank += 1
+        return Change(kind, item_id, parent, self._next_rank, None, value)
+
+    def update(self, kind: Kind, item_id: str, value: Any) -> Change:
+        """Give the change that replaces an item's value."""
+        item = self._items[kind][item_id]
+        return Change(kind, item_id, item.parent, item.rank, item.value, value)
+
+    def remove(self, kind: Kind, item_id: str) -> Change:
+        """Give the change that removes an item."""
+        item = self._items[kind][item_id]
+        return Change(kind, item_id, item.parent, item.rank, item.value, None)
+
+    def apply(self, changes: Iterable[Change]) -> None:
+        """Make changes, in order."""
+        for change in changes:
+            if change.before is not None:
+                self._forget(self._items[change.kind][change.id])
+                if change.after is None:
+                    del self._items[change.kind][change.id]
+            if change.after is not None:
+                self._put(Item(change.kind, change.id, change.parent, change.rank, change.after))
+            if change.kind in OF_SCENE:
+                self._scene = None
+            else:
+                self._project = None
+
+    def _put(self, item: Item) -> None:
+        of_kind = self._items[item.kind]
+        if item.rank < self._next_rank and item.id not in of_kind:
+            self._unordered.add(item.kind)
+        self._next_rank = max(self._next_rank, item.rank)
+        of_kind[item.id] = item
+        for index, key in self._keys(item):
+            index.setdefault(key, {})[item.id] = None
+        if item.kind in OWNED:
+            self._owned.setdefault(item.parent, {kind: {} for kind in OWNED})[item.kind][item.id] = None
+
+    def _forget(self, item: Item) -> None:
+        for index, key in self._keys(item):
+            ids = index[key]
+            ids.pop(item.id, None)
+            if not ids:
+                del index[key]
+        if item.kind in OWNED:
+            owned = self._owned[item.parent]
+            del owned[item.kind][item.id]
+            if not any(owned.values()):
+                del self._owned[item.parent]
+
+    def _keys(self, item: Item) -> Iterator[tuple[dict[Any, dict[str, None]], Any]]:
+        """Give each index with the key under which it lists the item; a key comes at most once."""
+        value = item.value
+        match item.kind:
+            case Kind.OBJECT | Kind.PARAMETER:
+                yield self._names, (item.kind, value.name)
+            case Kind.POINT:
+                yield self._names, (item.kind, value.name)
+                if value.parent:
+                    yield self._points, value.parent
+            case Kind.ORIENTATION | Kind.JOINTS:
+                yield self._names, (item.parent + item.kind, value.name)
+            case Kind.ACTION:
+                yield self._names, (item.kind, value.name)
+                for output in set(value.outputs()):
+                    yield self._names, ("output", output)
+                targets = {reference(parameter.type, parameter.value) for parameter in value.parameters}
+                for target in targets - {None}:
+                    yield self._users, target
+            case Kind.LOGIC:
+                yield self._leaving, action_of(value.start)
+                yield self._arriving, action_of(value.end)
+                if value.condition:
+                    yield self._users, action_of(value.condition.what)
+
+    # ------------------------------------------------------------------------------------------ whole documents
+    def of_kind(self, kind: Kind) -> list[Item]:
+        """Give the items of a kind in their order."""
+        if kind in self._unordered:
+            ordered = sorted(self._items[kind].values(), key=_by_rank)
+            self._items[kind] = {item.id: item for item in ordered}
+            self._unordered.discard(kind)
+        return list(self._items[kind].values())
+
+    def items(self) -> list[Item]:
+        """Give all items, kind by kind, in their order."""
+        return [item for kind in Kind for item in self.of_kind(kind)]
+
+    def count(self, kind: Kind) -> int:
+        """Give how many items of a kind there are."""
+        return len(self._items[kind])
+
+    @property
+    def scene(self) -> Scene | None:
+        """The scene, None when the document is empty."""
+        if self._scene is None and (base := self._bare(Kind.SCENE)) is not None:
+            self._scene = replace(base, objects=[item.value for item in self.of_kind(Kind.OBJECT)])
+        return self._scene
+
+    @property
+    def project(self) -> Project | None:
+        """The project, None when none is open."""
+        if self._project is None and (base := self._bare(Kind.PROJECT)) is not None:
+            values = {kind: [item.value for item in self.of_kind(kind)] for kind in Kind if kind not in OWNED}
+            self._project = replace(
+                base,
+                action_points=[self.full_point(point.id) for point in values[Kind.POINT]],
+                parameters=values[Kind.PARAMETER],
+                logic=values[Kind.LOGIC],
+                object_overrides=values[Kind.OVERRIDE],
+            )
+        return self._project
+
+    def _bare(self, kind: Kind) -> Any:
+        return next((item.value for item in self._items[kind].values()), None)
+
+    def full_point(self, point_id: str) -> ActionPoint:
+        """Give an action point with orientations, joints and actions."""
+        point = self.action_point(point_id)
+        return ActionPoint(
+            **{name: getattr(point, name) for name in BareActionPoint.__struct_fields__},
+            orientations=[item.value for item in self.owned(point_id, Kind.ORIENTATION)],
+            robot_joints=[item.value for item in self.owned(point_id, Kind.JOINTS)],
+            actions=[item.value for item in self.owned(point_id, Kind.ACTION)],
+        )
+
+    # ------------------------------------------------------------------------------------------ one item
+    def find(self, kind: Kind, item_id: str) -> Item | None:
+        """Give an item, None when there is none."""
+        return self._items[kind].get(item_id)
+
+    def _get(self, kind: Kind, item_id: str, what: str) -> Item:
+        try:
+            return self._items[kind][item_id]
+        except KeyError:
+            raise NotFound(f"There is no {what} with the id {item_id!r}.") from None
+
+    def scene_object(self, object_id: str) -> SceneObject:
+        """Give an object of the scene."""
+        value: SceneObject = self._get(Kind.OBJECT, object_id, "object").value
+        return value
+
+    def action_point(self, action_point_id: str) -> BareActionPoint:
+        """Give an action point without its lists."""
+        value: BareActionPoint = self._get(Kind.POINT, action_point_id, "action point").value
+        return value
+
+    def orientation(self, orientation_id: str) -> tuple[BareActionPoint, NamedOrientation]:
+        """Give an orientation with its action point."""
+        item = self._get(Kind.ORIENTATION, orientation_id, "orientation")
+        return self.action_point(item.parent), item.value
+
+    def joints(self, joints_id: str) -> tuple[BareActionPoint, ProjectRobotJoints]:
+        """Give joints with their action point."""
+        item = self._get(Kind.JOINTS, joints_id, "joints")
+        return self.action_point(item.parent), item.value
+
+    def action(self, action_id: str) -> tuple[BareActionPoint, Action]:
+        """Give an action with its action point."""
+        item = self._get(Kind.ACTION, action_id, "action")
+        return self.action_point(item.parent), item.value
+
+    def parameter(self, parameter_id: str) -> ProjectParameter:
+        """Give a project parameter."""
+        value: ProjectParameter = self._get(Kind.PARAMETER, parameter_id, "project parameter").value
+        return value
+
+    def logic_item(self, logic_item_id: str) -> LogicItem:
+        """Give a logic item."""
+        value: LogicItem = self._get(Kind.LOGIC, logic_item_id, "logic item").value
+        return value
+
+    def override(self, object_id: str) -> SceneObjectOverride:
+        """Give the overrides of an object."""
+        value: SceneObjectOverride = self._get(Kind.OVERRIDE, object_id, "override of an object").value
+        return value
+
+    # ------------------------------------------------------------------------------------------ relations
+    def owned(self, point_id: str, kind: Kind) -> list[Item]:
+        """Give what belongs to an action point, in its order."""
+        ids = self._owned.get(point_id, {}).get(kind, {})
+        return sorted((self._items[kind][i] for i in ids), key=_by_rank)
+
+    def points_of(self, parent_id: str) -> list[BareActionPoint]:
+        """Give the action points whose parent is this object or action point."""
+        ids = self._points.get(parent_id, ())
+        return [item.value for item in sorted((self._items[Kind.POINT][i] for i in ids), key=_by_rank)]
+
+    def descendants(self, parent_id: str) -> list[BareActionPoint]:
+        """Give the action points below an object or action point, depth first, without itself."""
+        found: list[BareActionPoint] = []
+        waiting = self.points_of(parent_id)[::-1]
+        while waiting:
+            point = waiting.pop()
+            found.append(point)
+            waiting += self.points_of(point.id)[::-1]
+        return found
+
+    def named(self, kind: Kind | str, name: str, parent: str = "") -> str | None:
+        """Give the id of what has that name, None when the name is free.
+
+        Names are unique per kind, those of orientations and joints within their action point. Kind "output": the
+        action whose result has that name.
+        """
+        scope = parent + kind if parent else kind
+        return next(iter(self._names.get((scope, name), ())), None)
+
+    def outgoing(self, start: str) -> list[LogicItem]:
+        """Give the logic items that leave START or an action."""
+        return [self._items[Kind.LOGIC][i].value for i in self._leaving.get(start, ())]
+
+    def incoming(self, end: str) -> list[LogicItem]:
+        """Give the logic items that arrive at END or an action."""
+        return [self._items[Kind.LOGIC][i].value for i in self._arriving.get(end, ())]
+
+    def users_of(self, target_id: str) -> list[Action | LogicItem]:
+        """Give the actions with a parameter that refers to this id, and the logic items with a condition on it."""
+        actions, logic = self._items[Kind.ACTION], self._items[Kind.LOGIC]
+        return [(actions.get(i) or logic[i]).value for i in self._users.get(target_id, ())]
+
+    def root_of(self, item: str) -> str:
+        """Give the root of the tree that an id belongs to (protocol, section 6); NotFound for an unknown id."""
+        for kind in OWNED:
+            if (owned := self._items[kind].get(item)) is not None:
+                item = owned.parent
+                break
+        points = self._items[Kind.POINT]
+        seen = set()
+        while (point := points.get(item)) is not None and point.value.parent and item not in seen:
+            seen.add(item)
+            item = point.value.parent
+        if item in points or any(item in self._items[kind] for kind in ROOTS):
+            return item
+        raise NotFound(f"{item!r} is not part of what is open.")
+
+    def tree_of(self, root: str) -> list[str]:
+        """Give the ids below a root: the action points and what belongs to them; nothing when it is none."""
+        points = [point.id for point in self.descendants(root)]
+        below = [i for holder in (root, *points) for kind in OWNED for i in self._owned.get(holder, {}).get(kind, ())]
+        return points + below
+
+
+def bare_point(point: BareActionPoint) -> BareActionPoint:
+    """Give an action point without its lists."""
+    return BareActionPoint(**{name: getattr(point, name) for name in BareActionPoint.__struct_fields__})

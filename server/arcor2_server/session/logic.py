@@ -1,0 +1,90 @@
+"""What makes a step between two actions right (protocol, section 10.4)."""
+
+from collections.abc import Callable
+
+import msgspec
+
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.object_type import ObjectAction
+from arcor2_hw.data.project import END, START, Action, LogicItem, ProjectLogicIf
+from arcor2_hw.exceptions import InvalidData
+from arcor2_server.session.document import Document, action_of
+
+
+def check_logic_item(document: Document, meta_of: Callable[[Action], ObjectAction], item: LogicItem) -> None:
+    """Check an item that is to be added, or to replace the one with its id. Raises InvalidData, NotFound."""
+    start, end = _place(item.start, START), _place(item.end, END)
+    if start == START and end == END:
+        raise InvalidData("START cannot lead straight to END: put an action between them.")
+    if start == end:
+        raise InvalidData(f"{_name(document, start)} cannot lead to itself.")
+    for place in {start, end} - {START, END}:
+        document.action(place)
+    siblings = [other for other in document.outgoing(start) if other.id != item.id]
+    if start == START and siblings:
+        raise InvalidData(f"START leads to {_name(document, action_of(siblings[0].end))} already.")
+    if any(action_of(other.end) == end for other in siblings):
+        raise InvalidData(f"{_name(document, start)} leads to {_name(document, end)} already.")
+    if siblings and (isinstance(item.condition, Unset) or any(isinstance(s.condition, Unset) for s in siblings)):
+        raise InvalidData(f"Each of several steps from {_name(document, start)} needs a condition.")
+    if not isinstance(item.condition, Unset):
+        if start == START:
+            raise InvalidData("The step from START cannot have a condition: there is no result yet.")
+        _check_condition(document, meta_of, item.condition)
+        if any(_same(item.condition, other.condition) for other in siblings):
+            raise InvalidData(f"Another step from {_name(document, start)} has the same condition.")
+    if start != START and end != END and _reaches(document, end, start, item.id):
+        raise InvalidData(f"The step from {_name(document, start)} to {_name(document, end)} would close a loop.")
+
+
+def _place(text: str, border: str) -> str:
+    """Give the action id, or START or END, of one side of an item."""
+    action_id, slash, flow = text.partition("/")
+    if not action_id or (slash and (flow != "default" or action_id == border)):
+        raise InvalidData(f"{text!r} names no action: write its id, or {border}.")
+    if action_id == (END if border == START else START):
+        raise InvalidData(f"A step cannot {'start at END' if border == START else 'end at START'}.")
+    return action_id
+
+
+def _name(document: Document, place: str) -> str:
+    return place if place in (START, END) else document.action(place)[1].name
+
+
+def _same(one: ProjectLogicIf, other: ProjectLogicIf | Unset) -> bool:
+    if isinstance(other, Unset):
+        return False
+    return one.what == other.what and msgspec.json.decode(one.value) == msgspec.json.decode(other.value)
+
+
+def _check_condition(document: Document, meta_of: Callable[[Action], ObjectAction], condition: ProjectLogicIf) -> None:
+    try:
+        action_id, flow, index = condition.parse_what()
+    except ValueError as error:
+        raise InvalidData(f"The condition is not understood: {error}.") from None
+    _, action = document.action(action_id)
+    outputs, returns = action.outputs(), meta_of(action).returns
+    if flow != "default" or index >= len(outputs) or index >= len(returns):
+        raise InvalidData(f"Action {action.name} keeps no result number {index}: name its results first.")
+    if returns[index] != "boolean":
+        raise InvalidData(f"The result {outputs[index]} of {action.name} is {returns[index]}; only boolean can branch.")
+    try:
+        msgspec.json.decode(condition.value, type=bool)
+    except msgspec.DecodeError:
+        raise InvalidData(f"A condition compares with true or false, not with {condition.value[:40]}.") from None
+
+
+def _reaches(document: Document, origin: str, target: str, without: str) -> bool:
+    """Tell whether the logic leads from one action to another when the item `without` is left out."""
+    waiting, seen = [origin], {origin}
+    while waiting:
+        for item in document.outgoing(waiting.pop()):
+            if item.id == without:
+                continue
+            following = action_of(item.end)
+            if following == target:
+                return True
+            if following not in seen:
+                seen.add(following)
+                waiting.append(following)
+    return False

@@ -1,0 +1,75 @@
+"""Action points keep their place in the world when they get another parent (protocol, section 10.1)."""
+
+from typing import Final
+
+from msgspec.structs import replace
+
+from arcor2_hw.data.base import UNSET, Unset
+from arcor2_hw.data.geometry import Orientation
+from arcor2_hw.data.project import BareActionPoint
+from arcor2_hw.data.project_index import ProjectLookup, global_pose, relative_pose
+from arcor2_hw.exceptions import InvalidData, NotFound
+from arcor2_server.session.changes import Change, Kind
+from arcor2_server.session.document import Document
+
+SAME_ROTATION: Final = 1e-9
+"""Angle in rad below which two frames count as turned alike, so that what hangs on them need not be rewritten."""
+
+
+def check_parent(lookup: ProjectLookup, parent_id: str, name: str) -> None:
+    """Check that an object or action point can be the parent of the action point `name`; InvalidData, NotFound."""
+    try:
+        lookup.action_point(parent_id)
+    except NotFound:
+        pass
+    else:
+        return
+    try:
+        obj = lookup.scene_object(parent_id)
+    except NotFound:
+        raise NotFound(f"The parent of {name} is neither an object nor an action point: {parent_id!r}.") from None
+    if isinstance(obj.pose, Unset):
+        raise InvalidData(f"{obj.name} has no pose and cannot be the parent of {name}.")
+
+
+def changes_for_parent(document: Document, point_id: str, new_parent: str) -> tuple[list[Change], list[str]]:
+    """Give the changes that hang an action point on another parent ("" = none), and the points that change.
+
+    Positions and orientations are restated so that nothing moves; those of descendants too when the frame is
+    turned. Raises InvalidData for a parent that cannot be one, or hangs on the point itself.
+    """
+    point = document.action_point(point_id)
+    moved = replace(point, parent=new_parent or UNSET)
+    if new_parent:
+        check_parent(document, new_parent, point.name)
+        _check_loop(document, point, new_parent)
+    here = relative_pose(document, moved, global_pose(document, point))
+    changes = [document.update(Kind.POINT, point_id, replace(moved, position=here.position))]
+    # The point's own pose has no rotation, so what is left in `here` is the turn between the two frames.
+    turn = here.orientation
+    if turn.angle_to(Orientation()) <= SAME_ROTATION:
+        return changes, [point_id]
+    changes += _turned(document, point_id, turn)
+    changed = [point_id]
+    for below in document.descendants(point_id):
+        position = below.position.rotated(turn)
+        changes.append(document.update(Kind.POINT, below.id, replace(below, position=position)))
+        changes += _turned(document, below.id, turn)
+        changed.append(below.id)
+    return changes, changed
+
+
+def _turned(document: Document, point_id: str, turn: Orientation) -> list[Change]:
+    return [
+        document.update(Kind.ORIENTATION, item.id, replace(item.value, orientation=turn * item.value.orientation))
+        for item in document.owned(point_id, Kind.ORIENTATION)
+    ]
+
+
+def _check_loop(document: Document, point: BareActionPoint, new_parent: str) -> None:
+    at: str | Unset = new_parent
+    while not isinstance(at, Unset):
+        if at == point.id:
+            raise InvalidData(f"{point.name} cannot hang on itself: choose a parent that is not below it.")
+        item = document.find(Kind.POINT, at)
+        at = UNSET if item is None else item.value.parent
