@@ -127,11 +127,10 @@ class World:
         if self._jaws_due is not None and self._now >= self._jaws_due:
             self._jaws_due = None
             if self._closing and not self.jaws_closed:
-                self.jaws_closed = True
                 await self._grip()
             elif not self._closing and self.jaws_closed:
-                self.jaws_closed = False
                 await self._let_go("let go")
+            self.jaws_closed = self._closing  # last, so that who sees it sees what came of it
 
     # ------------------------------------------------------------------------------------------------ gripping
 
@@ -153,17 +152,15 @@ class World:
                 await self._hold(thing, layout.tester.pose.matrix(), "taken out of the tester")
 
     async def _hold(self, thing: Thing, world_from_board: Matrix, why: str) -> None:
-        self._held = thing
         self._tip_from_board = np.linalg.inv(self._tip()) @ world_from_board
         self._move(thing, "gripper", why)
         await self._tell_sensor()
 
     async def _let_go(self, why: str) -> None:
-        thing, self._held = self._held, None
-        if thing is None:
-            return
-        await self._fall(thing, self._tip() @ self._tip_from_board, why)
-        await self._tell_sensor()
+        thing = self._held
+        if thing is not None:
+            await self._fall(thing, self._tip() @ self._tip_from_board, why)
+            await self._tell_sensor()
 
     async def _fall(self, thing: Thing, world_from_board: Matrix, why: str) -> None:
         layout = self._layout
@@ -195,6 +192,10 @@ class World:
         return self._feeder[0] if self._feeder and self._now >= self._refilled_at else None
 
     def _move(self, thing: Thing, place: str, why: str, position: tuple[float, float, float] | None = None) -> None:
+        if place == "gripper":
+            self._held = thing
+        elif thing is self._held:
+            self._held = None
         thing.place, thing.position = place, position
         thing.history.append(Event(self._now, place, why))
 
@@ -252,8 +253,6 @@ class World:
             self._refilled_at = self._now + self._layout.feeder.refill_time
         if thing in self._feeder:
             self._feeder.remove(thing)
-        if thing is self._held:
-            self._held = None
         self._move(thing, "removed", "taken away by hand")
         await self._tell_sensor()
 
