@@ -1,0 +1,58 @@
+"""Flow: end the program, wait, repeat a number of times."""
+
+import threading
+from typing import ClassVar
+
+from arcor2_hw.actions import action
+from arcor2_hw.exceptions import Cancelled, ProgramFinished
+from arcor2_hw.objects import Generic, Settings
+
+
+class FlowActions(Generic):
+    """Ends a program, waits, and repeats."""
+
+    _ABSTRACT = False
+    CANCEL_MAPPING: ClassVar[dict[str, str]] = {"wait": "cancel"}
+
+    def __init__(self, obj_id: str, name: str, settings: Settings | None = None) -> None:
+        super().__init__(obj_id, name, settings)
+        self._cancelled = threading.Event()
+        self._rounds: dict[str | None, int] = {}
+
+    @action
+    def finish(self, *, an: str | None = None) -> None:
+        """End the program here, as meant."""
+        raise ProgramFinished
+
+    @action(deadline=None)
+    def wait(self, seconds: float = 1.0, *, an: str | None = None) -> None:
+        """Wait before going on.
+
+        :param seconds: how long, s
+        """
+        assert 0.0 <= seconds <= 86400.0
+
+        self._cancelled.clear()
+        if self._cancelled.wait(seconds):
+            raise Cancelled(f"{self.name}: the wait was cancelled")
+
+    def cancel(self) -> None:
+        """End the present wait."""
+        self._cancelled.set()
+
+    @action
+    def repeat(self, times: int = 2, *, an: str | None = None) -> bool:
+        """Tell whether to go on repeating: true that many times, then once false, and from the beginning.
+
+        Each action counts for itself, by its name.
+
+        :param times: how many times the branch for true is taken
+        """
+        assert 0 <= times <= 1000000
+
+        done = self._rounds.get(an, 0)
+        if done < times:
+            self._rounds[an] = done + 1
+            return True
+        self._rounds[an] = 0
+        return False

@@ -1,0 +1,61 @@
+"""Time: sleep, the present time, stopwatches."""
+
+import threading
+import time
+from typing import ClassVar
+
+from arcor2_hw.actions import action
+from arcor2_hw.exceptions import Cancelled, NotFound
+from arcor2_hw.objects import Generic, Settings
+
+
+class TimeActions(Generic):
+    """Sleeps, tells the time and measures it."""
+
+    _ABSTRACT = False
+    CANCEL_MAPPING: ClassVar[dict[str, str]] = {"sleep": "cancel"}
+
+    def __init__(self, obj_id: str, name: str, settings: Settings | None = None) -> None:
+        super().__init__(obj_id, name, settings)
+        self._cancelled = threading.Event()
+        self._started: dict[str, float] = {}
+
+    @action(deadline=None)
+    def sleep(self, seconds: float = 1.0, *, an: str | None = None) -> None:
+        """Do nothing for a while.
+
+        :param seconds: how long, s
+        """
+        assert 0.0 <= seconds <= 86400.0
+
+        self._cancelled.clear()
+        if self._cancelled.wait(seconds):
+            raise Cancelled(f"{self.name}: the sleep was cancelled")
+
+    def cancel(self) -> None:
+        """End the present sleep."""
+        self._cancelled.set()
+
+    @action
+    def time_ns(self, *, an: str | None = None) -> int:
+        """Give the present time: nanoseconds since 1970 in UTC."""
+        return time.time_ns()
+
+    @action
+    def start_stopwatch(self, stopwatch: str = "stopwatch", *, an: str | None = None) -> None:
+        """Start a stopwatch from zero.
+
+        :param stopwatch: its name; each name is a stopwatch of its own
+        """
+        self._started[stopwatch] = time.monotonic()
+
+    @action
+    def elapsed(self, stopwatch: str = "stopwatch", *, an: str | None = None) -> float:
+        """Give the seconds since a stopwatch was started; it runs on. Not touched by changes of the clock.
+
+        :param stopwatch: its name
+        """
+        try:
+            return time.monotonic() - self._started[stopwatch]
+        except KeyError:
+            raise NotFound(f"{self.name}: stopwatch {stopwatch!r} was never started") from None
