@@ -1,0 +1,230 @@
+"""Bad days of the whole product: cables cut, stops pressed, processes killed."""
+
+import asyncio
+import time
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from arcor2_hw.client import Client, RequestFailed
+from arcor2_hw.data import rpc
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.events import SceneStateEnum
+from arcor2_hw.data.geometry import Position
+from arcor2_hw.data.package import PackageStateEnum
+from arcor2_hw.data.project import Project
+from tests.e2e.harness import Cell, alive, kill, running_cell, scene_state, until
+
+pytestmark = pytest.mark.timeout(180)
+
+REST_JOINT_SPEED = 1e-3
+"""rad/s below which a joint counts as standing."""
+
+
+@pytest.fixture
+async def cell(tmp_path: Path) -> AsyncIterator[Cell]:
+    async with running_cell(tmp_path) as running:
+        yield running
+
+
+@pytest.fixture
+async def running(tmp_path: Path) -> AsyncIterator[Cell]:
+    """With the small world, so that programs can pick boards."""
+    async with running_cell(tmp_path, boards=3, seed=4) as cell:
+        yield cell
+
+
+async def arm(cell: Cell) -> dict[str, Any]:
+    truth: dict[str, Any] = await cell.tell("robot", "truth")
+    return truth
+
+
+async def moving(cell: Cell) -> bool:
+    return max(abs(v) for v in (await arm(cell))["qd"]) > 0.2
+
+
+async def at_rest(cell: Cell) -> bool:
+    return max(abs(v) for v in (await arm(cell))["qd"]) < REST_JOINT_SPEED
+
+
+async def assert_stays(cell: Cell, seconds: float) -> None:
+    """No joint moves for that long."""
+    before = (await arm(cell))["q"]
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        now = (await arm(cell))["q"]
+        assert max(abs(a - b) for a, b in zip(before, now, strict=True)) < 1e-3, "the arm moved by itself"
+        await asyncio.sleep(0.05)
+
+
+async def online(cell: Cell, client: Client) -> Project:
+    _, project = await cell.open(client)
+    await client.call("StartScene")
+    await scene_state(client, SceneStateEnum.STARTED)
+    return project
+
+
+def action_id(project: Project, name: str) -> str:
+    return next(a.id for point in project.action_points for a in point.actions if a.name == name)
+
+
+async def start_moving(cell: Cell, client: Client, project: Project) -> None:
+    """Try the action that picks from the feeder; return in mid-move."""
+    await client.call("ExecuteAction", rpc.ExecuteActionArgs(action_id(project, "pick")))
+    await until(lambda: moving(cell), "the arm to move", 10)
+
+
+async def program_in_mid_move(cell: Cell, client: Client) -> None:
+    _, project = await cell.open(client, boards=3)
+    package = await cell.build(client, project)
+    await client.call("RunPackage", rpc.RunPackageArgs(package))
+    await until(lambda: moving(cell), "the arm to move", 20)
+
+
+async def program_ends_with(client: Client, timeout: float) -> str:
+    """The text of the ProjectException that comes before PackageState stopped."""
+    text = ""
+    while True:
+        event = await client.next_event("ProjectException", "PackageState", timeout=timeout)
+        if event.event == "ProjectException":
+            text = event.data.message
+        elif event.data.state is PackageStateEnum.STOPPED:
+            return text
+
+
+# ---------------------------------------------------------------------------------------------------- start of a scene
+async def test_robot_off_at_start_is_named_and_a_later_start_works(cell: Cell) -> None:
+    client = await cell.client("technician")
+    await cell.open(client)
+    await cell.kill("robot")
+    await client.call("StartScene")
+    event = await scene_state(client, SceneStateEnum.STOPPED)
+    assert not isinstance(event.data.message, Unset)
+    assert "robot" in event.data.message
+    assert cell.robot_host in event.data.message
+    await client.call("SystemInfo")
+    await cell.start_robot()
+    await client.call("StartScene")
+    await scene_state(client, SceneStateEnum.STARTED)
+
+
+async def test_a_foreign_program_plays_on_joints_are_shown_and_control_is_refused(cell: Cell) -> None:
+    await cell.tell("robot", "foreign_program", on=True)
+    playing = (await arm(cell))["program"]
+    assert playing is not None
+    client = await cell.client("operator")
+    project = await online(cell, client)
+    scene = await client.call("GetScene", rpc.IdArgs(project.scene_id))
+    robot = next(obj.id for obj in scene.objects if obj.name == "robot")
+    joints = await client.call("GetRobotJoints", rpc.GetRobotJointsArgs(robot))
+    truth = await arm(cell)
+    assert len(joints) == 6
+    assert [joint.value for joint in joints] == pytest.approx(truth["q"], abs=0.2)
+    await client.call("ExecuteAction", rpc.ExecuteActionArgs(action_id(project, "pick")))
+    result = (await client.next_event("ActionResult", timeout=20)).data
+    assert not isinstance(result.error, Unset)
+    assert "program" in result.error
+    assert (await arm(cell))["program"] == playing
+    assert (await arm(cell))["programs_killed"] == truth["programs_killed"]
+
+
+# ---------------------------------------------------------------------------------------------------- in mid-move
+@pytest.mark.parametrize("fault", ["silence", "reset", "half_frame"])
+async def test_cable_cut_in_mid_move_fails_the_action_and_nothing_moves_again(running: Cell, fault: str) -> None:
+    client = await running.client("operator")
+    await program_in_mid_move(running, client)
+    cut = time.monotonic()
+    await running.tell("robot", fault)
+    text = await program_ends_with(client, 10)
+    assert time.monotonic() - cut < 8
+    assert "robot" in text, text
+    await until(lambda: at_rest(running), "the arm to rest", 1.0)
+    await running.tell("robot", "heal")
+    await assert_stays(running, 2.0)
+    await client.call("SystemInfo")
+
+
+async def test_protective_stop_is_named_and_stays_until_a_person_unlocks_it(running: Cell) -> None:
+    client = await running.client("operator")
+    await program_in_mid_move(running, client)
+    await running.tell("robot", "protective_stop")
+    text = await program_ends_with(client, 10)
+    assert "protective stop" in text.lower(), text
+    await assert_stays(running, 6.0)  # the controller refuses to unlock for 5 s: nobody may have tried after that
+    assert (await arm(running))["safety"] == "PROTECTIVE_STOP"
+
+
+async def test_safeguard_stop_released_moves_nothing_until_a_new_command(cell: Cell) -> None:
+    client = await cell.client("operator")
+    project = await online(cell, client)
+    await start_moving(cell, client, project)
+    await cell.tell("robot", "safeguard_stop", on=True)
+    result = (await client.next_event("ActionResult", timeout=10)).data
+    assert not isinstance(result.error, Unset)
+    assert "safeguard" in result.error.lower()
+    await cell.tell("robot", "safeguard_stop", on=False)
+    await assert_stays(cell, 2.0)
+    await start_moving(cell, client, project)
+
+
+# ---------------------------------------------------------------------------------------------------- killed processes
+async def test_host_killed_in_mid_move(cell: Cell) -> None:
+    client = await cell.client("operator")
+    project = await online(cell, client)
+    (busy, *_) = [p for p in cell.hosts() if any(c.raddr and c.raddr.port == 30004 for c in p.net_connections())]
+    await start_moving(cell, client, project)
+    kill(busy.pid)
+    killed = time.monotonic()
+    rest = asyncio.create_task(until(lambda: at_rest(cell), "the arm to rest", 2.0))
+    event = await scene_state(client, SceneStateEnum.STOPPED, timeout=2.0)
+    told = time.monotonic() - killed
+    await rest
+    rested = time.monotonic() - killed
+    assert rested < 0.6, f"the arm rested after {rested:.2f} s"  # 0.5 s by the watchdog and one look
+    assert told < 1.0
+    assert not isinstance(event.data.message, Unset)
+    await client.call("StartScene")
+    await scene_state(client, SceneStateEnum.STARTED)
+    await start_moving(cell, client, project)
+
+
+async def test_server_killed_while_a_program_runs_stops_the_motion_and_ends_the_host(running: Cell) -> None:
+    client = await running.client("operator")
+    await program_in_mid_move(running, client)
+    hosts = [p.pid for p in running.hosts()]
+    assert hosts
+    await running.kill("server")
+    killed = time.monotonic()
+    await until(lambda: at_rest(running), "the arm to rest", 2.0)
+    await until(lambda: not any(alive(pid) for pid in hosts), "the hosts to end", 2.5)
+    assert time.monotonic() - killed < 2.5
+    await assert_stays(running, 1.0)
+
+
+async def test_every_acknowledged_edit_survives_the_server(cell: Cell) -> None:
+    client = await cell.client("author")
+    _, project = await cell.open(client)
+    acknowledged: set[str] = set()
+
+    async def edit() -> None:
+        for number in range(100_000):
+            await client.call("AddActionPoint", rpc.AddActionPointArgs(f"point_{number}", Position(number, 0, 0)))
+            acknowledged.add(f"point_{number}")
+
+    editing = asyncio.create_task(edit())
+    await until(lambda: len(acknowledged) >= 50, "some edits")
+    await cell.kill("server")
+    with pytest.raises(Exception, match="closed"):
+        await editing
+    assert len(acknowledged) >= 50
+    await cell.start_server()
+    again = await cell.client("author")
+    event = await again.next_event("OpenProject", timeout=5)
+    assert event.data.project.id == project.id
+    kept = {point.name for point in event.data.project.action_points}
+    assert acknowledged <= kept
+    with pytest.raises(RequestFailed):
+        await again.call("CloseProject")  # there are unsaved changes
+    await again.call("SaveProject")
