@@ -1,9 +1,12 @@
 """The connected clients: events to all of them, or to one."""
 
+from collections.abc import Callable
+
 import msgspec
 
-from arcor2_hw.data.events import EVENTS, Event
+from arcor2_hw.data.events import EVENTS, Event, MainScreen, ShowMainScreenData
 from arcor2_server.client import Client
+from arcor2_server.rpc.registry import make_event
 
 encode = msgspec.json.Encoder().encode
 
@@ -13,17 +16,24 @@ class Hub:
 
     def __init__(self) -> None:
         self.clients: set[Client] = set()
+        self.on_leave: list[Callable[[Client], None]] = []
+        self.main_screen = make_event("ShowMainScreen", ShowMainScreenData(MainScreen.SCENES_LIST))
+        """What a client sees that connects while nothing is open: the last ShowMainScreen, without `highlight`."""
 
     def add(self, client: Client) -> None:
         """Take in a connection."""
         self.clients.add(client)
 
     def remove(self, client: Client) -> None:
-        """Forget a connection."""
+        """Forget a connection, and tell those who keep something for it (subscriptions)."""
         self.clients.discard(client)
+        for forget in self.on_leave:
+            forget(client)
 
     def broadcast(self, event: Event, *, besides: Client | None = None) -> None:
         """Send an event to all clients whose role may see it, but not to `besides`."""
+        if isinstance(event.data, ShowMainScreenData):
+            self.main_screen = make_event(event.event, ShowMainScreenData(event.data.what))
         if self.clients:
             self.broadcast_encoded(event.event, encode(event), besides=besides)
 

@@ -144,9 +144,8 @@ class Locks:
     # ------------------------------------------------------------------------------------------------ of clients
     async def write_lock(self, user: str, item: str, tree: bool = False) -> list[str]:
         """Lock for a client. Gives the ids to announce, none when he holds it already. Locked, NotFound."""
-        await self._pass()
-        root_id = await self._root_of(item)
-        if self.holds(user, item, tree=tree):
+        root_id = (await self._enter([item]))[item]
+        if self.holds(user, item, tree=tree) and self._is_announced(user, root_id, item):
             return []
         self._take_write(user, root_id, item, tree)
         ids = {item}
@@ -164,8 +163,7 @@ class Locks:
 
     async def read_lock(self, user: str, item: str) -> None:
         """Lock for reading, for a client. Locked, NotFound."""
-        await self._pass()
-        self._take_read(user, await self._root_of(item), item)
+        self._take_read(user, (await self._enter([item]))[item], item)
         self._reads.setdefault(user, []).append(item)
 
     async def read_unlock(self, user: str, item: str) -> None:
@@ -248,8 +246,6 @@ class Locks:
 
         Locked at once while anybody holds an announced lock, and when silent ones do not end in time.
         """
-        self._refuse_announced()
-        await self._pass()
         self._refuse_announced()
         deadline = asyncio.get_running_loop().time() + self._patience
         while self._exclusive is not None or self.write_locked_roots():
@@ -345,6 +341,11 @@ class Locks:
         root = self._roots.get(self._where.get(item, ""))
         return root is not None and root.writers.get(item) == user
 
+    def _is_announced(self, user: str, root_id: str, item: str) -> bool:
+        """Tell whether a client asked for the lock that covers an id; one that a request holds will not last."""
+        announced = self._announced.get(user, {})
+        return item in announced or any(writer in announced for writer in self._roots[root_id].writers)
+
     def _refuse_write(self, root: _Root | None, item: str, tree: bool) -> None:
         if root is None:
             return
@@ -433,19 +434,25 @@ class Locks:
         if found := self.announced():
             raise Locked(f"Something is locked by {', '.join(sorted(found))}.")
 
-    async def _eventually(self, take: Callable[[dict[str, str]], None], ids: Iterable[str]) -> None:
+    async def _eventually(self, take: Callable[[dict[str, str]], None], items: Iterable[str]) -> None:
         deadline = asyncio.get_running_loop().time() + self._patience
-        await self._pass()
         while True:
             # Looked up anew each time: what is waited for may be removed or moved meanwhile.
-            root_ids = {item: await self._root_of(item) for item in dict.fromkeys(ids)}
-            await self._pass()
+            root_ids = await self._enter(items)
             try:
                 take(root_ids)
             except Locked as error:
                 await self._wait_for_change(deadline, str(error))
             else:
                 return
+
+    async def _enter(self, items: Iterable[str]) -> dict[str, str]:
+        """Wait for the end of an exclusive operation; give the roots, valid until the caller next awaits."""
+        while True:
+            await self._pass()
+            root_ids = {item: await self._root_of(item) for item in dict.fromkeys(items)}
+            if self._exclusive is None or self._exclusive is asyncio.current_task():
+                return root_ids
 
     async def _pass(self) -> None:
         """Wait while somebody else works under `exclusive`."""

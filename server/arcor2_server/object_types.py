@@ -44,6 +44,12 @@ class ObjectTypes:
 
     def __init__(self, storage: Storage) -> None:
         self._storage = storage
+        self.revision = 0
+        """Grows with every change of what is known."""
+
+    async def load(self) -> None:
+        """Read built-in, installed and uploaded types."""
+        raise NotImplementedError
 
     async def refresh(self) -> Changes:
         """Take in what was put straight into storage since the last time."""

@@ -1,7 +1,9 @@
 """The parts of the server, each made once, known to each other through this one object."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
+
+from arcor2_server.kept import KeptAnswers
 
 if TYPE_CHECKING:
     from arcor2_server.build.service import BuildService
@@ -22,7 +24,7 @@ class Services:
 
     hub: the connected clients. users: who is logged in. locks: who holds what. storage: saved documents.
     types: what is known of object types. session: the open scene or project. cell: the scene when online.
-    execution: packages and the running program. build: project to package.
+    execution: packages and the running program. build: project to package. kept: encoded answers.
     """
 
     settings: "ServerSettings"
@@ -35,3 +37,4 @@ class Services:
     cell: "OnlineCell"
     execution: "Execution"
     build: "BuildService"
+    kept: KeptAnswers = field(default_factory=KeptAnswers)

@@ -40,10 +40,11 @@ def make_event(name: str, data: Any = UNSET, change: ChangeType | None = None, p
 class Context:
     """What a handler is given beside its arguments.
 
-    Events: `emit` sends to all clients after the response, `emit_first` before it (protocol, section 2).
+    Events: `emit` sends to all clients after the response, `emit_first` before it (protocol, section 2). They are
+    sent when the request is granted, or refused with data; an error that is raised otherwise drops them.
     """
 
-    __slots__ = ("client", "dry_run", "events_after", "events_before", "services")
+    __slots__ = ("client", "dry_run", "events_after", "events_before", "events_to_caller", "services")
 
     def __init__(self, services: "Services", client: "Client", dry_run: bool = False) -> None:
         self.services = services
@@ -51,6 +52,8 @@ class Context:
         self.dry_run = dry_run
         self.events_before: list[Event] = []
         self.events_after: list[Event] = []
+        self.events_to_caller: list[Event] = []
+        """Sent to the caller alone, after the response."""
 
     @property
     def user(self) -> str:

@@ -1,0 +1,102 @@
+"""The ASGI application: the websocket, the REST routes, and the parts behind them, brought up and ended in order."""
+
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import AsyncExitStack, asynccontextmanager
+from importlib.metadata import version
+from typing import Any, Final
+
+from litestar import Litestar, Response, Router, WebSocket, get, websocket
+from litestar.openapi import OpenAPIConfig
+from litestar.openapi.plugins import JsonRenderPlugin
+
+from arcor2_hw.data.role import Role
+from arcor2_server.build.service import BuildService
+from arcor2_server.cell.online import OnlineCell
+from arcor2_server.endpoint import Endpoint
+from arcor2_server.execution import Execution
+from arcor2_server.hub import Hub
+from arcor2_server.locks import Locks
+from arcor2_server.object_types import ObjectTypes
+
+# Imported for their handlers.
+from arcor2_server.rpc import general, lists, locking, object_types  # noqa: F401
+from arcor2_server.services import Services
+from arcor2_server.session import Session
+from arcor2_server.settings import ServerSettings
+from arcor2_server.storage import Storage
+from arcor2_server.users import Users
+
+ROLE: Final = "role"
+"""The key of a route's `opt` under which it declares the least role that may use it."""
+
+
+@asynccontextmanager
+async def running_services(settings: ServerSettings) -> AsyncIterator[Services]:
+    """Bring up all parts, and end them in the opposite order. StorageError when the data cannot be used."""
+    async with AsyncExitStack() as stack:
+        storage = await Storage.open(settings)
+        stack.push_async_callback(storage.close)
+        hub = Hub()
+        locks = Locks(settings.lock_retries, settings.lock_retry_wait)
+        users = Users(hub, locks, settings)
+        stack.callback(users.close)
+        types = ObjectTypes(storage)
+        await types.load()
+        services = Services(
+            settings=settings,
+            hub=hub,
+            users=users,
+            locks=locks,
+            storage=storage,
+            types=types,
+            session=None,  # type: ignore[arg-type]
+            cell=None,  # type: ignore[arg-type]
+            execution=None,  # type: ignore[arg-type]
+            build=None,  # type: ignore[arg-type]
+        )
+        services.session = Session(services)
+        services.cell = OnlineCell(services)
+        services.execution = Execution(services)
+        services.build = BuildService(services)
+        locks.tree = services.session
+        locks.stored = _is_known(services)
+        yield services
+
+
+def _is_known(services: Services) -> Callable[[str], Awaitable[bool]]:
+    """Give what tells whether an id names an object type, or a saved scene or project."""
+
+    async def known(item: str) -> bool:
+        return services.types.known(item) or await services.storage.identify(item) is not None
+
+    return known
+
+
+@get("/healthz/ready", opt={ROLE: Role.OPERATOR}, status_code=200, media_type="text/plain")
+async def ready() -> Response[str]:
+    """Answer 200 as soon as requests are served."""
+    return Response("")
+
+
+@websocket(["/", "/{path:path}"], opt={ROLE: Role.OPERATOR})
+async def arserver(socket: WebSocket[Any, Any, Any]) -> None:
+    """Speak the ARCOR2 protocol; each request declares its own least role."""
+    await socket.app.state.endpoint.serve(socket)
+
+
+def create_app(services: Services) -> Litestar:
+    """Make the application around parts that are up."""
+    endpoint = Endpoint(services)
+    app = Litestar(
+        route_handlers=[ready, arserver],
+        openapi_config=OpenAPIConfig(
+            title="ARCOR2-HW",
+            version=version("arcor2-hw"),
+            openapi_router=Router("/openapi", route_handlers=[], opt={ROLE: Role.OPERATOR}),
+            render_plugins=[JsonRenderPlugin()],
+        ),
+        on_shutdown=[endpoint.close],
+        logging_config=None,
+    )
+    app.state.endpoint = endpoint
+    return app

@@ -1,0 +1,1 @@
+"""The command line: `arcor2-hw`, one module per subcommand."""

@@ -1,0 +1,39 @@
+"""The entry point `arcor2-hw`: subcommands are imported only when they are called."""
+
+import os
+import sys
+from importlib.metadata import version
+
+from cyclopts import App
+
+from arcor2_server.cli.status import ExitStatus
+
+app = App(
+    name="arcor2-hw",
+    help="Set up, program and run robotic workplaces. Try `arcor2-hw demo`, or `arcor2-hw serve` and open a client.",
+    version=lambda: f"arcor2-hw {version('arcor2-hw')}",
+    version_flags=["--version"],
+    result_action="return_value",
+)
+app.command("arcor2_server.cli.serve:serve")
+app.command("arcor2_server.cli.demo:demo")
+app.command("arcor2_server.cli.package:app", name="package")
+app.command("arcor2_server.cli.device:app", name="device")
+app.command("arcor2_server.cli.analyse:analyse")
+
+
+def main() -> None:
+    """Run the command line; the process ends with an ExitStatus."""
+    try:
+        status = app(exit_on_error=False, print_error=False)
+    except KeyboardInterrupt:
+        status = ExitStatus.INTERRUPTED
+    except BrokenPipeError:
+        # The reader of our output is gone (`| head`); the interpreter must not try to flush it.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        status = ExitStatus.OK
+    sys.exit(status if isinstance(status, int) else ExitStatus.OK)
+
+
+if __name__ == "__main__":
+    main()

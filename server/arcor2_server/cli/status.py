@@ -1,0 +1,31 @@
+"""With which status a command ends, and why."""
+
+import enum
+
+
+class ExitStatus(enum.IntEnum):
+    """Kept stable: scripts test it. Every status but OK comes with one line on standard error."""
+
+    OK = 0
+    FAILED = 1
+    """Something went wrong that has no status of its own."""
+    USAGE = 2
+    """The command line makes no sense."""
+    PORT_TAKEN = 3
+    """Another program listens there, or the address is none of this machine."""
+    DATA_UNUSABLE = 4
+    """The data directory cannot be created or written."""
+    DATABASE_UNUSABLE = 5
+    """The database is damaged, or was written by a newer version."""
+    DATA_IN_USE = 6
+    """Another server uses the data directory."""
+    NO_SERVER = 7
+    """There is no server at the address, or it does not answer."""
+    PROGRAM_FAILED = 8
+    """The program did not run to its end, or not to the right one."""
+    NOT_FOUND = 9
+    """What was named does not exist."""
+    ANALYSIS_PROBLEMS = 10
+    """An object type has problems."""
+    INTERRUPTED = 130
+    """Ctrl-C (128 + SIGINT)."""

@@ -1,0 +1,243 @@
+"""The websocket endpoint: reads messages, gives each request to its handler, answers every message."""
+
+import asyncio
+import logging
+import secrets
+from typing import Any, Final
+
+import msgspec
+import structlog
+from litestar import WebSocket
+from msgspec import UNSET, Struct
+
+from arcor2_hw.data.events import Event
+from arcor2_hw.data.role import Role
+from arcor2_hw.data.rpc import RPCS, Request, Response, Rpc
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.client import Client
+from arcor2_server.hub import encode
+from arcor2_server.rpc.registry import HANDLERS, Context, Handler, RequestRefused
+from arcor2_server.services import Services
+from arcor2_server.wire import EXTENSION, WireProtocol
+
+log = structlog.get_logger(__name__)
+
+UNREADABLE: Final = "Error"
+"""What stands as the answered request when that could not be read."""
+_decode_request = msgspec.json.Decoder(Request).decode
+_decode_anything = msgspec.json.Decoder().decode
+
+
+class _Head(Struct):
+    """What is read of a message that is not served."""
+
+    id: int = 0
+    request: str = UNREADABLE
+
+
+_decode_head = msgspec.json.Decoder(_Head).decode
+
+
+class Route(Struct, frozen=True):
+    """One request with all that is needed to serve it."""
+
+    rpc: Rpc
+    handler: Handler | None
+    decode: Any
+    default: Any
+    """What the handler gets when the arguments are left out; UNSET when they must not be."""
+
+
+def routes() -> dict[str, Route]:
+    """Give a route for each request of the protocol, with its handler where there is one."""
+    table = {}
+    for name, rpc in RPCS.items():
+        default: Any = None
+        if rpc.args is not None:
+            default = UNSET
+            if rpc.args_optional:
+                is_struct = isinstance(rpc.args, type) and issubclass(rpc.args, Struct)
+                default = rpc.args() if is_struct else None
+        decode = None if rpc.args is None else msgspec.json.Decoder(rpc.args).decode
+        table[name] = Route(rpc, HANDLERS.get(name), decode, default)
+    return table
+
+
+class _SocketWire:
+    """A client's connection: the ASGI socket for closing, the protocol below it for the rest."""
+
+    def __init__(self, socket: WebSocket[Any, Any, Any], protocol: WireProtocol) -> None:
+        self._socket = socket
+        self.send = protocol.send_text
+        self.ping = protocol.ping
+        self.abort = protocol.abort
+
+    async def close(self, code: int, reason: str) -> None:
+        """Send a close frame."""
+        try:
+            await self._socket.send({"type": "websocket.close", "code": code, "reason": reason})
+        except RuntimeError as error:
+            raise ConnectionError("the connection is closed") from error
+
+
+class Endpoint:
+    """Serves all connections of one server."""
+
+    def __init__(self, services: Services) -> None:
+        self._services = services
+        self._settings = services.settings
+        self._hub = services.hub
+        self._routes = routes()
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    async def serve(self, socket: WebSocket[Any, Any, Any]) -> None:
+        """Serve one connection until it ends."""
+        await socket.accept()
+        protocol: Any = (socket.scope["extensions"] or {})[EXTENSION]
+        client = Client(_SocketWire(socket, protocol), self._settings)
+        writer = asyncio.create_task(client.write(), name=f"client {client.number} writes")
+        log.info("client connected", client=client.number, address=socket.client)
+        try:
+            for event in self._greeting():
+                self._hub.send(client, event)
+            self._hub.add(client)
+            await self._read(socket, client)
+        finally:
+            self._hub.remove(client)
+            self._services.users.disconnected(client)
+            client.close(1000, "")
+            writer.cancel()
+            await asyncio.gather(writer, return_exceptions=True)
+            log.info("client disconnected", client=client.number, user=client.user)
+
+    async def close(self) -> None:
+        """Cancel the requests that are still being worked on."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    def _greeting(self) -> list[Event]:
+        services = self._services
+        return services.session.greeting() or services.execution.greeting() or [self._hub.main_screen]
+
+    async def _read(self, socket: WebSocket[Any, Any, Any], client: Client) -> None:
+        receive = socket.receive
+        create_task = asyncio.get_running_loop().create_task
+        served, in_flight = self._settings.served_size, self._settings.requests_in_flight
+        mine: set[asyncio.Task[None]] = set()
+        while True:
+            message = await receive()
+            if message["type"] != "websocket.receive":
+                return
+            text = message.get("text")
+            if text is None:
+                self._refuse(client, _Head(), "Send requests as text messages.")
+                continue
+            if len(text) > served:
+                self._refuse(client, _read_head(text), f"The message is longer than {served} bytes: it was not read.")
+                continue
+            if len(mine) >= in_flight:
+                await asyncio.wait(mine, return_when=asyncio.FIRST_COMPLETED)
+            task = create_task(self._handle(client, text))
+            for held in (mine, self._tasks):
+                held.add(task)
+                task.add_done_callback(held.discard)
+
+    async def _handle(self, client: Client, text: str) -> None:
+        try:
+            request = _decode_request(text)
+        except (msgspec.DecodeError, RecursionError) as error:
+            self._refuse(client, _read_head(text), f"This is no request: {error}.")
+            return
+        route = self._routes.get(request.request)
+        if route is None:
+            self._refuse(client, request, f"There is no request {request.request!r}.")
+            return
+        try:
+            await self._run(client, request, route)
+        except asyncio.CancelledError:
+            raise
+        except Exception:
+            reference = secrets.token_hex(4)
+            log.exception("request failed", request=request.request, reference=reference, user=client.user)
+            self._refuse(client, request, f"An error inside the server: see its log, reference {reference}.")
+
+    async def _run(self, client: Client, request: Request, route: Route) -> None:
+        rpc = route.rpc
+        if client.role < rpc.role:
+            self._refuse(client, request, f"{rpc.name} needs the role {Role(rpc.role).name.lower()} or a higher one.")
+            return
+        args = route.default
+        if route.decode is not None:
+            if not isinstance(request.args, msgspec.UnsetType):
+                try:
+                    args = route.decode(request.args)
+                except (msgspec.DecodeError, RecursionError) as error:
+                    self._refuse(client, request, f"The arguments of {rpc.name} are wrong: {error}.")
+                    return
+            elif args is UNSET:
+                self._refuse(client, request, f"The arguments of {rpc.name} are missing.")
+                return
+        if route.handler is None:
+            self._refuse(client, request, f"{rpc.name} is not available in this version.")
+            return
+        context = Context(self._services, client, request.dry_run and rpc.dry_run)
+        try:
+            data = await route.handler(context, args)
+        except RequestRefused as error:
+            # Data in a refusal means that a part was done, and its events are true.
+            partly = error.data is not UNSET
+            self._answer(client, request, context if partly else None, False, error.data, str(error))
+            return
+        except Arcor2Error as error:
+            if error.detail:
+                log.info("request refused", request=rpc.name, reason=str(error), detail=error.detail)
+            self._refuse(client, request, str(error))
+            return
+        self._answer(client, request, context, True, UNSET if data is None else data)
+
+    def _answer(
+        self, client: Client, request: Request, context: Context | None, result: bool, data: Any, message: str = ""
+    ) -> None:
+        response = encode(
+            Response(request.id, request.request, result, [message] if message else UNSET, data),
+        )
+        if context is None:
+            client.put(response)
+            return
+        broadcast = self._hub.broadcast
+        for event in context.events_before:
+            broadcast(event)
+        client.put(response)
+        for event in context.events_to_caller:
+            self._hub.send(client, event)
+        for event in context.events_after:
+            broadcast(event)
+
+    def _refuse(self, client: Client, request: "Request | _Head", message: str) -> None:
+        if log.is_enabled_for(logging.DEBUG):
+            log.debug("refused", client=client.number, request=request.request, message=message)
+        try:
+            answer = encode(Response(request.id, request.request, False, [message]))
+        except UnicodeEncodeError:
+            # A name with half a surrogate pair can be read but not sent back.
+            answer = encode(Response(request.id, UNREADABLE, False, [ascii(message)]))
+        client.put(answer)
+
+
+def _read_head(text: str) -> _Head:
+    """Read what can be read of the id and name of a message that is no request, or is too long."""
+    try:
+        return _decode_head(text)
+    except (msgspec.DecodeError, RecursionError):
+        pass
+    try:
+        content = _decode_anything(text)
+    except (msgspec.DecodeError, RecursionError):
+        return _Head()
+    if not isinstance(content, dict):
+        return _Head()
+    number, name = content.get("id"), content.get("request")
+    if not isinstance(number, int) or isinstance(number, bool):
+        return _Head()
+    return _Head(number, name if isinstance(name, str) else UNREADABLE)

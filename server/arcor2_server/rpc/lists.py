@@ -1,0 +1,71 @@
+"""Requests for saved scenes and projects; the lists are kept encoded until something is written."""
+
+from typing import Any
+
+import msgspec
+from msgspec import UNSET, Raw
+
+from arcor2_hw.data.project import Project
+from arcor2_hw.data.rpc import IdArgs, ListProjectsData, ListScenesData
+from arcor2_hw.data.scene import Scene
+from arcor2_server.hub import encode
+from arcor2_server.rpc.object_types import notice_new_types
+from arcor2_server.rpc.registry import Context, rpc
+
+
+def _revisions(context: Context) -> tuple[int, ...]:
+    return context.services.storage.revision, context.services.types.revision
+
+
+@rpc("ListScenes")
+async def list_scenes(context: Context, args: None) -> Raw:  # noqa: ARG001
+    """Give all saved scenes with what is wrong with them."""
+    await notice_new_types(context)
+    services, revisions = context.services, _revisions(context)
+    if (kept := services.kept.get("ListScenes", revisions)) is not None:
+        return kept
+    answer = []
+    for scene in await services.storage.scenes():
+        problems = services.session.scene_problems(await services.storage.scene(scene.id))
+        answer.append(
+            ListScenesData(
+                id=scene.id,
+                name=scene.name,
+                created=_saved(scene.created),
+                modified=_saved(scene.modified),
+                description=scene.description or UNSET,
+                problems=problems or UNSET,
+            )
+        )
+    return services.kept.keep("ListScenes", revisions, encode(answer))
+
+
+@rpc("ListProjects")
+async def list_projects(context: Context, args: None) -> Raw:  # noqa: ARG001
+    """Give all saved projects with what is wrong with them."""
+    await notice_new_types(context)
+    services, revisions = context.services, _revisions(context)
+    if (kept := services.kept.get("ListProjects", revisions)) is not None:
+        return kept
+    answer = []
+    for project in await services.storage.projects():
+        problems = await services.session.project_problems(await services.storage.project(project.id))
+        answer.append(ListProjectsData(**msgspec.structs.asdict(project), problems=problems or UNSET))
+    return services.kept.keep("ListProjects", revisions, encode(answer))
+
+
+@rpc("GetScene")
+async def get_scene(context: Context, args: IdArgs) -> Scene:
+    """Give a scene as it was last saved."""
+    return await context.services.storage.scene(args.id)
+
+
+@rpc("GetProject")
+async def get_project(context: Context, args: IdArgs) -> Project:
+    """Give a project as it was last saved."""
+    return await context.services.storage.project(args.id)
+
+
+def _saved(stamp: Any) -> str:
+    """Everything in storage carries both time stamps."""
+    return str(stamp)

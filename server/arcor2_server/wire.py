@@ -1,0 +1,74 @@
+"""The websocket of a client, on uvicorn's protocol: text frames of bytes, pings that can be waited for, abort."""
+
+import asyncio
+import secrets
+from typing import Any
+
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.exceptions import InvalidState
+from websockets.frames import Frame
+from websockets.http11 import Request
+
+EXTENSION = "arcor2_hw.wire"
+"""The key under which an ASGI scope's extensions hold the connection's WireProtocol."""
+
+
+class WireProtocol(WebSocketsSansIOProtocol):
+    """uvicorn's protocol, which ASGI alone does not let send a ping, drop a connection or write encoded text."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self._pongs: dict[bytes, asyncio.Future[None]] = {}
+
+    def handle_connect(self, event: Request) -> None:
+        """Put this object into the scope, where the endpoint finds it."""
+        super().handle_connect(event)
+        if (scope := getattr(self, "scope", None)) is not None:
+            scope["extensions"][EXTENSION] = self
+
+    def handle_pong(self, event: Frame) -> None:
+        """Tell the one who waits for this pong."""
+        waiter = self._pongs.pop(bytes(event.data), None)
+        if waiter is None:
+            super().handle_pong(event)
+        elif not waiter.done():
+            waiter.set_result(None)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Tell those who wait for a pong that there will be none."""
+        super().connection_lost(exc)
+        for waiter in self._pongs.values():
+            if not waiter.done():
+                waiter.set_exception(ConnectionError("the connection is lost"))
+        self._pongs.clear()
+
+    async def send_text(self, message: bytes) -> None:
+        """Send a text message that is encoded already; returns when the connection takes more."""
+        if not self.writable.is_set():
+            await self.writable.wait()
+        if self.disconnected or self.close_sent:
+            raise ConnectionError("the connection is closed")
+        try:
+            self.conn.send_text(message)
+        except InvalidState as error:
+            raise ConnectionError("the connection is closed") from error
+        for chunk in self.conn.data_to_send():
+            self.transport.write(chunk)
+
+    async def ping(self) -> None:
+        """Return when a ping is answered; ConnectionError when the connection ends."""
+        if self.disconnected or self.close_sent:
+            raise ConnectionError("the connection is closed")
+        payload = secrets.token_bytes(8)  # four bytes are those of uvicorn's own pings
+        waiter = self._pongs[payload] = self.loop.create_future()
+        try:
+            self.conn.send_ping(payload)
+            self.transport.write(b"".join(self.conn.data_to_send()))
+            await waiter
+        finally:
+            self._pongs.pop(payload, None)
+
+    def abort(self) -> None:
+        """Drop the connection at once, with what waits in its buffers."""
+        if not self.disconnected:
+            self.transport.abort()
