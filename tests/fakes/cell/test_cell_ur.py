@@ -1,0 +1,72 @@
+"""The world with the real fakes all round: the fake UR controller plays a program, the boards go where its arm goes."""
+
+import socket
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import arcor2_fakes.cell
+
+EXAMPLE = str(Path(arcor2_fakes.cell.__file__).with_name("example.json"))
+
+# In the controller's base: the world's x and y with the other sign, TCP at the tip of the example's gripper.
+CARRY = """def carry():
+  set_tcp(p[0, 0, {tcp}, 0, 0, 0])
+  movej(p[-0.4, 0.3, {above}, 0, 3.14159265358979, 0], a=6, v=3)
+  movel(p[-0.4, 0.3, {feeder}, 0, 3.14159265358979, 0], a=3, v=1)
+  set_standard_digital_out(0, True)
+  sleep(0.3)
+  movel(p[-0.4, 0.3, {above}, 0, 3.14159265358979, 0], a=3, v=1)
+  movej(p[-0.5, -0.15, {above}, 0, 3.14159265358979, 0], a=6, v=3)
+  movel(p[{x}, -0.15, {tester}, 0, 3.14159265358979, 0], a=3, v=1)
+  set_standard_digital_out(0, False)
+  sleep(0.3)
+end
+"""
+
+
+def play(ur: Any, tcp: float = 0.1, x: float = -0.5) -> None:
+    """Send the program; heights are of the tip, which the controller's TCP may or may not agree with."""
+    lift = 0.1 - tcp
+    program = CARRY.format(tcp=tcp, x=x, above=0.25 + lift, feeder=0.08 + lift, tester=0.1 + lift)
+    host, port = ur.ready["script"].split(":")
+    with socket.create_connection((host, int(port)), 2.0) as script:
+        script.sendall(program.encode())
+    ur.control.wait_until(lambda truth: truth["program"] == "carry")
+    ur.control.wait_until(lambda truth: truth["program"] is None, within=30.0)
+
+
+@pytest.fixture
+def cell(start_fake: Callable[..., Any]) -> tuple[Any, Any, Any]:
+    ports = [part for name in ("rtde", "script", "dashboard") for part in (f"--{name}-port", "0")]
+    ur = start_fake("ur", *ports)
+    tester = start_fake("functional_tester", "--time-scale", "20")
+    reader = start_fake("barcode_reader")
+    world = start_fake(
+        "cell",
+        *("--layout", EXAMPLE, "--seed", "5", "--boards", "2"),
+        *("--robot", ur.ready["control"], "--tester", tester.ready["control"], "--reader", reader.ready["control"]),
+    )
+    tester.control.do("push_door", opening=True)
+    return ur, tester, world
+
+
+@pytest.mark.parametrize("tcp", [0.1, 0.0])
+def test_the_arm_carries_a_board_into_the_tester(cell: tuple[Any, Any, Any], tcp: float) -> None:
+    ur, tester, world = cell
+    play(ur, tcp)
+    board = world.truth()["boards"][0]
+    assert [event["place"] for event in board["history"]] == ["gripper", "tester"]
+    assert tester.truth()["board"] == board["code"]
+    assert ur.truth()["digital_inputs"] == 0
+
+
+def test_half_a_centimetre_beside_the_fixture_is_lost(cell: tuple[Any, Any, Any]) -> None:
+    ur, tester, world = cell
+    world.control.do("sensor", stuck=True)
+    assert ur.truth()["digital_inputs"] == 1
+    play(ur, x=-0.505)
+    assert [board["place"] for board in world.truth()["boards"]] == ["lost", "feeder"]
+    assert tester.truth()["board"] is None
