@@ -11,8 +11,11 @@ from typing import Any, Final
 
 import msgspec
 import structlog
+from msgspec import UNSET
 
 from arcor2_hw.data.base import now
+from arcor2_hw.data.project import BareProject
+from arcor2_hw.data.scene import BareScene
 from arcor2_hw.exceptions import StorageError
 from arcor2_server.session.changes import (
     Edit,
@@ -31,23 +34,49 @@ FORMAT: Final = 1
 BUSY_TIMEOUT: Final = 5.0
 """Seconds to wait for another process that has the file (a server that is just ending)."""
 
+ALL: Final = 2**63 - 1
+"""As `Base.forget`: drop all edits, those of another document too."""
+
 _SCHEMA: Final = """
 create table base (id integer primary key check (id = 1), items blob not null, edit integer not null,
-                   changed_scene integer not null, changed_project integer not null) strict;
+                   scene_times text not null, project_times text not null) strict;
 create table edit (number integer primary key, time text not null, user text not null, changes blob not null) strict;
 """
 
 
-class Recovered(msgspec.Struct, frozen=True):
-    """What the journal held: the document as `items` after edit `number`, and all edits that are kept.
+class Times(msgspec.Struct, frozen=True):
+    """When a document was created, saved, and changed after it was saved; empty where it was not."""
 
-    changed_scene, changed_project: whether the base had changes that are not in the storage.
-    """
+    created: str = ""
+    modified: str = ""
+    changed: str = ""
+
+    @classmethod
+    def of(cls, document: BareScene | BareProject) -> "Times":
+        """Take the times of a scene or project."""
+        return cls(document.created or "", document.modified or "", document.int_modified or "")
+
+    @property
+    def unsaved(self) -> bool:
+        """Whether there is anything that is not saved."""
+        return not self.modified or bool(self.changed)
+
+    def fields(self) -> dict[str, Any]:
+        """Give the times as fields of a scene or project."""
+        return {
+            "created": self.created or UNSET,
+            "modified": self.modified or UNSET,
+            "int_modified": self.changed or UNSET,
+        }
+
+
+class Recovered(msgspec.Struct, frozen=True):
+    """What the journal held: the document as `items` after edit `number`, and all edits that are kept."""
 
     items: list[Item]
     number: int
-    changed_scene: bool
-    changed_project: bool
+    scene: Times
+    project: Times
     edits: list[Edit]
 
 
@@ -56,8 +85,8 @@ class Base(msgspec.Struct, frozen=True):
 
     items: list[Item]
     number: int
-    changed_scene: bool
-    changed_project: bool
+    scene: Times
+    project: Times
     forget: int
 
 
@@ -187,8 +216,9 @@ def _write(connection: sqlite3.Connection, job: Edit | Base | None) -> None:
     match job:
         case Edit(number, time, user, changes):
             connection.execute("insert into edit values (?, ?, ?, ?)", (number, time, user, encode_changes(changes)))
-        case Base(items, number, changed_scene, changed_project, forget):
-            row = (encode_items(items), number, changed_scene, changed_project)
+        case Base(items, number, scene, project, forget):
+            times = (msgspec.json.encode(scene).decode(), msgspec.json.encode(project).decode())
+            row = (encode_items(items), number, *times)
             connection.execute("insert or replace into base values (1, ?, ?, ?, ?)", row)
             connection.execute("delete from edit where number <= ?", (forget,))
         case None:
@@ -244,7 +274,7 @@ def _recover(connection: sqlite3.Connection) -> Recovered | None:
     (check,) = connection.execute("pragma quick_check(1)").fetchone()
     if check != "ok":
         raise _WrongFormat(check)
-    row = connection.execute("select items, edit, changed_scene, changed_project from base").fetchone()
+    row = connection.execute("select items, edit, scene_times, project_times from base").fetchone()
     if row is None:
         return None
     rows = connection.execute("select number, time, user, changes from edit order by number").fetchall()
@@ -252,7 +282,8 @@ def _recover(connection: sqlite3.Connection) -> Recovered | None:
     following = [edit.number for edit in edits if edit.number > row[1]]
     if following != list(range(row[1] + 1, row[1] + 1 + len(following))):
         raise _WrongFormat("an edit is missing")
-    return Recovered(decode_items(row[0]), row[1], bool(row[2]), bool(row[3]), edits)
+    scene, project = (msgspec.json.decode(text, type=Times) for text in row[2:])
+    return Recovered(decode_items(row[0]), row[1], scene, project, edits)
 
 
 def _set_aside(path: Path) -> Path:

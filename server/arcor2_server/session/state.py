@@ -1,0 +1,333 @@
+"""The one owner of the open scene or project: every edit goes through it, to memory and to the journal."""
+
+import asyncio
+from collections import deque
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import structlog
+from msgspec.structs import replace
+
+from arcor2_hw.data.base import now
+from arcor2_hw.data.events import Event, OpenProjectData, OpenSceneData, SceneStateData
+from arcor2_hw.data.project import (
+    Action,
+    BareActionPoint,
+    BareProject,
+    NamedOrientation,
+    Project,
+    ProjectParameter,
+    ProjectRobotJoints,
+)
+from arcor2_hw.data.scene import BareScene, Scene, SceneObject
+from arcor2_hw.exceptions import NotFound
+from arcor2_server.rpc.registry import RequestRefused, make_event
+from arcor2_server.session.changes import OF_SCENE, Change, Edit, Kind
+from arcor2_server.session.checks import project_problems, scene_problems
+from arcor2_server.session.document import Document
+from arcor2_server.session.journal import ALL, Base, Journal, Recovered, Times
+
+if TYPE_CHECKING:
+    from arcor2_server.services import Services
+
+log = structlog.get_logger(__name__)
+
+
+class _Pending:
+    """An edit that is made but not yet on the disk, with the times that held before it."""
+
+    __slots__ = ("edit", "project", "scene")
+
+    def __init__(self, edit: Edit, scene: Times, project: Times) -> None:
+        self.edit = edit
+        self.scene = scene
+        self.project = project
+
+
+class Session:
+    """What is open. Between two awaits of a handler nobody else changes it.
+
+    `history` holds the newest edits, oldest first.
+    """
+
+    def __init__(self, services: "Services") -> None:
+        settings = services.settings
+        self.document = Document()
+        self.history: deque[Edit] = deque(maxlen=settings.history_limit)
+        self._services = services
+        self._limit = settings.history_limit
+        self._journal = Journal(settings.journal_database, self._take_back)
+        self._number = 0
+        self._based_on = 0
+        self._scene_times = Times()
+        self._project_times = Times()
+        self._pending: deque[_Pending] = deque()
+        self._scene: Scene | None = None
+        self._project: Project | None = None
+
+    # ------------------------------------------------------------------------------------------ life
+    async def open(self) -> None:
+        """Go on with what the journal holds. Raises StorageError when it cannot be written."""
+        recovered = await self._journal.open()
+        if recovered is None:
+            return
+        self._restore(recovered)
+        log.info(
+            "reopened",
+            scene=self._name(Kind.SCENE),
+            project=self._name(Kind.PROJECT),
+            edits=self._number - recovered.number,
+            unsaved=self.has_changes,
+        )
+
+    async def close(self) -> None:
+        """Write what waits. What is open stays open for the next start."""
+        await self._journal.close()
+
+    def _restore(self, recovered: Recovered) -> None:
+        self.document = Document(recovered.items)
+        self._scene_times, self._project_times = recovered.scene, recovered.project
+        self._number = self._based_on = recovered.number
+        for edit in recovered.edits:
+            self.history.append(edit)
+            if edit.number > recovered.number:
+                self._apply(edit)
+
+    def _name(self, kind: Kind) -> str | None:
+        return next((item.value.name for item in self.document.of_kind(kind)), None)
+
+    # ------------------------------------------------------------------------------------------ what is open
+    @property
+    def scene(self) -> Scene | None:
+        """The open scene as it is now, None when there is none."""
+        if self._scene is None and (scene := self.document.scene) is not None:
+            self._scene = replace(scene, **self._scene_times.fields())
+        return self._scene
+
+    @property
+    def project(self) -> Project | None:
+        """The open project as it is now, None when there is none."""
+        if self._project is None and (project := self.document.project) is not None:
+            self._project = replace(project, **self._project_times.fields())
+        return self._project
+
+    def require_scene(self) -> Scene:
+        """Give the open scene; RequestRefused when there is none."""
+        if (scene := self.scene) is None:
+            raise RequestRefused("No scene is open: open one first.")
+        return scene
+
+    def require_project(self) -> Project:
+        """Give the open project; RequestRefused when there is none."""
+        self.require_project_open()
+        assert self.project is not None
+        return self.project
+
+    def require_scene_open(self) -> Document:
+        """Give the document when a scene is open, with or without a project; else RequestRefused."""
+        if not self.document.count(Kind.SCENE):
+            raise RequestRefused("No scene is open: open one first.")
+        return self.document
+
+    def require_scene_alone(self) -> Document:
+        """Give the document when a scene is open and no project; else RequestRefused."""
+        document = self.require_scene_open()
+        if document.count(Kind.PROJECT):
+            raise RequestRefused("The scene cannot be changed while a project is open: close the project first.")
+        return document
+
+    def require_project_open(self) -> Document:
+        """Give the document when a project is open; else RequestRefused."""
+        self.require_scene_open()
+        if not self.document.count(Kind.PROJECT):
+            raise RequestRefused("No project is open: open one first.")
+        return self.document
+
+    def require_nothing_open(self) -> None:
+        """RequestRefused when a scene or project is open."""
+        if self.document.count(Kind.PROJECT):
+            raise RequestRefused(f"The project {self._name(Kind.PROJECT)} is open: close it first.")
+        if self.document.count(Kind.SCENE):
+            raise RequestRefused(f"The scene {self._name(Kind.SCENE)} is open: close it first.")
+
+    def bare_scene(self) -> BareScene:
+        """Give the open scene without its objects."""
+        value = self.document.of_kind(Kind.SCENE)[0].value
+        return BareScene(name=value.name, description=value.description, id=value.id, **self._scene_times.fields())
+
+    def bare_project(self) -> BareProject:
+        """Give the open project without its content."""
+        value = self.document.of_kind(Kind.PROJECT)[0].value
+        return BareProject(
+            name=value.name,
+            scene_id=value.scene_id,
+            description=value.description,
+            has_logic=value.has_logic,
+            id=value.id,
+            **self._project_times.fields(),
+        )
+
+    @property
+    def scene_changed(self) -> bool:
+        """Whether the open scene has changes that are not saved."""
+        return bool(self.document.count(Kind.SCENE)) and self._scene_times.unsaved
+
+    @property
+    def project_changed(self) -> bool:
+        """Whether the open project has changes that are not saved."""
+        return bool(self.document.count(Kind.PROJECT)) and self._project_times.unsaved
+
+    @property
+    def has_changes(self) -> bool:
+        """Whether closing would lose something."""
+        return self.scene_changed or self.project_changed
+
+    def greeting(self) -> list[Event]:
+        """Give the events that tell a new connection what is open; none when nothing is."""
+        if (scene := self.scene) is None:
+            return []
+        state = make_event("SceneState", SceneStateData(self._services.cell.state))
+        if (project := self.project) is not None:
+            return [make_event("OpenProject", OpenProjectData(scene, project)), state]
+        return [make_event("OpenScene", OpenSceneData(scene)), state]
+
+    # ------------------------------------------------------------------------------------------ edits
+    async def commit(self, user: str, changes: Sequence[Change]) -> None:
+        """Make changes as one edit; returns when they are on the disk.
+
+        Others see them at once. Raises StorageError when they cannot be kept: then they are taken back.
+        """
+        edit = Edit(self._number + 1, now(), user, list(changes))
+        kept = self._journal.append(edit)
+        self._pending.append(_Pending(edit, self._scene_times, self._project_times))
+        kept.add_done_callback(self._kept)
+        self._apply(edit)
+        self.history.append(edit)
+        if self._number - self._based_on >= self._limit:
+            self._shorten()
+        # A caller who goes away does not take the edit with him.
+        await asyncio.shield(kept)
+
+    def _apply(self, edit: Edit) -> None:
+        self.document.apply(edit.changes)
+        self._number = edit.number
+        for change in edit.changes:
+            if change.kind in OF_SCENE:
+                self._scene_times = replace(self._scene_times, changed=edit.time)
+            else:
+                self._project_times = replace(self._project_times, changed=edit.time)
+        self._forget_snapshots()
+
+    def _kept(self, future: "asyncio.Future[None]") -> None:
+        if future.exception() is None:
+            self._pending.popleft()
+
+    def _take_back(self) -> None:
+        """Undo all that is not on the disk: the journal cannot be written."""
+        while self._pending:
+            pending = self._pending.pop()
+            self.document.apply(change.inverse() for change in reversed(pending.edit.changes))
+            self._number = pending.edit.number - 1
+            self._scene_times, self._project_times = pending.scene, pending.project
+            if self.history and self.history[-1] is pending.edit:
+                self.history.pop()
+        self._forget_snapshots()
+        self._journal.next_epoch()
+
+    def _shorten(self) -> None:
+        """Let the journal begin at the present document, so that it and the next start stay short."""
+        self._rebase(forget=self._number - self._limit).add_done_callback(lambda future: future.exception())
+
+    def _rebase(self, forget: int) -> "asyncio.Future[None]":
+        self._based_on = self._number
+        base = Base(self.document.items(), self._number, self._scene_times, self._project_times, forget)
+        return self._journal.rebase(base)
+
+    def _forget_snapshots(self) -> None:
+        self._scene = None
+        self._project = None
+
+    # ------------------------------------------------------------------------------------------ opening, saving
+    async def show(self, scene: Scene, project: Project | None = None) -> None:
+        """Open a scene, or a project on its scene, in place of what is open."""
+        document = Document.of(scene, project)
+        scene_times = Times.of(scene)
+        project_times = Times() if project is None else Times.of(project)
+        await self._journal.rebase(Base(document.items(), 0, scene_times, project_times, ALL))
+        self._replace(document)
+        self._scene_times, self._project_times = scene_times, project_times
+
+    async def discard(self) -> None:
+        """Close what is open; what is not saved is lost."""
+        await self._journal.clear()
+        self._replace(Document())
+        self._scene_times = self._project_times = Times()
+
+    def _replace(self, document: Document) -> None:
+        self.document = document
+        self.history.clear()
+        self._number = self._based_on = 0
+        self._forget_snapshots()
+
+    async def save(self) -> None:
+        """Save what has changes: the scene, the project, or both. Raises StorageError."""
+        if self.scene_changed:
+            at, scene = self._number, self.require_scene()
+            saved_scene = await self._services.storage.put_scene(scene)
+            self._scene_times = self._times_after(at, saved_scene, self._scene_times)
+        if self.project_changed:
+            at, project = self._number, self.require_project()
+            saved_project = await self._services.storage.put_project(project)
+            self._project_times = self._times_after(at, saved_project, self._project_times)
+        self._forget_snapshots()
+        await self._rebase(forget=self._number - self._limit)
+
+    def _times_after(self, at: int, saved: BareScene | BareProject, before: Times) -> Times:
+        # An edit that came while the storage was writing is not saved yet.
+        return replace(Times.of(saved), changed=before.changed if self._number != at else "")
+
+    # ------------------------------------------------------------------------------------------ problems
+    def scene_problems(self, scene: Scene) -> list[str]:
+        """Give what is wrong with a scene, empty when it can be opened."""
+        return scene_problems(scene, self._services.types)
+
+    async def project_problems(self, project: Project) -> list[str]:
+        """Give what is wrong with a project on its saved scene, empty when it can be opened."""
+        try:
+            scene = await self._services.storage.scene(project.scene_id)
+        except NotFound:
+            return [f"The scene of the project {project.name} does not exist."]
+        return project_problems(scene, project, self._services.types)
+
+    # ------------------------------------------------------------------------------------------ look-ups
+    def scene_object(self, object_id: str) -> SceneObject:
+        """Give an object of the scene; NotFound."""
+        return self.document.scene_object(object_id)
+
+    def action_point(self, action_point_id: str) -> BareActionPoint:
+        """Give an action point without its lists; NotFound."""
+        return self.document.action_point(action_point_id)
+
+    def orientation(self, orientation_id: str) -> tuple[BareActionPoint, NamedOrientation]:
+        """Give an orientation with its action point; NotFound."""
+        return self.document.orientation(orientation_id)
+
+    def joints(self, joints_id: str) -> tuple[BareActionPoint, ProjectRobotJoints]:
+        """Give joints with their action point; NotFound."""
+        return self.document.joints(joints_id)
+
+    def action(self, action_id: str) -> tuple[BareActionPoint, Action]:
+        """Give an action with its action point; NotFound."""
+        return self.document.action(action_id)
+
+    def parameter(self, parameter_id: str) -> ProjectParameter:
+        """Give a project parameter; NotFound."""
+        return self.document.parameter(parameter_id)
+
+    def root_of(self, item: str) -> str:
+        """Give the root of the lock tree that an id belongs to; NotFound."""
+        return self.document.root_of(item)
+
+    def tree_of(self, root: str) -> list[str]:
+        """Give the ids below a root of a lock tree."""
+        return self.document.tree_of(root)
