@@ -1,0 +1,328 @@
+"""The rules of PROTOCOL.md section 6, one by one, against the table of locks alone."""
+
+import asyncio
+
+import pytest
+
+from arcor2_hw.exceptions import NotFound
+from arcor2_server.locks import Locked, Locks
+
+PARENTS = {"ap1": "box", "ap2": "ap1", "ori": "ap1", "act": "ap2", "free": "", "ori2": "free", "box": "", "robot": ""}
+
+
+class Tree:
+    def __init__(self) -> None:
+        self.parents = dict(PARENTS)
+
+    def root_of(self, id: str) -> str:  # noqa: A002
+        if id not in self.parents:
+            raise NotFound(f"{id} unknown")
+        while parent := self.parents[id]:
+            id = parent  # noqa: A001
+        return id
+
+    def tree_of(self, root: str) -> list[str]:
+        return [item for item in self.parents if item != root and self.root_of(item) == root]
+
+
+@pytest.fixture
+def tree() -> Tree:
+    return Tree()
+
+
+@pytest.fixture
+def locks(tree: Tree) -> Locks:
+    locks = Locks(retries=3, retry_wait=0.05)
+    locks.tree = tree
+    return locks
+
+
+WHOLE = {"box", "ap1", "ap2", "ori", "act"}
+
+
+async def test_write_lock_is_announced_once_and_kept_from_others(locks: Locks) -> None:
+    assert await locks.write_lock("ann", "ap1") == ["ap1"]
+    assert await locks.write_lock("ann", "ap1") == []
+    assert locks.holds("ann", "ap1")
+    assert not locks.holds("ann", "ap2")
+    assert not locks.holds("ann", "ap1", tree=True)
+    with pytest.raises(Locked):
+        await locks.write_lock("bob", "ap1")
+    # Another id of the same tree may have another writer.
+    assert await locks.write_lock("bob", "ap2") == ["ap2"]
+    with pytest.raises(Locked):
+        await locks.write_unlock("bob", "ap1")
+    assert await locks.write_unlock("ann", "ap1") == ["ap1"]
+    with pytest.raises(Locked):
+        await locks.write_unlock("ann", "ap1")
+
+
+async def test_unknown_id_is_refused_unless_stored(locks: Locks) -> None:
+    with pytest.raises(NotFound):
+        await locks.write_lock("ann", "nothing")
+
+    async def stored(item: str) -> bool:
+        return item == "scn_stored"
+
+    locks.stored = stored
+    assert await locks.write_lock("ann", "scn_stored") == ["scn_stored"]
+    assert locks.holds("ann", "scn_stored")
+    for special in ("SCENE", "PROJECT", "ACTION", "ADDING_OBJECT", "START", "END"):
+        assert await locks.write_lock("ann", special) == [special]
+
+
+async def test_tree_lock_covers_the_whole_tree_of_the_root(locks: Locks) -> None:
+    assert set(await locks.write_lock("ann", "ap2", tree=True)) == WHOLE
+    for item in WHOLE:
+        assert locks.holds("ann", item)
+        assert locks.writer_of(item) == "ann"
+        with pytest.raises(Locked):
+            await locks.write_lock("bob", item)
+        with pytest.raises(Locked):
+            await locks.read_lock("ann", item)
+    assert locks.holds("ann", "ap2", tree=True)
+    assert await locks.write_lock("ann", "act") == []
+    # Unlocking needs the very id that was locked.
+    with pytest.raises(Locked):
+        await locks.write_unlock("ann", "ap1")
+    assert set(await locks.write_unlock("ann", "ap2")) == WHOLE
+    assert locks.locked_roots() == []
+
+
+@pytest.mark.parametrize("other", ["ap1", "act", "box"])
+async def test_tree_lock_is_refused_while_anything_in_it_is_locked(locks: Locks, other: str) -> None:
+    await locks.read_lock("ann", other)
+    with pytest.raises(Locked):
+        await locks.write_lock("ann", "ap2", tree=True)
+    await locks.read_unlock("ann", other)
+    await locks.write_lock("bob", other)
+    with pytest.raises(Locked):
+        await locks.write_lock("ann", "ap2", tree=True)
+    await locks.write_unlock("bob", other)
+    assert set(await locks.write_lock("ann", "ap2", tree=True)) == WHOLE
+
+
+async def test_readers_keep_writers_out_and_the_other_way_round(locks: Locks) -> None:
+    await locks.read_lock("ann", "ap1")
+    await locks.read_lock("bob", "ap1")
+    with pytest.raises(Locked):
+        await locks.write_lock("ann", "ap1")
+    await locks.read_unlock("ann", "ap1")
+    with pytest.raises(Locked):
+        await locks.read_unlock("ann", "ap1")
+    with pytest.raises(Locked):
+        await locks.write_lock("ann", "ap1")
+    await locks.read_unlock("bob", "ap1")
+    assert await locks.write_lock("ann", "ap1") == ["ap1"]
+    with pytest.raises(Locked):
+        await locks.read_lock("ann", "ap1")
+
+
+async def test_update_lock_widens_and_narrows(locks: Locks) -> None:
+    with pytest.raises(Locked):
+        await locks.update_lock("ann", "ap1", tree=True)
+    await locks.write_lock("ann", "ap1")
+    with pytest.raises(Locked):
+        await locks.update_lock("ann", "ap1", tree=False)
+    assert set(await locks.update_lock("ann", "ap1", tree=True)) == WHOLE - {"ap1"}
+    assert locks.announced() == {"ann": sorted(WHOLE)}
+    assert set(await locks.update_lock("ann", "ap1", tree=False)) == WHOLE - {"ap1"}
+    assert locks.announced() == {"ann": ["ap1"]}
+    await locks.write_lock("bob", "act")
+    with pytest.raises(Locked):
+        await locks.update_lock("ann", "ap1", tree=True)
+
+
+async def test_auto_waits_for_the_lock_then_gives_up(locks: Locks) -> None:
+    loop = asyncio.get_running_loop()
+    await locks.write_lock("ann", "robot")
+    start = loop.time()
+    with pytest.raises(Locked):
+        async with locks.auto("bob", "SCENE", "robot"):
+            pass
+    assert 0.14 <= loop.time() - start < 1.0
+    assert locks.locked_roots() == ["robot"], "nothing of a refused set stays locked"
+    # Also when the same user holds it.
+    with pytest.raises(Locked):
+        async with locks.auto("ann", "robot"):
+            pass
+    loop.call_later(0.05, lambda: locks.release_announced("ann", ["robot"]))
+    async with locks.auto("bob", "SCENE", "robot"):
+        assert locks.holds("bob", "robot")
+        assert locks.announced() == {}
+    assert locks.locked_roots() == []
+
+
+async def test_auto_is_given_back_when_the_request_fails(locks: Locks) -> None:
+    with pytest.raises(ZeroDivisionError):
+        async with locks.auto("ann", "box"):
+            raise ZeroDivisionError
+    assert locks.locked_roots() == []
+
+
+async def test_auto_skip_held_leaves_the_clients_own_locks(locks: Locks) -> None:
+    await locks.write_lock("ann", "act")
+    async with locks.auto_skip_held("ann", "act", "robot"):
+        assert locks.holds("ann", "robot")
+    assert locks.holds("ann", "act")
+    assert not locks.holds("ann", "robot")
+    await locks.write_unlock("ann", "act")
+    await locks.write_lock("ann", "box", tree=True)
+    async with locks.auto_skip_held("ann", "act"):
+        pass
+    assert locks.holds("ann", "box", tree=True)
+
+
+async def test_read_is_skipped_where_the_user_holds_a_lock(locks: Locks) -> None:
+    await locks.write_lock("ann", "robot")
+    async with locks.read("ann", "robot", "box"):
+        assert locks.holds_read("ann", "box")
+        with pytest.raises(Locked):
+            async with locks.auto("bob", "box"):
+                pass
+    assert not locks.holds_read("ann", "box")
+    with pytest.raises(Locked):
+        async with locks.read("bob", "robot"):
+            pass
+    await locks.read_lock("ann", "box")
+    async with locks.read("ann", "box"):
+        pass
+    assert locks.holds_read("ann", "box"), "the client's own read lock outlives the request's"
+
+
+async def test_a_client_does_not_get_a_lock_that_its_own_request_holds_for_a_moment(locks: Locks) -> None:
+    async with locks.auto("ann", "robot"):
+        with pytest.raises(Locked):
+            await locks.write_lock("ann", "robot")
+    assert await locks.write_lock("ann", "robot") == ["robot"]
+
+
+async def test_exclusive_is_refused_at_once_while_a_client_holds_a_lock(locks: Locks) -> None:
+    await locks.write_lock("ann", "box")
+    start = asyncio.get_running_loop().time()
+    with pytest.raises(Locked):
+        async with locks.exclusive():
+            pass
+    assert asyncio.get_running_loop().time() - start < 0.05
+
+
+async def test_exclusive_waits_for_silent_locks_and_keeps_others_out(locks: Locks) -> None:
+    order: list[str] = []
+    entered = asyncio.Event()
+
+    async def edit() -> None:
+        async with locks.auto("ann", "box"):
+            entered.set()
+            await asyncio.sleep(0.05)
+            order.append("edited")
+
+    async def save() -> None:
+        async with locks.exclusive():
+            order.append("saving")
+            await asyncio.sleep(0.05)
+            # What runs inside may use locks itself.
+            async with locks.auto("ann", "SCENE"):
+                pass
+            order.append("saved")
+
+    async def lock() -> None:
+        await asyncio.sleep(0.07)
+        assert await locks.write_lock("bob", "robot") == ["robot"]
+        order.append("locked")
+
+    edited = asyncio.create_task(edit())
+    await entered.wait()
+    await asyncio.gather(edited, save(), lock())
+    assert order == ["edited", "saving", "saved", "locked"]
+
+    with pytest.raises(Locked):
+        async with locks.exclusive():
+            pass
+
+
+async def test_exclusive_gives_up_on_a_silent_lock_that_stays(locks: Locks) -> None:
+    await locks.acquire("SERVER", "SCENE")
+    with pytest.raises(Locked):
+        async with locks.exclusive():
+            pass
+    locks.release("SERVER", "SCENE")
+    async with locks.exclusive():
+        pass
+
+
+async def test_release_announced_gives_what_to_tell(locks: Locks) -> None:
+    await locks.write_lock("ann", "ap1", tree=True)
+    assert locks.release_announced("bob", ["ap1"]) == []
+    assert set(locks.release_announced("ann", ["ap1", "robot"])) == WHOLE
+    assert locks.release_announced("ann", ["ap1"]) == []
+
+
+async def test_drop_forgets_silently(locks: Locks, tree: Tree) -> None:
+    await locks.write_lock("ann", "ap2", tree=True)
+    for item in ("ap2", "act"):
+        del tree.parents[item]
+    locks.drop(["ap2", "act"])
+    assert locks.announced() == {}
+    assert locks.locked_roots() == []
+    assert await locks.write_lock("bob", "ap1") == ["ap1"]
+
+    async with locks.auto("ann", "robot"):
+        del tree.parents["robot"]
+        locks.drop(["robot"])
+    assert locks.locked_roots() == ["box"]
+
+
+async def test_new_parent_takes_the_locks_along(locks: Locks, tree: Tree) -> None:
+    await locks.write_lock("ann", "free")
+    await locks.write_lock("bob", "act")
+    tree.parents["free"] = "box"
+    locks.move_root(["free", "ori2"], "box")
+    assert locks.locked_roots() == ["box"]
+    assert locks.holds("ann", "free")
+    with pytest.raises(Locked):
+        await locks.write_lock("bob", "box", tree=True)
+    assert locks.release_announced("ann", ["free"]) == ["free"]
+    assert locks.holds("bob", "act")
+    await locks.write_unlock("bob", "act")
+    assert locks.locked_roots() == []
+
+
+async def test_tree_lock_of_a_moved_point_is_given_back_whole(locks: Locks, tree: Tree) -> None:
+    assert set(await locks.write_lock("ann", "free", tree=True)) == {"free", "ori2"}
+    tree.parents["free"] = "box"
+    locks.move_root(["free", "ori2"], "box")
+    assert {"free", "ori2"} <= set(locks.release_announced("ann", ["free"]))
+    assert locks.locked_roots() == []
+
+
+async def test_dry_run_asks_whether_the_tree_could_be_locked(locks: Locks) -> None:
+    assert locks.could_lock_tree("ann", "ap1")
+    await locks.write_lock("ann", "ap1")
+    assert locks.could_lock_tree("ann", "ap1")
+    assert not locks.could_lock_tree("bob", "ap1")
+    await locks.write_lock("bob", "act")
+    assert not locks.could_lock_tree("ann", "ap1")
+
+
+async def test_release_all_covers_children_too(locks: Locks) -> None:
+    """A lock on something that is not its own root is released as well (the protocol's quirk Q19)."""
+    await locks.write_lock("ann", "act")
+    await locks.write_lock("ann", "ori2")
+    await locks.read_lock("ann", "robot")
+    await locks.write_lock("bob", "ap1")
+    assert locks.release_all("ann") == ["act", "ori2"]
+    assert set(locks.locked_roots()) == {"box"}
+    assert await locks.write_lock("bob", "robot") == ["robot"]
+
+
+async def test_waiting_for_something_that_is_removed_ends(locks: Locks, tree: Tree) -> None:
+    await locks.write_lock("ann", "robot")
+
+    def remove() -> None:
+        del tree.parents["robot"]
+        locks.drop(["robot"])
+
+    asyncio.get_running_loop().call_later(0.03, remove)
+    with pytest.raises(NotFound):
+        async with locks.auto("bob", "robot"):
+            pass
