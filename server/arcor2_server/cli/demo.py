@@ -1,0 +1,71 @@
+"""`arcor2-hw demo`: the demo workplace comes up on this machine and runs its program."""
+
+import asyncio
+import random
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter, validators
+from rich.console import Console
+
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.cli.status import ExitStatus
+from arcor2_server.demo.display import Display
+from arcor2_server.demo.run import Demo
+from arcor2_server.settings import default_data_dir
+
+
+def demo(
+    *,
+    boards: Annotated[int, Parameter(validator=validators.Number(gte=1, lte=100))] = 5,
+    seed: int | None = None,
+    once: bool = False,
+    host: str = "127.0.0.1",
+    port: Annotated[int, Parameter(validator=validators.Number(gte=0, lte=65535))] = 6789,
+    data_dir: Path | None = None,
+    picture: Path | None = None,
+) -> int:
+    """Bring up the demo workplace and run its program.
+
+    A robot, a tester and a barcode reader are simulated at the far end of their real protocols. The program scans,
+    tests and sorts boards. Afterwards the server goes on until Ctrl-C.
+
+    Parameters
+    ----------
+    boards
+        How many boards lie in the feeder.
+    seed
+        Draws which boards are bad; drawn itself, and told, when it is not given.
+    once
+        End when the program has run. The exit status is 0 only if every board lies in the right box.
+    host
+        Address on which the server listens.
+    port
+        Port of the server; 0 takes any free one.
+    data_dir
+        Where scenes, projects and packages are kept.
+    picture
+        Write what the terminal showed last to this SVG file.
+    """
+    directory = data_dir if data_dir is not None else default_data_dir() / "demo"
+    drawn = seed if seed is not None else random.randrange(1_000_000)
+    console = Console(highlight=False, record=picture is not None)
+    with Display(console, boards) as display:
+        display.note(f"{boards} boards, seed {drawn}")
+        job = Demo(host=host, port=port, data_dir=directory, boards=boards, seed=drawn, once=once, display=display)
+        try:
+            outcome = asyncio.run(job.run())
+        except asyncio.CancelledError:
+            return ExitStatus.OK if not once else ExitStatus.INTERRUPTED
+        except Arcor2Error as error:
+            display.close()
+            sys.stderr.write(f"arcor2-hw demo: {error}\n")
+            return ExitStatus.PROGRAM_FAILED
+        except OSError as error:
+            display.close()
+            sys.stderr.write(f"arcor2-hw demo: {directory}: {error.strerror or error}\n")
+            return ExitStatus.DATA_UNUSABLE
+    if picture is not None:
+        console.save_svg(str(picture), title="make run")
+    return ExitStatus.OK if outcome.right else ExitStatus.PROGRAM_FAILED
