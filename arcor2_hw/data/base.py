@@ -15,8 +15,11 @@ class Data(Struct, frozen=True):
     """Base of everything that travels: immutable, an unset optional field is left out, a null is refused."""
 
 
-class MutableData(Struct):
-    """Base of the few types that existing scripts change in place (Pose, Joint and their like)."""
+class MutableData(Struct, dict=True):
+    """Base of the few types that existing scripts change in place (Pose, Joint and their like).
+
+    Other attributes may be set on an instance; they stay off the wire.
+    """
 
 
 # A field of type `X | Unset` is omitted on the wire while it is UNSET.

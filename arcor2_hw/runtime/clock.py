@@ -1,0 +1,57 @@
+"""The host's clock: one thread for everything that happens at a time, periodic or once."""
+
+import heapq
+import itertools
+import logging
+import threading
+import time
+from collections.abc import Callable
+
+_log = logging.getLogger(__name__)
+
+
+class Clock:
+    """Calls short functions, which must not block: periods and deadlines."""
+
+    def __init__(self) -> None:
+        self._due: list[tuple[float, int, float, Callable[[], object]]] = []
+        self._number = itertools.count()
+        self._changed = threading.Condition()
+
+    def start(self) -> None:
+        """Let time pass."""
+        threading.Thread(target=self._run, name="clock", daemon=True).start()
+
+    def after(self, seconds: float, function: Callable[[], object]) -> None:
+        """Call a function once, `seconds` from now."""
+        self._add(time.monotonic() + seconds, 0.0, function)
+
+    def every(self, period: float, function: Callable[[], object]) -> None:
+        """Call a function now and every `period` s."""
+        self._add(time.monotonic(), period, function)
+
+    def _add(self, moment: float, period: float, function: Callable[[], object]) -> None:
+        with self._changed:
+            heapq.heappush(self._due, (moment, next(self._number), period, function))
+            if self._due[0][3] is function:
+                self._changed.notify()
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                if not self._due:
+                    self._changed.wait()
+                    continue
+                moment, _, period, function = self._due[0]
+                now = time.monotonic()
+                if moment > now:
+                    self._changed.wait(moment - now)
+                    continue
+                heapq.heappop(self._due)
+                if period:
+                    # After a pause of the whole process the missed beats are not made up for.
+                    heapq.heappush(self._due, (max(moment + period, now), next(self._number), period, function))
+            try:
+                function()
+            except Exception:
+                _log.exception("at its time, %s failed", function)

@@ -1,0 +1,238 @@
+"""From a scene object to an instance: its class, its constructor's arguments, its settings."""
+
+import dataclasses
+import enum
+import importlib
+import importlib.metadata
+import importlib.util
+import inspect
+import sys
+import tempfile
+import typing
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Final
+
+import humps
+import msgspec
+
+from arcor2_hw import objects
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.object_type import ObjectModel
+from arcor2_hw.data.parameter import Parameter
+from arcor2_hw.data.scene import SceneObject, SceneObjectOverride
+from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound
+from arcor2_hw.objects import CollisionObject, Generic, GenericWithPose, Settings
+from arcor2_hw.runtime.messages import TypeCode
+
+ENTRY_POINTS: Final = "arcor2_hw.object_types"
+"""Entry point group under which installed object types are found, by the type's name."""
+
+source_hooks: list[Callable[[], None]] = []
+"""Called before a source that is no installed module is imported: the place of what older sources want to import."""
+
+
+def module_name(type_name: str) -> str:
+    """Give the name of the module of an object type (protocol, section 9.1)."""
+    return str(humps.depascalize(type_name))
+
+
+# ------------------------------------------------------------------------------------------------ classes
+def _class_of(module: ModuleType, name: str) -> type[Generic]:
+    found = getattr(module, name, None)
+    if not isinstance(found, type):
+        raise NotFound(f"object type {name}: module {module.__name__} has no such class")
+    if not issubclass(found, Generic):
+        raise InvalidData(f"object type {name} does not derive from Generic")
+    return found
+
+
+def _import(module: str, type_name: str) -> ModuleType:
+    try:
+        return importlib.import_module(module)
+    except Arcor2Error:
+        raise
+    except BaseException as error:  # an object type's module may do anything when it is imported
+        if isinstance(error, KeyboardInterrupt):
+            raise
+        detail = f"{type(error).__name__}: {error}"
+        raise InvalidData(f"object type {type_name} cannot be imported: {detail}", module) from error
+
+
+def write_sources(types: Iterable[TypeCode]) -> str | None:
+    """Write uploaded sources as the package `object_types` into a private directory, and put it on the path.
+
+    Gives the directory, None when there is nothing to write.
+    """
+    uploaded = [code for code in types if not code.entry_point and code.source]
+    if not uploaded:
+        return None
+    for hook in source_hooks:
+        hook()
+    root = tempfile.mkdtemp(prefix="arcor2-hw-types-")
+    package = Path(root) / "object_types"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    for code in uploaded:
+        module = code.module or module_name(code.name)
+        if not module.isidentifier():
+            raise InvalidData(f"object type {code.name}: {module!r} is no name of a module")
+        (package / f"{module}.py").write_text(code.source, encoding="utf-8")
+    for known in [name for name in sys.modules if name == "object_types" or name.startswith("object_types.")]:
+        del sys.modules[known]
+    sys.path.insert(0, root)
+    importlib.invalidate_caches()
+    return root
+
+
+def load_type(code: TypeCode) -> type[Generic]:
+    """Import an object type; NotFound or InvalidData naming it."""
+    if code.entry_point:
+        module, _, attribute = code.entry_point.partition(":")
+        return _class_of(_import(module, code.name), attribute or code.name)
+    if code.source:
+        return _class_of(_import(f"object_types.{code.module or module_name(code.name)}", code.name), code.name)
+    return find_type(code.name)
+
+
+def find_type(name: str) -> type[Generic]:
+    """Find an object type by its name: in the package's own `object_types`, among the installed, among the bases."""
+    module = f"object_types.{module_name(name)}"
+    try:
+        here = importlib.util.find_spec(module) is not None
+    except (ModuleNotFoundError, ValueError):
+        here = False
+    if here:
+        return _class_of(_import(module, name), name)
+    installed = importlib.metadata.entry_points(group=ENTRY_POINTS, name=name)
+    for entry in installed:
+        return _class_of(_import(entry.module, name), entry.attr or name)
+    base = getattr(objects, name, None)
+    if isinstance(base, type) and issubclass(base, Generic):
+        return base
+    raise NotFound(f"object type {name} is not known here")
+
+
+# ------------------------------------------------------------------------------------------------ settings
+def settings_type(cls: type[Generic]) -> type[Settings] | None:
+    """Give the dataclass of an object type's settings, None when it has none."""
+    for base in cls.__mro__:
+        constructor = base.__dict__.get("__init__")
+        if constructor is None:
+            continue
+        try:
+            hint = typing.get_type_hints(constructor).get("settings")
+        except (NameError, TypeError, AttributeError) as error:
+            raise InvalidData(f"object type {cls.__name__}: the hints of __init__ cannot be read: {error}") from error
+        if hint is None:
+            if any(p.kind is p.VAR_KEYWORD for p in inspect.signature(constructor).parameters.values()):
+                continue  # passes them on to the next base
+            return None
+        for candidate in (hint, *typing.get_args(hint)):
+            if isinstance(candidate, type) and issubclass(candidate, Settings) and candidate is not Settings:
+                return candidate
+        return None
+    return None
+
+
+def _setting(hint: Any, parameter: Parameter) -> Any:
+    value = msgspec.json.decode(parameter.value)
+    if isinstance(hint, type) and issubclass(hint, enum.Enum):
+        return hint(value)
+    if hint is bool and not isinstance(value, bool):
+        raise ValueError(f"{value!r} is no boolean")
+    return msgspec.convert(value, hint)
+
+
+def fill_settings(cls: type[Generic], name: str, parameters: Mapping[str, Parameter]) -> Settings | None:
+    """Make the settings of object `name` from its parameters; InvalidData names the object and the parameter."""
+    kind = settings_type(cls)
+    if kind is None:
+        if parameters:
+            raise InvalidData(f"{name}: {cls.__name__} has no settings, but {', '.join(parameters)} is given")
+        return None
+    hints = typing.get_type_hints(kind)
+    fields = {f.name: f for f in dataclasses.fields(kind) if f.init}
+    values: dict[str, Any] = {}
+    for parameter in parameters.values():
+        if parameter.name not in fields:
+            raise InvalidData(f"{name}: {cls.__name__} has no setting {parameter.name}")
+        try:
+            values[parameter.name] = _setting(hints[parameter.name], parameter)
+        except (msgspec.DecodeError, msgspec.ValidationError, ValueError, TypeError) as error:
+            raise InvalidData(f"{name}: setting {parameter.name}: {error}", parameter.value) from error
+    missing = [
+        f.name
+        for f in fields.values()
+        if f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING and f.name not in values
+    ]
+    if missing:
+        raise InvalidData(f"{name}: setting {', '.join(missing)} is missing")
+    try:
+        return kind(**values)
+    except (ValueError, TypeError, AssertionError) as error:  # a dataclass may check itself
+        raise InvalidData(f"{name}: settings: {error}") from error
+
+
+def address_of(settings: Settings | None) -> str:
+    """Give where a device should be, for messages: the settings that say so, empty when none does."""
+    if settings is None:
+        return ""
+    wanted = (
+        "address",
+        "host",
+        "hostname",
+        "ip",
+        "url",
+        "port",
+        "device",
+        "serial_port",
+        "interface",
+        "channel",
+        "path",
+    )
+    given = dataclasses.asdict(settings)
+    return ", ".join(f"{key} {given[key]}" for key in wanted if given.get(key) not in (None, ""))
+
+
+# ------------------------------------------------------------------------------------------------ instances
+@dataclasses.dataclass(frozen=True, slots=True)
+class Recipe:
+    """All that is needed to make one instance."""
+
+    scene_object: SceneObject
+    cls: type[Generic]
+    arguments: tuple[Any, ...]
+    keywords: Mapping[str, Any]
+    address: str
+
+    def make(self) -> Generic:
+        """Call the constructor."""
+        return self.cls(*self.arguments, **self.keywords)
+
+
+def recipe(
+    scene_object: SceneObject,
+    cls: type[Generic],
+    model: ObjectModel | None,
+    overrides: Iterable[SceneObjectOverride] = (),
+) -> Recipe:
+    """Work out the constructor's arguments (protocol, section 9.2); InvalidData names object and parameter."""
+    name = scene_object.name
+    if cls.abstract():
+        raise InvalidData(f"{name}: object type {cls.__name__} is abstract")
+    parameters = {parameter.name: parameter for parameter in scene_object.parameters}
+    for override in overrides:
+        if override.id == scene_object.id:
+            parameters |= {parameter.name: parameter for parameter in override.parameters}
+    settings = fill_settings(cls, name, parameters)
+    arguments: list[Any] = [scene_object.id, name]
+    if issubclass(cls, GenericWithPose):
+        if isinstance(scene_object.pose, Unset):
+            raise InvalidData(f"{name}: {cls.__name__} needs a pose")
+        arguments.append(scene_object.pose)
+        if issubclass(cls, CollisionObject):
+            arguments.append(None if model is None or model.type.value == "None" else model.model())
+    keywords = {} if settings is None else {"settings": settings}
+    return Recipe(scene_object, cls, tuple(arguments), keywords, address_of(settings))

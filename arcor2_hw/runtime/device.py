@@ -1,0 +1,213 @@
+"""A device in the host: the instance, its lanes, and what may be asked of it on which."""
+
+import inspect
+import time
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+from arcor2_hw.actions import deadline_of
+from arcor2_hw.exceptions import Arcor2Error, Arcor2NotImplemented, DeviceError, InvalidData, NotConnected
+from arcor2_hw.objects import Axis, Generic, Robot
+from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
+from arcor2_hw.runtime.creation import Recipe
+from arcor2_hw.runtime.lane import Job, Lane
+from arcor2_hw.runtime.values import decode_arguments
+
+CONSTRUCTION_DEADLINE: Final = 10.0
+"""Seconds beyond the connect timeout for a constructor that, by the older convention, opens the device itself."""
+STOP_DEADLINE: Final = 2.0
+"""Seconds a `stop` may take before it is reported as failed."""
+STOP_GRACE: Final = 2.0
+"""Seconds a stopped call has to come back before its caller is told that it is cancelled."""
+CLOSE_DEADLINE: Final = 1.2
+"""Seconds `disconnect` has (objects promise 1 s)."""
+
+OBSERVING: Final = frozenset(
+    {
+        "alarms",
+        "connection",
+        "control_owner",
+        "forward_kinematics",
+        "get_arm_ids",
+        "get_end_effector_pose",
+        "get_end_effectors_ids",
+        "get_hand_teaching_mode",
+        "grippers",
+        "health",
+        "joint_limits",
+        "max_tcp_speed",
+        "move_in_progress",
+        "robot_joints",
+        "state",
+        "suctions",
+    }
+)
+"""What is asked on the watch lane of a robot, so that it is answered while an action runs."""
+
+PLAIN: Final = frozenset(
+    {"id", "name", "settings", "pose", "collision_model", "enabled", "connection", "health", "move_in_progress"}
+)
+"""Properties of the bases that are memory, not I/O: read where one is, without a lane."""
+
+
+def connect_timeout(cls: type[Generic]) -> float:
+    """Give the seconds that an object type allows itself to connect: the default of `timeout`."""
+    parameter = inspect.signature(cls.connect).parameters.get("timeout")
+    default = None if parameter is None else parameter.default
+    return float(default) if isinstance(default, int | float) else DEFAULT_CONNECT_TIMEOUT
+
+
+def overrides(cls: type[Generic], name: str) -> bool:
+    """Tell whether an object type brings its own `name`, instead of the one of Generic."""
+    return getattr(cls, name, None) is not getattr(Generic, name)
+
+
+class Device:
+    """One object of the scene. Every call on the instance is made on one of its lanes."""
+
+    def __init__(self, recipe: Recipe) -> None:
+        self.recipe = recipe
+        self.id = recipe.scene_object.id
+        self.name = recipe.scene_object.name
+        self.instance: Generic | None = None
+        self.lane = Lane(self.name)
+        self.stop_lane = Lane(self.name, "stop")
+        self._watch_lane: Lane | None = None
+        self.closing = False
+
+    # -------------------------------------------------------------------------------- life
+    def open(self, notify: Callable[[Job], None]) -> tuple[Job, float]:
+        """Begin to create and connect the instance; gives the call and its deadline."""
+        cls = self.recipe.cls
+        deadline = connect_timeout(cls) + (1.0 if overrides(cls, "connect") else CONSTRUCTION_DEADLINE)
+        job = Job("connect", self._open, notify=notify)
+        self.lane.submit(job)
+        return job, deadline
+
+    def _open(self) -> None:
+        instance = self.recipe.make()
+        self.instance = instance
+        instance.connect()
+        if self.closing:  # came up too late: nobody waits any more
+            instance.cleanup()
+
+    def begin_close(self) -> Job | None:
+        """Begin to disconnect; gives the call, None when there is nothing to close.
+
+        A device whose lane hangs is closed from the stop lane: its socket is still ours to shut.
+        """
+        self.closing = True
+        instance = self.instance
+        if instance is None:
+            return None
+        job = Job("disconnect", instance.cleanup)  # calls disconnect unless an older type has its own
+        (self.stop_lane if self.lane.busy_with else self.lane).submit(job)
+        return job
+
+    def release_lanes(self) -> None:
+        """End the threads."""
+        for lane in (self.lane, self.stop_lane, self._watch_lane):
+            if lane is not None:
+                lane.close()
+
+    # -------------------------------------------------------------------------------- calls
+    @property
+    def watch_lane(self) -> Lane:
+        """Give the lane for observing, made on first use."""
+        if self._watch_lane is None:
+            self._watch_lane = Lane(self.name, "watch")
+        return self._watch_lane
+
+    def lane_for(self, method: str) -> Lane:
+        """Give the lane on which a method is called."""
+        if method in OBSERVING and isinstance(self.instance, Robot):
+            return self.watch_lane
+        return self.lane
+
+    def require(self) -> Generic:
+        """Give the instance; NotConnected when there is none."""
+        if self.instance is None:
+            raise NotConnected(f"{self.name} is not up")
+        return self.instance
+
+    def take_control(self) -> None:
+        """Take control unless it is ours. To be called on the lane."""
+        instance = self.require()
+        if instance.control_owner() != "us":
+            instance.take_control()
+
+    def prepare(
+        self, method: str, arguments: Mapping[str, bytes], control: bool, notify: Callable[[Job], None]
+    ) -> tuple[Job, float | None]:
+        """Make the call of a method with arguments in JSON; gives it with the method's own deadline.
+
+        Raises NotFound, InvalidData.
+        """
+        instance = self.require()
+        if method.startswith("_") or (not hasattr(type(instance), method) and method not in vars(instance)):
+            raise InvalidData(f"{self.name} ({type(instance).__name__}) has no method {method}")
+        static = inspect.getattr_static(type(instance), method, None)
+        if not callable(static) and not isinstance(static, staticmethod | classmethod):
+            return Job(method, getattr, (instance, method), notify=notify), deadline_of(static)
+        bound = getattr(instance, method)
+        keywords = decode_arguments(bound, arguments, self.name)
+
+        def run() -> Any:
+            if control:
+                self.take_control()
+            return bound(**keywords)
+
+        return Job(method, run, notify=notify), deadline_of(bound)
+
+    # -------------------------------------------------------------------------------- stop
+    @property
+    def stop_method(self) -> Callable[[], Any] | None:
+        """Give what stops this device, None when nothing does."""
+        instance = self.instance
+        if isinstance(instance, Axis):
+            return instance.halt
+        found = getattr(instance, "stop", None)
+        return found if callable(found) and getattr(found, "__func__", None) is not Robot.stop else None
+
+    def begin_stop(self, notify: Callable[[Job], None] | None = None) -> tuple[Job, Job | None] | None:
+        """Send `stop` past everything else; gives the call and the call that it interrupts, None without `stop`."""
+        stop = self.stop_method
+        if stop is None:
+            return None
+        interrupted = self.lane.interrupt()
+        job = Job("stop", stop, notify=notify)
+        self.stop_lane.submit(job)
+        return job, interrupted
+
+    @property
+    def moving(self) -> bool:
+        """Tell whether the instance says that it moves."""
+        return isinstance(self.instance, Robot) and self.instance.move_in_progress
+
+
+def describe(device: Device, error: BaseException) -> Arcor2Error:
+    """Give an error that names the device, its type and its address; one that is typed keeps its type."""
+    where = f"{device.name} ({device.recipe.cls.__name__})"
+    address = device.recipe.address
+    text = str(error) or type(error).__name__
+    if isinstance(error, Arcor2NotImplemented):
+        return DeviceError(f"{where}: not implemented: {text}")
+    prefix = "" if text.startswith(device.name) else f"{where}: "
+    suffix = (
+        f" [{address}]" if address and not any(part.split(" ", 1)[-1] in text for part in address.split(", ")) else ""
+    )
+    if isinstance(error, Arcor2Error):
+        if not prefix and not suffix:
+            return error
+        named = type(error)(f"{prefix}{text}{suffix}", error.detail)
+        named.__cause__ = error
+        return named
+    kind = "" if text == type(error).__name__ else f"{type(error).__name__}: "
+    wrapped = DeviceError(f"{prefix}{kind}{text}{suffix}")
+    wrapped.__cause__ = error
+    return wrapped
+
+
+def until(deadline: float) -> float:
+    """Give the seconds left until a moment of the monotonic clock, never negative."""
+    return max(0.0, deadline - time.monotonic())

@@ -1,0 +1,384 @@
+"""The cell host: the one process that owns the device instances of a scene or of a program's run.
+
+Started by the server with one end of a socket pair (`--fd N`). The main thread runs the script, so that a signal can
+interrupt whatever the script waits for; one thread reads, one writes, one keeps the time, each device has its lanes.
+"""
+
+import argparse
+import contextlib
+import faulthandler
+import logging
+import os
+import shutil
+import signal
+import socket
+import sys
+import threading
+import types
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Final
+
+import msgspec
+
+from arcor2_hw.actions.json_values import encode as encode_json
+from arcor2_hw.exceptions import Arcor2Error, Cancelled, ProgramFinished, ProgramStopped
+from arcor2_hw.runtime import messages as m
+from arcor2_hw.runtime.cell import Cell, SceneFault, recipes
+from arcor2_hw.runtime.clock import Clock
+from arcor2_hw.runtime.creation import load_type, write_sources
+from arcor2_hw.runtime.device import STOP_DEADLINE, STOP_GRACE, Device, describe
+from arcor2_hw.runtime.lane import Job
+from arcor2_hw.runtime.link import Link
+from arcor2_hw.runtime.package import put_on_path
+from arcor2_hw.runtime.program import Program, set_current, traceback_text
+from arcor2_hw.runtime.watch import OBSERVE_PERIOD, Streams, Watch
+
+GONE_WITHIN: Final = 1.8
+"""Seconds from the loss of the server to the end of this process, whatever hangs."""
+NUDGE_PERIOD: Final = 0.1
+"""Seconds between two interruptions of a script that does not end although it is stopped."""
+FLUSH: Final = 0.3
+"""Seconds for the last messages."""
+
+
+def error_data(error: BaseException, object_id: str = "") -> m.ErrorData:
+    """Give an error in the form in which it leaves the process."""
+    code = error.code if isinstance(error, Arcor2Error) else "error"
+    detail = error.detail if isinstance(error, Arcor2Error) else ""
+    return m.ErrorData(code, type(error).__name__, str(error) or type(error).__name__, detail, object_id)
+
+
+class _LogHandler(logging.Handler):
+    """Sends what drivers and scripts log to the server."""
+
+    def __init__(self, link: Link) -> None:
+        super().__init__()
+        self._link = link
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._link.post(m.LogLine(record.levelname.lower(), self.format(record)[:65536]))
+
+
+class Host:
+    """One scene or one run, from the first message to the exit."""
+
+    def __init__(self, sock: socket.socket) -> None:
+        self.link = Link(sock)
+        self.clock = Clock()
+        self.program: Program | None = None
+        self._cell = Cell()
+        self._work: SimpleQueue[m.HostBound] = SimpleQueue()
+        self._subscribed: dict[str, m.Subscribe] = {}
+        self._streams = Streams(self._cell, self._send_stream)
+        self._watch = Watch(self._cell, self.link.post)
+        self._leaving = threading.Event()
+        self._types: str | None = None
+        self._wake, wake_up = socket.socketpair()
+        wake_up.setblocking(False)
+        signal.set_wakeup_fd(wake_up.detach(), warn_on_full_buffer=False)
+        signal.signal(signal.SIGTERM, lambda *_: None)  # told through the wake-up socket: the reader acts
+        signal.signal(signal.SIGUSR1, self._interrupted)
+
+    # -------------------------------------------------------------------------------- main thread
+    def run(self) -> int:
+        """Serve until the scene or the program is over; gives the exit status."""
+        logging.basicConfig(level=logging.INFO, format="%(name)s: %(message)s", handlers=[_LogHandler(self.link)])
+        self.clock.every(m.HEARTBEAT_PERIOD, lambda: self.link.post(m.Heartbeat()))
+        self.clock.every(OBSERVE_PERIOD, lambda: self._watch.look())
+        self.clock.every(NUDGE_PERIOD, self._nudge)
+        self.clock.start()
+        self.link.post(m.Ready(os.getpid()))
+        threading.Thread(target=self._read, name="from server", daemon=True).start()
+        status = 0
+        while True:
+            match self._work.get():
+                case m.OpenScene() as message:
+                    if not self._open_scene(message):
+                        break
+                case m.RunPackage() as message:
+                    self._run_package(message)
+                    break
+                case _:
+                    self._close_scene()
+                    break
+        if self._types is not None:
+            shutil.rmtree(self._types, ignore_errors=True)
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError, ValueError):
+                stream.flush()
+        self.link.close(FLUSH)
+        return status
+
+    def _open_scene(self, message: m.OpenScene) -> bool:
+        """Bring the scene up; False when the host has to go."""
+        fault: SceneFault | None = None
+        try:
+            self._types = write_sources(message.types)
+            used = {scene_object.type for scene_object in message.scene.objects}
+            classes = {code.name: load_type(code) for code in message.types if code.name in used}
+            self._cell.open(recipes(message.scene, classes, message.models, message.overrides))
+        except SceneFault as caught:
+            fault = caught
+        except Arcor2Error as error:
+            fault = SceneFault("", error)
+        except ProgramStopped:  # closed, or the server gone, while objects were coming up
+            return True
+        except Exception as error:  # noqa: BLE001 - whatever a type does when it is loaded
+            fault = SceneFault("", Arcor2Error(f"{type(error).__name__}: {error}", traceback_text(error)))
+        if fault is not None:
+            self._cell.close()
+            self.link.post(m.SceneFailed(error_data(fault.error, fault.object_id)))
+            return False
+        self.link.post(m.SceneOpened())
+        self.clock.every(message.streaming_period if message.streaming_period > 0 else 0.1, self._stream_subscribed)
+        return True
+
+    def _close_scene(self) -> None:
+        active = self._leaving.is_set() or any(device.lane.busy_with or device.moving for device in self._cell)
+        stopped = self._cell.stop_and_wait(0.5) if active else None
+        problem = self._cell.close() or stopped
+        self.link.post(m.SceneClosed(None if problem is None else error_data(problem)))
+
+    def _run_package(self, message: m.RunPackage) -> None:
+        program = Program(
+            self, message.package_id, start_paused=message.start_paused, breakpoints=frozenset(message.breakpoints)
+        )
+        self._cell = program.cell
+        self._streams = Streams(program.cell, self._send_stream)
+        self._watch = Watch(program.cell, self.link.post)
+        program.inside = True
+        self.program = program
+        set_current(program)
+        if self._leaving.is_set():
+            program.stop()
+        if message.streaming_period > 0:
+            self.clock.every(message.streaming_period, self._stream_all)
+        directory = Path(message.directory)
+        handled = True
+        try:
+            _execute(directory, program)
+        except (ProgramFinished, ProgramStopped):
+            pass
+        except SystemExit as error:
+            if error.code not in (None, 0):
+                program.exception(error)
+        except BaseException as error:  # noqa: BLE001 - the script may raise anything
+            program.exception(error)
+            handled = False
+        program.ended = True
+        failed = program.stop_requested or program.error is not None
+        if program.error is not None and not (handled and isinstance(program.error, Arcor2Error)):
+            _save_traceback(directory, program.error)
+        problem = program.cell.stop_and_wait() if failed else None
+        problem = program.cell.close() or problem
+        why = program.error or problem
+        self.link.post(
+            m.ProgramChanged("stopped", not failed and problem is None, None if why is None else error_data(why))
+        )
+
+    # -------------------------------------------------------------------------------- channel of the program
+    def event(self, name: str, encoded: bytes) -> None:
+        """Pass on an encoded event of the program."""
+        self.link.post(m.ProgramEvent(name, encoded))
+
+    def changed(self, state: str) -> None:
+        """Tell that the program is running or paused now."""
+        self.link.post(m.ProgramChanged(state))
+
+    # -------------------------------------------------------------------------------- reader thread
+    def _read(self) -> None:
+        try:
+            for message in self.link.messages(self._wake):
+                self._handle(message)
+        except (msgspec.MsgspecError, ValueError) as error:  # the stream is out of step: as good as lost
+            self.link.post(m.LogLine("error", f"the server sent what is no message: {error}"))
+        self._leave()
+
+    def _handle(self, message: m.HostBound) -> None:
+        match message:
+            case m.OpenScene() | m.RunPackage():
+                self._work.put(message)
+            case m.CloseScene():
+                self._cell.abandon()
+                self._work.put(message)
+            case m.Call():
+                self._call(message)
+            case m.StopMotion():
+                self._stop_motion(message)
+            case m.Subscribe():
+                self._subscribed[message.object_id] = message
+            case m.StopProgram():
+                self._stop_program()
+            case m.Pause() | m.Resume() | m.Step() if self.program is not None:
+                gate = self.program.gate
+                {m.Pause: gate.pause, m.Resume: gate.resume, m.Step: gate.step}[type(message)]()
+
+    def _leave(self) -> None:
+        """The server is gone, or wants us gone: stop motion, disconnect, exit, in bounded time."""
+        watchdog = threading.Timer(GONE_WITHIN, os._exit, (3,))
+        watchdog.daemon = True
+        watchdog.start()
+        self._leaving.set()
+        self._cell.stop_all()
+        self._stop_program()
+        self._cell.abandon()
+        self._work.put(m.CloseScene())
+
+    def _stop_program(self) -> None:
+        if self.program is not None and not self.program.stop_requested:
+            self.program.stop()
+            self._nudge()
+
+    def _call(self, message: m.Call) -> None:
+        device: Device | None = None
+        try:
+            device = self._cell[message.object_id]
+            answer = self._answer(message.id, device)
+            if message.method == "stop":
+                self._stop_motion(m.StopMotion(message.id, message.object_id))
+                return
+            job, own = device.prepare(message.method, message.arguments, message.control, answer)
+            lane = device.stop_lane if message.urgent else device.lane_for(message.method)
+            lane.submit(job)
+        except Exception as error:  # noqa: BLE001 - a call that cannot be made is an answer too
+            told = error if device is None else describe(device, error)
+            self.link.post(m.CallFailed(message.id, error_data(told, message.object_id)))
+            return
+        deadline = own if message.deadline is None else message.deadline
+        if deadline is not None:
+            within = deadline
+            self.clock.after(within, lambda: lane.expire(job, within))
+
+    def _answer(self, number: int, device: Device) -> Callable[[Job], None]:
+        def answer(job: Job) -> None:
+            error = job.error
+            if error is None:
+                try:
+                    value = b"" if job.value is None else encode_json(job.value).encode()
+                except Arcor2Error as caught:
+                    error = caught
+                else:
+                    self.link.post(m.CallDone(number, value))
+                    return
+            self.link.post(m.CallFailed(number, error_data(describe(device, error), device.id)))
+
+        return answer
+
+    def _stop_motion(self, message: m.StopMotion) -> None:
+        try:
+            devices = [self._cell[message.object_id]] if message.object_id else list(self._cell)
+        except Arcor2Error as error:
+            self.link.post(m.CallFailed(message.id, error_data(error, message.object_id)))
+            return
+        stops = [device for device in devices if device.stop_method is not None]
+        if message.object_id and not stops:
+            refusal = Arcor2Error(f"{devices[0].name} cannot be stopped: it has no stop")
+            self.link.post(m.CallFailed(message.id, error_data(refusal, message.object_id)))
+            return
+        left = len(stops)
+        failed: list[m.ErrorData] = []
+        lock = threading.Lock()
+
+        def answer(device: Device, error: BaseException | None) -> None:
+            nonlocal left
+            with lock:
+                left -= 1
+                if error is not None:
+                    failed.append(error_data(describe(device, error), device.id))
+                if left:
+                    return
+            self.link.post(m.CallFailed(message.id, failed[0]) if failed else m.CallDone(message.id))
+
+        if not stops:
+            self.link.post(m.CallDone(message.id))
+        for device in stops:
+            self._stop_one(device, answer)
+
+    def _stop_one(self, device: Device, answer: Callable[[Device, BaseException | None], None]) -> None:
+        try:
+            begun = device.begin_stop(lambda job: answer(device, job.error))
+        except Arcor2Error as error:  # an earlier stop hangs
+            answer(device, error)
+            return
+        if begun is None:
+            answer(device, None)
+            return
+        stop, interrupted = begun
+        self.clock.after(STOP_DEADLINE, lambda: device.stop_lane.expire(stop, STOP_DEADLINE))
+        if interrupted is not None:
+            cancelled = Cancelled(f"{device.name}: {interrupted.method} was stopped")
+            self.clock.after(STOP_GRACE, lambda: interrupted.give_up(cancelled))
+
+    # -------------------------------------------------------------------------------- clock thread
+    def _nudge(self) -> None:
+        program = self.program
+        if program is not None and program.stop_requested and not program.ended:
+            signal.pthread_kill(_MAIN, signal.SIGUSR1)
+
+    def _stream_subscribed(self) -> None:
+        for wanted in list(self._subscribed.values()):
+            with contextlib.suppress(Arcor2Error):
+                self._streams.send(self._cell[wanted.object_id], joints=wanted.joints, eef=wanted.eef)
+
+    def _stream_all(self) -> None:
+        program = self.program
+        if program is not None and not program.ended:
+            for device in program.cell:
+                self._streams.send(device, joints=True, eef=True)
+
+    def _send_stream(self, name: str, object_id: str, encoded: bytes) -> None:
+        self.link.post_stream(m.StreamEvent(name, object_id, encoded))
+
+    # -------------------------------------------------------------------------------- signal handler
+    def _interrupted(self, number: int, frame: types.FrameType | None) -> None:  # noqa: ARG002
+        """Raise ProgramStopped in the script; never inside our own code, which looks by itself."""
+        program = self.program
+        if program is not None and program.stop_requested and not program.inside and not program.ended:
+            raise ProgramStopped
+
+
+_MAIN: Final = threading.main_thread().ident or 0
+
+
+def _execute(directory: Path, program: Program) -> None:
+    """Run script.py as `__main__` in its directory."""
+    put_on_path(directory)
+    os.chdir(directory)
+    script = directory / "script.py"
+    sys.argv = [str(script)]
+    module = types.ModuleType("__main__")
+    module.__file__ = str(script)
+    sys.modules["__main__"] = module
+    code = compile(script.read_bytes(), str(script), "exec")
+    try:
+        program.inside = False
+        exec(code, module.__dict__)  # noqa: S102 - running the program is what this process is for
+    finally:
+        program.inside = True
+
+
+def _save_traceback(directory: Path, error: BaseException) -> None:
+    path = directory / f"traceback-{datetime.now(UTC):%Y-%m-%dT%H-%M-%S}.txt"
+    with contextlib.suppress(OSError):
+        path.write_text(traceback_text(error), encoding="utf-8")
+
+
+def main() -> None:
+    """Serve the socket that was inherited as `--fd`, then end the process, whatever threads are left."""
+    parser = argparse.ArgumentParser(description="Owns the devices of a scene. Started by the server.")
+    parser.add_argument("--fd", type=int, required=True, help="the inherited socket to the server")
+    options = parser.parse_args()
+    faulthandler.enable()
+    sys.setswitchinterval(0.0005)  # a script that computes must not keep a stop waiting
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(line_buffering=True, errors="backslashreplace")
+    status = Host(socket.socket(fileno=options.fd)).run()
+    os._exit(status)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,225 @@
+"""A lane: one thread on which the calls of one device run one after the other, each with a deadline."""
+
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from queue import Empty, SimpleQueue
+from typing import Any, Final
+
+from arcor2_hw.exceptions import Arcor2Error, Cancelled, DeviceTimeout
+
+_NO_ARGUMENTS: Final[Mapping[str, Any]] = {}
+
+_on_lane = threading.local()
+
+
+def on_any_lane() -> bool:
+    """Tell whether the present thread is a lane's: whatever it calls is part of another call."""
+    return getattr(_on_lane, "here", False)
+
+
+class Job:
+    """One call. It ends once: by the lane, by its deadline, or by somebody who gives it up; the first one counts."""
+
+    __slots__ = (
+        "_claim",
+        "_gate",
+        "arguments",
+        "epoch",
+        "error",
+        "function",
+        "given_up",
+        "keywords",
+        "method",
+        "notify",
+        "since",
+        "value",
+    )
+
+    def __init__(
+        self,
+        method: str,
+        function: Callable[..., Any],
+        arguments: Sequence[Any] = (),
+        keywords: Mapping[str, Any] = _NO_ARGUMENTS,
+        notify: "Callable[[Job], None] | None" = None,
+    ) -> None:
+        self.method = method
+        self.function = function
+        self.arguments = arguments
+        self.keywords = keywords
+        self.notify = notify
+        self.value: Any = None
+        self.error: BaseException | None = None
+        self.since = 0.0
+        self.epoch = 0
+        self.given_up = False
+        self._claim = threading.Lock()
+        self._gate = threading.Lock()
+        self._gate.acquire()
+
+    @property
+    def ended(self) -> bool:
+        """Tell whether the call has ended, one way or the other."""
+        return self._claim.locked()
+
+    def finish(self, value: Any = None, error: BaseException | None = None) -> bool:
+        """End the call; False when it had ended already and this answer is dropped."""
+        if not self._claim.acquire(blocking=False):
+            return False
+        self.value = value
+        self.error = error
+        self._gate.release()
+        if self.notify is not None:
+            self.notify(self)
+        return True
+
+    def give_up(self, error: BaseException) -> bool:
+        """End the call without waiting for its answer."""
+        self.given_up = True  # before `finish`: whoever learns of the end finds the lane refusing
+        if self.finish(None, error):
+            return True
+        self.given_up = False
+        return False
+
+    def wait(self, timeout: float | None) -> bool:
+        """Wait for the end, at most `timeout` s; False when it did not come."""
+        if self._gate.acquire(timeout=-1 if timeout is None else max(timeout, 0.0)):
+            self._gate.release()
+            return True
+        return False
+
+    def outcome(self) -> Any:
+        """Give the result of a call that has ended, or raise its error."""
+        if self.error is not None:
+            raise self.error
+        return self.value
+
+
+class Lane:
+    """Runs the calls of one device on one thread.
+
+    A call that is not back at its deadline fails with DeviceTimeout, its late answer is dropped, and until the thread
+    is back every further call is refused at once, naming what the device is still busy with.
+    """
+
+    def __init__(self, device: str, purpose: str = "") -> None:
+        self.device = device
+        self._queue: SimpleQueue[Job | None] = SimpleQueue()
+        self._current: Job | None = None
+        self._epoch = 0  # counts the stops: a call from before one is cancelled
+        self._thread = threading.Thread(target=self._run, name=f"{device} {purpose}".strip(), daemon=True)
+        self._thread.start()
+
+    # -------------------------------------------------------------------------------- callers
+    def call(
+        self,
+        method: str,
+        function: Callable[..., Any],
+        arguments: Sequence[Any] = (),
+        keywords: Mapping[str, Any] = _NO_ARGUMENTS,
+        deadline: float | None = None,
+    ) -> Any:
+        """Run a call and give its result; DeviceTimeout after `deadline` s. On the lane itself it simply runs."""
+        if threading.current_thread() is self._thread:
+            return function(*arguments, **keywords)
+        job = Job(method, function, arguments, keywords)
+        self.submit(job)
+        if not job.wait(deadline) and deadline is not None:
+            self.expire(job, deadline)
+        return job.outcome()
+
+    def submit(self, job: Job) -> None:
+        """Queue a call; DeviceTimeout at once when the lane is hung."""
+        current = self._current
+        if current is not None and current.given_up:
+            raise self._hung(current)
+        job.epoch = self._epoch
+        self._queue.put(job)
+
+    def expire(self, job: Job, deadline: float) -> None:
+        """End a call whose deadline has passed, and those that wait behind it."""
+        if job is not self._current:
+            current = self._current
+            busy = "" if current is None else f": the device is busy with {current.method}"
+            job.finish(
+                None, DeviceTimeout(f"{self.device}: {job.method} did not get its turn within {deadline:g} s{busy}")
+            )
+        elif job.give_up(DeviceTimeout(f"{self.device}: {job.method} did not finish within {deadline:g} s")):
+            for waiting in self._drain():
+                waiting.finish(None, self._hung(job))
+
+    def interrupt(self) -> Job | None:
+        """Cancel what waits, and mark what runs as stopped: it ends as Cancelled. Gives the running call."""
+        self._epoch += 1
+        current = self._current
+        for waiting in self._drain():
+            waiting.finish(None, Cancelled(f"{self.device}: {waiting.method} was stopped before it began"))
+        return current
+
+    # -------------------------------------------------------------------------------- state
+    @property
+    def busy_with(self) -> str:
+        """Name the method that runs, empty when none does."""
+        current = self._current
+        return "" if current is None else current.method
+
+    @property
+    def hung(self) -> bool:
+        """Tell whether a call that was given up still runs."""
+        current = self._current
+        return current is not None and current.given_up
+
+    def close(self) -> None:
+        """End the thread once it is free; what waits is cancelled."""
+        self.interrupt()
+        self._queue.put(None)
+
+    def join(self, timeout: float) -> bool:
+        """Wait for the end of the thread after `close`; False when it did not come."""
+        self._thread.join(timeout)
+        return not self._thread.is_alive()
+
+    # -------------------------------------------------------------------------------- inside
+    def _hung(self, job: Job) -> DeviceTimeout:
+        return DeviceTimeout(
+            f"{self.device} is still busy with {job.method}, which was given up",
+            f"it began {time.monotonic() - job.since:.1f} s ago",
+        )
+
+    def _drain(self) -> list[Job]:
+        found: list[Job] = []
+        ended = False
+        while True:
+            try:
+                job = self._queue.get_nowait()
+            except Empty:
+                break
+            if job is None:
+                ended = True
+            else:
+                found.append(job)
+        if ended:
+            self._queue.put(None)
+        return found
+
+    def _run(self) -> None:
+        _on_lane.here = True
+        while (job := self._queue.get()) is not None:
+            self._current = job  # before looking whether it has ended, so that its deadline finds it here
+            if job.ended or job.epoch != self._epoch:
+                self._current = None
+                job.finish(None, Cancelled(f"{self.device}: {job.method} was stopped before it began"))
+                continue
+            job.since = time.monotonic()
+            value: Any = None
+            error: BaseException | None = None
+            try:
+                value = job.function(*job.arguments, **job.keywords)
+            except BaseException as caught:  # noqa: BLE001 - whatever a driver raises belongs to its caller
+                error = caught
+            if job.epoch != self._epoch and not isinstance(error, Arcor2Error):
+                error = Cancelled(f"{self.device}: {job.method} was stopped", "" if error is None else repr(error))
+            self._current = None
+            job.finish(value, error)
+            del job, value, error

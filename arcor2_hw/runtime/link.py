@@ -1,0 +1,104 @@
+"""The host's end of the socket to the server: a thread that writes, and a reader that signals can wake."""
+
+import select
+import signal
+import socket
+import threading
+from collections.abc import Iterator
+from queue import Empty, SimpleQueue
+from typing import Any, Final
+
+from arcor2_hw.runtime.messages import (
+    PREFIX_SIZE,
+    HostBound,
+    StreamEvent,
+    ToServer,
+    body_length,
+    decode_host_bound,
+    encode,
+)
+
+STREAM_BACKLOG: Final = 1000
+"""Messages waiting for a server that does not read, beyond which streamed values are left out."""
+_CHUNK: Final = 1 << 18
+
+
+class Link:
+    """Messages to and from the server."""
+
+    def __init__(self, sock: socket.socket) -> None:
+        self._socket = sock
+        self._socket.setblocking(True)
+        self._outbox: SimpleQueue[ToServer | None] = SimpleQueue()
+        self._writer = threading.Thread(target=self._write, name="to server", daemon=True)
+        self._writer.start()
+
+    # -------------------------------------------------------------------------------- out
+    def post(self, message: ToServer) -> None:
+        """Send a message; never blocks, never raises."""
+        self._outbox.put(message)
+
+    def post_stream(self, message: StreamEvent) -> None:
+        """Send a value that a newer one replaces anyway: dropped when the server does not read."""
+        if self._outbox.qsize() < STREAM_BACKLOG:
+            self._outbox.put(message)
+
+    def close(self, timeout: float) -> None:
+        """Send what waits, within `timeout` s."""
+        self._outbox.put(None)
+        self._writer.join(timeout)
+
+    def _write(self) -> None:
+        alive = True
+        while (message := self._outbox.get()) is not None:
+            batch = [encode(message)]
+            last = False
+            while len(batch) < 256:
+                try:
+                    more = self._outbox.get_nowait()
+                except Empty:
+                    break
+                if more is None:
+                    last = True
+                    break
+                batch.append(encode(more))
+            if alive:
+                try:
+                    self._socket.sendall(b"".join(batch))
+                except OSError:
+                    alive = False  # the reader learns of it too; what follows has no address
+            if last:
+                return
+
+    # -------------------------------------------------------------------------------- in
+    def messages(self, wake: socket.socket) -> Iterator[HostBound]:
+        """Give what the server says, until it is gone or SIGTERM is told on `wake`."""
+        buffer = bytearray()
+        poll = select.poll()
+        poll.register(self._socket, select.POLLIN)
+        poll.register(wake, select.POLLIN)
+        while True:
+            for descriptor, _ in poll.poll():
+                if descriptor == wake.fileno():
+                    if signal.SIGTERM in wake.recv(256):
+                        return
+                    continue
+                try:
+                    chunk = self._socket.recv(_CHUNK)
+                except OSError:
+                    return
+                if not chunk:
+                    return
+                buffer += chunk
+                yield from _take(buffer)
+
+
+def _take(buffer: bytearray) -> Iterator[Any]:
+    """Take all whole messages from the front of a buffer."""
+    while len(buffer) >= PREFIX_SIZE:
+        end = PREFIX_SIZE + body_length(bytes(buffer[:PREFIX_SIZE]))
+        if len(buffer) < end:
+            return
+        body = bytes(buffer[PREFIX_SIZE:end])
+        del buffer[:end]
+        yield decode_host_bound(body)

@@ -1,0 +1,129 @@
+"""What a script has in its hands instead of a device: every call goes through the device's lane, actions are told."""
+
+import inspect
+import types
+from collections.abc import Callable, Mapping
+from typing import Any, cast
+
+from arcor2_hw.actions import deadline_of, metadata_of
+from arcor2_hw.exceptions import InvalidData, ProgramFinished, ProgramStopped
+from arcor2_hw.objects import Generic
+from arcor2_hw.runtime.device import PLAIN, STOP_DEADLINE, Device
+from arcor2_hw.runtime.lane import on_any_lane
+from arcor2_hw.runtime.program import Program
+
+_DEVICE = "_arcor2_device"
+_PROGRAM = "_arcor2_program"
+
+
+def _bind(bound: Any, arguments: tuple[Any, ...], keywords: Mapping[str, Any]) -> list[Any]:
+    """Give all arguments in the order of the signature, as if they were positional."""
+    try:
+        return list(inspect.signature(bound).bind(*arguments, **keywords).arguments.values())
+    except TypeError:  # the call itself will say so better
+        return list(arguments)
+
+
+def _plain_call(device: Device, program: Program, name: str, bound: Callable[..., Any]) -> Callable[..., Any]:
+    """Wrap a method that is no action."""
+    cls = type(device.require())
+    if name == "stop" or name in cls.CANCEL_MAPPING.values():
+        lane, deadline = device.stop_lane, cast("float | None", STOP_DEADLINE)
+    else:
+        lane, deadline = device.lane_for(name), deadline_of(bound)
+
+    def call(*arguments: Any, **keywords: Any) -> Any:
+        if on_any_lane():
+            return lane.call(name, bound, arguments, keywords, deadline)
+        program.check()
+        if not program.in_main_thread:
+            return lane.call(name, bound, arguments, keywords, deadline)
+        program.inside = True
+        try:
+            return lane.call(name, bound, arguments, keywords, deadline)
+        finally:
+            program.inside = False
+
+    return call
+
+
+def _action_call(device: Device, program: Program, name: str, bound: Callable[..., Any]) -> Callable[..., Any]:
+    """Wrap an action: the outermost call is told before and after, and paced."""
+    lane, deadline = device.lane, deadline_of(bound)
+    what = f"{device.name}.{name}"
+
+    def run(an: str | None, arguments: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
+        shown = _bind(bound, arguments, keywords) if keywords else arguments
+        action_id = program.action_begins(what, an, shown)
+        if an is not None:
+            keywords["an"] = an
+        try:
+            value = lane.call(name, bound, arguments, keywords, deadline)
+        except ProgramFinished:
+            program.action_ended(action_id, None)
+            raise
+        except BaseException as error:
+            program.action_failed()
+            if program.stop_requested and isinstance(error, Exception):
+                raise ProgramStopped from error
+            raise
+        program.action_ended(action_id, value)
+        return value
+
+    def call(*arguments: Any, an: str | None = None, **keywords: Any) -> Any:
+        if on_any_lane():
+            if an is not None:
+                raise InvalidData(f"{what} is called inside another action and must not have a name (an={an!r})")
+            return lane.call(name, bound, arguments, keywords, deadline)
+        if not program.in_main_thread:
+            return run(an, arguments, keywords)
+        program.inside = True
+        try:
+            return run(an, arguments, keywords)
+        finally:
+            program.inside = False
+
+    return call
+
+
+class Proxy:
+    """Stands for a device; `isinstance` sees the device's own class."""
+
+    def __init__(self, device: Device, program: Program) -> None:
+        self.__dict__[_DEVICE] = device
+        self.__dict__[_PROGRAM] = program
+
+    @property  # type: ignore[misc]
+    def __class__(self) -> type:
+        return cast("type", self.__dict__[_DEVICE].recipe.cls)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        device: Device = self.__dict__[_DEVICE]
+        program: Program = self.__dict__[_PROGRAM]
+        instance = device.require()
+        if isinstance(inspect.getattr_static(type(instance), name, None), property) and name not in PLAIN:
+            return _plain_call(device, program, name, getattr)(instance, name)
+        value = getattr(instance, name)
+        if not isinstance(value, types.MethodType) or value.__self__ is not instance:
+            return value
+        wrap = _plain_call if metadata_of(value) is None else _action_call
+        wrapped = wrap(device, program, name, value)
+        self.__dict__[name] = wrapped  # found there the next time, past this method
+        return wrapped
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        setattr(self.__dict__[_DEVICE].require(), name, value)
+
+    def __dir__(self) -> list[str]:
+        return dir(self.__dict__[_DEVICE].require())
+
+    def __repr__(self) -> str:
+        device: Device = self.__dict__[_DEVICE]
+        return f"<{device.recipe.cls.__name__} {device.name}>"
+
+
+def proxy(device: Device, program: Program) -> Generic:
+    """Give what a script calls as if it were the device."""
+    return cast("Generic", Proxy(device, program))

@@ -1,0 +1,125 @@
+"""Resources: what a package's script works with. In the cell host it uses the host's program, else one of its own."""
+
+import types
+from pathlib import Path
+from typing import Any
+
+from arcor2_hw.data.events import PackageInfoData
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.project import ActionPoint, Project, ProjectRobotJoints
+from arcor2_hw.data.scene import Scene
+from arcor2_hw.exceptions import Arcor2Error, ProgramFinished, ProgramStopped
+from arcor2_hw.objects import Generic
+from arcor2_hw.runtime.cell import SceneFault, recipes
+from arcor2_hw.runtime.creation import find_type
+from arcor2_hw.runtime.package import PackageData, Places, package_name, put_on_path
+from arcor2_hw.runtime.program import Program, current
+from arcor2_hw.runtime.proxy import proxy
+from arcor2_hw.runtime.standalone import Standalone
+
+
+class Resources:
+    """The objects of the scene by id, and the action points in the world.
+
+    As a context: entering creates and connects the objects, tells PackageInfo, takes control of the devices; leaving
+    closes them. A program that is stopped, or finished by a flow action, leaves the context without an exception.
+    Raises InvalidPackage, NotFound, InvalidData, and what a device raises when it cannot be connected.
+    """
+
+    def __init__(self) -> None:
+        program = current()
+        self._standalone: Standalone | None = None
+        if program is None:
+            self._standalone = Standalone()
+            program = self._standalone.program
+        self._program: Program = program
+        self._directory = Path.cwd() if self._standalone is None else self._standalone.directory
+        self.objects: dict[str, Generic] = {}
+        """What the script calls, by the id of the scene object."""
+        data = PackageData(self._directory)
+        self._data = data
+        self._places = Places(data.scene, data.project)
+        program.load(data.project)
+
+    # -------------------------------------------------------------------------------- data
+    @property
+    def scene(self) -> Scene:
+        """Give the scene of the package."""
+        return self._data.scene
+
+    @property
+    def project(self) -> Project:
+        """Give the project of the package; its action points are relative to their parents."""
+        return self._data.project
+
+    def action_point(self, action_point_id: str) -> ActionPoint:
+        """Give an action point with its position in the world; NotFound."""
+        return self._places.bare_action_point(action_point_id)
+
+    def position(self, action_point_id: str) -> Position:
+        """Give where an action point is in the world, as a copy; NotFound."""
+        return self._places.position(action_point_id)
+
+    def pose(self, orientation_id: str) -> Pose:
+        """Give the pose in the world of an orientation at its action point, as a copy; NotFound."""
+        return self._places.pose(orientation_id)
+
+    def joints(self, joints_id: str) -> ProjectRobotJoints:
+        """Give joints of an action point, as a copy; NotFound."""
+        return self._places.joints(joints_id)
+
+    def parameter(self, parameter_id: str) -> Any:
+        """Give the value of a project parameter; NotFound."""
+        return self._places.parameter(parameter_id)
+
+    # -------------------------------------------------------------------------------- life
+    def __enter__(self) -> "Resources":
+        program = self._program
+        program.inside = True
+        try:
+            if self._standalone is not None:
+                self._standalone.start()
+            self._open()
+        except BaseException:
+            self._close(True)
+            raise
+        finally:
+            program.inside = False
+        return self
+
+    def _open(self) -> None:
+        put_on_path(self._directory)
+        program, data = self._program, self._data
+        program.check()
+        classes = {name: find_type(name) for name in {o.type for o in data.scene.objects}}
+        try:
+            program.cell.open(recipes(data.scene, classes, data.models, data.project.object_overrides))
+            program.check()
+            program.cell.take_control()
+        except SceneFault as fault:
+            raise fault.error from fault
+        for device in program.cell:
+            self.objects[device.id] = proxy(device, program)
+        name = package_name(self._directory, program.package_id)
+        program.started(PackageInfoData(program.package_id, name, data.scene, data.project, data.collision_models()))
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, where: types.TracebackType | None
+    ) -> bool:
+        self._program.ended = True
+        failed = error is not None and not isinstance(error, ProgramFinished)
+        problem = self._close(failed)
+        if problem is not None and error is None:
+            raise problem
+        return isinstance(error, ProgramFinished | ProgramStopped)
+
+    def _close(self, failed: bool) -> Arcor2Error | None:
+        """Close what is ours to close; after a failure everything is stopped first: nothing may go on moving."""
+        self._program.ended = True
+        problem: Arcor2Error | None = None
+        if failed:
+            problem = self._program.cell.stop_and_wait()
+        if self._standalone is not None:
+            problem = self._program.cell.close() or problem
+            self._standalone.end()
+        return problem

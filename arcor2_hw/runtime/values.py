@@ -1,0 +1,83 @@
+"""Arguments from JSON by the hints of a method, results back to JSON."""
+
+import functools
+import inspect
+import sys
+import types
+import typing
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import msgspec
+
+from arcor2_hw.actions.json_values import decode_json, decode_picture, encode
+from arcor2_hw.exceptions import InvalidData
+
+
+def encode_shown(value: Any) -> str:
+    """Give a value as JSON text for people to look at; what has no form in JSON is described."""
+    try:
+        return encode(value)
+    except InvalidData:
+        return msgspec.json.encode(repr(value)[:200]).decode()
+
+
+def results(value: Any) -> list[str]:
+    """Give the results of an action as the protocol lists them: none, one, or the members of a tuple."""
+    if value is None:
+        return []
+    if isinstance(value, tuple):
+        return [encode(member) for member in value]
+    return [encode(value)]
+
+
+def _hint(annotation: Any, module: str) -> Any:
+    """Evaluate one hint; one that exists for type checkers only stays as text."""
+    if not isinstance(annotation, str):
+        return annotation
+    try:
+        return eval(annotation, vars(sys.modules[module]))  # noqa: S307 - the source is running in this process anyway
+    except Exception:  # noqa: BLE001 - a hint may be anything
+        return annotation
+
+
+@functools.cache
+def _signature(function: Callable[..., Any]) -> tuple[inspect.Signature, Mapping[str, Any]]:
+    signature = inspect.signature(function)
+    try:
+        hints = typing.get_type_hints(function)
+    except (NameError, TypeError, AttributeError):
+        hints = {p.name: _hint(p.annotation, function.__module__) for p in signature.parameters.values()}
+    return signature, {name: hint for name, hint in hints.items() if hint is not inspect.Parameter.empty}
+
+
+def _decode(raw: bytes, hint: Any) -> Any:
+    name = hint if isinstance(hint, str) else getattr(hint, "__name__", "")
+    module = "" if isinstance(hint, str) else getattr(hint, "__module__", "")
+    if name.endswith("Image") and (isinstance(hint, str) or module.startswith("PIL")):
+        return decode_picture(raw.decode())
+    return decode_json(raw.decode(), Any if isinstance(hint, str) else hint)
+
+
+def decode_arguments(bound: Any, arguments: Mapping[str, bytes], whose: str) -> dict[str, Any]:
+    """Read the arguments of a bound method by its hints; InvalidData names `whose`, the method and the parameter."""
+    function = bound.__func__ if isinstance(bound, types.MethodType) else bound
+    signature, hints = _signature(function)
+    parameters = list(signature.parameters.values())
+    takes_any = any(p.kind is p.VAR_KEYWORD for p in parameters)
+    result: dict[str, Any] = {}
+    for name, raw in arguments.items():
+        if name not in signature.parameters and not takes_any:
+            raise InvalidData(f"{whose}: {function.__name__} has no parameter {name}")
+        try:
+            result[name] = _decode(raw, hints.get(name, Any))
+        except (InvalidData, UnicodeDecodeError) as error:
+            raise InvalidData(f"{whose}: {function.__name__}: parameter {name}: {error}") from error
+    missing = [
+        p.name
+        for p in parameters[1 if bound is not function else 0 :]
+        if p.default is p.empty and p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY) and p.name not in result
+    ]
+    if missing:
+        raise InvalidData(f"{whose}: {function.__name__} needs {', '.join(missing)}")
+    return result

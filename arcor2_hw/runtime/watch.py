@@ -1,0 +1,127 @@
+"""What is told of devices without being asked: joints and end effectors of robots, connection, health, alarms."""
+
+import time
+from collections.abc import Callable
+from typing import Any, Final
+
+import msgspec
+
+from arcor2_hw.data.base import UNSET
+from arcor2_hw.data.device import Alarm, Connection, Health
+from arcor2_hw.data.events import Event, RobotEefData, RobotJointsData
+from arcor2_hw.data.robot import EefPose
+from arcor2_hw.exceptions import DeviceTimeout
+from arcor2_hw.objects import Generic, MultiArmRobot, Robot
+from arcor2_hw.runtime.cell import Cell
+from arcor2_hw.runtime.device import Device, overrides
+from arcor2_hw.runtime.lane import Job
+from arcor2_hw.runtime.messages import DeviceChanged
+
+OBSERVE_PERIOD: Final = 0.25
+"""Seconds between two looks at a device's connection and health (memory, by contract)."""
+INQUIRY_PERIOD: Final = 1.0
+"""Seconds between two looks at alarms and control, for which a driver may have to ask."""
+
+_encode = msgspec.json.Encoder().encode
+
+
+def _joints(robot: Robot) -> bytes:
+    return _encode(Event("RobotJoints", data=RobotJointsData(robot.id, robot.robot_joints(include_gripper=True))))
+
+
+def _eef(robot: Robot) -> bytes:
+    poses: list[EefPose] = []
+    if isinstance(robot, MultiArmRobot):
+        for arm in sorted(robot.get_arm_ids()):
+            poses += [
+                EefPose(eef, robot.get_end_effector_pose(eef, arm), arm)
+                for eef in sorted(robot.get_end_effectors_ids(arm))
+            ]
+    else:
+        poses = [EefPose(e, robot.get_end_effector_pose(e), UNSET) for e in sorted(robot.get_end_effectors_ids())]
+    return _encode(Event("RobotEef", data=RobotEefData(robot.id, poses)))
+
+
+class Streams:
+    """Sends the state of robots. A robot that has not answered the last time is not asked again: nothing piles up."""
+
+    def __init__(self, cell: Cell, send: Callable[[str, str, bytes], None]) -> None:
+        self._cell = cell
+        self._send = send
+        self._pending: dict[str, Job] = {}
+
+    def send(self, device: Device, *, joints: bool, eef: bool) -> None:
+        """Begin to send joints or end effector poses of a device that is a robot; what fails is left out."""
+        robot = device.instance
+        if not isinstance(robot, Robot) or device.closing:
+            return
+        before = self._pending.get(device.id)
+        if before is not None and not before.ended:
+            return
+        job = Job("stream", self._look, (robot, joints, eef))
+        self._pending[device.id] = job
+        try:
+            device.watch_lane.submit(job)
+        except DeviceTimeout as error:  # a question of somebody else hangs there
+            job.finish(None, error)
+
+    def _look(self, robot: Robot, joints: bool, eef: bool) -> None:
+        # A value that is stale, or a robot that is away, is no event: clients see the age of the last one.
+        if joints:
+            self._send("RobotJoints", robot.id, _joints(robot))
+        if eef:
+            self._send("RobotEef", robot.id, _eef(robot))
+
+
+class Watch:
+    """Compares what devices say of their condition with what they said last, and tells changes."""
+
+    def __init__(self, cell: Cell, tell: Callable[[DeviceChanged], None]) -> None:
+        self._cell = cell
+        self._tell = tell
+        self._pending: dict[str, Job] = {}
+        self._known: dict[str, DeviceChanged] = {}
+        self._inquired: dict[str, float] = {}
+
+    def look(self) -> None:
+        """Begin to look at every device that has something to say."""
+        for device in self._cell:
+            cls = device.recipe.cls
+            if device.instance is None or device.closing:
+                continue
+            static = not any(overrides(cls, name) for name in ("connection", "health", "alarms", "control_owner"))
+            if static and device.id in self._known:
+                continue
+            before = self._pending.get(device.id)
+            if before is not None and not before.ended:
+                continue
+            job = Job("watch", self._observe, (device, device.instance))
+            self._pending[device.id] = job
+            try:
+                device.watch_lane.submit(job)
+            except DeviceTimeout as error:
+                job.finish(None, error)
+
+    def _observe(self, device: Device, instance: Generic) -> None:
+        before = self._known.get(device.id)
+        alarms: list[Alarm] = [] if before is None else before.alarms
+        owner = None if before is None else before.control_owner
+        moment = time.monotonic()
+        if moment - self._inquired.get(device.id, -INQUIRY_PERIOD) >= INQUIRY_PERIOD:
+            self._inquired[device.id] = moment
+            alarms = _told(instance.alarms, alarms)
+            owner = _told(instance.control_owner, owner)
+        connection = _told(lambda: instance.connection, Connection.FAILED)
+        health = _told(lambda: instance.health, Health.FAILURE)
+        found = DeviceChanged(device.id, connection, health, alarms, owner)
+        if found != before:
+            self._known[device.id] = found
+            self._tell(found)
+
+
+def _told(ask: Callable[[], Any], otherwise: Any) -> Any:
+    """Ask; a device that cannot say keeps what was known."""
+    try:
+        return ask()
+    except Exception:  # noqa: BLE001 - a driver may raise anything; the next look asks again
+        return otherwise

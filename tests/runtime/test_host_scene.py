@@ -1,0 +1,267 @@
+"""The cell host with a scene online: creation, calls, deadlines, the stop lane, loss of the server."""
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from arcor2_hw.data.parameter import Parameter
+from arcor2_hw.data.scene import SceneObjectOverride
+from arcor2_hw.runtime import messages as m
+
+from .conftest import HostProcess, open_scene, scene_object, type_code
+
+DEVICE = """
+@dataclass
+class DeviceSettings(Settings):
+    file: str = ""
+    connect_takes: float = 0.0
+    fail: str = ""
+
+class Device(Generic):
+    _ABSTRACT = False
+
+    def __init__(self, obj_id: str, name: str, settings: DeviceSettings) -> None:
+        super().__init__(obj_id, name, settings)
+        self.stopped = threading.Event()
+
+    def note(self, text):
+        if self.settings.file:
+            with open(self.settings.file, "a") as f:
+                f.write(self.name + " " + text + "\\n")
+
+    def connect(self, timeout: float = 5.0) -> None:
+        if self.settings.fail == "refused":
+            raise NotConnected("no route to 192.0.2.1:30004")
+        if self.settings.fail == "odd":
+            raise ZeroDivisionError("odd")
+        time.sleep(self.settings.connect_takes)
+        self.note("connected")
+
+    def disconnect(self) -> None:
+        self.note("disconnected")
+
+    def echo(self, value: float, pose: Pose, joints: list[Joint], an: str | None = None) -> tuple[float, Pose]:
+        assert isinstance(pose, Pose) and all(isinstance(j, Joint) for j in joints)
+        return value, pose
+
+    def hang(self, seconds: float) -> str:
+        time.sleep(seconds)
+        return "late"
+
+    def quick(self) -> str:
+        return "quick"
+
+    def move(self) -> str:
+        self.note("move")
+        self.stopped.wait(30)
+        return "arrived"
+
+    def stop(self) -> None:
+        self.note("stop")
+        self.stopped.set()
+
+    def crash(self) -> None:
+        os._exit(7)
+
+    def shout(self, size: int) -> int:
+        print("x" * size)
+        sys.stderr.write("y" * size)
+        return size
+
+    def leave(self) -> None:
+        raise SystemExit(3)
+
+    def freeze(self) -> None:
+        ctypes.PyDLL(None).usleep(1_600_000)
+"""
+
+
+def _open(host: HostProcess, *names: str, **settings: object) -> None:
+    objects = [scene_object(name, "Device", **settings) for name in names]
+    host.send(open_scene([type_code("Device", DEVICE)], *objects))
+    host.expect(m.SceneOpened)
+
+
+def test_arguments_are_read_by_the_hints_and_results_come_back(host: HostProcess) -> None:
+    _open(host, "a")
+    pose = {"position": {"x": 1, "y": 2, "z": 3}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}
+    assert host.call("obj_a", "echo", value=2, pose=pose, joints=[{"name": "j", "value": 1}]) == [2.0, pose]
+    wrong = host.call("obj_a", "echo", value="text", pose=pose, joints=[])
+    assert (wrong.code, wrong.object_id) == ("invalid_data", "obj_a")
+    assert "value" in wrong.message
+    assert "a" in wrong.message
+    assert host.call("obj_a", "echo", value=1).code == "invalid_data"
+    assert host.call("obj_a", "_open").code == "invalid_data"
+    assert host.call("obj_none", "quick").code == "not_found"
+
+
+def test_a_hung_device_fails_in_time_and_hinders_no_other(host: HostProcess) -> None:
+    _open(host, "a", "b")
+    hang = host.begin("obj_a", "hang", deadline=0.3, seconds=1.0)
+    waiting = host.begin("obj_a", "quick")
+    began = time.monotonic()
+    assert host.call("obj_b", "quick") == "quick"
+    assert time.monotonic() - began < 0.25
+    error = host.answer(hang)
+    assert time.monotonic() - began < 0.8
+    assert error.code == "device_timeout"
+    assert all(part in error.message for part in ("a", "hang", "0.3 s"))
+    assert "hang" in host.answer(waiting).message
+    refused = host.call("obj_a", "quick")
+    assert refused.code == "device_timeout"
+    assert "still busy with hang" in refused.message
+    deadline = time.monotonic() + 5
+    while host.call("obj_a", "quick") != "quick":  # the device is back: no answer is mixed up
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def test_stop_passes_the_busy_device(host: HostProcess, tmp_path: Path) -> None:
+    _open(host, "a", file=str(tmp_path / "notes"))
+    move = host.begin("obj_a", "move")
+    queued = host.begin("obj_a", "quick")
+    while "move" not in (tmp_path / "notes").read_text():
+        time.sleep(0.01)
+    began = time.monotonic()
+    host.send(m.StopMotion(99))
+    assert host.answer(queued).code == "cancelled"
+    assert host.answer(move).code == "cancelled"
+    assert host.answer(99) is None
+    assert time.monotonic() - began < 0.5
+    assert host.call("obj_a", "quick") == "quick"
+
+
+def test_twenty_slow_devices_come_up_at_once(host: HostProcess) -> None:
+    began = time.monotonic()
+    _open(host, *(f"d{n}" for n in range(20)), connect_takes=0.5)
+    assert 0.5 < time.monotonic() - began < 1.2  # the figure itself is measured by the benchmark
+
+
+@pytest.mark.parametrize(("fail", "words"), [("refused", "192.0.2.1:30004"), ("odd", "ZeroDivisionError")])
+def test_one_that_fails_takes_the_others_down_again(host: HostProcess, tmp_path: Path, fail: str, words: str) -> None:
+    notes = str(tmp_path / "notes")
+    objects = [scene_object("good", "Device", file=notes), scene_object("bad", "Device", fail=fail, connect_takes=0.0)]
+    host.send(open_scene([type_code("Device", DEVICE)], *objects))
+    error = host.expect(m.SceneFailed).error
+    assert error.object_id == "obj_bad"
+    assert "bad" in error.message
+    assert words in error.message
+    assert host.gone() == 0
+    assert (tmp_path / "notes").read_text().splitlines() == ["good connected", "good disconnected"]
+
+
+def test_a_device_that_hangs_on_connect_is_named(host: HostProcess) -> None:
+    source = DEVICE.replace("timeout: float = 5.0", "timeout: float = 0.2")
+    host.send(open_scene([type_code("Device", source)], scene_object("slow", "Device", connect_takes=30)))
+    error = host.expect(m.SceneFailed, within=5).error
+    assert error.code == "device_timeout"
+    assert "slow" in error.message
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [({"nonsense": 1}, "nonsense"), ({"connect_takes": "long"}, "connect_takes")],
+)
+def test_a_bad_setting_names_object_and_setting(host: HostProcess, settings: dict[str, object], words: str) -> None:
+    host.send(open_scene([type_code("Device", DEVICE)], scene_object("a", "Device", **settings)))
+    error = host.expect(m.SceneFailed).error
+    assert (error.code, error.object_id) == ("invalid_data", "obj_a")
+    assert words in error.message
+
+
+def test_overrides_lie_over_parameters(host: HostProcess, tmp_path: Path) -> None:
+    override = SceneObjectOverride("obj_a", [Parameter("file", "string", f'"{tmp_path}/over"')])
+    objects = [scene_object("a", "Device", file=str(tmp_path / "under"))]
+    host.send(open_scene([type_code("Device", DEVICE)], *objects, overrides=[override]))
+    host.expect(m.SceneOpened)
+    assert [p.name for p in tmp_path.iterdir()] == ["over"]
+
+
+def test_a_source_that_breaks_is_named(host: HostProcess) -> None:
+    host.send(open_scene([type_code("Device", "def broken(:\n")], scene_object("a", "Device")))
+    error = host.expect(m.SceneFailed).error
+    assert "Device" in error.message
+    assert "SyntaxError" in error.message
+
+
+def test_the_older_convention_works(host: HostProcess, tmp_path: Path) -> None:
+    source = f"""
+    class OldBox(GenericWithPose):
+        _ABSTRACT = False
+        def __init__(self, obj_id, name, pose, settings=None):
+            super().__init__(obj_id, name, pose, settings)
+            Path({str(tmp_path / "old")!r}).write_text("open")
+        def cleanup(self):
+            Path({str(tmp_path / "old")!r}).write_text("closed")
+    """
+    host.send(open_scene([type_code("OldBox", source)], scene_object("old", "OldBox", pose=True)))
+    host.expect(m.SceneOpened)
+    assert (tmp_path / "old").read_text() == "open"
+    host.send(m.CloseScene())
+    assert host.expect(m.SceneClosed).error is None
+    assert host.gone() == 0
+    assert (tmp_path / "old").read_text() == "closed"
+
+
+def test_the_server_gone_means_stop_disconnect_exit_within_two_seconds(host: HostProcess, tmp_path: Path) -> None:
+    notes = tmp_path / "notes"
+    _open(host, "a", "b", file=str(notes))
+    host.begin("obj_a", "move")
+    host.begin("obj_b", "hang", seconds=30)
+    while "move" not in notes.read_text():
+        time.sleep(0.01)
+    began = time.monotonic()
+    host.socket.close()
+    host.gone(5)
+    assert time.monotonic() - began < 2.0
+    lines = notes.read_text().splitlines()
+    assert lines.index("a stop") < lines.index("a disconnected")
+    assert "b stop" in lines
+    assert "b disconnected" in lines  # past its hung lane
+
+
+def test_sigterm_means_the_same(host: HostProcess, tmp_path: Path) -> None:
+    notes = tmp_path / "notes"
+    _open(host, "a", file=str(notes))
+    host.begin("obj_a", "move")
+    while "move" not in notes.read_text():
+        time.sleep(0.01)
+    began = time.monotonic()
+    os.kill(host.process.pid, signal.SIGTERM)
+    host.gone(5)
+    assert time.monotonic() - began < 2.0
+    assert notes.read_text().splitlines()[-2:] == ["a stop", "a disconnected"]
+
+
+def test_what_drivers_do_to_a_process_stays_theirs(host: HostProcess) -> None:
+    _open(host, "a")
+    left = host.call("obj_a", "leave")
+    assert "SystemExit" in left.message
+    # More than a pipe holds, so that the test has to read meanwhile; no newline at the end of the second one.
+    number = host.begin("obj_a", "shout", size=300_000)
+    text = ""
+    deadline = time.monotonic() + 10
+    while text.count("y") < 300_000 and time.monotonic() < deadline:
+        text += host.output()
+    assert text.count("x") == text.count("y") == 300_000
+    assert host.answer(number) == 300_000
+    assert host.call("obj_a", "quick") == "quick"
+
+
+def test_a_call_that_holds_the_interpreter_is_silence_not_death(host: HostProcess) -> None:
+    _open(host, "a")
+    began = time.monotonic()
+    host.begin("obj_a", "freeze")
+    assert host.call("obj_a", "quick") == "quick"
+    assert time.monotonic() - began > 1.5
+
+
+def test_the_end_of_the_process_is_seen(host: HostProcess) -> None:
+    _open(host, "a")
+    host.begin("obj_a", "crash")
+    with pytest.raises(EOFError):
+        host.expect(m.CallDone)
+    assert host.gone() == 7
