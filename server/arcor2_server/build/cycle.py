@@ -1,0 +1,213 @@
+"""The logic of a project as the statements of a script's loop."""
+
+import ast
+
+from arcor2_hw.actions.parameter_types import PARAMETER_TYPES, read_reference
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.object_type import ParameterMeta
+from arcor2_hw.data.project import ActionParameter, ActionParameterType, parse_link
+from arcor2_hw.exceptions import Arcor2Error, InvalidData, InvalidProject
+from arcor2_server.build import expressions
+from arcor2_server.build.flow import END_NODE, Condition, Flow
+from arcor2_server.build.frame import NOTE, REFERENCES, Frame, References
+from arcor2_server.build.layout import arrange
+
+Block = list[ast.stmt]
+Stack = list[tuple[int, Block]]
+
+
+class Cycle:
+    """The statements of the logic."""
+
+    def __init__(self, frame: Frame, flow: Flow) -> None:
+        self.frame, self.flow = frame, flow
+        self.layout, self.natural = arrange(flow.edges)
+        self.numbers = {action.id: number for number, action in enumerate(flow.actions)}
+        names: set[str] = set()
+        for action in flow.actions:
+            if action.name in names:
+                raise InvalidProject(f"two actions are named {action.name!r}: a program could not tell them apart")
+            names.add(action.name)
+        self.declared = [frame.declared(action) for action in flow.actions]
+        self.results = [self._name_results(number) for number in range(len(flow.actions))]
+
+    def _name_results(self, number: int) -> list[str]:
+        action, returns = self.flow.actions[number], self.declared[number][3].returns
+        outputs = action.outputs()
+        if outputs and len(outputs) != len(returns):
+            method = self.declared[number][2]
+            raise InvalidProject(
+                f"action {action.name!r} names {len(outputs)} results, but {method} gives {len(returns)}"
+            )
+        return [self.frame.names.claim(output) for output in outputs]
+
+    # ------------------------------------------------------------------------------------------------ blocks
+    def statements(self) -> Block:
+        """Give the body of the loop."""
+        body: Block = []
+        stack: Stack = [(0, body)]
+        while stack:
+            node, block = stack.pop()
+            placed = self.layout.placed[node]
+            if placed.guarded:
+                guard = ast.If(expressions.equals(NOTE, self.flow.actions[node].name), [], [])
+                block.append(guard)
+                block = guard.body
+            block.append(self._call(node))
+            stack.extend((join, block) for join in reversed(placed.joins))
+            if placed.last != END_NODE:
+                stack.append((placed.last, block))
+            edges = self.flow.edges[node]
+            if len(edges) == 1:
+                self._go(node, edges[0].target, block, stack, placed.follow)
+            else:
+                self._branch(node, block, stack)
+        return body
+
+    def _go(self, node: int, target: int, block: Block, stack: Stack, follow: int) -> None:
+        """Write how the program gets from the end of a block to `target`, when the text goes on with `follow`."""
+        if target == END_NODE:
+            if follow != END_NODE:
+                block.append(ast.Continue())
+        elif not self.layout.is_join[target]:
+            stack.append((target, block))
+        elif self.layout.needs_note(node, target):
+            block.append(expressions.assign(NOTE, ast.Constant(self.flow.actions[target].name)))
+
+    def _branch(self, node: int, block: Block, stack: Stack) -> None:
+        placed = self.layout.placed[node]
+        targets = {edge.target for edge in self.flow.edges[node]}
+        if len(targets) == 1:
+            self._go(node, targets.pop(), block, stack, placed.follow)
+            return
+        follow = placed.follow if placed.last == END_NODE else placed.last
+        branches: list[tuple[Condition, Block, bool]] = []
+        for edge in self.flow.edges[node]:
+            inside: Block = []
+            assert edge.condition is not None, "an action with several ways on has conditions"
+            waiting = len(stack)
+            if edge.target == END_NODE or edge.target != placed.last:
+                self._go(node, edge.target, inside, stack, follow)
+            branches.append((edge.condition, inside, bool(inside) or len(stack) > waiting))
+        while branches and not branches[-1][2]:
+            # Whatever the last branches would do is what the text says next anyway.
+            branches.pop()
+        if not branches:
+            return
+        if len(self.flow.edges[node]) == 2 and not branches[0][2]:
+            condition, inside, _ = branches[1]
+            block.append(ast.If(self._test(node, condition), inside, []))
+            return
+        above: ast.If | None = None
+        for number, (condition, inside, filled) in enumerate(branches):
+            if not filled:
+                inside.append(ast.Pass())
+            if above is not None and number == len(self.flow.edges[node]) - 1:
+                above.orelse = inside
+                break
+            step = ast.If(self._test(node, condition), inside, [])
+            if above is None:
+                block.append(step)
+            else:
+                above.orelse = [step]
+            above = step
+
+    # ------------------------------------------------------------------------------------------------ expressions
+    def _result(self, node: int, source: int, output: int, kind: str) -> str:
+        """Give the variable that holds a result of action number `source` where number `node` uses it."""
+        user, giver = self.flow.actions[node], self.flow.actions[source]
+        names, returns = self.results[source], self.declared[source][3].returns
+        if output >= len(names):
+            raise InvalidProject(f"action {user.name!r} uses a result that {giver.name!r} does not name")
+        if returns[output] != kind:
+            name = giver.outputs()[output]
+            raise InvalidProject(
+                f"action {user.name!r} needs {kind}, but {name} of {giver.name!r} is {returns[output]}"
+            )
+        return names[output]
+
+    def _test(self, node: int, condition: Condition) -> ast.expr:
+        source = condition.action
+        if not self.natural.always_before(source, node):
+            raise self._too_early(node, source)
+        return expressions.equals(self._result(node, source, condition.output, "boolean"), condition.value)
+
+    def _too_early(self, node: int, source: int) -> InvalidProject:
+        user, giver = self.flow.actions[node].name, self.flow.actions[source].name
+        return InvalidProject(f"action {user!r} uses a result of {giver!r}, which has not always run before it")
+
+    def _linked(self, node: int, parameter: ActionParameter, meta: ParameterMeta) -> ast.expr:
+        action_id, flow, output = parse_link(read_reference(parameter))
+        source = self.numbers.get(action_id)
+        if source is None or flow != "default":
+            _, giver = self.frame.index.action(action_id)
+            raise InvalidData(f"parameter {parameter.name}: {giver.name!r} never runs, so it has no result")
+        if source == node or not self.natural.always_before(source, node):
+            raise self._too_early(node, source)
+        return expressions.name(self._result(node, source, output, meta.type))
+
+    def _constant(self, parameter: ActionParameter, meta: ParameterMeta) -> ast.expr:
+        constant = self.frame.index.parameter(read_reference(parameter))
+        if constant.type != meta.type:
+            raise InvalidData(f"parameter {parameter.name} must be {meta.type}, but {constant.name} is {constant.type}")
+        return expressions.name(self.frame.parameters[constant.id])
+
+    def _literal(self, node: int, parameter: ActionParameter, meta: ParameterMeta) -> ast.expr:
+        object_id, type_name, method, _ = self.declared[node]
+        kind = PARAMETER_TYPES.get(meta.type)
+        if kind is None or parameter.type != meta.type:
+            raise InvalidData(f"parameter {parameter.name} must be of type {meta.type}, not {parameter.type}")
+        if meta.type not in REFERENCES:  # those are looked up by name below
+            kind.check(parameter, meta)
+        enumerations = self.frame.types[type_name].enumerations
+        return kind.expression(parameter, References(self.frame, object_id, enumerations, method))
+
+    def _arguments(self, node: int) -> tuple[list[ast.expr], list[ast.keyword]]:
+        """Give positional arguments, and by keyword those behind one that is left to its default."""
+        action, declared = self.flow.actions[node], self.declared[node][3]
+        given = {parameter.name: parameter for parameter in action.parameters}
+        positional: list[ast.expr] = []
+        keywords: list[ast.keyword] = []
+        gap = False
+        for meta in declared.parameters:
+            parameter = given.pop(meta.name, None)
+            if parameter is None:
+                if isinstance(meta.default_value, Unset):
+                    raise InvalidProject(f"action {action.name!r}: parameter {meta.name} is missing")
+                gap = True
+                continue
+            match parameter.type:
+                case ActionParameterType.LINK:
+                    value = self._linked(node, parameter, meta)
+                case ActionParameterType.PROJECT_PARAMETER:
+                    value = self._constant(parameter, meta)
+                case _:
+                    value = self._literal(node, parameter, meta)
+            if gap:
+                keywords.append(ast.keyword(meta.name, value))
+            else:
+                positional.append(value)
+        if given:
+            raise InvalidProject(f"action {action.name!r}: {declared.name} has no parameter {', '.join(given)}")
+        return positional, keywords
+
+    def _call(self, node: int) -> ast.stmt:
+        """Give the statement that runs an action and keeps its results."""
+        action = self.flow.actions[node]
+        object_id, _, method, _ = self.declared[node]
+        try:
+            positional, keywords = self._arguments(node)
+        except InvalidProject:
+            raise
+        except (Arcor2Error, ValueError) as error:
+            raise InvalidProject(f"action {action.name!r}: {error}") from error
+        keywords.append(ast.keyword("an", ast.Constant(action.name)))
+        call = ast.Call(expressions.dotted(self.frame.objects[object_id], (method,)), positional, keywords)
+        match self.results[node]:
+            case []:
+                return ast.Expr(call)
+            case [name]:
+                return expressions.assign(name, call)
+            case names:
+                target = ast.Tuple([ast.Name(name, ast.Store()) for name in names], ast.Store())
+                return ast.Assign([target], call, lineno=0)

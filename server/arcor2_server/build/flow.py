@@ -1,0 +1,156 @@
+"""The logic of a project as a graph: which action follows which, under which condition."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.project import END, START, Action, LogicItem, Project, ProjectLogicIf, parse_link
+from arcor2_hw.exceptions import InvalidProject
+
+END_NODE: Final = -1
+"""Stands for the end of a cycle among the numbers of actions."""
+
+
+class Condition(NamedTuple):
+    """Holds when output `output` of action number `action` equals `value`."""
+
+    action: int
+    output: int
+    value: bool
+
+
+class Edge(NamedTuple):
+    """One way on: to action number `target` (or END_NODE), always or under a condition."""
+
+    target: int
+    condition: Condition | None
+
+
+@dataclass(frozen=True, slots=True)
+class Flow:
+    """The actions that a cycle can reach, numbered so that every edge leads to a higher number; 0 is the first.
+
+    `edges[n]`: one edge without a condition, or several of which exactly one holds if they are tried in order: the last
+    one holds when no other does.
+    """
+
+    actions: list[Action]
+    edges: list[tuple[Edge, ...]]
+
+
+def _node(reference: str, item: LogicItem, known: dict[str, int]) -> int:
+    action_id, slash, kind = reference.partition("/")
+    if slash and kind != "default":
+        raise InvalidProject(f"logic item {item.id}: an action has no flow {kind!r}")
+    try:
+        return known[action_id]
+    except KeyError:
+        raise InvalidProject(f"logic item {item.id} leads to or from an unknown action {action_id}") from None
+
+
+def _condition(
+    condition: ProjectLogicIf, source: Action, actions: Sequence[Action], known: dict[str, int]
+) -> Condition:
+    try:
+        action_id, flow, output = parse_link(condition.what)
+        value = json.loads(condition.value)
+    except ValueError as error:
+        raise InvalidProject(f"action {source.name!r}: a condition cannot be read: {error}") from None
+    if action_id not in known or flow != "default":
+        raise InvalidProject(f"action {source.name!r}: a condition asks for {condition.what!r}, which does not exist")
+    if not isinstance(value, bool):
+        raise InvalidProject(f"action {source.name!r}: only true and false can be branched on, not {condition.value}")
+    asked = actions[known[action_id]]
+    if output >= len(asked.outputs()):
+        raise InvalidProject(f"action {source.name!r}: a condition asks for a result that {asked.name!r} does not name")
+    return Condition(known[action_id], output, value)
+
+
+def _ordered(edges: list[Edge], source: Action, actions: Sequence[Action]) -> tuple[Edge, ...]:
+    """Check that exactly one edge is taken whatever the results are; put true before false where two are opposite."""
+    if not edges:
+        raise InvalidProject(f"action {source.name!r}: nothing follows it")
+    if len(edges) == 1 and edges[0].condition is None:
+        return tuple(edges)
+    tried: set[Condition] = set()
+    settled = False
+    for edge in edges:
+        if (condition := edge.condition) is None:
+            raise InvalidProject(f"action {source.name!r}: one of the ways on has no condition")
+        if settled or condition in tried:
+            where = "the end" if edge.target == END_NODE else repr(actions[edge.target].name)
+            raise InvalidProject(f"action {source.name!r}: the way on to {where} can never be taken")
+        tried.add(condition)
+        settled = condition._replace(value=not condition.value) in tried
+    if not settled:
+        [one, *more] = tried
+        result = actions[one.action].outputs()[one.output]
+        when = "no condition holds" if more else f"{result} is {str(not one.value).lower()}"
+        raise InvalidProject(f"action {source.name!r}: nothing follows it when {when}")
+    if len(edges) == 2:
+        edges.sort(key=lambda edge: edge.condition is not None and not edge.condition.value)
+    return tuple(edges)
+
+
+def _number(first: int, edges: list[list[int]], actions: Sequence[Action]) -> list[int]:
+    """Give what can be reached from `first`, each before what follows it, branches in their order."""
+    done: list[int] = []
+    open_, closed = 1, 2
+    state = [0] * len(edges)
+    stack = [(first, iter(reversed(edges[first])))]
+    state[first] = open_
+    while stack:
+        node, rest = stack[-1]
+        for target in rest:
+            if target == END_NODE or state[target] == closed:
+                continue
+            if state[target] == open_:
+                raise InvalidProject(f"action {actions[target].name!r}: the logic leads back to it")
+            state[target] = open_
+            stack.append((target, iter(reversed(edges[target]))))
+            break
+        else:
+            state[node] = closed
+            done.append(node)
+            stack.pop()
+    done.reverse()
+    return done
+
+
+def read(project: Project) -> Flow:
+    """Give the graph of a project's logic; InvalidProject names the action where it is no program."""
+    actions = [action for point in project.action_points for action in point.actions]
+    known = {action.id: number for number, action in enumerate(actions)}
+    starts: list[int] = []
+    items: list[list[tuple[int, LogicItem]]] = [[] for _ in actions]
+    for item in project.logic:
+        target = END_NODE if item.end == END else _node(item.end, item, known)
+        if item.start == START:
+            if target == END_NODE:
+                raise InvalidProject("the logic leads from START to END: there is nothing to do")
+            starts.append(target)
+        else:
+            items[_node(item.start, item, known)].append((target, item))
+    if not starts:
+        raise InvalidProject("the logic has no START: no action is the first one")
+    if len(starts) > 1:
+        names = ", ".join(repr(actions[start].name) for start in starts)
+        raise InvalidProject(f"the logic has more than one first action: {names}")
+
+    order = _number(starts[0], [[target for target, _ in ways] for ways in items], actions)
+    place = {action: number for number, action in enumerate(order)}
+    reached = [actions[number] for number in order]
+    reached_ids = {action.id: number for number, action in enumerate(reached)}
+    edges: list[tuple[Edge, ...]] = []
+    for old, source in zip(order, reached, strict=True):
+        ways = [
+            Edge(
+                END_NODE if target == END_NODE else place[target],
+                None if isinstance(item.condition, Unset) else _condition(item.condition, source, reached, reached_ids),
+            )
+            for target, item in items[old]
+        ]
+        edges.append(_ordered(ways, source, reached))
+    return Flow(reached, edges)

@@ -1,0 +1,197 @@
+"""What stands around the logic in a script: imports, objects, project parameters, entry; and all names in it."""
+
+import ast
+import builtins
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from arcor2_hw.actions.parameter_types import PARAMETER_TYPES
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.object_type import ObjectAction
+from arcor2_hw.data.parameter import Parameter
+from arcor2_hw.data.project import Action, Project
+from arcor2_hw.data.project_index import ProjectIndex
+from arcor2_hw.data.scene import Scene
+from arcor2_hw.exceptions import InvalidData, InvalidProject, NotFound
+from arcor2_server.build import expressions
+from arcor2_server.build.naming import Names
+from arcor2_server.build.points import PointNames, names_of
+from arcor2_server.build.style import Writer
+
+NOTE: Final = "next_action"
+"""The variable that notes where a program goes on behind joins that it passes by."""
+REFERENCES: Final = frozenset({"pose", "position", "joints"})
+"""Parameter types whose value is an id of something in the project."""
+_FIXED: Final = ("ActionPoints", "Resources", "aps", "error", "main", "print_exception", "res", NOTE)
+
+
+@dataclass(frozen=True, slots=True)
+class Enumeration:
+    """An enumeration that a parameter takes: where a script imports it from, and its members by value."""
+
+    module: str
+    name: str
+    members: Mapping[str | int, str]
+
+
+@dataclass(frozen=True, slots=True)
+class TypeFacts:
+    """What a script needs of one object type. `enumerations` by action and parameter."""
+
+    module: str
+    actions: Mapping[str, ObjectAction]
+    enumerations: Mapping[tuple[str, str], Enumeration] = field(default_factory=dict)
+
+
+class Frame:
+    """The names of one script, and all of it but its loop."""
+
+    def __init__(self, scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -> None:
+        self.scene, self.project, self.types = scene, project, types
+        self.index = ProjectIndex(scene, project)
+        self.points: PointNames = names_of(project)
+        self.names = Names([*dir(builtins), *_FIXED])
+        self.objects = {obj.id: self.names.claim(obj.name) for obj in scene.objects}
+        self.imports: dict[tuple[str, str], str] = {}
+        self.classes = {obj.id: self.imported(self._facts(obj.type).module, obj.type) for obj in scene.objects}
+        self.parameters = {one.id: self.names.claim(one.name) for one in project.parameters}
+        self.comments: dict[ast.stmt, str] = {}
+
+    def _facts(self, type_name: str) -> TypeFacts:
+        try:
+            return self.types[type_name]
+        except KeyError:
+            raise NotFound(f"object type {type_name} is not known") from None
+
+    def imported(self, module: str, name: str) -> str:
+        """Give the name under which the script knows a class, imported where it is used first."""
+        key = (module, name)
+        if key not in self.imports:
+            self.imports[key] = self.names.claim(name, f"{name}Type")
+        return self.imports[key]
+
+    # ------------------------------------------------------------------------------------------------ module
+    def module(self, loop: list[ast.stmt]) -> str:
+        """Give the text of the script with `loop` as its cycle; without one there is just the place for it."""
+        body: list[ast.stmt] = [
+            expressions.assign("aps", ast.Call(expressions.name("ActionPoints"), [expressions.name("res")], []))
+        ]
+        objects: list[ast.stmt] = [
+            ast.AnnAssign(
+                ast.Name(self.objects[obj.id], ast.Store()),
+                expressions.name(self.classes[obj.id]),
+                ast.Subscript(expressions.dotted("res", ("objects",)), ast.Constant(obj.id), ast.Load()),
+                simple=1,
+            )
+            for obj in self.scene.objects
+        ]
+        constants: list[ast.stmt] = [
+            expressions.assign(self.parameters[one.id], self._constant(one)) for one in self.project.parameters
+        ]
+        for part, title in ((objects, "Objects of the scene"), (constants, "Project parameters")):
+            if part:
+                self.comments[part[0]] = title
+                body += part
+        body += loop
+        main = ast.FunctionDef(
+            "main",
+            ast.arguments([], [ast.arg("res", expressions.name("Resources"))], None, [], [], None, []),
+            body,
+            [],
+            ast.Constant(None),
+            lineno=0,
+        )
+        run: list[ast.stmt] = [
+            ast.With(
+                [ast.withitem(ast.Call(expressions.name("Resources"), [], []), ast.Name("res", ast.Store()))],
+                [ast.Expr(ast.Call(expressions.name("main"), [expressions.name("res")], []))],
+                lineno=0,
+            )
+        ]
+        tell = ast.Expr(ast.Call(expressions.name("print_exception"), [expressions.name("error")], []))
+        entry = ast.If(
+            ast.Compare(expressions.name("__name__"), [ast.Eq()], [ast.Constant("__main__")]),
+            [ast.Try(run, [ast.ExceptHandler(expressions.name("Exception"), "error", [tell])], [], [])],
+            [],
+        )
+        heading = ast.Expr(ast.Constant(f"Main script of the project {self.project.name}."))
+        return Writer(self.comments).module(ast.Module([heading, *self._imports(), main, entry], []))
+
+    def _imports(self) -> list[ast.stmt]:
+        wanted: dict[str, list[ast.alias]] = {
+            "action_points": [ast.alias("ActionPoints")],
+            "arcor2_hw.runtime.exceptions": [ast.alias("print_exception")],
+            "arcor2_hw.runtime.resources": [ast.alias("Resources")],
+        }
+        for (module, name), known_as in self.imports.items():
+            wanted.setdefault(module, []).append(ast.alias(name, None if known_as == name else known_as))
+        return [
+            ast.ImportFrom(module, sorted(aliases, key=lambda alias: alias.name), 0)
+            for module, aliases in sorted(wanted.items())
+        ]
+
+    def _constant(self, parameter: Parameter) -> ast.expr:
+        kind = PARAMETER_TYPES.get(parameter.type)
+        if kind is None or parameter.type in REFERENCES:
+            raise InvalidProject(f"project parameter {parameter.name!r} cannot be of type {parameter.type!r}")
+        try:
+            return kind.expression(parameter, References(self, "", {}, ""))
+        except InvalidData as error:
+            raise InvalidProject(f"project {error}") from error
+
+    # ------------------------------------------------------------------------------------------------ actions
+    def declared(self, action: Action) -> tuple[str, str, str, ObjectAction]:
+        """Give object id, type and method of an action, and what the type says of it; InvalidProject, NotFound."""
+        try:
+            object_id, method = action.parse_type()
+            obj = self.index.scene_object(object_id)
+        except (ValueError, NotFound) as error:
+            raise InvalidProject(f"action {action.name!r}: {error}") from error
+        found = self._facts(obj.type).actions.get(method)
+        if found is None:
+            raise InvalidProject(f"action {action.name!r}: {obj.type} has no action {method}")
+        if found.disabled:
+            why = "" if isinstance(found.problem, Unset) else f": {found.problem}"
+            raise InvalidProject(f"action {action.name!r}: {obj.type}.{method} cannot be used{why}")
+        return object_id, obj.type, method, found
+
+
+class References:
+    """The names of things that the parameters of one action refer to (`ScriptNames` of the parameter types)."""
+
+    def __init__(
+        self, frame: Frame, object_id: str, enumerations: Mapping[tuple[str, str], Enumeration], method: str
+    ) -> None:
+        self._frame = frame
+        self._object_id = object_id
+        self._enumerations = enumerations
+        self._method = method
+
+    @staticmethod
+    def _below(what: str, known: Mapping[str, tuple[str, ...]], wanted: str) -> ast.expr:
+        if wanted not in known:
+            raise NotFound(f"the project has no {what} {wanted}")
+        return expressions.dotted("aps", known[wanted])
+
+    def pose(self, orientation_id: str) -> ast.expr:
+        """Give the expression for the pose of an action point with this orientation."""
+        return self._below("orientation", self._frame.points.poses, orientation_id)
+
+    def position(self, action_point_id: str) -> ast.expr:
+        """Give the expression for the position of an action point."""
+        return self._below("action point", self._frame.points.positions, action_point_id)
+
+    def joints(self, joints_id: str) -> ast.expr:
+        """Give the expression for joints of an action point."""
+        _, joints = self._frame.index.joints(joints_id)
+        if joints.robot_id != self._object_id:
+            raise InvalidData(f"joints {joints.name} belong to another robot")
+        return self._below("joints", self._frame.points.joints, joints_id)
+
+    def enum_member(self, parameter: Parameter, value: str | int) -> ast.expr:
+        """Give the expression for the member with `value` of the enumeration that `parameter` takes."""
+        kind = self._enumerations.get((self._method, parameter.name))
+        if kind is None or value not in kind.members:
+            raise InvalidData(f"parameter {parameter.name}: {value!r} is no member of its enumeration")
+        return expressions.dotted(self._frame.imported(kind.module, kind.name), (kind.members[value],))

@@ -1,0 +1,51 @@
+"""Names in generated code: valid, no keyword, each used once; the same project always gets the same names."""
+
+import keyword
+import re
+from collections.abc import Iterable
+from typing import Final
+
+import humps
+
+_NO_PART_OF_A_NAME: Final = re.compile(r"\W", re.ASCII)
+
+
+def identifier(text: str) -> str:
+    """Give text as a Python identifier: what may stand in one stays as it is.
+
+    No two leading underscores: inside a class Python would change such a name.
+    """
+    name = _NO_PART_OF_A_NAME.sub("_", text)
+    if name.startswith("__"):
+        name = f"_{name.lstrip('_')}"
+    if not name or name[0].isdigit():
+        name = f"_{name}"
+    return f"{name}_" if keyword.iskeyword(name) or keyword.issoftkeyword(name) else name
+
+
+def class_name(text: str) -> str:
+    """Give text as the name of a class: `pick_up2` becomes `PickUp2`."""
+    name = str(humps.pascalize(identifier(text).strip("_"))).replace("_", "")
+    return identifier(name[:1].upper() + name[1:]) if name else "Nameless"
+
+
+class Names:
+    """The names of one scope."""
+
+    def __init__(self, taken: Iterable[str] = ()) -> None:
+        self._taken = set(taken)
+        self._next: dict[str, int] = {}
+
+    def claim(self, text: str, *others: str) -> str:
+        """Take a name close to `text`, or else the first free one of `others`, or else `text` with a number."""
+        wanted = identifier(text)
+        for name in (wanted, *map(identifier, others)):
+            if name not in self._taken:
+                self._taken.add(name)
+                return name
+        number = self._next.get(wanted, 2)
+        while f"{wanted}_{number}" in self._taken:
+            number += 1
+        self._next[wanted] = number + 1
+        self._taken.add(name := f"{wanted}_{number}")
+        return name

@@ -1,0 +1,117 @@
+"""action_points.py of a package: typed access to the action points of a project by their names.
+
+The generated classes ask `Resources` (arcor2_hw.runtime.resources) for `position(action_point_id)`,
+`pose(orientation_id)` and `joints(joints_id)`; each gives a copy of its own, in global coordinates, that knows its
+action point.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Final
+
+from arcor2_hw.data.project import ActionPoint, Project
+from arcor2_server.build.naming import Names, class_name
+
+_IMPORTED: Final = ("Pose", "Position", "ProjectRobotJoints", "Resources", "ActionPoints")
+_OWN_FIELD: Final = "_res"
+
+
+@dataclass(frozen=True, slots=True)
+class PointNames:
+    """How a script reaches what the action points have, by id, as the parts of a dotted name."""
+
+    positions: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    poses: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    joints: dict[str, tuple[str, ...]] = field(default_factory=dict)
+
+
+def names_of(project: Project) -> PointNames:
+    """Give the names below `aps` of all positions, poses and joints."""
+    result = PointNames()
+    points = Names([_OWN_FIELD])
+    for point in project.action_points:
+        own = points.claim(point.name)
+        result.positions[point.id] = (own, "position")
+        poses, joints = Names([_OWN_FIELD]), Names([_OWN_FIELD])
+        for orientation in point.orientations:
+            result.poses[orientation.id] = (own, "poses", poses.claim(orientation.name))
+        for one in point.robot_joints:
+            result.joints[one.id] = (own, "joints", joints.claim(one.name))
+    return result
+
+
+def _text(value: str) -> str:
+    """Give a string as Python would be written by hand."""
+    shown = repr(value)
+    return f'"{shown[1:-1]}"' if shown[0] == "'" and '"' not in shown else shown
+
+
+def _class(name: str, title: str, fields: Iterable[str], properties: Iterable[tuple[str, str, str]]) -> str:
+    lines = [
+        f"class {name}:",
+        f'    """{title}"""',
+        "",
+        "    def __init__(self, res: Resources) -> None:",
+        f"        self.{_OWN_FIELD} = res",
+        *(f"        {line}" for line in fields),
+    ]
+    for attribute, kind, call in properties:
+        lines += [
+            "",
+            "    @property",
+            f"    def {attribute}(self) -> {kind}:",
+            f"        return self.{_OWN_FIELD}.{call}",
+        ]
+    return "\n".join(lines)
+
+
+def _point(point: ActionPoint, names: PointNames, classes: Names) -> tuple[str, list[str]]:
+    """Give the name of an action point's class, and the classes it needs, itself last."""
+    own = classes.claim(class_name(point.name))
+    attribute = names.positions[point.id][0]
+    parts: list[str] = []
+    fields: list[str] = []
+    if point.orientations:
+        name = classes.claim(f"{own}Poses")
+        poses = [(names.poses[o.id][-1], "Pose", f"pose({_text(o.id)})") for o in point.orientations]
+        parts.append(_class(name, f"Poses of {attribute}.", (), poses))
+        fields.append(f"self.poses = {name}(res)")
+    if point.robot_joints:
+        name = classes.claim(f"{own}Joints")
+        joints = [(names.joints[j.id][-1], "ProjectRobotJoints", f"joints({_text(j.id)})") for j in point.robot_joints]
+        parts.append(_class(name, f"Joints of {attribute}.", (), joints))
+        fields.append(f"self.joints = {name}(res)")
+    position = ("position", "Position", f"position({_text(point.id)})")
+    parts.append(_class(own, f"Action point {attribute}.", fields, [position]))
+    return own, parts
+
+
+def source(project: Project) -> str:
+    """Give the text of action_points.py."""
+    names = names_of(project)
+    classes = Names(_IMPORTED)
+    parts: list[str] = []
+    fields: list[str] = []
+    for point in project.action_points:
+        own, needed = _point(point, names, classes)
+        parts += needed
+        fields.append(f"self.{names.positions[point.id][0]} = {own}(res)")
+    parts.append(_class("ActionPoints", "The action points of the project by name.", fields, ()))
+    geometry = [
+        name
+        for name, needed in (
+            ("Pose", any(point.orientations for point in project.action_points)),
+            ("Position", bool(project.action_points)),
+        )
+        if needed
+    ]
+    header = [
+        '"""Action points in global coordinates, generated from the project. Every access gives a copy of its own."""',
+        "",
+    ]
+    if geometry:
+        header.append(f"from arcor2_hw.data.geometry import {', '.join(geometry)}")
+    if any(point.robot_joints for point in project.action_points):
+        header.append("from arcor2_hw.data.project import ProjectRobotJoints")
+    header.append("from arcor2_hw.runtime.resources import Resources")
+    return "\n".join(header) + "\n\n\n" + "\n\n\n".join(parts) + "\n"

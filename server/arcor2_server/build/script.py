@@ -1,0 +1,36 @@
+"""script.py of a package: the logic of a project as readable Python."""
+
+import ast
+from collections.abc import Mapping
+
+from arcor2_hw.data.project import Project
+from arcor2_hw.data.scene import Scene
+from arcor2_hw.exceptions import InvalidProject
+from arcor2_server.build import flow
+from arcor2_server.build.cycle import Cycle
+from arcor2_server.build.frame import Frame, TypeFacts
+
+
+def from_logic(scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -> str:
+    """Give the script of a project's logic, which runs in a loop until it is stopped or an action finishes it.
+
+    Raises InvalidProject naming the action that is wrong, NotFound for an object type that `types` does not have.
+    """
+    frame = Frame(scene, project, types)
+    body = Cycle(frame, flow.read(project)).statements()
+    return frame.module([ast.While(ast.Constant(True), body, [])])
+
+
+def without_logic(scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -> str:
+    """Give a script that makes objects, action points and parameters known and does nothing yet."""
+    return Frame(scene, project, types).module([])
+
+
+def check_syntax(source: str) -> None:
+    """Return when `source` is Python; InvalidProject names the line when it is not."""
+    try:
+        compile(source, "script.py", "exec", dont_inherit=True)
+    except SyntaxError as error:
+        raise InvalidProject(f"script.py, line {error.lineno}: {error.msg}", error.text or "") from error
+    except (ValueError, RecursionError, MemoryError) as error:
+        raise InvalidProject(f"script.py is no Python: {error}") from error

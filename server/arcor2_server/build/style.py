@@ -1,0 +1,124 @@
+"""From a syntax tree to text that a person likes to read: blank lines, comments, quotes, lines of bearable length."""
+
+import ast
+import re
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+LINE: Final = 110
+_INDENT: Final = "    "
+_STRING: Final = re.compile(r"""'(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*\"""")
+_BLOCKS: Final = (ast.If, ast.While, ast.With, ast.Try, ast.FunctionDef)
+
+
+def _quoted(match: re.Match[str]) -> str:
+    found = match[0]
+    return found if found[0] == '"' or '"' in found else f'"{found[1:-1]}"'
+
+
+def _unparse(node: ast.AST) -> str:
+    # The text is one line and has no comment, so what starts with a quote is a string.
+    return _STRING.sub(_quoted, ast.unparse(node))
+
+
+def docstring(text: str) -> str:
+    """Give text as a docstring on one line."""
+    plain = " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    return '"""' + plain.replace("\\", "\\\\").replace('"', '\\"') + '"""'
+
+
+def _simple(node: ast.stmt, indent: str) -> list[str]:
+    """Write a statement that holds no others; a call too long for a line gets one argument per line."""
+    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
+        return [indent + docstring(node.value.value)]
+    text = indent + _unparse(node)
+    call = node.value if isinstance(node, ast.Expr | ast.Assign) else None
+    if len(text) <= LINE or not isinstance(call, ast.Call) or not (call.args or call.keywords):
+        return [text]
+    target = f"{', '.join(map(_unparse, node.targets))} = " if isinstance(node, ast.Assign) else ""
+    arguments = [*call.args, *call.keywords]
+    return [
+        f"{indent}{target}{_unparse(call.func)}(",
+        *(f"{indent}{_INDENT}{_unparse(argument)}," for argument in arguments),
+        f"{indent})",
+    ]
+
+
+def _reads(test: ast.expr, before: ast.stmt) -> bool:
+    """Tell whether a condition asks for what the statement before it has just found out."""
+    if not isinstance(before, ast.Assign):
+        return False
+    given = {name.id for target in before.targets for name in ast.walk(target) if isinstance(name, ast.Name)}
+    return any(isinstance(name, ast.Name) and name.id in given for name in ast.walk(test))
+
+
+class Writer:
+    """Writes a module. `comments` gives the line to put above a statement."""
+
+    def __init__(self, comments: Mapping[ast.stmt, str]) -> None:
+        self._comments = comments
+        self._lines: list[str] = []
+
+    def module(self, module: ast.Module) -> str:
+        """Give the text of the module."""
+        self._block(module.body, "")
+        return "\n".join(self._lines) + "\n"
+
+    def _block(self, body: Sequence[ast.stmt], indent: str) -> None:
+        before: ast.stmt | None = None
+        for node in body:
+            comment = self._comments.get(node)
+            if before is not None:
+                self._lines += [""] * self._distance(before, node, indent, commented=comment is not None)
+            if comment is not None:
+                self._lines.append(f"{indent}# {comment}")
+            self._statement(node, indent)
+            before = node
+
+    def _distance(self, before: ast.stmt, node: ast.stmt, indent: str, *, commented: bool) -> int:
+        """Give how many blank lines stand between two statements of a block."""
+        if not indent:
+            if isinstance(before, ast.FunctionDef) or isinstance(node, ast.FunctionDef):
+                return 2
+            return int(type(before) is not type(node))
+        if isinstance(node, ast.If) and not isinstance(before, _BLOCKS):
+            return int(commented or not _reads(node.test, before))
+        return int(commented or isinstance(before, _BLOCKS) or isinstance(node, _BLOCKS))
+
+    def _statement(self, node: ast.stmt, indent: str) -> None:
+        deeper = indent + _INDENT
+        match node:
+            case ast.If():
+                word = "if"
+                branch = node
+                while True:
+                    self._lines.append(f"{indent}{word} {_unparse(branch.test)}:")
+                    self._block(branch.body, deeper)
+                    match branch.orelse:
+                        case [ast.If() as branch]:
+                            word = "elif"
+                        case []:
+                            return
+                        case rest:
+                            self._lines.append(f"{indent}else:")
+                            self._block(rest, deeper)
+                            return
+            case ast.While():
+                self._lines.append(f"{indent}while {_unparse(node.test)}:")
+                self._block(node.body, deeper)
+            case ast.With():
+                self._lines.append(f"{indent}with {', '.join(map(_unparse, node.items))}:")
+                self._block(node.body, deeper)
+            case ast.Try():
+                self._lines.append(f"{indent}try:")
+                self._block(node.body, deeper)
+                for handler in node.handlers:
+                    kind = f" {_unparse(handler.type)}" if handler.type else ""
+                    self._lines.append(f"{indent}except{kind}{f' as {handler.name}' if handler.name else ''}:")
+                    self._block(handler.body, deeper)
+            case ast.FunctionDef():
+                returns = f" -> {_unparse(node.returns)}" if node.returns else ""
+                self._lines.append(f"{indent}def {node.name}({_unparse(node.args)}){returns}:")
+                self._block(node.body, deeper)
+            case _:
+                self._lines += _simple(node, indent)

@@ -1,0 +1,180 @@
+"""Projects made for the tests of Build, and a direct walk through a project's logic to compare programs with."""
+
+import builtins
+import itertools
+import json
+import types
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from arcor2_hw.data.base import UNSET
+from arcor2_hw.data.geometry import Position
+from arcor2_hw.data.object_type import ObjectAction, ParameterMeta
+from arcor2_hw.data.project import (
+    END,
+    START,
+    Action,
+    ActionParameter,
+    ActionPoint,
+    Flow,
+    LogicItem,
+    Project,
+    ProjectLogicIf,
+    parse_link,
+)
+from arcor2_hw.data.scene import Scene, SceneObject
+from arcor2_server.build.frame import TypeFacts
+from arcor2_server.build.script import from_logic
+
+OBJECT = "obj_1"
+Way = tuple[str, str, bool] | None
+"""Condition: the action asked, its output's name, the value."""
+
+DECLARED = {
+    "do": ObjectAction("do"),
+    "ask": ObjectAction("ask", returns=["boolean"]),
+    "ask2": ObjectAction("ask2", returns=["boolean", "boolean"]),
+    "use": ObjectAction("use", parameters=[ParameterMeta("flag", "boolean"), ParameterMeta("x", "double")]),
+}
+TYPES = {"Thing": TypeFacts("object_types.thing", DECLARED)}
+SCENE = Scene("scene", objects=[SceneObject("thing", "Thing", id=OBJECT)], id="scn_1")
+
+
+@dataclass
+class Draft:
+    """A project in the making: actions by name with the names of their results, and ways between them."""
+
+    actions: dict[str, list[str]] = field(default_factory=dict)
+    ways: list[tuple[str, str, Way]] = field(default_factory=list)
+    links: dict[str, tuple[str, int]] = field(default_factory=dict)
+
+    def action(self, name: str, *results: str) -> "Draft":
+        self.actions[name] = list(results)
+        return self
+
+    def way(self, start: str, end: str, condition: Way = None) -> "Draft":
+        self.ways.append((start, end, condition))
+        return self
+
+    def chain(self, *names: str) -> "Draft":
+        for name in names:
+            if name not in (START, END):
+                self.actions.setdefault(name, [])
+        for start, end in itertools.pairwise(names):
+            self.way(start, end)
+        return self
+
+    def branch(self, name: str, yes: str, no: str) -> "Draft":
+        self.actions[name] = self.actions.get(name) or [f"r_{name}"]
+        result = self.actions[name][0]
+        return self.way(name, yes, (name, result, True)).way(name, no, (name, result, False))
+
+    def _action(self, name: str) -> Action:
+        results = self.actions[name]
+        method = ("do", "ask", "ask2")[len(results)]
+        parameters = []
+        if name in self.links:
+            source, output = self.links[name]
+            method = "use"
+            link = ActionParameter("flag", "link", json.dumps(f"id_{source}/default/{output}"))
+            parameters = [link, ActionParameter("x", "double", "0.5")]
+        return Action(name, f"{OBJECT}/{method}", f"id_{name}", parameters, [Flow(outputs=results)])
+
+    def project(self) -> Project:
+        logic = []
+        for number, (start, end, condition) in enumerate(self.ways):
+            when: Any = UNSET
+            if condition is not None:
+                asked, result, value = condition
+                when = ProjectLogicIf(f"id_{asked}/default/{self.actions[asked].index(result)}", json.dumps(value))
+            begin = START if start == START else f"id_{start}"
+            logic.append(LogicItem(begin, END if end == END else f"id_{end}", when, f"lit_{number}"))
+        point = ActionPoint("ap", Position(), id="acp_1", actions=[self._action(name) for name in self.actions])
+        return Project("project", "scn_1", id="pro_1", action_points=[point], logic=logic)
+
+    def script(self) -> str:
+        return from_logic(SCENE, self.project(), TYPES)
+
+
+class Enough(Exception):
+    """The run has shown what it was to show."""
+
+
+Oracle = Callable[[str, int], tuple[bool, ...]]
+"""Gives the results of the n-th action that runs."""
+
+
+def walk(project: Project, oracle: Oracle, count: int) -> list[tuple[str, tuple[Any, ...]]]:
+    """Follow the logic item by item, without any notion of blocks; gives what runs with which linked values."""
+    actions = {action.id: action for point in project.action_points for action in point.actions}
+    done: list[tuple[str, tuple[Any, ...]]] = []
+    while True:
+        results: dict[str, tuple[bool, ...]] = {}
+        at = next(item.end for item in project.logic if item.start == START)
+        while at != END:
+            if len(done) == count:
+                return done
+            action = actions[at]
+            values = []
+            for parameter in action.parameters:
+                if parameter.type == "link":
+                    source, _, output = parse_link(json.loads(parameter.value))
+                    values.append(results[source][output])
+                else:
+                    values.append(json.loads(parameter.value))
+            results[at] = oracle(action.name, len(done))
+            done.append((action.name, tuple(values)))
+            for item in project.logic:
+                if item.start != at:
+                    continue
+                if isinstance(item.condition, ProjectLogicIf):
+                    source, _, output = parse_link(item.condition.what)
+                    if results[source][output] is not json.loads(item.condition.value):
+                        continue
+                at = item.end
+                break
+            else:
+                raise AssertionError(f"nothing follows {at}")
+
+
+class _Thing:
+    def __init__(self, oracle: Oracle, count: int) -> None:
+        self.done: list[tuple[str, tuple[Any, ...]]] = []
+        self._oracle, self._count = oracle, count
+
+    def __getattr__(self, method: str) -> Callable[..., Any]:
+        def call(*arguments: Any, an: str) -> Any:
+            if len(self.done) == self._count:
+                raise Enough
+            results = self._oracle(an, len(self.done))
+            self.done.append((an, arguments))
+            wanted = len(DECLARED[method].returns)
+            return None if wanted == 0 else results[0] if wanted == 1 else results[:wanted]
+
+        return call
+
+
+def run(source: str, oracle: Oracle, count: int) -> list[tuple[str, tuple[Any, ...]]]:
+    """Run a generated script with a recording object in place of the device, for `count` actions."""
+    thing = _Thing(oracle, count)
+    stub = types.SimpleNamespace(
+        ActionPoints=lambda res: None, Resources=None, print_exception=None, Thing=_Thing, thing=None
+    )
+    names: dict[str, Any] = {
+        "__builtins__": {**vars(builtins), "__import__": lambda *_, **__: stub},
+        "__name__": "script",
+    }
+    exec(compile(source, "script.py", "exec"), names)
+    try:
+        names["main"](types.SimpleNamespace(objects={OBJECT: thing}))
+    except Enough:
+        return thing.done
+    raise AssertionError("a generated program must not end by itself")
+
+
+def same_runs(draft: Draft, oracle: Oracle, count: int) -> None:
+    """Compare the program with the logic."""
+    project = draft.project()
+    source = from_logic(SCENE, project, TYPES)
+    assert run(source, oracle, count) == walk(project, oracle, count), source

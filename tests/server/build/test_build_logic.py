@@ -1,0 +1,367 @@
+"""Programs do what the logic says: random graphs are run both ways, and shapes that people draw are looked at."""
+
+import random
+import sys
+from types import FrameType
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from arcor2_hw.data.project import END, START
+from arcor2_hw.exceptions import InvalidProject
+from arcor2_server.build.layout import MAX_NESTING, Tree
+from arcor2_server.build.script import from_logic
+from tests.server.build.projects import SCENE, TYPES, Draft, run, same_runs
+
+
+def random_draft(rng: random.Random, size: int, joining: float, ending: float, window: int) -> Draft:
+    """Draw a graph without loops: each action goes on to one, two or three others, near ones rather than far ones."""
+    draft = Draft()
+    names = [f"a{n}" for n in range(size)]
+    # Which actions always run before another one: the sets are what the program may rely on.
+    always: dict[int, set[int]] = {0: {0}}
+    results: dict[int, int] = {n: rng.choice((0, 1, 1, 1, 2)) for n in range(size)}
+    for n in range(size):
+        draft.action(names[n], *[f"r{k}_{n}" for k in range(results[n])])
+    draft.way(START, names[0])
+    fresh = 1
+    for n in range(size):
+        if n not in always:
+            continue
+
+        def target(n: int = n) -> int:
+            nonlocal fresh
+            if rng.random() < ending or n == size - 1:
+                return size
+            known = [t for t in always if t > n]
+            if known and rng.random() < joining:
+                return rng.choice(sorted(known)[:window])
+            fresh = max(fresh, n + 1)
+            if fresh >= size:
+                return size
+            fresh += 1
+            return fresh - 1
+
+        sources = sorted(a for a in always[n] if results[a])
+        if sources and rng.random() < 0.6:
+            asked = n if results[n] and rng.random() < 0.7 else rng.choice(sources)
+            output = rng.randrange(results[asked])
+            conditions = [(asked, output, True), (asked, output, False)]
+            rng.shuffle(conditions)
+            others = [(s, k) for s in sources for k in range(results[s]) if (s, k) != (asked, output)]
+            if others and rng.random() < 0.3:
+                conditions.insert(rng.randrange(2), (*rng.choice(others), rng.random() < 0.5))
+        else:
+            conditions = []
+        for condition in conditions or [None]:
+            end = target()
+            way = None if condition is None else (names[condition[0]], f"r{condition[1]}_{condition[0]}", condition[2])
+            draft.way(names[n], names[end] if end < size else END, way)
+            if end < size:
+                always[end] = (always[end] & always[n] if end in always else always[n]) | {end}
+    for n in sorted(always):
+        sources = [a for a in sorted(always[n]) if results[a] and a != n]
+        if not results[n] and sources and rng.random() < 0.5:
+            source = rng.choice(sources)
+            draft.links[names[n]] = (names[source], rng.randrange(results[source]))
+    return draft
+
+
+@settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(
+    st.integers(0, 2**32),
+    st.integers(1, 30),
+    st.sampled_from([0.0, 0.2, 0.5, 0.9]),
+    st.sampled_from([0.0, 0.1, 0.3]),
+    st.sampled_from([1, 2, 3, 20]),
+)
+def test_a_program_does_what_the_logic_says(seed: int, size: int, joining: float, ending: float, window: int) -> None:
+    draft = random_draft(random.Random(seed), size, joining, ending, window)
+    for draw in range(4):
+        same_runs(draft, _oracle(seed + draw), 4 * size)
+
+
+def _oracle(seed: int) -> Any:
+    def results(name: str, number: int) -> tuple[bool, ...]:
+        rng = random.Random(f"{seed} {name} {number}")
+        return rng.random() < 0.5, rng.random() < 0.5
+
+    return results
+
+
+def test_big_random_graphs() -> None:
+    rng = random.Random(7)
+    for size in (200, 400):
+        for joining, window in ((0.3, 5), (0.6, 50), (0.05, 3)):
+            draft = random_draft(rng, size, joining, 0.05, window)
+            same_runs(draft, _oracle(rng.randrange(1000)), 3 * size)
+
+
+# ------------------------------------------------------------------------------------------------ shapes
+def loop(source: str) -> str:
+    """Give the body of the loop without the objects' names, for comparison by eye."""
+    lines = source.splitlines()
+    start = lines.index("    while True:") + 1
+    body = lines[start : lines.index('if __name__ == "__main__":')]
+    return "\n".join(line[8:] for line in body).strip()
+
+
+def test_a_diamond_joins_behind_the_branch() -> None:
+    draft = Draft().way(START, "a").branch("a", "b", "c").chain("b", "d").chain("c", "d").chain("d", END)
+    assert (
+        loop(draft.script())
+        == """\
+r_a = thing.ask(an="a")
+if r_a == True:
+    thing.do(an="b")
+else:
+    thing.do(an="c")
+
+thing.do(an="d")"""
+    )
+
+
+def test_branches_that_both_end_stand_side_by_side() -> None:
+    draft = Draft().way(START, "a").branch("a", "b", "c").chain("b", END).chain("c", END)
+    assert (
+        loop(draft.script())
+        == """\
+r_a = thing.ask(an="a")
+if r_a == True:
+    thing.do(an="b")
+else:
+    thing.do(an="c")"""
+    )
+
+
+def test_an_early_end_needs_no_else() -> None:
+    draft = Draft().way(START, "a").branch("a", "b", "c").chain("b", END).branch("c", "d", END).chain("d", END)
+    assert (
+        loop(draft.script())
+        == """\
+r_a = thing.ask(an="a")
+if r_a == True:
+    thing.do(an="b")
+    continue
+
+r_c = thing.ask(an="c")
+if r_c == True:
+    thing.do(an="d")"""
+    )
+
+
+def test_a_branch_that_leads_straight_to_the_join_is_left_out() -> None:
+    draft = Draft().way(START, "a").branch("a", "d", "c").chain("c", "d").chain("d", END)
+    assert (
+        loop(draft.script())
+        == """\
+r_a = thing.ask(an="a")
+if r_a == False:
+    thing.do(an="c")
+
+thing.do(an="d")"""
+    )
+
+
+def test_more_than_two_ways_make_an_elif() -> None:
+    draft = Draft().action("a", "x", "y").chain(START, "a").chain("b", "e").chain("c", "e").chain("d", "e", END)
+    draft.way("a", "b", ("a", "x", True)).way("a", "c", ("a", "y", True)).way("a", "d", ("a", "y", False))
+    assert (
+        loop(draft.script())
+        == """\
+x, y = thing.ask2(an="a")
+if x == True:
+    thing.do(an="b")
+elif y == True:
+    thing.do(an="c")
+else:
+    thing.do(an="d")
+
+thing.do(an="e")"""
+    )
+
+
+def test_a_join_that_can_be_passed_by_is_guarded_and_stands_once() -> None:
+    draft = (
+        Draft().way(START, "a").branch("a", "b", "c").branch("b", "d", "e").chain("c", "e", "f", END).chain("d", "f")
+    )
+    source = draft.script()
+    assert (
+        loop(source)
+        == """\
+r_a = thing.ask(an="a")
+if r_a == True:
+    r_b = thing.ask(an="b")
+    if r_b == True:
+        thing.do(an="d")
+        next_action = "f"
+    else:
+        next_action = "e"
+else:
+    thing.do(an="c")
+    next_action = "e"
+
+if next_action == "e":
+    thing.do(an="e")
+
+thing.do(an="f")"""
+    )
+    for seed in range(8):
+        same_runs(draft, _oracle(seed), 12)
+
+
+def nested(depth: int) -> Draft:
+    """Make branches within branches that all join again, one level behind the other."""
+    draft = Draft().way(START, "a0")
+    for n in range(depth):
+        draft.branch(f"a{n}", f"a{n + 1}" if n < depth - 1 else "deepest", f"b{n}")
+        draft.chain(f"b{n}", f"j{n}").chain(f"j{n}", f"j{n - 1}" if n else END)
+    return draft.chain("deepest", f"j{depth - 1}")
+
+
+@pytest.mark.parametrize("depth", [MAX_NESTING, MAX_NESTING + 1, 3 * MAX_NESTING, 400])
+def test_too_deep_branches_are_moved_out(depth: int) -> None:
+    draft = nested(depth)
+    deepest = max(len(line) - len(line.lstrip()) for line in draft.script().splitlines()) // 4
+    assert deepest <= MAX_NESTING + 4
+    for seed in range(3):
+        same_runs(draft, _oracle(seed), 60)
+    # The way into the depths, which chance hardly ever takes.
+    same_runs(draft, lambda *_: (True, True), 3 * depth)
+
+
+def diamonds(count: int) -> Draft:
+    draft = Draft().way(START, "a0")
+    for n in range(count):
+        draft.branch(f"a{n}", f"y{n}", f"n{n}")
+        after = f"a{n + 1}" if n < count - 1 else END
+        draft.chain(f"y{n}", after).chain(f"n{n}", after)
+    return draft
+
+
+def exits(count: int) -> Draft:
+    """Make a long chain whose every action may go straight to the last one."""
+    draft = Draft().way(START, "a0")
+    for n in range(count - 1):
+        draft.branch(f"a{n}", f"a{n + 1}", "last")
+    return draft.chain(f"a{count - 1}", "last", END)
+
+
+def chain(count: int) -> Draft:
+    return Draft().chain(START, *[f"a{n}" for n in range(count)], END)
+
+
+def ladder(count: int) -> Draft:
+    """Make two strands that change over everywhere: nothing of it is structured."""
+    draft = Draft().way(START, "l0")
+    for n in range(count):
+        last = n == count - 1
+        draft.branch(f"l{n}", END if last else f"l{n + 1}", f"r{n}")
+        draft.branch(f"r{n}", END, END if last else f"l{n + 1}") if n % 2 else draft.chain(
+            f"r{n}", END if last else f"r{n + 1}"
+        )
+    return draft
+
+
+@pytest.mark.parametrize(
+    ("make", "count"), [(diamonds, 18), (diamonds, 300), (exits, 300), (ladder, 200), (chain, 1000)]
+)
+def test_long_logic(make: Any, count: int) -> None:
+    draft = make(count)
+    for seed in range(3):
+        same_runs(draft, _oracle(seed), 1000)
+    same_runs(draft, lambda *_: (True, True), 1000)
+    same_runs(draft, lambda *_: (False, False), 1000)
+
+
+def _steps(draft: Draft) -> int:
+    """Count the lines of our code that a build runs through: a measure that no other load disturbs."""
+    project = draft.project()
+    count = 0
+
+    def trace(frame: FrameType, event: str, _: object) -> Any:
+        nonlocal count
+        if "arcor2_server" not in frame.f_code.co_filename:
+            return None
+        count += event == "line"
+        return trace
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        from_logic(SCENE, project, TYPES)
+    finally:
+        sys.settrace(before)
+    return count
+
+
+@pytest.mark.parametrize("make", [chain, diamonds, exits, ladder, nested])
+def test_the_time_of_a_build_is_linear(make: Any) -> None:
+    small, large = _steps(make(60)), _steps(make(480))
+    assert large / small < 8 * 1.35, f"eight times the actions take {large / small:.1f} times the steps"
+
+
+def test_common_ancestors() -> None:
+    rng = random.Random(1)
+    tree = Tree()
+    ancestors: list[list[int]] = []
+    for n in range(400):
+        parent = rng.randrange(max(n - 3, 0), n) if n else 0
+        tree.add(parent)
+        ancestors.append([*ancestors[parent], n] if n else [0])
+    for _ in range(2000):
+        a, b = rng.randrange(400), rng.randrange(400)
+        assert tree.common(a, b) == max(set(ancestors[a]) & set(ancestors[b]), key=lambda x: tree.depths[x])
+
+
+# ------------------------------------------------------------------------------------------------ refusals
+def _no_condition() -> Draft:
+    return Draft().action("a", "x").chain(START, "a").chain("a", "b", END).way("a", END, ("a", "x", True))
+
+
+def _never_taken() -> Draft:
+    draft = Draft().action("a", "x", "y").chain(START, "a").chain("b", END).chain("c", END).chain("d", END)
+    return draft.way("a", "b", ("a", "x", True)).way("a", "c", ("a", "x", False)).way("a", "d", ("a", "y", True))
+
+
+def _linked_from_a_branch() -> Draft:
+    draft = (
+        Draft().way(START, "a").branch("a", "b", "c").action("b", "x").chain("b", "d").chain("c", "d").chain("d", END)
+    )
+    draft.links["d"] = ("b", 0)
+    return draft
+
+
+def _linked_to_itself() -> Draft:
+    draft = Draft().chain(START, "a", END)
+    draft.links["a"] = ("a", 0)
+    return draft
+
+
+@pytest.mark.parametrize(
+    ("draft", "text"),
+    [
+        (Draft().chain("a", END), "START"),
+        (Draft().chain(START, "a", END).chain(START, "b", END), "more than one first action"),
+        (Draft().way(START, END), "nothing to do"),
+        (Draft().chain(START, "first", "second"), "'second': nothing follows"),
+        (Draft().chain(START, "a", "b", "c", "b"), "'b': the logic leads back"),
+        (Draft().action("a", "x").chain(START, "a").way("a", "b", ("a", "x", True)).chain("b", END), "x is false"),
+        (_no_condition(), "'a': one of the ways on has no condition"),
+        (_never_taken(), "'a': the way on to 'd' can never be taken"),
+        (_linked_from_a_branch(), "'d' uses a result of 'b', which has not always run before"),
+        (_linked_to_itself(), "'a' uses a result of 'a'"),
+    ],
+)
+def test_what_is_no_program_is_refused_by_name(draft: Draft, text: str) -> None:
+    with pytest.raises(InvalidProject) as caught:
+        draft.script()
+    assert text in str(caught.value)
+
+
+def test_what_cannot_be_reached_is_left_out() -> None:
+    draft = Draft().chain(START, "a", END).chain("lost", "also lost")
+    assert "lost" not in draft.script()
+    assert run(draft.script(), _oracle(0), 2) == [("a", ()), ("a", ())]
