@@ -195,7 +195,7 @@ class Storage:
         """Give the ids of all uploaded object types with when each was modified."""
         async with self._reading() as session:
             rows = await session.execute(select(ObjectTypeRow.id, ObjectTypeRow.modified))
-            return dict(rows.tuples().all())
+            return {key: modified for key, modified in rows}  # noqa: C416 - rows are no tuples to mypy
 
     async def object_types(self) -> list[ObjectTypeSource]:
         """Give all uploaded object types with their models."""

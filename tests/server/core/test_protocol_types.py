@@ -1,0 +1,160 @@
+"""The Structs say exactly what protocol.json says: every request, event, type, field, default and enum value."""
+
+import enum
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+from msgspec import UNSET, inspect
+
+from arcor2_hw.data.events import EVENTS, ChangeType
+from arcor2_hw.data.role import Role
+from arcor2_hw.data.rpc import RPCS
+
+
+@pytest.fixture(scope="module")
+def protocol(spec: Path) -> Any:
+    return msgspec.json.decode((spec / "protocol.json").read_bytes())
+
+
+class Comparison:
+    """Walks a type of the specification and one of ours side by side and notes where they differ."""
+
+    def __init__(self, types: dict[str, Any]) -> None:
+        self.types = types
+        self.differences: list[str] = []
+        self.compared: set[str] = set()
+        self._seen: set[tuple[str, Any]] = set()
+
+    def differ(self, where: str, what: str) -> None:
+        self.differences.append(f"{where}: {what}")
+
+    def same(self, where: str, theirs: dict[str, Any], ours: inspect.Type) -> None:
+        if isinstance(ours, inspect.UnionType):
+            rest = [kind for kind in ours.types if not isinstance(kind, inspect.UnsetType)]
+            if len(rest) != 1:
+                self.differ(where, f"{len(rest)} alternatives")
+                return
+            (ours,) = rest
+        if theirs["kind"] == "optional":
+            theirs = theirs["of"]
+        match theirs["kind"]:
+            case "string":
+                # `value` and the like are plain text; a time stamp is text with a pattern.
+                self.expect(where, isinstance(ours, inspect.StrType), ours)
+            case "integer":
+                self.expect(where, isinstance(ours, inspect.IntType), ours)
+            case "number":
+                self.expect(where, isinstance(ours, inspect.FloatType), ours)
+            case "boolean":
+                self.expect(where, isinstance(ours, inspect.BoolType), ours)
+            case "array":
+                if self.expect(where, isinstance(ours, inspect.ListType), ours):
+                    self.same(where + "[]", theirs["items"], ours.item_type)  # type: ignore[attr-defined]
+            case "set(json array, unique)":
+                if self.expect(where, isinstance(ours, inspect.SetType), ours):
+                    self.same(where + "{}", theirs["items"], ours.item_type)  # type: ignore[attr-defined]
+            case "enum":
+                if self.expect(where, isinstance(ours, inspect.EnumType), ours):
+                    self.same_enum(where, theirs["name"], ours.cls)  # type: ignore[attr-defined]
+            case "object":
+                if self.expect(where, isinstance(ours, inspect.StructType), ours):
+                    self.same_struct(where, theirs["name"], ours)  # type: ignore[arg-type]
+            case unknown:
+                raise AssertionError(unknown)
+
+    def expect(self, where: str, right: bool, ours: inspect.Type) -> bool:
+        if not right:
+            self.differ(where, f"is {ours}")
+        return right
+
+    def same_enum(self, where: str, name: str, ours: type[enum.Enum]) -> None:
+        self.compared.add(name)
+        if set(self.types[name]["values"].values()) != {member.value for member in ours}:
+            self.differ(where, f"{ours.__name__} has other values than {name}")
+
+    def same_struct(self, where: str, name: str, ours: inspect.StructType) -> None:
+        self.compared.add(name)
+        if (name, ours.cls) in self._seen:
+            return
+        self._seen.add((name, ours.cls))
+        fields = {field.encode_name: field for field in ours.fields}
+        # `inspect` leaves UNSET out.
+        unset = {field.encode_name for field in msgspec.structs.fields(ours.cls) if field.default is UNSET}
+        theirs = {field["name"]: field for field in self.types[name]["fields"]}
+        if set(fields) != set(theirs):
+            self.differ(where, f"{name} has {sorted(set(theirs) - set(fields))}, we have {set(fields) - set(theirs)}")
+        for key in set(fields) & set(theirs):
+            field, place = theirs[key], f"{where}.{key}"
+            optional = field["type"]["kind"] == "optional"
+            self.same(place, field["type"], fields[key].type)
+            if field["required"] != fields[key].required:
+                self.differ(place, f"required: theirs {field['required']}, ours {fields[key].required}")
+            if optional != (key in unset):
+                self.differ(place, f"optional: theirs {optional}, ours {key in unset}")
+            default = field.get("default")
+            if not optional and default is not None and self.default(fields[key]) != default:
+                self.differ(place, f"default: theirs {default!r}, ours {self.default(fields[key])!r}")
+
+    @staticmethod
+    def default(field: inspect.Field) -> Any:
+        value = field.default if field.default_factory is inspect.NODEFAULT else field.default_factory()
+        return msgspec.to_builtins(value)
+
+
+def test_requests(protocol: Any) -> None:
+    comparison = Comparison(protocol["types"])
+    assert set(RPCS) == set(protocol["arserver_rpcs"])
+    for name, theirs in protocol["arserver_rpcs"].items():
+        ours = RPCS[name]
+        assert (ours.args is None) == (theirs["args"] is None), name
+        assert (ours.data is None) == (theirs["response_data"] is None), name
+        if theirs["args"] is not None:
+            comparison.same(name, theirs["args"], inspect.type_info(ours.args))
+            assert ours.args_optional is not theirs["args_required"], name
+        if theirs["response_data"] is not None:
+            comparison.same(f"{name} answers", theirs["response_data"], inspect.type_info(ours.data))
+        assert ours.dry_run is theirs["dry_run"], name
+    assert comparison.differences == []
+
+
+def test_events(protocol: Any) -> None:
+    comparison = Comparison(protocol["types"])
+    assert set(EVENTS) == set(protocol["events"])
+    for name, theirs in protocol["events"].items():
+        ours = EVENTS[name]
+        assert (ours.data is None) == (theirs["data"] is None), name
+        if theirs["data"] is not None:
+            comparison.same(name, theirs["data"], inspect.type_info(ours.data))
+    comparison.same_enum("change_type", "Event.Type", ChangeType)
+    assert comparison.differences == []
+
+
+def test_no_type_is_left_out(protocol: Any) -> None:
+    comparison = Comparison(protocol["types"])
+    for name, theirs in protocol["arserver_rpcs"].items():
+        for kind, ours in ((theirs["args"], RPCS[name].args), (theirs["response_data"], RPCS[name].data)):
+            if kind is not None:
+                comparison.same(name, kind, inspect.type_info(ours))
+    for name, theirs in protocol["events"].items():
+        if theirs["data"] is not None:
+            comparison.same(name, theirs["data"], inspect.type_info(EVENTS[name].data))
+    # The envelope, and the answer of a request that ARServer does not expose.
+    outside = {"Event", "Event.Type", "Version.Response.Data"}
+    assert set(protocol["types"]) - comparison.compared == outside
+
+
+def test_every_request_and_event_declares_its_least_role() -> None:
+    for declared in [*RPCS.values(), *EVENTS.values()]:
+        assert isinstance(declared.role, Role), declared.name
+
+
+def test_comparison_finds_a_misspelt_field(protocol: Any) -> None:
+    class Wrong(msgspec.Struct):
+        object_id: str
+        lock_trees: bool = False
+
+    comparison = Comparison(protocol["types"])
+    comparison.same("WriteLock", {"kind": "object", "name": "WriteLock.Request.Args"}, inspect.type_info(Wrong))
+    assert len(comparison.differences) == 1
