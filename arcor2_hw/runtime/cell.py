@@ -143,11 +143,11 @@ class Cell:
                 running.give_up(because)
         return jobs
 
-    def stop_and_wait(self, within: float = STOP_DEADLINE) -> Arcor2Error | None:
-        """Send `stop` to every device and wait until they obeyed; gives the first that did not."""
+    def wait_stopped(self, stops: list[tuple[Device, Job]], within: float = STOP_DEADLINE) -> Arcor2Error | None:
+        """Wait until devices obeyed their `stop`; gives the first that did not."""
         deadline = time.monotonic() + within
         problem: Arcor2Error | None = None
-        for device, job in self.stop_all():
+        for device, job in stops:
             if not job.wait(until(deadline)):
                 device.stop_lane.expire(job, within)
             if job.error is not None and not isinstance(job.error, Cancelled):

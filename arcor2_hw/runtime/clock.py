@@ -53,5 +53,5 @@ class Clock:
                     heapq.heappush(self._due, (max(moment + period, now), next(self._number), period, function))
             try:
                 function()
-            except Exception:
+            except Exception:  # noqa: BLE001 - the clock goes on for everybody else
                 _log.exception("at its time, %s failed", function)

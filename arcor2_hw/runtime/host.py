@@ -138,7 +138,7 @@ class Host:
 
     def _close_scene(self) -> None:
         active = self._leaving.is_set() or any(device.lane.busy_with or device.moving for device in self._cell)
-        stopped = self._cell.stop_and_wait(0.5) if active else None
+        stopped = self._cell.wait_stopped(self._cell.stop_all(), 0.5) if active else None
         problem = self._cell.close() or stopped
         self.link.post(m.SceneClosed(None if problem is None else error_data(problem)))
 
@@ -172,7 +172,7 @@ class Host:
         failed = program.stop_requested or program.error is not None
         if program.error is not None and not (handled and isinstance(program.error, Arcor2Error)):
             _save_traceback(directory, program.error)
-        problem = program.cell.stop_and_wait() if failed else None
+        problem = program.settle(failed)
         problem = program.cell.close() or problem
         why = program.error or problem
         self.link.post(

@@ -18,6 +18,8 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.project import Project, ProjectRobotJoints
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound, ProgramStopped
 from arcor2_hw.runtime.cell import Cell
+from arcor2_hw.runtime.device import STOP_DEADLINE, Device
+from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.pacing import Gate
 from arcor2_hw.runtime.values import encode_shown, results
 
@@ -62,6 +64,8 @@ class Program:
         """The script's main thread is in our code, where an exception out of nowhere would do harm."""
         self.error: BaseException | None = None
         self._main = threading.main_thread()
+        self._stops: list[tuple[Device, Job]] = []
+        self._stop_sent = threading.Event()
         self._action_ids: dict[str, str] = {}
         self._joints_points: dict[str, str] = {}
 
@@ -139,9 +143,21 @@ class Program:
     def stop(self) -> None:
         """Stop all devices past whatever they do, then let nothing of the script go on."""
         self.stop_requested = True
-        self.cell.stop_all(ProgramStopped("the program was stopped"))
+        self._stops = self.cell.stop_all(ProgramStopped("the program was stopped"))
+        self._stop_sent.set()
         self.cell.abandon()
         self.gate.stop()
+
+    def settle(self, failed: bool) -> Arcor2Error | None:
+        """Wait for the stop that was sent; after a failure send it, so that nothing goes on moving.
+
+        Gives the first device that did not obey.
+        """
+        if self.stop_requested:
+            self._stop_sent.wait(STOP_DEADLINE)  # the script may be out before the last device was told
+        elif failed:
+            self._stops = self.cell.stop_all()
+        return self.cell.wait_stopped(self._stops)
 
     def exception(self, error: BaseException) -> None:
         """Tell of an exception that ended the script; one that was told already is not told again."""

@@ -116,9 +116,7 @@ class Resources:
     def _close(self, failed: bool) -> Arcor2Error | None:
         """Close what is ours to close; after a failure everything is stopped first: nothing may go on moving."""
         self._program.ended = True
-        problem: Arcor2Error | None = None
-        if failed:
-            problem = self._program.cell.stop_and_wait()
+        problem = self._program.settle(failed)
         if self._standalone is not None:
             problem = self._program.cell.close() or problem
             self._standalone.end()

@@ -1,0 +1,422 @@
+"""The cell host with a package: events, pacing, the ways a program ends."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.project import Action, ActionPoint, NamedOrientation, Project, ProjectParameter, ProjectRobotJoints
+from arcor2_hw.data.robot import Joint
+from arcor2_hw.data.scene import SceneObject
+from arcor2_hw.runtime import messages as m
+
+from .conftest import HostProcess, Package, scene_object
+
+ARM = """
+from arcor2_hw.data.device import Connection
+
+@dataclass
+class ArmSettings(Settings):
+    file: str
+
+class Arm(Robot):
+    _ABSTRACT = False
+
+    def __init__(self, obj_id, name, pose, settings: ArmSettings):
+        super().__init__(obj_id, name, pose, settings)
+        self.stopped = threading.Event()
+        self.owner = None
+
+    def note(self, text):
+        with open(self.settings.file, "a") as f:
+            f.write(text + "\\n")
+
+    def disconnect(self): self.note("disconnected")
+    def take_control(self):
+        self.owner = "us"
+        self.note("control")
+    def control_owner(self): return self.owner
+    def get_end_effectors_ids(self): return {"tool"}
+    def get_end_effector_pose(self, end_effector): return Pose(Position(0.1, 0.2, 0.3))
+    def robot_joints(self, include_gripper=False): return [Joint("j0", 0.5)]
+    def grippers(self): return set()
+    def suctions(self): return set()
+
+    def stop(self):
+        self.note("stop")
+        self.stopped.set()
+
+    @action
+    def go(self, where: Pose, speed: float = 0.5, *, an: str | None = None) -> None:
+        self.note(f"go {where.position.x:g}")
+
+    @action
+    def slow(self, seconds: float, *, an: str | None = None) -> str:
+        self.note("slow")
+        with self._move_lock:
+            self.stopped.wait(seconds)
+        return "arrived"
+
+    @action
+    def joints(self, target: ProjectRobotJoints, *, an: str | None = None) -> bool:
+        return target.is_valid
+
+    @action(composite=True)
+    def twice(self, where: Pose, *, an: str | None = None) -> tuple[int, str]:
+        self.go(where)
+        self.go(where)
+        return 2, "done"
+
+    @action
+    def fail(self, kind: str, *, an: str | None = None) -> None:
+        raise {"lost": ConnectionLost("cable cut"), "odd": ValueError("odd")}[kind]
+
+    @action
+    def finish(self, *, an: str | None = None) -> None:
+        raise ProgramFinished()
+
+    @action(deadline=0.2)
+    def stuck(self, *, an: str | None = None) -> None:
+        time.sleep(1.0)
+
+    @action
+    def unstoppable(self, *, an: str | None = None) -> None:
+        self.note("unstoppable")
+        ctypes.CDLL(None).sleep(1000)
+"""
+NAMES = ("a1", "a2", "a3", "a4")
+OBJ = "obj_arm"
+
+
+def _action(name: str) -> Action:
+    return Action(name, f"{OBJ}/go", f"act_{name}")
+
+
+PROJECT = Project(
+    "project",
+    "scn_1",
+    id="pro_1",
+    action_points=[
+        ActionPoint(
+            "top",
+            Position(1, 0, 0),
+            OBJ,
+            id="acp_top",
+            orientations=[NamedOrientation("o", Orientation(), "ori_top")],
+            robot_joints=[ProjectRobotJoints("j", OBJ, [Joint("j0", 0.5)], True, id="joi_1")],
+            actions=[_action(name) for name in NAMES],
+        ),
+        ActionPoint(
+            "child",
+            Position(1, 0, 0),
+            "acp_top",
+            id="acp_child",
+            orientations=[NamedOrientation("o", Orientation(), "ori_child")],
+        ),
+    ],
+    parameters=[ProjectParameter("speed", "double", "0.25", id="pco_speed")],
+)
+
+
+class Run:
+    def __init__(self, host: HostProcess, package: Package, tmp_path: Path) -> None:
+        self.host, self.package, self.notes_path = host, package, tmp_path / "notes"
+        self.directory = Path()
+
+    def write(self, body: str, project: Project = PROJECT) -> Path:
+        lines = f'arm = res.objects["{OBJ}"]\n' + textwrap.dedent(body)
+        arm = scene_object("arm", "Arm", pose=True, file=str(self.notes_path))
+        arm = SceneObject("arm", "Arm", Pose(Position(10, 0, 0)), arm.parameters, OBJ)
+        return self.package.write({"Arm": ARM}, [arm], project, lines)
+
+    def start(
+        self, body: str, *, project: Project = PROJECT, start_paused: bool = False, breakpoints: tuple = ()
+    ) -> None:
+        self.directory = self.write(body, project)
+        self.host.send(m.RunPackage("pkg_1", str(self.directory), start_paused, list(breakpoints), 0.05))
+
+    def notes(self) -> list[str]:
+        return self.notes_path.read_text().splitlines() if self.notes_path.exists() else []
+
+    def wait_note(self, text: str) -> None:
+        deadline = time.monotonic() + 10
+        while text not in self.notes():
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+
+    def told(self, name: str) -> list[dict[str, object]]:
+        return [
+            json.loads(e.encoded)["data"] for e in self.host.seen if isinstance(e, m.ProgramEvent) and e.event == name
+        ]
+
+
+@pytest.fixture
+def run(host: HostProcess, package: Package, tmp_path: Path) -> Run:
+    return Run(host, package, tmp_path)
+
+
+def test_events_of_a_whole_run(run: Run) -> None:
+    run.start(
+        """
+        from object_types.arm import Arm
+        assert isinstance(arm, Arm)
+        assert arm.name == "arm" and arm.pose.position.x == 10
+        assert res.parameter("pco_speed") == 0.25
+        pose = res.pose("ori_child")
+        assert pose.position.x == 12, pose
+        arm.go(pose, 0.75, an="a1")
+        arm.joints(res.joints("joi_1"), an="a2")
+        result = arm.twice(res.pose("ori_top"), an="a3")
+        assert result == (2, "done")
+        pose.position.x = 99
+        assert res.pose("ori_child").position.x == 12
+        arm.go(where=pose, speed=0.1, an="a4")
+        """
+    )
+    ended = run.host.expect_state("stopped")
+    assert (ended.error, ended.finished) == (None, True)
+    assert run.host.gone() == 0
+    pairs = ["ActionStateBefore", "ActionStateAfter"] * 4
+    assert run.host.events() == ["running", "PackageInfo", *pairs, "stopped"]
+    before, after = run.told("ActionStateBefore"), run.told("ActionStateAfter")
+    assert [b["action_id"] for b in before] == [f"act_{name}" for name in NAMES]
+    assert before[0]["action_point_ids"] == ["acp_child"]
+    assert before[0]["parameters"][1] == "0.75"
+    assert json.loads(before[0]["parameters"][0])["position"] == {"x": 12.0, "y": 0.0, "z": 0.0}
+    assert before[1]["action_point_ids"] == ["acp_top"]
+    assert before[3]["parameters"][1] == "0.1"
+    assert "thread_id" not in before[0]
+    assert after == [
+        {"action_id": "act_a1"},
+        {"action_id": "act_a2", "results": ["true"]},
+        {"action_id": "act_a3", "results": ["2", '"done"']},
+        {"action_id": "act_a4"},
+    ]
+    [info] = run.told("PackageInfo")
+    assert (info["package_id"], info["package_name"]) == ("pkg_1", "demo")
+    assert info["scene"]["objects"][0]["id"] == OBJ
+    assert run.notes() == ["control", "go 12", "go 11", "go 11", "go 99", "disconnected"]
+
+
+def test_robots_are_streamed_while_an_action_runs(run: Run) -> None:
+    run.start('arm.slow(30.0, an="a1")')
+    run.host.expect_event("ActionStateBefore")
+    for _ in range(3):
+        joints = run.host.expect(m.StreamEvent, lambda s: s.event == "RobotJoints")
+        eef = run.host.expect(m.StreamEvent, lambda s: s.event == "RobotEef")
+    assert msgspec.json.decode(joints.encoded)["data"] == {"robot_id": OBJ, "joints": [{"name": "j0", "value": 0.5}]}
+    assert msgspec.json.decode(eef.encoded)["data"]["end_effectors"][0]["end_effector_id"] == "tool"
+    run.host.send(m.StopProgram())
+    run.host.expect_state("stopped")
+
+
+def test_pause_waits_for_the_action_and_holds_the_next(run: Run) -> None:
+    run.start('arm.slow(0.4, an="a1")\narm.slow(0.0, an="a2")')
+    run.host.expect_event("ActionStateBefore")
+    run.host.send(m.Pause())
+    run.host.expect_state("paused")
+    assert run.host.events() == ["running", "PackageInfo", "ActionStateBefore", "ActionStateAfter", "paused"]
+    time.sleep(0.2)
+    assert run.notes().count("slow") == 1
+    run.host.send(m.Resume())
+    run.host.expect_state("stopped")
+    assert run.host.events()[5:] == ["running", "ActionStateBefore", "ActionStateAfter", "stopped"]
+
+
+def test_pause_outside_actions_is_told_at_once(run: Run) -> None:
+    run.start('time.sleep(0.5)\narm.slow(0.0, an="a1")')
+    run.host.expect_event("PackageInfo")
+    began = time.monotonic()
+    run.host.send(m.Pause())
+    run.host.expect_state("paused")
+    assert time.monotonic() - began < 0.4
+    run.host.expect_event("ActionStateBefore")
+    time.sleep(0.1)
+    assert "slow" not in run.notes()
+    run.host.send(m.Resume())
+    assert run.host.expect_state("stopped").finished
+
+
+def test_start_paused_and_step(run: Run) -> None:
+    run.start('for name in ("a1", "a2", "a3"): arm.slow(0.0, an=name)', start_paused=True)
+    run.host.expect_state("paused")
+    assert run.host.events() == ["running", "PackageInfo", "ActionStateBefore", "paused"]
+    for done in (1, 2):
+        run.host.send(m.Step())
+        run.host.expect_state("paused")
+        assert run.notes().count("slow") == done
+    tail = ["running", "ActionStateAfter", "ActionStateBefore", "paused"]
+    assert run.host.events()[4:] == tail * 2
+    run.host.send(m.Resume())
+    assert run.host.expect_state("stopped").finished
+
+
+def test_a_breakpoint_pauses_at_its_action_point(run: Run) -> None:
+    run.start(
+        'arm.go(res.pose("ori_top"), an="a1")\narm.go(res.pose("ori_child"), an="a2")\narm.slow(0.0, an="a3")',
+        breakpoints=("acp_child",),
+    )
+    run.host.expect_state("paused")
+    assert run.told("ActionStateBefore")[-1]["action_id"] == "act_a2"
+    assert [n for n in run.notes() if n.startswith("go")] == ["go 11"]
+    run.host.send(m.Resume())
+    assert run.host.expect_state("stopped").finished
+
+
+def test_an_unknown_breakpoint_fails_the_start(run: Run) -> None:
+    run.start('arm.slow(0.0, an="a1")', breakpoints=("acp_none",))
+    ended = run.host.expect_state("stopped")
+    assert ended.error is not None
+    assert "acp_none" in ended.error.message
+    assert run.host.events() == ["ProjectException", "stopped"]
+
+
+def test_the_flow_action_ends_the_program_as_meant(run: Run) -> None:
+    run.start("try:\n    arm.finish(an='a1')\nexcept Exception:\n    pass\narm.slow(0.0, an='a2')")
+    ended = run.host.expect_state("stopped")
+    assert (ended.finished, ended.error) == (True, None)
+    assert run.host.events()[2:] == ["ActionStateBefore", "ActionStateAfter", "stopped"]
+
+
+@pytest.mark.parametrize(
+    ("body", "kind", "handled"),
+    [
+        ('arm.fail("lost", an="a1")', "ConnectionLost", True),
+        ('arm.fail("odd", an="a1")', "ValueError", False),
+        ('arm.stuck(an="a1")', "DeviceTimeout", True),
+        ("arm.slow(0.0)", "InvalidData", True),
+        ('arm.slow(0.0, an="unknown")', "InvalidData", True),
+        ("1 / 0", "ZeroDivisionError", False),
+    ],
+)
+def test_an_exception_is_told_and_everything_is_stopped(run: Run, body: str, kind: str, handled: bool) -> None:
+    run.start(body)
+    ended = run.host.expect_state("stopped")
+    [told] = run.told("ProjectException")
+    assert (told["type"], told["handled"]) == (kind, handled)
+    assert told["message"]
+    assert not ended.finished
+    assert ended.error is not None
+    assert ended.error.type == kind
+    assert run.notes()[-2:] == ["stop", "disconnected"]
+    assert bool(list(run.directory.glob("traceback-*.txt"))) is not handled
+    assert run.host.gone() == 0
+
+
+def test_an_exception_that_the_script_deals_with_ends_nothing(run: Run) -> None:
+    run.start('try:\n    arm.fail("lost", an="a1")\nexcept ConnectionLost:\n    arm.slow(0.0, an="a2")')
+    assert run.host.expect_state("stopped").finished
+    assert "ProjectException" not in run.host.events()
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        'arm.slow(1000.0, an="a1")',
+        "arm.note('slow'); time.sleep(1000)",
+        "arm.note('slow')\nwhile True: pass",
+        "arm.note('slow')\nthreading.Event().wait()",
+        "arm.note('slow')\nwhile True:\n    try:\n        time.sleep(0.1)\n    except Exception:\n        pass",
+        "arm.note('slow')\nfor _ in 1, 2, 3:\n    try: time.sleep(1000)\n    except BaseException: pass",
+        "def f(): arm.slow(1000.0, an='a1')\nt = threading.Thread(target=f)\nt.start()\nt.join()",
+    ],
+    ids=["action", "sleep", "loop", "lock", "swallows", "swallows all", "thread"],
+)
+def test_stop_ends_whatever_the_script_does(run: Run, body: str) -> None:
+    run.start(body)
+    run.wait_note("slow")
+    began = time.monotonic()
+    run.host.send(m.StopProgram())
+    ended = run.host.expect_state("stopped")
+    assert time.monotonic() - began < 1.5
+    assert not ended.finished
+    assert ended.error is None
+    assert run.notes()[-2:] == ["stop", "disconnected"]
+    assert run.notes().count("stop") == 1
+    assert "ProjectException" not in run.host.events()
+    assert run.host.gone() == 0
+
+
+def test_stop_while_paused(run: Run) -> None:
+    run.start('arm.slow(0.0, an="a1")', start_paused=True)
+    run.host.expect_state("paused")
+    run.host.send(m.StopProgram())
+    run.host.expect_state("stopped")
+    assert "slow" not in run.notes()
+
+
+def test_a_driver_that_does_not_come_back_does_not_keep_the_host(run: Run) -> None:
+    run.start('arm.unstoppable(an="a1")')
+    run.wait_note("unstoppable")
+    began = time.monotonic()
+    run.host.send(m.StopProgram())
+    run.host.expect_state("stopped")
+    assert run.host.gone() == 0
+    assert time.monotonic() - began < 4
+    assert run.notes()[-1] == "disconnected"
+
+
+def test_a_server_killed_while_a_program_runs(run: Run) -> None:
+    run.start('arm.slow(1000.0, an="a1")')
+    run.wait_note("slow")
+    began = time.monotonic()
+    run.host.socket.close()
+    run.host.gone(5)
+    assert time.monotonic() - began < 2.0
+    assert [n for n in run.notes() if n in ("stop", "disconnected")][-1] == "disconnected"
+    assert "stop" in run.notes()
+
+
+def test_a_script_with_a_syntax_error(run: Run) -> None:
+    run.directory = run.write("pass")
+    (run.directory / "script.py").write_text("def broken(:\n")
+    run.host.send(m.RunPackage("pkg_1", str(run.directory)))
+    assert run.host.expect_state("stopped").error.type == "SyntaxError"
+    assert run.host.events() == ["ProjectException", "stopped"]
+
+
+# ---------------------------------------------------------------------------------------------------- by hand
+def _by_hand(directory: Path, *arguments: str) -> "subprocess.Popen[str]":
+    return subprocess.Popen(
+        [sys.executable, str(directory / "script.py"), *arguments],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "ARCOR2_STREAMING_PERIOD": "0"},
+    )
+
+
+def test_by_hand_events_are_lines_and_commands_letters(run: Run) -> None:
+    directory = run.write('arm.slow(0.0, an="a1")\narm.slow(0.0, an="a2")')
+    with _by_hand(directory, "-p") as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        told = []
+        for line in process.stdout:
+            event = json.loads(line)
+            told.append(event["data"]["state"] if event["event"] == "PackageState" else event["event"])
+            if told[-1] == "paused":
+                process.stdin.write("s\n" if told.count("paused") == 1 else "r\n")
+                process.stdin.flush()
+        assert process.wait(10) == 0
+    before, after = "ActionStateBefore", "ActionStateAfter"
+    first = ["running", "PackageInfo", before, "paused", "running", after]
+    assert told == [*first, before, "paused", "running", after]
+    assert run.notes() == ["control", "slow", "slow", "disconnected"]
+
+
+def test_by_hand_ctrl_c_stops(run: Run) -> None:
+    directory = run.write('arm.slow(1000.0, an="a1")')
+    with _by_hand(directory) as process:
+        run.wait_note("slow")
+        process.send_signal(signal.SIGINT)
+        assert process.wait(5) == 0
+    assert run.notes() == ["control", "slow", "stop", "disconnected"]
