@@ -30,6 +30,7 @@ PLACE is ``"pose": POSE, "tolerance": {"position": 0.005, "height": 0.01, "tilt"
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated
 
@@ -37,7 +38,6 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 from msgspec import Meta
-from transforms3d.affines import compose
 from transforms3d.axangles import axangle2mat
 from transforms3d.quaternions import quat2mat
 
@@ -65,9 +65,20 @@ class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError("orientation is no unit quaternion x, y, z, w")
 
     def matrix(self) -> Matrix:
-        """Give the pose as a transform."""
-        x, y, z, w = self.orientation
-        return _transform(self.position, quat2mat((w, x, y, z)))
+        """Give the pose as a transform. Not to be changed: it is kept."""
+        return _matrices(self)[0]
+
+    def inverse(self) -> Matrix:
+        """Give the inverse transform. Not to be changed: it is kept."""
+        return _matrices(self)[1]
+
+
+@lru_cache(maxsize=64)
+def _matrices(pose: Pose) -> tuple[Matrix, Matrix]:
+    x, y, z, w = pose.orientation
+    matrix = _transform(pose.position, quat2mat((w, x, y, z)))
+    inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
+    return matrix, inverse
 
 
 class Tolerance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -87,7 +98,7 @@ class Place(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def holds(self, world_from_board: Matrix) -> bool:
         """Say whether a board at this pose is at this place."""
-        board = np.linalg.inv(self.pose.matrix()) @ world_from_board
+        board = self.pose.inverse() @ world_from_board
         x, y, z = board[:3, 3]
         tolerance = self.tolerance
         if math.hypot(x, y) > tolerance.position or not -tolerance.position <= z <= tolerance.height:
@@ -154,5 +165,7 @@ def from_rotation_vector(pose: tuple[float, float, float, float, float, float]) 
 
 
 def _transform(position: tuple[float, float, float], rotation: Matrix) -> Matrix:
-    matrix: Matrix = compose(position, rotation, np.ones(3))
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation
+    matrix[:3, 3] = position
     return matrix

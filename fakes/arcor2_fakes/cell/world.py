@@ -91,7 +91,9 @@ class World:
         self._held: Thing | None = None
         self._tip_from_board: Matrix = np.eye(4)
         self._world_from_base = layout.robot.base.matrix() @ _BASE_LINK_FROM_BASE
+        self._feeder_in_view = layout.reader.holds(layout.feeder.pose.matrix())
         self._flange_from_tip = layout.gripper.tip.matrix()
+        self._robot: Robot | None = None
         self._world_from_tip: Matrix | None = None
         self._now = 0.0
         self._closing = False  # what the output last told the jaws
@@ -112,7 +114,9 @@ class World:
     async def step(self, now: float, robot: Robot) -> None:
         """Let the world follow the robot; `now` in seconds since the world began."""
         self._now = now
-        self._world_from_tip = self._world_from_base @ robot.base_from_flange() @ self._flange_from_tip
+        if robot != self._robot:  # an arm at rest costs nothing
+            self._robot = robot
+            self._world_from_tip = self._world_from_base @ robot.base_from_flange() @ self._flange_from_tip
         await self._drive_jaws(bool(robot.digital_outputs >> self._layout.gripper.output & 1))
         await self._show()
 
@@ -212,7 +216,7 @@ class World:
         window, code, top = self._layout.reader, None, self._top()
         if self._held is not None and window.holds(self._tip() @ self._tip_from_board):
             code = self._held.board.code
-        elif top is not None and window.holds(self._layout.feeder.pose.matrix()):
+        elif top is not None and self._feeder_in_view:
             code = top.board.code
         if code != self._shown:
             self._shown = code

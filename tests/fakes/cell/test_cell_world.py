@@ -236,6 +236,20 @@ async def test_the_next_board_takes_its_time_and_a_board_can_be_put_back() -> No
     assert cell.world.truth()["at_pick_place"] == "B"
 
 
+async def test_a_reader_that_looks_at_the_feeder() -> None:
+    reader = msgspec.structs.replace(LAYOUT.reader, pose=LAYOUT.feeder.pose)
+    cell = Cell(layout=msgspec.structs.replace(LAYOUT, reader=reader))
+    await cell.at(*NOWHERE)
+    assert cell.devices.shown == "A"
+    await cell.at(*FEEDER)
+    await cell.grip(True)
+    assert cell.devices.shown == "A"  # held, still in view
+    await cell.at(*TESTER, wait=0.02)
+    assert cell.devices.shown is None
+    await cell.wait(0.5)
+    assert cell.devices.shown == "B"
+
+
 async def test_jaws_take_their_time() -> None:
     cell = Cell()
     await cell.at(*FEEDER)
