@@ -9,7 +9,6 @@ from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.project import ActionPoint, Project, ProjectRobotJoints
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error, ProgramFinished, ProgramStopped
-from arcor2_hw.objects import Generic
 from arcor2_hw.runtime.cell import SceneFault, recipes
 from arcor2_hw.runtime.creation import find_type
 from arcor2_hw.runtime.package import PackageData, Places, package_name, put_on_path
@@ -34,8 +33,8 @@ class Resources:
             program = self._standalone.program
         self._program: Program = program
         self._directory = Path.cwd() if self._standalone is None else self._standalone.directory
-        self.objects: dict[str, Generic] = {}
-        """What the script calls, by the id of the scene object."""
+        self.objects: dict[str, Any] = {}
+        """What the script calls, by the id of the scene object. Any: the script annotates each with its own type."""
         data = PackageData(self._directory)
         self._data = data
         self._places = Places(data.scene, data.project)
