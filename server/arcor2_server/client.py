@@ -30,8 +30,11 @@ class CloseCode(enum.IntEnum):
 class Wire(Protocol):
     """What a client needs of its connection."""
 
+    def send_now(self, message: bytes) -> bool:
+        """Send one text message if the connection takes it at once; tells whether it did."""
+
     async def send(self, message: bytes) -> None:
-        """Send one text message; returns when the connection takes more. ConnectionError when it is closed."""
+        """Send one text message when the connection takes it. ConnectionError when it is closed."""
 
     async def ping(self) -> None:
         """Return when the other side has answered a ping."""
@@ -75,6 +78,9 @@ class Client:
         """Queue an encoded message; a client that lags too far behind is closed instead."""
         if self._closing is not None:
             return
+        # The usual case: nothing waits, and the connection takes it without the way through the writer.
+        if not self._waiting and self._sending_since is None and self._wire.send_now(message):
+            return
         self._waiting.append(message)
         self._bytes += len(message)
         if len(self._waiting) > 1 and self._lagging():
@@ -84,6 +90,8 @@ class Client:
     def put_newest(self, stream: str, message: bytes) -> None:
         """Queue the newest message of a stream in place of the one that still waits."""
         if self._closing is not None:
+            return
+        if not self._waiting and self._sending_since is None and self._wire.send_now(message):
             return
         previous = self._newest.get(stream)
         self._newest[stream] = message

@@ -69,6 +69,7 @@ class _SocketWire:
     def __init__(self, socket: WebSocket[Any, Any, Any], protocol: WireProtocol) -> None:
         self._socket = socket
         self.send = protocol.send_text
+        self.send_now = protocol.send_text_now
         self.ping = protocol.ping
         self.abort = protocol.abort
 

@@ -42,18 +42,23 @@ class WireProtocol(WebSocketsSansIOProtocol):
                 waiter.set_exception(ConnectionError("the connection is lost"))
         self._pongs.clear()
 
-    async def send_text(self, message: bytes) -> None:
-        """Send a text message that is encoded already; returns when the connection takes more."""
-        if not self.writable.is_set():
-            await self.writable.wait()
-        if self.disconnected or self.close_sent:
-            raise ConnectionError("the connection is closed")
+    def send_text_now(self, message: bytes) -> bool:
+        """Send an encoded text message unless the connection is full, or closed; tells whether it was sent."""
+        if self.disconnected or self.close_sent or not self.writable.is_set():
+            return False
         try:
             self.conn.send_text(message)
-        except InvalidState as error:
-            raise ConnectionError("the connection is closed") from error
-        for chunk in self.conn.data_to_send():
-            self.transport.write(chunk)
+        except InvalidState:
+            return False
+        self.transport.writelines(self.conn.data_to_send())
+        return True
+
+    async def send_text(self, message: bytes) -> None:
+        """Send an encoded text message when the connection takes it; ConnectionError when it is closed."""
+        while not self.send_text_now(message):
+            if self.writable.is_set():
+                raise ConnectionError("the connection is closed")
+            await self.writable.wait()
 
     async def ping(self) -> None:
         """Return when a ping is answered; ConnectionError when the connection ends."""
