@@ -21,7 +21,7 @@ from arcor2_hw.data.project import (
     parse_link,
 )
 from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
-from arcor2_hw.exceptions import NotFound
+from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_server.session.changes import OF_SCENE, Change, Item, Kind
 
 OWNED: Final = (Kind.ORIENTATION, Kind.JOINTS, Kind.ACTION)
@@ -65,6 +65,7 @@ class Document:
         self._items: dict[Kind, dict[str, Item]] = {kind: {} for kind in Kind}
         self._unordered: set[Kind] = set()
         self._next_rank = 0
+        self._retired = False
         self._owned: dict[str, dict[Kind, dict[str, None]]] = {}
         self._points: dict[str, dict[str, None]] = {}
         self._names: dict[tuple[str, str], dict[str, None]] = {}
@@ -105,18 +106,29 @@ class Document:
     # ------------------------------------------------------------------------------------------ changing
     def add(self, kind: Kind, item_id: str, value: Any, parent: str = "") -> Change:
         """Give the change that adds an item at the end of its kind; nothing happens before `apply`."""
+        self._check_open()
         self._next_rank += 1
         return Change(kind, item_id, parent, self._next_rank, None, value)
 
     def update(self, kind: Kind, item_id: str, value: Any) -> Change:
-        """Give the change that replaces an item's value."""
-        item = self._items[kind][item_id]
+        """Give the change that replaces an item's value; NotFound."""
+        self._check_open()
+        item = self._get(kind, item_id, kind.replace("_", " "))
         return Change(kind, item_id, item.parent, item.rank, item.value, value)
 
     def remove(self, kind: Kind, item_id: str) -> Change:
-        """Give the change that removes an item."""
-        item = self._items[kind][item_id]
+        """Give the change that removes an item; NotFound."""
+        self._check_open()
+        item = self._get(kind, item_id, kind.replace("_", " "))
         return Change(kind, item_id, item.parent, item.rank, item.value, None)
+
+    def retire(self) -> None:
+        """Refuse to make further changes: something else was opened while somebody waited with this one."""
+        self._retired = True
+
+    def _check_open(self) -> None:
+        if self._retired:
+            raise InvalidData("The scene or project was closed meanwhile: nothing was changed.")
 
     def apply(self, changes: Iterable[Change]) -> None:
         """Make changes, in order."""

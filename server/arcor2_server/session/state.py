@@ -53,6 +53,8 @@ class Session:
     def __init__(self, services: "Services") -> None:
         settings = services.settings
         self.document = Document()
+        self.removed_types: set[str] = set()
+        """Object types of objects that were removed: those made for one object are deleted when the scene is saved."""
         self.history: deque[Edit] = deque(maxlen=settings.history_limit)
         self._services = services
         self._limit = settings.history_limit
@@ -264,8 +266,10 @@ class Session:
         self._scene_times = self._project_times = Times()
 
     def _replace(self, document: Document) -> None:
+        self.document.retire()
         self.document = document
         self.history.clear()
+        self.removed_types.clear()
         self._number = self._based_on = 0
         self._forget_snapshots()
 

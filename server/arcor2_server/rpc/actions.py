@@ -1,0 +1,105 @@
+"""Requests that add, change and remove actions (protocol, 7.4 and 10.2, 10.3)."""
+
+from msgspec.structs import replace
+
+from arcor2_hw.data.base import Unset, new_id
+from arcor2_hw.data.events import ChangeType
+from arcor2_hw.data.project import Action, BareAction
+from arcor2_hw.data.rpc import AddActionArgs, IdArgs, RenameActionArgs, UpdateActionArgs
+from arcor2_hw.exceptions import InvalidData
+from arcor2_server.rpc.editing import commit, require_free, require_held, tell, unlock
+from arcor2_server.rpc.registry import Context, RequestRefused, rpc
+from arcor2_server.session.changes import Kind
+from arcor2_server.session.checks import (
+    action_meta,
+    check_flows,
+    check_outputs_unique,
+    check_parameters,
+    complete_parameters,
+)
+from arcor2_server.session.document import Document
+
+
+def _check_name(context: Context, name: str) -> None:
+    if not name:
+        raise InvalidData("The action needs a name.")
+    require_free(context, Kind.ACTION, name, "an action")
+
+
+@rpc("AddAction")
+async def add_action(context: Context, args: AddActionArgs) -> None:
+    """Add an action to an action point; parameters that have a default may be left out."""
+    services = context.services
+    document = services.session.require_project_open()
+    async with services.locks.auto_skip_held(context.user, args.action_point_id):
+        document.action_point(args.action_point_id)
+        _check_name(context, args.name)
+        action = Action(args.name, args.type, new_id("act"), list(args.parameters), list(args.flows))
+        meta = action_meta(action, document, services.types)
+        check_flows(action, meta)
+        check_outputs_unique(document, action)
+        action = complete_parameters(action, meta)
+        check_parameters(action, meta, document, services.types)
+        changes = [document.add(Kind.ACTION, action.id, action, args.action_point_id)]
+        if await commit(context, changes):
+            tell(context, changes, "ActionChanged", ChangeType.ADD, args.action_point_id)
+
+
+@rpc("UpdateAction")
+async def update_action(context: Context, args: UpdateActionArgs) -> None:
+    """Replace parameters, flows or both of an action."""
+    services = context.services
+    document = services.session.require_project_open()
+    _, action = document.action(args.action_id)
+    meta = action_meta(action, document, services.types)
+    updated = action
+    if not isinstance(args.flows, Unset):
+        updated = replace(updated, flows=list(args.flows))
+        check_flows(updated, meta)
+        check_outputs_unique(document, updated)
+        _check_results_unneeded(document, action, updated)
+    if not isinstance(args.parameters, Unset):
+        updated = complete_parameters(replace(updated, parameters=list(args.parameters)), meta)
+        check_parameters(updated, meta, document, services.types)
+    require_held(context, action.id)
+    changes = [document.update(Kind.ACTION, action.id, updated)]
+    if await commit(context, changes):
+        tell(context, changes, "ActionChanged", ChangeType.UPDATE)
+
+
+def _check_results_unneeded(document: Document, before: Action, after: Action) -> None:
+    """Refuse that results are no longer kept which a link or a condition uses."""
+    if before.outputs() and not after.outputs() and (users := document.users_of(before.id)):
+        user = users[0]
+        who = f"The action {user.name}" if isinstance(user, Action) else "A condition of the logic"
+        raise RequestRefused(f"{who} uses a result of {before.name}: its results have to keep names.")
+
+
+@rpc("RenameAction")
+async def rename_action(context: Context, args: RenameActionArgs) -> None:
+    """Give an action another name."""
+    document = context.services.session.require_project_open()
+    _check_name(context, args.new_name)
+    _, action = document.action(args.action_id)
+    require_held(context, action.id)
+    changes = [document.update(Kind.ACTION, action.id, replace(action, name=args.new_name))]
+    if await commit(context, changes):
+        unlock(context, action.id)
+        tell(context, changes, "ActionChanged", ChangeType.UPDATE_BASE)
+
+
+@rpc("RemoveAction")
+async def remove_action(context: Context, args: IdArgs) -> None:
+    """Remove an action; refused while the logic or another action needs it."""
+    services = context.services
+    document = services.session.require_project_open()
+    async with services.locks.auto_skip_held(context.user, args.id):
+        _, action = document.action(args.id)
+        if document.outgoing(action.id) or document.incoming(action.id):
+            raise RequestRefused(f"{action.name} is part of the logic: remove its steps first.")
+        for user in document.users_of(action.id):
+            who = f"the action {user.name}" if isinstance(user, Action) else "a condition of the logic"
+            raise RequestRefused(f"A result of {action.name} is used by {who}: change that first.")
+        if await commit(context, [document.remove(Kind.ACTION, action.id)]):
+            context.emit("ActionChanged", BareAction(action.name, action.type, action.id), ChangeType.REMOVE)
+            services.locks.drop([action.id])

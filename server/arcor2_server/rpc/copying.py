@@ -1,0 +1,94 @@
+"""The request that copies an action point with all that hangs on it (protocol, 7.4)."""
+
+import itertools
+from collections.abc import Callable
+
+import msgspec
+from msgspec import UNSET
+from msgspec.structs import replace
+
+from arcor2_hw.data.base import new_id
+from arcor2_hw.data.events import ChangeType
+from arcor2_hw.data.project import Action, ActionParameter, ActionParameterType
+from arcor2_hw.data.rpc import CopyActionPointArgs
+from arcor2_server.rpc.editing import commit
+from arcor2_server.rpc.registry import Context, rpc
+from arcor2_server.session.changes import Change, Kind
+from arcor2_server.session.document import OWNED, Document, reference
+
+_EVENTS = {Kind.POINT: "ActionPointChanged", Kind.ORIENTATION: "OrientationChanged", Kind.JOINTS: "JointsChanged"}
+_PREFIXES = {Kind.POINT: "acp", Kind.ORIENTATION: "ori", Kind.JOINTS: "joi", Kind.ACTION: "act"}
+
+
+@rpc("CopyActionPoint")
+async def copy_action_point(context: Context, args: CopyActionPointArgs) -> None:
+    """Copy an action point with its descendants; what refers to something copied refers to the copy."""
+    session = context.services.session
+    document = session.require_project_open()
+    user = context.user
+    document.action_point(args.id)
+    below = [args.id, *(point.id for point in document.descendants(args.id))]
+    async with context.services.locks.read(user, *below):
+        places, actions = _copy(document, args)
+        if not await commit(context, [*places, *actions]):
+            return
+    for change in places:
+        parent = None if change.kind is Kind.POINT else change.parent
+        context.emit_first(_EVENTS[change.kind], change.after, ChangeType.ADD, parent)
+    for change in actions:
+        context.emit_first("ActionChanged", change.after, ChangeType.ADD, change.parent)
+
+
+def _copy(document: Document, args: CopyActionPointArgs) -> tuple[list[Change], list[Change]]:
+    """Give the changes that add the points with orientations and joints, and those that add the actions."""
+    points = [document.action_point(args.id), *document.descendants(args.id)]
+    owned = {point.id: [item for kind in OWNED for item in document.owned(point.id, kind)] for point in points}
+    new_ids = {point.id: new_id("acp") for point in points}
+    new_ids |= {item.id: new_id(_PREFIXES[item.kind]) for items in owned.values() for item in items}
+    free_point, free_action, free_output = (_names(document, kind) for kind in (Kind.POINT, Kind.ACTION, "output"))
+    places: list[Change] = []
+    actions: list[Change] = []
+    for point in points:
+        key = new_ids[point.id]
+        parent = point.parent if point.id == args.id else new_ids[str(point.parent)]
+        position = args.position if point.id == args.id and args.position is not UNSET else point.position
+        copied = replace(point, id=key, name=free_point(point.name), parent=parent, position=position)
+        places.append(document.add(Kind.POINT, key, copied))
+        for item in owned[point.id]:
+            value = replace(item.value, id=new_ids[item.id])
+            if item.kind is Kind.ACTION:
+                value = _copied_action(value, new_ids, free_action, free_output)
+                actions.append(document.add(Kind.ACTION, value.id, value, key))
+            else:
+                places.append(document.add(item.kind, value.id, value, key))
+    return places, actions
+
+
+def _names(document: Document, kind: Kind | str) -> Callable[[str], str]:
+    """Give what makes names of copies: `_copy`, then `_copy_1` and on, whichever is free."""
+    taken: set[str] = set()
+
+    def free(name: str) -> str:
+        candidates = itertools.chain([f"{name}_copy"], (f"{name}_copy_{number}" for number in itertools.count(1)))
+        found = next(c for c in candidates if c not in taken and document.named(kind, c) is None)
+        taken.add(found)
+        return found
+
+    return free
+
+
+def _copied_action(
+    action: Action, new_ids: dict[str, str], free_name: Callable[[str], str], free_output: Callable[[str], str]
+) -> Action:
+    flows = [replace(flow, outputs=[free_output(output) for output in flow.outputs]) for flow in action.flows]
+    parameters = [_redirected(parameter, new_ids) for parameter in action.parameters]
+    return replace(action, name=free_name(action.name), flows=flows, parameters=parameters)
+
+
+def _redirected(parameter: ActionParameter, new_ids: dict[str, str]) -> ActionParameter:
+    target = reference(parameter.type, parameter.value)
+    if target is None or target not in new_ids:
+        return parameter
+    text = msgspec.json.decode(parameter.value, type=str)
+    new = new_ids[target] + text[len(target) :] if parameter.type == ActionParameterType.LINK else new_ids[target]
+    return replace(parameter, value=msgspec.json.encode(new).decode())

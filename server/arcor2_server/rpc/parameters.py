@@ -1,0 +1,133 @@
+"""Requests about project parameters and about settings that a project overrides (protocol, 7.3, 7.4 and 10.5)."""
+
+from msgspec.structs import replace
+
+from arcor2_hw.data.base import Unset, new_id
+from arcor2_hw.data.events import ChangeType
+from arcor2_hw.data.parameter import Parameter
+from arcor2_hw.data.project import Action, ProjectParameter
+from arcor2_hw.data.rpc import (
+    AddOverrideArgs,
+    AddProjectParameterArgs,
+    DeleteOverrideArgs,
+    RemoveProjectParameterArgs,
+    UpdateOverrideArgs,
+    UpdateProjectParameterArgs,
+)
+from arcor2_hw.data.scene import SceneObjectOverride
+from arcor2_hw.exceptions import InvalidData, NotFound
+from arcor2_server.locks import PROJECT
+from arcor2_server.rpc.editing import commit, require_free, require_held, tell, unlock
+from arcor2_server.rpc.registry import Context, RequestRefused, rpc
+from arcor2_server.session.changes import Change, Kind
+from arcor2_server.session.checks import check_project_parameter, check_setting
+from arcor2_server.session.document import Document
+
+
+@rpc("AddProjectParameter")
+async def add_project_parameter(context: Context, args: AddProjectParameterArgs) -> None:
+    """Add a constant of the project."""
+    document = context.services.session.require_project_open()
+    async with context.services.locks.auto(context.user, PROJECT):
+        parameter = ProjectParameter(args.name, args.type, args.value, id=new_id("pco"))
+        check_project_parameter(parameter)
+        require_free(context, Kind.PARAMETER, args.name, "a project parameter")
+        changes = [document.add(Kind.PARAMETER, parameter.id, parameter)]
+        if await commit(context, changes):
+            tell(context, changes, "ProjectParameterChanged", ChangeType.ADD)
+
+
+@rpc("UpdateProjectParameter")
+async def update_project_parameter(context: Context, args: UpdateProjectParameterArgs) -> None:
+    """Give a constant of the project another name, another value, or both."""
+    document = context.services.session.require_project_open()
+    parameter = document.parameter(args.id)
+    require_held(context, args.id)
+    updated = parameter
+    if not isinstance(args.name, Unset) and args.name != parameter.name:
+        require_free(context, Kind.PARAMETER, args.name, "a project parameter")
+        updated = replace(updated, name=args.name)
+    if not isinstance(args.value, Unset):
+        updated = replace(updated, value=args.value)
+    check_project_parameter(updated)
+    changes = [document.update(Kind.PARAMETER, args.id, updated)]
+    if await commit(context, changes):
+        tell(context, changes, "ProjectParameterChanged", ChangeType.UPDATE)
+        unlock(context, args.id)
+
+
+@rpc("RemoveProjectParameter")
+async def remove_project_parameter(context: Context, args: RemoveProjectParameterArgs) -> None:
+    """Remove a constant of the project; refused while an action uses it."""
+    services = context.services
+    document = services.session.require_project_open()
+    async with services.locks.auto_skip_held(context.user, args.id):
+        parameter = document.parameter(args.id)
+        for user in document.users_of(args.id):
+            name = user.name if isinstance(user, Action) else ""
+            raise RequestRefused(f"The action {name} uses the project parameter {parameter.name}.")
+        changes = [document.remove(Kind.PARAMETER, args.id)]
+        if await commit(context, changes):
+            tell(context, changes, "ProjectParameterChanged", ChangeType.REMOVE)
+            services.locks.drop([args.id])
+
+
+# ---------------------------------------------------------------------------------------------- overrides
+def _overrides(context: Context, object_id: str, given: Parameter) -> tuple[Document, list[Parameter]]:
+    """Check that the object has such a setting; give its overrides as they are."""
+    document = context.services.session.require_project_open()
+    obj = document.scene_object(object_id)
+    settings = {setting.name: setting for setting in context.services.types.meta(obj.type).settings}
+    if given.name not in settings:
+        raise NotFound(f"{obj.type} has no setting {given.name}.")
+    check_setting(given, settings[given.name])
+    item = document.find(Kind.OVERRIDE, object_id)
+    return document, [] if item is None else list(item.value.parameters)
+
+
+async def _set_overrides(
+    context: Context, document: Document, object_id: str, overrides: list[Parameter], given: Parameter, how: ChangeType
+) -> None:
+    require_held(context, object_id)
+    value = SceneObjectOverride(object_id, overrides)
+    change: Change
+    if document.find(Kind.OVERRIDE, object_id) is None:
+        change = document.add(Kind.OVERRIDE, object_id, value)
+    elif overrides:
+        change = document.update(Kind.OVERRIDE, object_id, value)
+    else:
+        change = document.remove(Kind.OVERRIDE, object_id)
+    if await commit(context, [change]):
+        context.emit("OverrideUpdated", given, how, object_id)
+
+
+def _index(overrides: list[Parameter], name: str) -> int:
+    for index, override in enumerate(overrides):
+        if override.name == name:
+            return index
+    raise NotFound(f"The setting {name} is not overridden.")
+
+
+@rpc("AddOverride")
+async def add_override(context: Context, args: AddOverrideArgs) -> None:
+    """Let the project replace a setting of an object."""
+    document, overrides = _overrides(context, args.id, args.override)
+    if any(override.name == args.override.name for override in overrides):
+        raise InvalidData(f"The setting {args.override.name} is overridden already: update the override.")
+    await _set_overrides(context, document, args.id, [*overrides, args.override], args.override, ChangeType.ADD)
+
+
+@rpc("UpdateOverride")
+async def update_override(context: Context, args: UpdateOverrideArgs) -> None:
+    """Change the value by which the project replaces a setting."""
+    document, overrides = _overrides(context, args.id, args.override)
+    overrides[_index(overrides, args.override.name)] = args.override
+    await _set_overrides(context, document, args.id, overrides, args.override, ChangeType.UPDATE)
+
+
+@rpc("DeleteOverride")
+async def delete_override(context: Context, args: DeleteOverrideArgs) -> None:
+    """Let the setting of the scene count again."""
+    document, overrides = _overrides(context, args.id, args.override)
+    del overrides[_index(overrides, args.override.name)]
+    await _set_overrides(context, document, args.id, overrides, args.override, ChangeType.REMOVE)

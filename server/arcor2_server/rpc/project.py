@@ -1,0 +1,220 @@
+"""Requests that open, save, close, rename, copy and delete projects (protocol, 7.4)."""
+
+import contextlib
+
+import msgspec
+from msgspec import UNSET
+from msgspec.structs import replace
+
+from arcor2_hw.data.base import new_id, now
+from arcor2_hw.data.events import ChangeType, MainScreen, OpenProjectData, SceneStateData, ShowMainScreenData
+from arcor2_hw.data.project import BareProject, Project, ProjectParameter
+from arcor2_hw.data.rpc import (
+    CloseProjectArgs,
+    CopyProjectArgs,
+    IdArgs,
+    NewProjectArgs,
+    RenameProjectArgs,
+    UpdateProjectDescriptionArgs,
+    UpdateProjectHasLogicArgs,
+)
+from arcor2_hw.data.scene import Scene
+from arcor2_hw.exceptions import NotFound
+from arcor2_server.locks import PROJECT
+from arcor2_server.rpc.editing import commit, opening_allowed, require_held, require_name_free, require_no_program
+from arcor2_server.rpc.object_types import notice_new_types
+from arcor2_server.rpc.registry import Context, RequestRefused, rpc
+from arcor2_server.rpc.scene import save_open_scene
+from arcor2_server.session.changes import Kind
+from arcor2_server.session.checks import project_problems
+
+_BARE = BareProject.__struct_fields__
+
+
+def bare(project: BareProject) -> BareProject:
+    """Give a project without its content."""
+    return BareProject(**{name: getattr(project, name) for name in _BARE})
+
+
+def _given(parameter: str, value: str) -> ProjectParameter:
+    return ProjectParameter(parameter, "string", msgspec.json.encode(value).decode(), id=new_id("pco"))
+
+
+def _tell_opened(context: Context) -> None:
+    session = context.services.session
+    context.emit("OpenProject", OpenProjectData(session.require_scene(), session.require_project()))
+    context.emit("SceneState", SceneStateData(context.services.cell.state))
+
+
+def _require_no_project(context: Context) -> None:
+    if (project := context.services.session.project) is not None:
+        raise RequestRefused(f"The project {project.name} is open: close it first.")
+
+
+async def _scene_for(context: Context, scene_id: str) -> Scene:
+    """Give the open scene, which has to be that one, or the saved one when none is open."""
+    if (opened := context.services.session.scene) is None:
+        return await context.services.storage.scene(scene_id)
+    if opened.id != scene_id:
+        raise RequestRefused(f"The project belongs to another scene than {opened.name}, which is open: close it first.")
+    return opened
+
+
+async def _save_scene_changes(context: Context) -> None:
+    """Save an open scene that has changes: a project can only be stored on a stored scene."""
+    if context.services.session.scene_changed:
+        await save_open_scene(context)
+        context.emit("SceneSaved")
+
+
+@rpc("NewProject")
+async def new_project(context: Context, args: NewProjectArgs) -> None:
+    """Open a new project, which exists in memory alone until it is saved."""
+    services, session = context.services, context.services.session
+    _require_no_project(context)
+    async with services.locks.auto(context.user, PROJECT):
+        require_no_program(context)
+        await require_name_free(context, args.name, "project")
+        if services.locks.write_locked_roots(besides=(PROJECT,)):
+            raise RequestRefused("Something is locked: all locks have to be given back first.")
+        scene = await _scene_for(context, args.scene_id)
+        if problems := session.scene_problems(scene):
+            raise RequestRefused(f"{scene.name} cannot be opened. {' '.join(problems)}")
+        # Another request may have opened something meanwhile.
+        _require_no_project(context)
+        if context.dry_run:
+            return
+        await _save_scene_changes(context)
+        key = new_id("pro")
+        project = Project(
+            name=args.name,
+            scene_id=args.scene_id,
+            description=args.description,
+            has_logic=args.has_logic,
+            int_modified=now(),
+            id=key,
+            parameters=[_given("scene_id", args.scene_id), _given("project_id", key)],
+        )
+        await session.show(session.scene or scene, project)
+        _tell_opened(context)
+
+
+@rpc("OpenProject")
+async def open_project(context: Context, args: IdArgs) -> None:
+    """Open a saved project with its scene."""
+    services, session = context.services, context.services.session
+    async with opening_allowed(context):
+        _require_no_project(context)
+        project = await services.storage.project(args.id)
+        scene = await _scene_for(context, project.scene_id)
+        await notice_new_types(context)
+        if problems := project_problems(scene, project, services.types):
+            raise RequestRefused(f"{project.name} cannot be opened. {' '.join(problems)}")
+        await _save_scene_changes(context)
+        await session.show(session.scene or scene, project)
+        _tell_opened(context)
+
+
+@rpc("SaveProject")
+async def save_project(context: Context, args: None) -> None:  # noqa: ARG001
+    """Save the open project."""
+    session = context.services.session
+    async with context.services.locks.exclusive():
+        project = session.require_project()
+        if not session.has_changes:
+            raise RequestRefused(f"{project.name} has no changes to save.")
+        if context.dry_run:
+            return
+        await session.save()
+    context.emit("ProjectSaved")
+
+
+@rpc("CloseProject")
+async def close_project(context: Context, args: CloseProjectArgs) -> None:
+    """Close the project and its scene."""
+    session = context.services.session
+    async with context.services.locks.exclusive():
+        project = session.require_project()
+        context.services.cell.require_offline()
+        if session.has_changes and not args.force:
+            raise RequestRefused(f"{project.name} has changes that are not saved: save it, or close it by force.")
+        if context.dry_run:
+            return
+        await session.discard()
+    context.emit("ProjectClosed")
+    context.emit("ShowMainScreen", ShowMainScreenData(MainScreen.PROJECTS_LIST, project.id))
+
+
+@rpc("RenameProject")
+async def rename_project(context: Context, args: RenameProjectArgs) -> None:
+    """Give a project another name."""
+    await require_name_free(context, args.new_name, "project")
+    require_held(context, args.project_id)
+    await _update_base(context, args.project_id, name=args.new_name)
+    if not context.dry_run:
+        context.services.locks.release_announced(context.user, [args.project_id])
+
+
+@rpc("UpdateProjectDescription")
+async def update_project_description(context: Context, args: UpdateProjectDescriptionArgs) -> None:
+    """Give a project another description."""
+    async with context.services.locks.auto(context.user, args.project_id):
+        await _update_base(context, args.project_id, description=args.new_description)
+
+
+@rpc("UpdateProjectHasLogic")
+async def update_project_has_logic(context: Context, args: UpdateProjectHasLogicArgs) -> None:
+    """Say whether a project's program is made from its logic; without, the logic is dropped."""
+    async with context.services.locks.auto(context.user, args.project_id):
+        await _update_base(context, args.project_id, has_logic=args.new_has_logic)
+
+
+async def _update_base(context: Context, project_id: str, **fields: str | bool) -> None:
+    session, storage = context.services.session, context.services.storage
+    without_logic = fields.get("has_logic") is False
+    document = session.document
+    if (item := document.find(Kind.PROJECT, project_id)) is not None:
+        changes = [document.update(Kind.PROJECT, project_id, replace(item.value, **fields))]
+        if without_logic:
+            changes += [document.remove(Kind.LOGIC, step.id) for step in document.of_kind(Kind.LOGIC)]
+        if await commit(context, changes):
+            context.emit_first("ProjectChanged", session.bare_project(), ChangeType.UPDATE_BASE)
+        return
+    project = await storage.project(project_id)
+    if not context.dry_run:
+        changed = replace(project, **fields, **({"logic": []} if without_logic else {}))
+        context.emit_first("ProjectChanged", bare(await storage.put_project(changed)), ChangeType.UPDATE_BASE)
+
+
+@rpc("CopyProject")
+async def copy_project(context: Context, args: CopyProjectArgs) -> None:
+    """Copy a saved project. What is in it keeps its ids; existing clients expect to be told by update_base."""
+    storage = context.services.storage
+    async with context.services.locks.auto(context.user, args.source_id):
+        await require_name_free(context, args.target_name, "copy of the project")
+        source = await storage.project(args.source_id)
+        key = new_id("pro")
+        parameters = [
+            replace(p, value=msgspec.json.encode(key).decode()) if p.name == "project_id" else p
+            for p in source.parameters
+        ]
+        copied = replace(source, id=key, name=args.target_name, parameters=parameters, created=UNSET, modified=UNSET)
+        if context.dry_run:
+            return
+        saved = await storage.put_project(copied)
+        with contextlib.suppress(NotFound):  # it has logic, or no script was stored yet
+            await storage.put_project_source(key, await storage.project_source(source.id))
+        context.emit_first("ProjectChanged", bare(saved), ChangeType.UPDATE_BASE)
+
+
+@rpc("DeleteProject")
+async def delete_project(context: Context, args: IdArgs) -> None:
+    """Delete a saved project."""
+    storage = context.services.storage
+    _require_no_project(context)
+    async with context.services.locks.auto(context.user, args.id):
+        project = await storage.project(args.id)
+        if context.dry_run:
+            return
+        await storage.delete_project(args.id)
+        context.emit("ProjectChanged", bare(project), ChangeType.REMOVE)

@@ -1,0 +1,121 @@
+"""What saving or deleting a scene means for saved projects and for object types that were made for it."""
+
+from collections.abc import Awaitable, Callable, Iterable
+from typing import TYPE_CHECKING
+
+from msgspec.structs import replace
+
+from arcor2_hw.data.object_type import ObjectTypeMeta
+from arcor2_hw.data.project import Action, Project
+from arcor2_hw.data.scene import Scene
+from arcor2_hw.exceptions import NotFound
+from arcor2_server.session.changes import Change, Kind
+from arcor2_server.session.document import Document
+from arcor2_server.session.placing import changes_for_parent
+
+if TYPE_CHECKING:
+    from arcor2_server.services import Services
+
+VIRTUAL = "VirtualCollisionObject"
+
+
+async def after_saving(services: "Services", save: Callable[[], Awaitable[None]]) -> list[ObjectTypeMeta]:
+    """Save the open scene; then joints taught at objects that moved become invalid in all its projects.
+
+    What a project has of objects that are gone is taken out of it. Gives the object types that were deleted.
+    """
+    scene = services.session.require_scene()
+    try:
+        before = await services.storage.scene(scene.id)
+    except NotFound:
+        before = replace(scene, objects=[])
+    gone_types = services.session.removed_types | {obj.type for obj in before.objects}
+    await save()
+    await _update_projects(services, before, scene)
+    services.session.removed_types.clear()
+    return await forget_unused_types(services, gone_types - {obj.type for obj in scene.objects})
+
+
+async def _update_projects(services: "Services", before: Scene, after: Scene) -> None:
+    kept = {obj.id: obj for obj in after.objects}
+    removed = [obj.id for obj in before.objects if obj.id not in kept]
+    moved = [obj.id for obj in before.objects if obj.id in kept and kept[obj.id].pose != obj.pose]
+    if not removed and not moved:
+        return
+    for project_id in await services.storage.projects_with_scene(after.id):
+        project = await services.storage.project(project_id)
+        changed = project_after(before, project, removed, moved)
+        if changed is not project:
+            await services.storage.put_project(changed)
+
+
+def project_after(scene: Scene, project: Project, removed: Iterable[str], moved: Iterable[str]) -> Project:
+    """Give a project as it is when objects of its scene were removed and others moved; itself when nothing changes.
+
+    `scene` is the scene as it was. Points at removed objects stay where they are in the world.
+    """
+    document = Document.of(scene, project)
+    changes: list[Change] = []
+
+    def make(new: list[Change]) -> None:
+        document.apply(new)
+        changes.extend(new)
+
+    for object_id in moved:
+        for point in document.descendants(object_id):
+            for item in document.owned(point.id, Kind.JOINTS):
+                if item.value.is_valid:
+                    make([document.update(Kind.JOINTS, item.id, replace(item.value, is_valid=False))])
+    for object_id in removed:
+        for point in document.points_of(object_id):
+            make(changes_for_parent(document, point.id, "")[0])
+        for item in document.of_kind(Kind.ACTION):
+            if item.value.type.partition("/")[0] == object_id:
+                make(_without_action(document, item.value))
+        if document.find(Kind.OVERRIDE, object_id) is not None:
+            make([document.remove(Kind.OVERRIDE, object_id)])
+    result = document.project
+    return project if not changes or result is None else replace(result, created=project.created)
+
+
+def _without_action(document: Document, action: Action) -> list[Change]:
+    steps = {item.id: item for item in (*document.outgoing(action.id), *document.incoming(action.id))}
+    steps |= {user.id: user for user in document.users_of(action.id) if not isinstance(user, Action)}
+    return [*(document.remove(Kind.LOGIC, i) for i in steps), document.remove(Kind.ACTION, action.id)]
+
+
+async def forget_unused_types(services: "Services", candidates: Iterable[str]) -> list[ObjectTypeMeta]:
+    """Delete those of the object types that are virtual collision objects and stand in no scene; gives them."""
+    types = services.types
+    virtual = {
+        name for name in candidates if name != VIRTUAL and types.known(name) and types.derives_from(name, VIRTUAL)
+    }
+    if not virtual:
+        return []
+    if (opened := services.session.scene) is not None:
+        virtual -= {obj.type for obj in opened.objects}
+    for listed in await services.storage.scenes():
+        if not virtual:
+            break
+        virtual -= {obj.type for obj in (await services.storage.scene(listed.id)).objects}
+    return [await types.remove(name) for name in sorted(virtual)]
+
+
+async def uses_object(services: "Services", object_id: str) -> set[str]:
+    """Give the projects of the open scene that use an object: the saved ones, and the open one as it is now."""
+    session = services.session
+    scene, opened = session.require_scene(), session.project
+    found = set()
+    for project_id in await services.storage.projects_with_scene(scene.id):
+        if (opened is None or project_id != opened.id) and _uses(await services.storage.project(project_id), object_id):
+            found.add(project_id)
+    if opened is not None and _uses(opened, object_id):
+        found.add(opened.id)
+    return found
+
+
+def _uses(project: Project, object_id: str) -> bool:
+    return any(
+        point.parent == object_id or any(action.type.partition("/")[0] == object_id for action in point.actions)
+        for point in project.action_points
+    )
