@@ -7,6 +7,7 @@ from arcor2_hw.data.events import ChangeType
 from arcor2_hw.data.geometry import Orientation
 from arcor2_hw.data.project import NamedOrientation
 from arcor2_hw.data.project_index import relative_pose
+from arcor2_hw.data.robot import RobotArg
 from arcor2_hw.data.rpc import (
     AddActionPointOrientationArgs,
     AddActionPointOrientationUsingRobotArgs,
@@ -15,7 +16,6 @@ from arcor2_hw.data.rpc import (
     UpdateActionPointOrientationArgs,
     UpdateActionPointOrientationUsingRobotArgs,
 )
-from arcor2_hw.data.robot import RobotArg
 from arcor2_server.rpc.editing import commit, eef_pose, require_free, require_held, tell
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
 from arcor2_server.session.changes import Kind
