@@ -71,15 +71,14 @@ class ControlServer:
 
     @property
     def address(self) -> str:
-        """``host:port`` where it listens; once `start` has returned."""
-        if self._server is None:
-            raise RuntimeError("the control channel is not started")
-        host, port = self._server.sockets[0].getsockname()[:2]
+        """``host:port``; the real port once `start` has returned."""
+        host, port = self._bind
         return f"{host}:{port}"
 
     async def start(self) -> str:
         """Listens and returns the address. Raises `OSError` when the port is taken."""
         self._server = await asyncio.start_server(self._serve, *self._bind, limit=MAX_LINE)
+        self._bind = (self._bind[0], self._server.sockets[0].getsockname()[1])
         return self.address
 
     async def close(self) -> None:
@@ -235,7 +234,7 @@ class ControlClient:
             async with asyncio.timeout(within):
                 reader, writer = await asyncio.open_connection(host, port, limit=MAX_LINE)
         except OSError as e:  # TimeoutError is one
-            raise ControlError(f"control channel {address}: {e or 'timed out'}") from e
+            raise ControlError(f"control channel {address}: {str(e) or 'timed out'}") from e
         return cls(address, reader, writer)
 
     async def do(self, command: str, within: float = 2.0, **arguments: Any) -> Any:
@@ -250,7 +249,7 @@ class ControlClient:
                 await self._writer.drain()
                 return _data(await future, command)
         except OSError as e:
-            raise ControlError(f"{command}: {self.address}: {e or f'no answer in {within:g} s'}") from e
+            raise ControlError(f"{command}: {self.address}: {str(e) or f'no answer in {within:g} s'}") from e
         finally:
             del self._waiting[number]
 

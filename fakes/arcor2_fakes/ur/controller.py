@@ -25,7 +25,7 @@ Steps = Generator[None, None, None]
 """A running piece of program: each step ends where the real one waits for the next control cycle."""
 
 
-class Refused(Exception):
+class Refused(ValueError):
     """The controller does not do that in its present state; the text is the dashboard's answer."""
 
 

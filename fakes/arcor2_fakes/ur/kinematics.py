@@ -17,7 +17,10 @@ Transform = tuple[Vector, Vector, Vector, Vector]
 """The axes x, y, z and the origin of a frame, each in base coordinates."""
 
 IDENTITY: Transform = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
-_SINGULAR = 1e-9
+_SINGULAR = 1e-6  # sine of joint 5; acos has no more to give near 1
+_MARGIN = 1e-7  # of a cosine beyond 1, at the edge of reach
+_DAMPING = 1e-10 * np.eye(6)
+_SMALL_STEP = 1e-4  # rad
 
 
 @dataclass(frozen=True)
@@ -159,12 +162,17 @@ class Chain:
 
     def jacobian(self, q: Sequence[float]) -> np.ndarray:
         """6 x 6, TCP velocity (m/s, rad/s, base axes) per joint velocity."""
+        return self._tip_and_jacobian(q)[1]
+
+    def _tip_and_jacobian(self, q: Sequence[float]) -> tuple[Transform, np.ndarray]:
         flange, axes, origins = self._frames(q)
-        tip = compose(flange, self.tcp)[3]
-        columns = []
-        for axis, o in zip(axes, origins, strict=True):
-            columns.append((*cross(axis, (tip[0] - o[0], tip[1] - o[1], tip[2] - o[2])), *axis))
-        return np.array(columns).T
+        tip = compose(flange, self.tcp)
+        p = tip[3]
+        columns = [
+            (*cross(axis, (p[0] - o[0], p[1] - o[1], p[2] - o[2])), *axis)
+            for axis, o in zip(axes, origins, strict=True)
+        ]
+        return tip, np.array(columns).T
 
     def _frames(self, q: Sequence[float]) -> tuple[Transform, tuple[Vector, ...], tuple[Vector, ...]]:
         """Flange, the joints' axes and a point on each. Each line is one row of the DH table."""
@@ -197,15 +205,15 @@ class Chain:
         x6, y6, z6, p = compose(target, self._flange_from_tcp)
         wx, wy = p[0] - g.d6 * z6[0], p[1] - g.d6 * z6[1]
         radius = math.hypot(wx, wy)
-        if radius < g.d4:
+        if radius < g.d4 * (1.0 - _MARGIN):
             return []
         found = []
-        toward, lean = math.atan2(wy, wx), math.asin(g.d4 / radius)
+        toward, lean = math.atan2(wy, wx), math.asin(min(1.0, g.d4 / radius))
         for q1 in (toward + lean, toward + math.pi - lean):
             c1, s1 = math.cos(q1), math.sin(q1)
             n: Vector = (s1, -c1, 0.0)
             cosine = (dot(p, n) - g.d4) / g.d6
-            if abs(cosine) > 1.0 + 1e-9:
+            if abs(cosine) > 1.0 + _MARGIN:
                 continue
             bend = math.acos(min(1.0, max(-1.0, cosine)))
             for q5 in (bend, -bend):
@@ -220,7 +228,7 @@ class Chain:
                 p3 = _combine(1.0, _combine(1.0, _combine(1.0, p, -g.d6, z6), -g.d5, z4), -g.d4, n)
                 u, w = p3[0] * c1 + p3[1] * s1, p3[2] - g.d1
                 cosine = (u * u + w * w - g.a2 * g.a2 - g.a3 * g.a3) / (2.0 * g.a2 * g.a3)
-                if abs(cosine) > 1.0 + 1e-9:
+                if abs(cosine) > 1.0 + _MARGIN:
                     continue
                 fold = math.acos(min(1.0, max(-1.0, cosine)))
                 for q3 in (fold, -fold):
@@ -239,20 +247,20 @@ class Chain:
                 best, least = q, far
         if best is None:
             raise NoSolution("the pose is out of reach")
-        return best
+        return self.follow(target, best) or best  # singular ones are exact only after a step of Newton's
 
-    def follow(self, target: Transform, q: Sequence[float], steps: int = 4) -> tuple[float, ...] | None:
+    def follow(self, target: Transform, q: Sequence[float], steps: int = 5) -> tuple[float, ...] | None:
         """A configuration right beside `q` (Newton, damped near singularities); None when it does not get there."""
         for _ in range(steps):
-            shift, turn = difference(self.forward(q), target)
-            if max(map(abs, shift)) < 1e-8 and max(map(abs, turn)) < 1e-8:
+            tip, jacobian = self._tip_and_jacobian(q)
+            shift, turn = difference(tip, target)
+            error = np.array((*shift, *turn))
+            step = (jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + _DAMPING, error)).tolist()
+            q = [a + b for a, b in zip(q, step, strict=True)]
+            # Newton converges quadratically: what a small step leaves is its square.
+            if max(map(abs, step)) < _SMALL_STEP:
                 return tuple(q)
-            jacobian = self.jacobian(q)
-            damped = jacobian @ jacobian.T + 1e-10 * np.eye(6)
-            step = jacobian.T @ np.linalg.solve(damped, np.array((*shift, *turn)))
-            q = [a + b for a, b in zip(q, step.tolist(), strict=True)]
-        shift, turn = difference(self.forward(q), target)
-        return tuple(q) if max(map(abs, (*shift, *turn))) < 1e-5 else None
+        return None
 
     def joint_rates(self, q: Sequence[float], twist: Sequence[float]) -> list[float]:
         """Joint velocities that give the TCP the velocity `twist`."""

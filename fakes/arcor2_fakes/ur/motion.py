@@ -75,9 +75,9 @@ class JointMove:
 
     def step(self, _: "Arm", dt: float) -> Joints:
         """Positions after `dt` seconds."""
+        self.done = self.done or self._t >= self.profile.duration  # one cycle at the goal: the velocity is then zero
         self._t += dt
-        if self.done or self._t >= self.profile.duration:
-            self.done = True
+        if self._t >= self.profile.duration:
             return self._goal
         f = self.profile.position(self._t) / self.profile.length
         return [s + f * w for s, w in zip(self._start, self._way, strict=True)]
@@ -102,13 +102,14 @@ class LinearMove:
         """Positions after `dt` seconds. Raises `MotionRefused` in a singularity or out of reach."""
         if self.done or dt == 0.0:
             return arm.q
+        self.done = self._t >= self.profile.duration  # one cycle at the goal: the velocity is then zero
         self._t += dt
-        self.done = self._t >= self.profile.duration
         f = self.profile.position(self._t) / self.profile.length
         x, y, z, origin = self._start
         turned = compose(from_pose((0.0, 0.0, 0.0, *(f * r for r in self._turn))), (x, y, z, (0.0, 0.0, 0.0)))
         there = (origin[0] + f * self._shift[0], origin[1] + f * self._shift[1], origin[2] + f * self._shift[2])
-        q = arm.chain.follow((turned[0], turned[1], turned[2], there), arm.q)
+        guess = [a + v * arm.period for a, v in zip(arm.q, arm.qd, strict=True)]
+        q = arm.chain.follow((turned[0], turned[1], turned[2], there), guess)
         if q is None:
             raise MotionRefused("the line leaves the reach of the arm")
         return q
@@ -228,6 +229,8 @@ class Arm:
         self.chain = chain
         self.q: tuple[float, ...] = tuple(q)
         self.qd: tuple[float, ...] = (0.0,) * 6
+        self.period = 0.0
+        """The length of the cycle in progress."""
         self.motion: Motion | None = None
         self.rate = 1.0
         """How fast path time runs now: the speed slider, or on its way to or from zero in a pause."""
@@ -306,6 +309,7 @@ class Arm:
         if self.rate != wanted:
             change = dt / self._ramp
             self.rate = min(wanted, self.rate + change) if self.rate < wanted else max(wanted, self.rate - change)
+        self.period = dt
         motion = self.motion
         if motion is None:
             return

@@ -37,7 +37,7 @@ class OutputRecipe:
         HEADER.pack_into(self._buffer, 0, offset, Kind.DATA)
         self._buffer[HEADER.size] = number
         self._every = every
-        self._left = 0.0
+        self._left = 1.0
 
     def due(self) -> bool:
         """Counts one control cycle; true when the client wants this one."""

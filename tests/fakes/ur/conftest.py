@@ -1,0 +1,110 @@
+"""Fixtures: the fake controller as a process, and the real ur_rtde library in another one, with a time limit."""
+
+import itertools
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+
+from arcor2_fakes.control import BlockingControlClient
+
+_PRELUDE = """
+import json, os, sys, time
+from rtde_control import RTDEControlInterface as Control
+from rtde_receive import RTDEReceiveInterface as Receive
+from rtde_io import RTDEIOInterface as IO
+from dashboard_client import DashboardClient as Dashboard
+from arcor2_fakes.control import BlockingControlClient
+host = sys.argv[1]
+fake = BlockingControlClient(sys.argv[2])
+HOME = [0.0, -1.5707963267948966, 1.5707963267948966, -1.5707963267948966, -1.5707963267948966, 0.0]
+
+def report(**values):
+    print("RESULT " + json.dumps(values), flush=True)
+    os._exit(0)  # the library's own end takes half a second and is not what is tested
+
+def until(holds, within=5.0):
+    deadline = time.monotonic() + within
+    while not holds():
+        if time.monotonic() > deadline:
+            report(error="not within %g s: %s" % (within, fake.do("truth")))
+        time.sleep(0.002)
+"""
+
+_hosts = (f"127.{os.getpid() % 200 + 20}.{n // 250 + 1}.{n % 250 + 1}" for n in itertools.count())
+
+
+@dataclass
+class FakeUr:
+    """A running fake controller."""
+
+    process: subprocess.Popen[str]
+    ready: dict[str, Any]
+    control: BlockingControlClient
+
+    @property
+    def host(self) -> str:
+        return self.ready["host"]
+
+    def do(self, command: str, **arguments: Any) -> Any:
+        return self.control.do(command, **arguments)
+
+    def library(self, body: str, within: float = 30.0) -> dict[str, Any]:
+        """Runs `body` with ur_rtde in a process of its own; gives what it reports."""
+        run = subprocess.run(
+            [sys.executable, "-c", _PRELUDE + body, self.host, self.ready["control"]],
+            capture_output=True,
+            text=True,
+            timeout=within,
+        )
+        for line in run.stdout.splitlines():
+            if "RESULT " in line:  # the library writes to the same stream without line ends
+                return json.loads(line.partition("RESULT ")[2])
+        raise AssertionError(f"status {run.returncode}\n{run.stdout[-3000:]}\n{run.stderr[-3000:]}")
+
+
+@pytest.fixture
+def start_ur() -> Iterator[Callable[..., FakeUr]]:
+    """``start_ur("--time-scale", "0.1")`` starts a fake controller on an address of its own."""
+    running: list[FakeUr] = []
+
+    def start(*options: str) -> FakeUr:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "arcor2_fakes.ur", "--host", next(_hosts), *options],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
+        assert process.stdout is not None
+        word, _, rest = process.stdout.readline().partition(" ")
+        assert word == "ready", "the fake did not start"
+        ready = json.loads(rest)
+        running.append(FakeUr(process, ready, BlockingControlClient(ready["control"])))
+        return running[-1]
+
+    yield start
+    for fake in running:
+        fake.control.close()
+        if fake.process.poll() is None:
+            fake.process.send_signal(signal.SIGTERM)
+        try:
+            fake.process.wait(2.0)
+        except subprocess.TimeoutExpired:
+            fake.process.kill()
+            fake.process.wait()
+            raise
+        finally:
+            assert fake.process.stdout is not None
+            fake.process.stdout.close()
+
+
+@pytest.fixture
+def ur(start_ur: Callable[..., FakeUr]) -> FakeUr:
+    """A fake UR5e, powered and ready, whose waits are ten times shorter."""
+    return start_ur("--time-scale", "0.1")
