@@ -19,7 +19,22 @@ from arcor2_server.locks import Locks
 from arcor2_server.object_types import ObjectTypes
 
 # Imported for their handlers.
-from arcor2_server.rpc import general, lists, locking, object_types  # noqa: F401
+from arcor2_server.rpc import (  # noqa: F401
+    action_points,
+    actions,
+    copying,
+    general,
+    joints,
+    lists,
+    locking,
+    logic,
+    object_types,
+    orientations,
+    parameters,
+    project,
+    scene,
+    scene_objects,
+)
 from arcor2_server.services import Services
 from arcor2_server.session import Session
 from arcor2_server.settings import ServerSettings
@@ -55,6 +70,8 @@ async def running_services(settings: ServerSettings) -> AsyncIterator[Services]:
             build=None,  # type: ignore[arg-type]
         )
         services.session = Session(services)
+        await services.session.open()
+        stack.push_async_callback(services.session.close)
         services.cell = OnlineCell(services)
         services.execution = Execution(services)
         services.build = BuildService(services)
