@@ -1,0 +1,281 @@
+"""A server without a socket: the real endpoint, hub, locks, storage, journal; object types as recorded in the spec.
+
+What is missing of a whole server is the network, the cell host and the analysis of object types: they have tests of
+their own, and the same requests are sent to a real server process elsewhere.
+"""
+
+import contextlib
+import json
+from collections.abc import AsyncIterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import msgspec
+
+from arcor2_hw.data.events import SceneStateEnum
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ObjectTypeSource, ParameterMeta
+from arcor2_hw.data.robot import Joint, RobotMeta, RobotType
+from arcor2_hw.exceptions import NotFound
+from arcor2_server.client import Client
+from arcor2_server.endpoint import Endpoint
+from arcor2_server.hub import Hub
+from arcor2_server.locks import Locks
+from arcor2_server.object_types import Changes
+from arcor2_server.rpc import (  # noqa: F401
+    action_points,
+    actions,
+    copying,
+    general,
+    joints,
+    lists,
+    locking,
+    logic,
+    object_types,
+    orientations,
+    parameters,
+    project,
+    scene,
+    scene_objects,
+)
+from arcor2_server.rpc.registry import RequestRefused
+from arcor2_server.services import Services
+from arcor2_server.session import Session
+from arcor2_server.settings import ServerSettings
+from arcor2_server.storage import Storage
+from arcor2_server.users import Users
+
+SPEC = Path(__file__).resolve().parents[4] / "shared" / "spec"
+
+
+def trace(name: str) -> list[dict[str, Any]]:
+    """Give a recorded session of the spec."""
+    return [json.loads(line) for line in (SPEC / "traces" / f"{name}.jsonl").read_text().splitlines()]
+
+
+class RecordedTypes:
+    """The object types of the recorded sessions, in place of the registry that analyses sources."""
+
+    def __init__(self) -> None:
+        answers = {m["msg"].get("response"): m["msg"] for m in trace("01_connect_register") if m["who"] == "A<"}
+        metas = msgspec.convert(answers["GetObjectTypes"]["data"], list[ObjectTypeMeta])
+        self._metas = {meta.type: meta for meta in metas}
+        dobot = msgspec.convert(answers["GetActions"]["data"], list[ObjectAction])
+        double, text = ParameterMeta("seconds", "double"), ParameterMeta("text", "string")
+        self._actions = {
+            "DobotMagician": dobot,
+            "TimeActions": [ObjectAction("sleep", parameters=[double]), ObjectAction("say", parameters=[text])],
+            "RandomActions": [
+                ObjectAction("random_bool", parameters=[ParameterMeta("probability", "double")], returns=["boolean"]),
+                ObjectAction("random_double", returns=["double"]),
+            ],
+        }
+        self.revision = 1
+        self.news: list[ObjectTypeMeta] = []
+
+    async def refresh(self) -> Changes:
+        news, self.news = self.news, []
+        self._metas |= {meta.type: meta for meta in news}
+        return Changes([], [], news)
+
+    def known(self, name: str) -> bool:
+        return name in self._metas
+
+    def meta(self, name: str) -> ObjectTypeMeta:
+        try:
+            return self._metas[name]
+        except KeyError:
+            raise NotFound(f"There is no object type {name!r}.") from None
+
+    def derives_from(self, name: str, base: str) -> bool:
+        while name:
+            if name == base:
+                return True
+            name = self.meta(name).base
+        return False
+
+    def action(self, type_name: str, name: str) -> ObjectAction:
+        for action in self._actions.get(type_name, ()):
+            if action.name == name:
+                return action
+        raise NotFound(f"{type_name} has no action {name!r}.")
+
+    def robot_meta(self, name: str) -> RobotMeta:
+        if not self.derives_from(name, "Robot"):
+            raise NotFound(f"{name} is no robot.")
+        return RobotMeta(name, RobotType.ARTICULATED)
+
+    async def add(self, source: ObjectTypeSource) -> ObjectTypeMeta:
+        base = source.source.partition(f"class {source.id}(")[2].partition(")")[0]
+        meta = ObjectTypeMeta(
+            source.id, base=base, object_model=source.model, has_pose=True, modified="2026-11-21T06:43:11.076433+00:00"
+        )
+        self._metas[source.id] = meta
+        self.revision += 1
+        return meta
+
+    async def remove(self, name: str) -> ObjectTypeMeta:
+        self.revision += 1
+        return self._metas.pop(name)
+
+
+class FakeCell:
+    """The cell, offline until told otherwise, with one robot that stands still."""
+
+    def __init__(self) -> None:
+        self.state = SceneStateEnum.STOPPED
+        self.pose = Pose(Position(0.4, 0.1, 0.3), Orientation(1, 0, 0, 0))
+        self.joints = [Joint("j1", 0.1), Joint("j2", -0.2)]
+        self.moved: list[tuple[str, Pose]] = []
+
+    @property
+    def online(self) -> bool:
+        return self.state is SceneStateEnum.STARTED
+
+    def require_offline(self) -> None:
+        if self.state is not SceneStateEnum.STOPPED:
+            raise RequestRefused("The scene is online.")
+
+    def require_online(self) -> None:
+        if not self.online:
+            raise RequestRefused("The scene is offline.")
+
+    async def end_effector_pose(self, robot_id: str, end_effector: str, arm_id: str | None) -> Pose:
+        return self.pose
+
+    async def robot_joints(self, robot_id: str, arm_id: str | None) -> list[Joint]:
+        return self.joints
+
+    async def object_pose_changed(self, object_id: str, pose: Pose) -> None:
+        self.moved.append((object_id, pose))
+
+
+class _Record:
+    """The wire of a client that takes everything."""
+
+    def __init__(self) -> None:
+        self.messages: list[dict[str, Any]] = []
+
+    def send_now(self, message: bytes) -> bool:
+        self.messages.append(json.loads(message))
+        return True
+
+    async def send(self, message: bytes) -> None:
+        self.send_now(message)
+
+    async def ping(self) -> None:
+        raise ConnectionError
+
+    async def close(self, code: int, reason: str) -> None: ...
+
+    def abort(self) -> None: ...
+
+
+class Refused(Exception):
+    """A request was answered with result=false."""
+
+
+class Person:
+    """A client at the desk. `seen` holds all that came since it was last taken, answers and events in order."""
+
+    def __init__(self, desk: "Desk", name: str) -> None:
+        self.desk = desk
+        self.name = name
+        self._record = _Record()
+        self._number = 0
+        self.client = Client(self._record, desk.services.settings)
+        desk.services.hub.add(self.client)
+
+    async def send(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Send a request as it stands and give the answer as it came."""
+        await self.desk.endpoint._handle(self.client, json.dumps(request))
+        return next(m for m in reversed(self._record.messages) if m.get("id") == request["id"] and "response" in m)
+
+    async def ask(self, name: str, dry_run: bool = False, **args: Any) -> Any:
+        """Send a request; gives the answer's data, raises Refused with its message."""
+        self._number += 1
+        request: dict[str, Any] = {"id": self._number, "request": name, "dry_run": dry_run}
+        if args:
+            request["args"] = args
+        answer = await self.send(request)
+        if not answer["result"]:
+            raise Refused(answer["messages"][0])
+        return answer.get("data")
+
+    def take(self) -> list[dict[str, Any]]:
+        """Give what came since the last time."""
+        taken, self._record.messages = self._record.messages, []
+        return taken
+
+    def events(self) -> list[dict[str, Any]]:
+        """Give the events since the last time, without the answers."""
+        return [message for message in self.take() if "event" in message]
+
+    def names(self) -> list[str]:
+        """Give the events since the last time in short."""
+        return ["/".join(filter(None, (e["event"], e.get("change_type")))) for e in self.events()]
+
+    async def lock(self, item: str, tree: bool = False) -> None:
+        await self.ask("WriteLock", object_id=item, lock_tree=tree)
+        self.take()
+
+
+class Desk:
+    """The parts of a server that the session works with."""
+
+    def __init__(self, services: Services, types: RecordedTypes, cell: FakeCell) -> None:
+        self.services = services
+        self.types = types
+        self.cell = cell
+        self.endpoint = Endpoint(services)
+
+    @property
+    def session(self) -> Session:
+        return self.services.session
+
+    async def person(self, name: str = "") -> Person:
+        person = Person(self, name)
+        if name:
+            await person.ask("RegisterUser", user_name=name)
+        person.take()
+        return person
+
+
+@contextlib.asynccontextmanager
+async def open_desk(directory: Path, **settings: Any) -> AsyncIterator[Desk]:
+    """Bring up the parts over a data directory."""
+    given: dict[str, Any] = {"lock_retries": 2, "lock_retry_wait": 0.02} | settings
+    chosen = ServerSettings(data_dir=directory, **given)
+    types, cell, hub = RecordedTypes(), FakeCell(), Hub()
+    storage = await Storage.open(chosen)
+    locks = Locks(chosen.lock_retries, chosen.lock_retry_wait)
+    users = Users(hub, locks, chosen)
+    execution: Any = SimpleNamespace(running=False, greeting=list)
+    services = Services(
+        settings=chosen,
+        hub=hub,
+        users=users,
+        locks=locks,
+        storage=storage,
+        types=types,  # type: ignore[arg-type]
+        session=None,  # type: ignore[arg-type]
+        cell=cell,  # type: ignore[arg-type]
+        execution=execution,
+        build=None,  # type: ignore[arg-type]
+    )
+    services.session = Session(services)
+
+    async def stored(item: str) -> bool:
+        return types.known(item) or await storage.identify(item) is not None
+
+    locks.tree, locks.stored = services.session, stored
+    try:
+        await services.session.open()
+        try:
+            yield Desk(services, types, cell)
+        finally:
+            await services.session.close()
+    finally:
+        users.close()
+        await storage.close()
