@@ -4,11 +4,12 @@ The program text itself says what each command code does; this is a model of tha
 runs: a stopL or stopJ is run as stopj until the first asynchronous stop, and as stopl from then on.
 """
 
+import math
 import re
 from collections.abc import Callable, Sequence
 
 from arcor2_fakes.ur.controller import Controller, Program, Steps
-from arcor2_fakes.ur.kinematics import NoSolution, compose, from_pose, to_pose
+from arcor2_fakes.ur.kinematics import compose, from_pose, to_pose
 from arcor2_fakes.ur.motion import JOINT_RANGE, JointSpeed, LinearSpeed, Servo
 from arcor2_fakes.ur.outputs import flange_pose, readers
 from arcor2_fakes.ur.urscript import Call, Interpreter, calls
@@ -82,15 +83,13 @@ class ControlScript(Program):
         while True:
             try:
                 next(main)
-            except (StopIteration, NoSolution):  # without a solution the controller ends the program with an error
+            except StopIteration:
                 return
             for name, thread in tuple(self._threads.items()):
                 try:
                     next(thread)
                 except StopIteration:
                     self._threads.pop(name, None)
-                except NoSolution:
-                    return
             yield
 
     def _main(self) -> Steps:
@@ -233,6 +232,7 @@ class ControlScript(Program):
 
     # ------------------------------------------------------------------------------------------- speed, servo and jog
     def _set_speed(self, linear: bool) -> None:
+        _finite(self._six(0))
         self._speed = (linear, self._six(0), max(0.01, self._double(6)))
         if "speed" not in self._threads:
             self._c.note_command("speedl" if linear else "speedj", target=list(self._six(0)))
@@ -256,6 +256,7 @@ class ControlScript(Program):
         return self._interpreter.stop(self._double(0), linear=self._speed[0])
 
     def _set_servo(self, target: tuple[float, ...]) -> None:
+        _finite(target)
         self._servo_target, self._servo_lookahead = target, self._double(9)
         if "servo" not in self._threads:
             self._c.note_command("servoj", target=list(target))
@@ -310,6 +311,11 @@ class ControlScript(Program):
     def _jacobian(self) -> None:
         columns = self._c.chain.jacobian(self._arm.q).T.flatten().tolist()
         self._c.output_doubles[0:24], self._c.output_doubles[36:48] = columns[:24], columns[24:]
+
+
+def _finite(values: Sequence[float]) -> None:
+    if not all(map(math.isfinite, values)):
+        raise ValueError("not a number")
 
 
 class _WithProgress(Interpreter):

@@ -79,7 +79,8 @@ class Controller:
         self._steps: Steps | None = None
         self._conditions: dict[SafetyMode, bool] = dict.fromkeys(SafetyMode, False)
         self._unlockable = 0  # cycle from which a protective stop may be unlocked
-        self._goes_on = False  # a safeguard stop paused the program: it goes on by itself
+        self._goes_on = False  # a safeguard stop holds the program: it goes on by itself
+        self._suspended = False  # held without saying so
         self._watchdog: tuple[int, float] | None = None  # input register and the longest silence
         self._written = [0] * 48  # cycle of the last write of each integer register
         self._due: list[tuple[int, Callable[[], None]]] = []  # (cycle, what)
@@ -93,13 +94,15 @@ class Controller:
         if self._watchdog is not None:
             self._check_watchdog()
         runtime = self.runtime
-        if runtime is Runtime.PLAYING and self._steps is not None:
+        if runtime is Runtime.PLAYING and self._steps is not None and not self._suspended:
             try:
                 next(self._steps)
             except StopIteration:
                 self.stop_program("ended")
             except MotionRefused as e:
                 self.protective_stop(str(e))
+            except (ValueError, TypeError, LookupError, ArithmeticError) as e:  # what the program says makes no sense
+                self.stop_program(f"runtime error: {e}")
         elif runtime is Runtime.STOPPING and not self.arm.busy:
             self.runtime = Runtime.STOPPED
         elif runtime is Runtime.PAUSING and not self.arm.moving:
@@ -179,15 +182,23 @@ class Controller:
             )
         self._condition(SafetyMode.PROTECTIVE_STOP, False)
 
-    def safeguard_stop(self, on: bool) -> None:
-        """The door. Pauses a playing program, which goes on by itself when the door closes: there is no reset input."""
+    def safeguard_stop(self, on: bool, reports_paused: bool = False) -> None:
+        """The door. Holds a playing program, which goes on by itself when the door closes: there is no reset input.
+
+        RTDE goes on saying "playing" by default, for ur_rtde keeps waiting through a safeguard stop and would give up
+        at once if told "paused"; `reports_paused` gives the other reading of the manual.
+        """
         if on and not self._conditions[SafetyMode.SAFEGUARD_STOP]:
             self._goes_on = self.runtime in (Runtime.PLAYING, Runtime.RESUMING)
-            self._pause()
+            if reports_paused or not self._goes_on:
+                self._pause()
+            else:
+                self._suspended = True
+                self.arm.hold()
         self._condition(SafetyMode.SAFEGUARD_STOP, on)
         if not on and self._goes_on and self.safety in MAY_MOVE:
             self._resume()
-        if not on and self.program is None:
+        if not on and self.program is None and self.safety in MAY_MOVE:
             self.arm.go_on()
 
     def emergency_stop(self, on: bool, system: bool = False) -> None:
@@ -285,6 +296,7 @@ class Controller:
             self.programs_killed += 1
         program, steps = self.program, self._steps
         self.program, self._steps, self._watchdog, self._goes_on = None, None, None, False
+        self._suspended = False
         self.freedrive = False
         self.arm.halt()
         if self.safety in MAY_MOVE:
@@ -299,6 +311,7 @@ class Controller:
         """Pauses on the path. Raises `Refused` when nothing plays."""
         if self.runtime is not Runtime.PLAYING:
             raise Refused("Failed to execute: pause")
+        self._goes_on = False
         self._pause()
 
     def play_program(self) -> None:
@@ -313,14 +326,15 @@ class Controller:
             raise Refused("Failed to execute: play")
 
     def _pause(self, protective: bool = False) -> None:
+        self._suspended = False
         self.arm.hold(protective)
         if self.runtime in (Runtime.PLAYING, Runtime.RESUMING):
             self.runtime = Runtime.PAUSING
 
     def _resume(self) -> None:
-        self._goes_on = False
+        self._goes_on = self._suspended = False
         self.arm.go_on()
-        if self.program is not None:
+        if self.runtime in (Runtime.PAUSED, Runtime.PAUSING):
             self.runtime = Runtime.RESUMING
         self.changed()
 

@@ -41,8 +41,11 @@ class ScriptPort:
         self.scripts_taken += 1
         if kind == "sec":  # a secondary program runs beside and takes no time
             interpreter = Interpreter(self.controller)
-            for call in calls(text):
-                interpreter.at_once(call)
+            try:
+                for call in calls(text):
+                    interpreter.at_once(call)
+            except (ValueError, TypeError, LookupError) as e:
+                log.info("secondary program %s: runtime error: %s", name, e)
             return
         program: Program
         if ControlScript.is_one(text):

@@ -114,6 +114,9 @@ def register(control: ControlServer, c: Controller, rtde: RtdeServer, script: Sc
             raise ValueError("fraction is 0 to 1")
         c.arm.slider = float(fraction)
 
+    def safeguard_stop(on: bool = True, reports_paused: bool = False) -> None:
+        _switch(lambda to: c.safeguard_stop(to, reports_paused))(on)
+
     def contact(on: bool) -> None:
         c.contact = on
 
@@ -140,7 +143,7 @@ def register(control: ControlServer, c: Controller, rtde: RtdeServer, script: Sc
     control.command("commands_taken", lambda: list(c.commands))
     control.command("popup", lambda: dashboard.popup)
     control.command("protective_stop", lambda why="control channel": c.protective_stop(why))
-    control.command("safeguard_stop", _switch(c.safeguard_stop))
+    control.command("safeguard_stop", safeguard_stop)
     control.command("emergency_stop", lambda on=True, system=False: c.emergency_stop(on, system))
     control.command("reduced", _switch(c.reduced))
     control.command("violation", lambda: c.fault(violation=True))

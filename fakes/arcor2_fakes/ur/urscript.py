@@ -5,6 +5,7 @@ Not a URScript interpreter: no variables, conditions or loops. A statement it do
 
 import ast
 import logging
+import math
 import operator
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -13,7 +14,6 @@ from typing import Any
 
 from arcor2_fakes.ur.controller import Controller, Program, Steps
 from arcor2_fakes.ur.kinematics import from_pose
-from arcor2_fakes.ur.motion import MotionRefused
 
 log = logging.getLogger("script")
 
@@ -121,7 +121,7 @@ class Interpreter:
         self.controller = controller
 
     def run(self, statements: Sequence[Call]) -> Steps:
-        """All of them in order. Raises `MotionRefused`."""
+        """All of them in order. Raises `MotionRefused`, or `ValueError` and the like."""
         for call in statements:
             yield from self.statement(call)
 
@@ -182,7 +182,7 @@ class Interpreter:
     def move_joints(self, q: Sequence[float], velocity: float, acceleration: float) -> Steps:
         """movej: to its end, or until another motion has taken its place."""
         arm = self.controller.arm
-        self._check(velocity, acceleration)
+        self._check(q, velocity, acceleration)
         self.controller.note_command("movej", q=list(q), v=velocity, a=acceleration)
         while arm.moving:  # a motion that was cut off ends first
             yield
@@ -192,7 +192,7 @@ class Interpreter:
     def move_linear(self, goal: Sequence[float], velocity: float, acceleration: float, is_pose: bool) -> Steps:
         """movel to a pose, or to where joints have the TCP."""
         arm = self.controller.arm
-        self._check(velocity, acceleration)
+        self._check(goal, velocity, acceleration)
         target = from_pose(goal) if is_pose else self.controller.chain.forward(goal)
         self.controller.note_command("movel", goal=list(goal), v=velocity, a=acceleration)
         while arm.moving:
@@ -214,9 +214,11 @@ class Interpreter:
             yield
 
     @staticmethod
-    def _check(velocity: float, acceleration: float) -> None:
-        if velocity <= 0.0 or acceleration <= 0.0:
-            raise MotionRefused("a motion needs a velocity and an acceleration above zero")
+    def _check(goal: Sequence[float], velocity: float, acceleration: float) -> None:
+        if len(goal) != 6 or not all(map(math.isfinite, goal)):
+            raise ValueError("a goal is six numbers")
+        if not (0.0 < velocity < math.inf and 0.0 < acceleration < math.inf):
+            raise ValueError("a motion needs a velocity and an acceleration above zero")
 
 
 class ScriptProgram(Program):

@@ -75,11 +75,14 @@ def test_stopping_the_program_first_forgets_the_old_motion(c):
 
 
 # ------------------------------------------------------------------------------------------------------ safeguard stop
-def test_safeguard_stop_goes_on_by_itself(c):
+@pytest.mark.parametrize("reports_paused", [False, True])
+def test_safeguard_stop_goes_on_by_itself(c, reports_paused):
     start_move(c)
-    c.safeguard_stop(True)
+    c.safeguard_stop(True, reports_paused)
     assert c.safety is SafetyMode.SAFEGUARD_STOP
-    until(c, lambda: c.runtime is Runtime.PAUSED)
+    assert until(c, lambda: not c.arm.moving) < 0.25
+    wait(c, 0.01)
+    assert c.runtime is (Runtime.PAUSED if reports_paused else Runtime.PLAYING)
     resting = c.arm.q
     wait(c, 3.0)
     assert c.arm.q == resting
@@ -104,6 +107,13 @@ def test_safeguard_stop_does_not_wake_a_stopped_or_paused_program(c):
     assert c.arm.q == resting
     assert c.program is None
     start_move(c)  # and a new one moves
+    c.safeguard_stop(True)
+    c.pause_program()
+    wait(c, 0.5)
+    c.safeguard_stop(False)
+    wait(c, 0.5)
+    assert c.runtime is Runtime.PAUSED
+    assert not c.arm.moving
 
 
 # ------------------------------------------------------------------------------------------------- emergency and faults
@@ -313,6 +323,31 @@ def test_stop_script_ends_the_program(c):
     assert c.program is None
     until(c, lambda: c.runtime is Runtime.STOPPED)
     assert c.arm.q[0] < 1.0
+
+
+@pytest.mark.parametrize(
+    ("code", "doubles"),
+    [(1, [math.nan] * 8), (1, [*HOME, 0.0, 1.0]), (3, [0.4, math.inf, 0, 0, 0, 0, 1, 1]), (11, [math.nan])],
+)
+@pytest.mark.parametrize("asynchronous", [0, 1])
+def test_senseless_numbers_end_the_program_not_the_controller(c, code, doubles, asynchronous):
+    control_script(c)
+    c.input_doubles[: len(doubles)] = doubles
+    c.input_ints[1], c.input_ints[0] = asynchronous, code
+    wait(c, 0.1)
+    assert c.program is None
+    assert c.arm.q == pytest.approx(HOME)
+    start_move(c)
+
+
+@pytest.mark.parametrize(
+    "line", ["movej([1,2])", "movej('x')", "movel(p[9,9,9,0,0,0])", "movej(p[9,9,9,0,0,0])", "sleep([])"]
+)
+def test_senseless_scripts_end_in_an_error(c, line):
+    c.start_program(ScriptProgram(c, "bad", line))
+    wait(c, 8.0)
+    assert c.program is None or c.safety is SafetyMode.PROTECTIVE_STOP
+    assert not c.arm.moving
 
 
 def test_inverse_without_solution_ends_the_program_as_a_runtime_error(c):

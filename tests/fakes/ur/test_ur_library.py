@@ -295,7 +295,8 @@ goal = [0.8] + HOME[1:]
 control.moveJ(goal, 1.0, 2.0, True)
 until(lambda: fake.do("truth")["q"][0] > 0.2)
 fake.do("safeguard_stop", on=True)
-until(lambda: receive.getRuntimeState() == 4)
+until(lambda: receive.getSafetyMode() == 5 and not fake.do("truth")["moving"])
+time.sleep(0.01)
 mode, resting = receive.getSafetyMode(), receive.getActualQ()
 time.sleep(0.3)
 still = receive.getActualQ()
@@ -307,6 +308,36 @@ report(mode=mode, resting=resting, still=still, goal=goal, end=receive.getActual
     assert seen["still"] == seen["resting"]
     assert seen["resting"][0] < 0.7
     assert seen["end"] == pytest.approx(seen["goal"], abs=1e-9)
+
+
+def test_synchronous_move_waits_through_a_safeguard_stop_and_gives_up_on_an_emergency_stop(ur):
+    seen = ur.library("""
+import threading
+control = Control(host, 500.0)
+ends = {}
+def move(name, goal):
+    ends[name] = control.moveJ([goal] + HOME[1:], 1.0, 4.0)
+def start(name, goal):
+    thread = threading.Thread(target=move, args=(name, goal), daemon=True)
+    thread.start()
+    until(lambda: fake.do("truth")["moving"])
+    return thread
+first = start("first", 0.5)
+fake.do("safeguard_stop", on=True)
+first.join(1.0)
+waits = first.is_alive()
+fake.do("safeguard_stop", on=False)
+first.join(5.0)
+second = start("second", 1.5)
+fake.do("emergency_stop", on=True)
+second.join(5.0)
+until(lambda: fake.do("truth")["robot_mode"] == "POWER_OFF")
+report(waits=waits, ends=ends, hangs=second.is_alive(), truth=fake.do("truth"))
+""")
+    assert seen["waits"]
+    assert seen["ends"] == {"first": True, "second": False}
+    assert not seen["hangs"]
+    assert seen["truth"]["safety"] == "ROBOT_EMERGENCY_STOP"
 
 
 def test_foreign_program_survives_observation_and_dies_by_control(ur):
