@@ -1,1 +1,17 @@
 """Object type source to metadata, from text alone: what is read is never imported."""
+
+from arcor2_hw.analysis.installed import GROUP, InstalledType, installed_types
+from arcor2_hw.analysis.library import BUILT_IN, Library, TypeAnalysis
+from arcor2_hw.analysis.source import Problem, SourceFile, module_name
+
+__all__ = [
+    "BUILT_IN",
+    "GROUP",
+    "InstalledType",
+    "Library",
+    "Problem",
+    "SourceFile",
+    "TypeAnalysis",
+    "installed_types",
+    "module_name",
+]

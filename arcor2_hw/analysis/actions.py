@@ -1,0 +1,269 @@
+"""Methods as actions (protocol, 9.3 and 9.4)."""
+
+import ast
+import inspect
+from typing import Any, Final
+
+from docstring_parser import DocstringStyle, ParseError
+from docstring_parser import parse as parse_docstring
+
+from arcor2_hw.actions.json_values import encode
+from arcor2_hw.actions.parameter_types import Extra, ParameterType
+from arcor2_hw.analysis.constants import EnumMember, constant, enum_members
+from arcor2_hw.analysis.hierarchy import Hierarchy
+from arcor2_hw.analysis.hints import parameter_type_of, results, without_none
+from arcor2_hw.analysis.module import ClassInfo, FunctionNode
+from arcor2_hw.analysis.source import Broken, sendable
+from arcor2_hw.analysis.symbols import External, framework_name
+from arcor2_hw.data.base import UNSET, Unset
+from arcor2_hw.data.object_type import ActionMetadata, ObjectAction, ParameterMeta
+from arcor2_hw.exceptions import InvalidData
+
+_LITERALS: Final = {"boolean": bool, "integer": int, "double": float, "string": str}
+_NOT_ORDINARY: Final = ("builtins.staticmethod", "builtins.classmethod", "builtins.property")
+
+
+class ActionReader:
+    """Reads the actions of classes."""
+
+    def __init__(self, hierarchy: Hierarchy) -> None:
+        self._hierarchy = hierarchy
+        self._resolver = hierarchy.resolver
+
+    # -------------------------------------------------------------------------------- which methods are actions
+    def mark(self, owner: ClassInfo, name: str, node: FunctionNode) -> ActionMetadata | None:
+        """Give how a method is marked as an action: by the decorator, or by `method.__action__ = ActionMetadata()`."""
+        expression = owner.marks.get((name, "__action__"))
+        if expression is not None:
+            if not isinstance(expression, ast.Call):
+                raise owner.problem(f"{name}.__action__ is no ActionMetadata(...)", expression)
+            return self._metadata(owner, expression)
+        for decorator in node.decorator_list:
+            plain = decorator.func if isinstance(decorator, ast.Call) else decorator
+            symbol = self._resolver.expression(plain, owner.module, owner)
+            if framework_name(symbol) == "action":
+                return self._metadata(owner, decorator) if isinstance(decorator, ast.Call) else ActionMetadata()
+        return None
+
+    def _metadata(self, owner: ClassInfo, call: ast.Call) -> ActionMetadata:
+        given: dict[str, Any] = dict(zip(("composite", "hidden"), call.args, strict=False))
+        given |= {keyword.arg: keyword.value for keyword in call.keywords if keyword.arg in ("composite", "hidden")}
+        values = {name: bool(constant(value, owner.module, owner, self._resolver)) for name, value in given.items()}
+        return ActionMetadata(**values)
+
+    def actions(self, info: ClassInfo, seen_from: ClassInfo) -> dict[str, ObjectAction]:
+        """Give the actions that `info` itself defines, by name, with what `seen_from` says of them.
+
+        Hidden ones are left out; so are what our bases only offer: abstract methods and hooks.
+        """
+        result: dict[str, ObjectAction] = {}
+        for name in sorted(info.members):
+            node = info.function(name)
+            if node is None:
+                continue
+            try:
+                metadata = self.mark(info, name, node)
+            except Broken as error:
+                result[name] = ObjectAction(name, disabled=True, problem=str(error.problem))
+                continue
+            if metadata is None or metadata.hidden or self._is_offer(info, node):
+                continue
+            result[name] = self._action(info, node, metadata, seen_from)
+        return result
+
+    def _is_offer(self, info: ClassInfo, node: FunctionNode) -> bool:
+        if self._hierarchy.is_hook_only(node, info):
+            return True
+        return framework_name(info) is not None and self._hierarchy.is_abstract(node, info)
+
+    # -------------------------------------------------------------------------------- one action
+    def _action(
+        self, info: ClassInfo, node: FunctionNode, metadata: ActionMetadata, seen_from: ClassInfo
+    ) -> ObjectAction:
+        text = ast.get_docstring(node)
+        description: str | Unset = sendable(text.strip().partition("\n")[0]) if text and text.strip() else UNSET
+        parameters: list[ParameterMeta] = []
+        returns: list[str] = []
+        try:
+            cancelled = self._hierarchy.attribute(seen_from, "CANCEL_MAPPING", {})
+            if isinstance(cancelled, dict) and node.name in cancelled:
+                metadata = ActionMetadata(metadata.composite, metadata.hidden, cancellable=True)
+            self._check_form(info, node)
+            returns = self._returns(info, node)
+            parameters = self._parameters(info, node, seen_from, text)
+        except Broken as error:
+            problem = str(error.problem)
+            return ObjectAction(node.name, description, parameters, metadata, UNSET, returns, True, problem)
+        return ObjectAction(node.name, description, parameters, metadata, UNSET, returns)
+
+    def _check_form(self, info: ClassInfo, node: FunctionNode) -> None:
+        if isinstance(node, ast.AsyncFunctionDef):
+            raise info.problem(f"{node.name}: an action is synchronous", node)
+        if self._hierarchy.decorated(node, info, *_NOT_ORDINARY):
+            raise info.problem(f"{node.name}: an action is an ordinary method", node)
+        arguments = node.args
+        if arguments.vararg or arguments.kwarg:
+            raise info.problem(f"{node.name}: an action names its parameters (no * and **)", node)
+        if not (arguments.posonlyargs or arguments.args):
+            raise info.problem(f"{node.name}: an action has self as its first parameter", node)
+        every = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs][1:]
+        if not every or every[-1].arg != "an":
+            raise info.problem(f"{node.name}: the last parameter of an action is `an: str | None = None`", node)
+        hint = every[-1].annotation
+        if hint is None:
+            raise info.problem(f"{node.name}: `an` is annotated `str | None`", node)
+        inner, optional = without_none(hint, info.module, self._resolver)
+        if not optional or self._resolver.expression(inner, info.module, info) != External("builtins.str"):
+            raise info.problem(f"{node.name}: `an` is annotated `str | None`", hint)
+        if node.returns is None:
+            raise info.problem(f"{node.name}: the return annotation is missing", node)
+
+    def _returns(self, info: ClassInfo, node: FunctionNode) -> list[str]:
+        if node.returns is None:
+            return []
+        try:
+            return [
+                parameter_type_of(hint, info.module, info, self._resolver)[0].name
+                for hint in results(node.returns, info.module, self._resolver)
+            ]
+        except Broken as error:
+            raise info.problem(f"{node.name}: result: {error}", node.returns) from None
+
+    def _parameters(
+        self, info: ClassInfo, node: FunctionNode, seen_from: ClassInfo, text: str | None
+    ) -> list[ParameterMeta]:
+        arguments = node.args
+        positional = [*arguments.posonlyargs, *arguments.args]
+        defaults: dict[str, ast.expr] = {
+            argument.arg: default
+            for argument, default in zip(reversed(positional), reversed(arguments.defaults), strict=False)
+        }
+        defaults |= {
+            argument.arg: default
+            for argument, default in zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True)
+            if default is not None
+        }
+        descriptions = described_parameters(text)
+        dynamic = self._dynamic(seen_from)
+        ranges = _ranges(node)
+        result = []
+        for argument in [*positional, *arguments.kwonlyargs][1:-1]:
+            name = argument.arg
+            if argument.annotation is None:
+                raise info.problem(f"{node.name}: parameter {name} is not annotated", argument)
+            try:
+                kind, enumeration = parameter_type_of(argument.annotation, info.module, info, self._resolver)
+                extra = self._extra(info, kind, enumeration, ranges.get(name))
+                default = self.default(info, kind, enumeration, defaults.get(name))
+            except Broken as error:
+                raise Broken(
+                    f"{node.name}: parameter {name}: {error}", error.problem.path, error.problem.line
+                ) from None
+            parents = dynamic.get(name)
+            result.append(
+                ParameterMeta(
+                    name,
+                    kind.name,
+                    parents is not None,
+                    parents or UNSET,
+                    descriptions.get(name, UNSET),
+                    default,
+                    extra,
+                )
+            )
+        return result
+
+    def _dynamic(self, seen_from: ClassInfo) -> dict[str, set[str]]:
+        declared = self._hierarchy.attribute(seen_from, "DYNAMIC_PARAMS", {})
+        try:
+            return {str(name): {str(parent) for parent in parents} for name, (_, parents) in declared.items()}
+        except (AttributeError, TypeError, ValueError):
+            raise seen_from.problem(
+                "DYNAMIC_PARAMS is {parameter: (name of a method, set of parameters it needs)}"
+            ) from None
+
+    def _extra(
+        self, info: ClassInfo, kind: ParameterType, enumeration: ClassInfo | None, limits: "_Limits | None"
+    ) -> str | Unset:
+        try:
+            if enumeration is not None:
+                members = enum_members(enumeration, self._resolver)
+                if not members:
+                    raise enumeration.problem(f"the enumeration {enumeration.name} has no members")
+                return encode(Extra(allowed_values=list(dict.fromkeys(members.values()))))
+            if limits is None or kind.name not in ("integer", "double"):
+                return UNSET
+            if {type(limits.low), type(limits.high)} != {_LITERALS[kind.name]}:
+                raise info.problem(f"the range in `assert` has to be of type {kind.name} too", limits.node)
+            return encode(Extra(minimum=limits.low, maximum=limits.high))
+        except InvalidData as error:
+            raise info.problem(str(error), enumeration.node if enumeration else None) from None
+
+    def default(
+        self, info: ClassInfo, kind: ParameterType, enumeration: ClassInfo | None, expression: ast.expr | None
+    ) -> str | Unset:
+        """Give a default as JSON. Raises Broken when it is of another type, or cannot be told from the source.
+
+        Poses, positions, joints and pictures have none: what a project refers to cannot stand in a source.
+        """
+        if expression is None or (enumeration is None and kind.name not in _LITERALS):
+            return UNSET
+        value = constant(expression, info.module, info, self._resolver)
+        if enumeration is not None:
+            if isinstance(value, EnumMember) and value.owner is enumeration:
+                value = value.value
+            elif value not in (enum_members(enumeration, self._resolver) or {}).values():
+                raise info.problem(f"the default is no member of {enumeration.name}", expression)
+        try:
+            return kind.encode(value)
+        except InvalidData as error:
+            raise info.problem(f"default: {error}", expression) from None
+
+
+class _Limits:
+    """An `assert a <= p <= b`."""
+
+    def __init__(self, node: ast.AST, low: Any, high: Any) -> None:
+        self.node = node
+        self.low = low
+        self.high = high
+
+
+def _ranges(node: FunctionNode) -> dict[str, _Limits]:
+    """Give the ranges that a body asserts for its parameters; of several for one parameter the first.
+
+    As in the protocol only plain literals count: a negative bound (an operator and a literal) tells no range.
+    """
+    result: dict[str, _Limits] = {}
+    for statement in node.body:
+        match statement:
+            case ast.Assert(
+                test=ast.Compare(
+                    left=ast.Constant(value=low),
+                    ops=[ast.LtE(), ast.LtE()],
+                    comparators=[ast.Name(id=name), ast.Constant(value=high)],
+                )
+            ):
+                result.setdefault(name, _Limits(statement, low, high))
+            case _:
+                pass
+    return result
+
+
+def described_parameters(docstring: str | None) -> dict[str, str]:
+    """Give what a docstring says of each parameter; in any of the usual styles."""
+    if not docstring:
+        return {}
+    if ":param" in docstring:
+        style = DocstringStyle.REST
+    elif "Args:" in docstring or "Arguments:" in docstring:
+        style = DocstringStyle.GOOGLE
+    elif "Parameters\n" in docstring:
+        style = DocstringStyle.NUMPYDOC
+    else:
+        return {}
+    try:
+        parsed = parse_docstring(inspect.cleandoc(docstring), style)
+    except ParseError:
+        return {}
+    return {p.arg_name: sendable(p.description) for p in parsed.params if p.description}

@@ -1,0 +1,168 @@
+"""Where a class comes from: its bases over any number of files, in the order in which Python looks them up."""
+
+import ast
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+from arcor2_hw.analysis.constants import constant
+from arcor2_hw.analysis.module import Binding, ClassInfo, FunctionNode, Value
+from arcor2_hw.analysis.symbols import External, Resolver, framework_name, is_framework
+
+Lineage = list["ClassInfo | External"]
+
+
+class Hierarchy:
+    """Gives bases and lookup order of classes; every answer is remembered."""
+
+    def __init__(self, resolver: Resolver) -> None:
+        self.resolver = resolver
+        self._lineages: dict[ClassInfo, Lineage] = {}
+        self._underway: list[ClassInfo] = []
+
+    def bases(self, info: ClassInfo) -> "list[ClassInfo | External]":
+        """Give the classes in the class statement. Raises Broken when one cannot be obtained."""
+        result: list[ClassInfo | External] = []
+        for expression in info.node.bases:
+            # Generic[T] of typing: the subscript says nothing about inheritance.
+            plain = expression.value if isinstance(expression, ast.Subscript) else expression
+            symbol = self.resolver.expression(plain, info.module)
+            if isinstance(symbol, ClassInfo | External):
+                result.append(symbol)
+            else:
+                shown = getattr(plain, "id", None) or getattr(plain, "attr", None) or "base"
+                raise info.problem(f"{info.name}: the base {shown} cannot be obtained", expression)
+        return result
+
+    def base(self, info: ClassInfo) -> ClassInfo | None:
+        """Give the base of an object type: the last one, everything before it is a mixin."""
+        bases = self.bases(info)
+        return bases[-1] if bases and isinstance(bases[-1], ClassInfo) else None
+
+    def lineage(self, info: ClassInfo) -> Lineage:
+        """Give the class and its ancestors in Python's lookup order (C3). Raises Broken for a circle."""
+        if info in self._lineages:
+            return self._lineages[info]
+        if info in self._underway:
+            names = " -> ".join(c.name for c in [*self._underway[self._underway.index(info) :], info])
+            raise info.problem(f"{info.name} is its own ancestor: {names}")
+        self._underway.append(info)
+        try:
+            bases = self.bases(info)
+            sequences: list[Lineage] = [
+                list(self.lineage(base)) if isinstance(base, ClassInfo) else [base] for base in bases
+            ]
+            result: Lineage = [info, *self._merged(info, [*sequences, list(bases)])]
+        finally:
+            self._underway.pop()
+        self._lineages[info] = result
+        return result
+
+    def _merged(self, info: ClassInfo, sequences: list[Lineage]) -> Lineage:
+        result: Lineage = []
+        while sequences := [sequence for sequence in sequences if sequence]:
+            for sequence in sequences:
+                candidate = sequence[0]
+                if not any(candidate in other[1:] for other in sequences):
+                    break
+            else:
+                raise info.problem(f"{info.name}: its bases contradict each other in their order")
+            result.append(candidate)
+            for sequence in sequences:
+                if sequence[0] == candidate:
+                    del sequence[0]
+        return result
+
+    def ancestors(self, info: ClassInfo) -> Iterator[ClassInfo]:
+        """Give the class and those of its ancestors that can be read."""
+        return (each for each in self.lineage(info) if isinstance(each, ClassInfo))
+
+    def derives_from(self, info: ClassInfo, name: str) -> bool:
+        """Tell whether our base `name` is the class itself or an ancestor."""
+        return any(framework_name(each) == name for each in self.lineage(info))
+
+    def find(self, info: ClassInfo, name: str) -> tuple[ClassInfo, Binding] | None:
+        """Give the class that binds a member as it is seen from `info`, and the binding."""
+        for each in self.ancestors(info):
+            if name in each.members:
+                binding = each.members[name]
+                if isinstance(binding, Value) and binding.expression is None:
+                    continue  # annotated only: bound nowhere at run time
+                return each, binding
+        return None
+
+    def method(self, info: ClassInfo, name: str) -> tuple[ClassInfo, FunctionNode] | None:
+        """Give a method as it is seen from `info`, with the class that defines it."""
+        found = self.find(info, name)
+        if found is None or not isinstance(found[1], ast.FunctionDef | ast.AsyncFunctionDef):
+            return None
+        return found[0], found[1]
+
+    def attribute(self, info: ClassInfo, name: str, default: Any = None) -> Any:
+        """Give the value of a class attribute. Raises Broken when it cannot be told from the source."""
+        found = self.find(info, name)
+        if found is None:
+            return default
+        owner, binding = found
+        if not isinstance(binding, Value) or binding.expression is None:
+            raise owner.problem(f"{owner.name}.{name} is no plain value")
+        return constant(binding.expression, owner.module, owner, self.resolver)
+
+    def decorated(self, node: FunctionNode, owner: ClassInfo, *names: str) -> bool:
+        """Tell whether a function has one of these decorators, by their dotted names."""
+        for decorator in node.decorator_list:
+            plain = decorator.func if isinstance(decorator, ast.Call) else decorator
+            symbol = self.resolver.expression(plain, owner.module, owner)
+            if isinstance(symbol, External) and symbol.dotted in names:
+                return True
+        return False
+
+    def is_abstract(self, node: FunctionNode, owner: ClassInfo) -> bool:
+        """Tell whether a method is abstract."""
+        return self.decorated(node, owner, "abc.abstractmethod", "abc.abstractproperty")
+
+    def unimplemented(self, info: ClassInfo) -> list[str]:
+        """Give the names of the abstract methods that nobody implements."""
+        seen: set[str] = set()
+        missing: list[str] = []
+        for each in self.ancestors(info):
+            for name, member in each.members.items():
+                if name in seen or (isinstance(member, Value) and member.expression is None):
+                    continue
+                seen.add(name)
+                if isinstance(member, ast.FunctionDef | ast.AsyncFunctionDef) and self.is_abstract(member, each):
+                    missing.append(name)
+        return missing
+
+    def is_hook_only(self, node: FunctionNode, owner: ClassInfo) -> bool:
+        """Tell whether a body is nothing but a raise of the framework's not-implemented error."""
+        body = node.body
+        if body and isinstance(body[0], ast.Expr) and isinstance(body[0].value, ast.Constant):
+            body = body[1:]
+        if len(body) != 1 or not isinstance(body[0], ast.Raise) or body[0].exc is None:
+            return False
+        raised = body[0].exc
+        symbol = self.resolver.expression(raised.func if isinstance(raised, ast.Call) else raised, owner.module, owner)
+        return framework_name(symbol) == "Arcor2NotImplemented"
+
+    def implemented_hooks(self, info: ClassInfo) -> frozenset[str]:
+        """Give the optional methods of our bases that the type, or an ancestor of its own, really implements."""
+        offered = {
+            name
+            for each in self.ancestors(info)
+            if is_framework(each)
+            for name, member in each.members.items()
+            if not name.startswith("_") and isinstance(member, ast.FunctionDef) and not self.is_abstract(member, each)
+        }
+        result = set()
+        for name in offered:
+            found = self.method(info, name)
+            if found is not None and not is_framework(found[0]) and not self.is_hook_only(found[1], found[0]):
+                result.add(name)
+        return frozenset(result)
+
+
+def is_known_library(symbol: External) -> bool:
+    """Tell whether this belongs to Python's library or to us, so that it certainly is no object type."""
+    top = symbol.dotted.partition(".")[0]
+    return top in sys.stdlib_module_names or top in {"builtins", "arcor2_hw", "arcor2"}

@@ -1,0 +1,132 @@
+"""Type hints (PEP 484) as parameter types."""
+
+import ast
+from typing import Final
+
+from arcor2_hw.actions.parameter_types import ParameterType, by_annotation
+from arcor2_hw.analysis.constants import enum_kind
+from arcor2_hw.analysis.module import ClassInfo, Module
+from arcor2_hw.analysis.source import Broken
+from arcor2_hw.analysis.symbols import External, Resolver, Symbol, framework_name
+
+_SCALARS: Final = {"builtins.bool", "builtins.int", "builtins.float", "builtins.str"}
+_PICTURE: Final = "PIL.Image.Image"
+
+
+def plain(hint: ast.expr, module: Module) -> ast.expr:
+    """Give a hint without quotes around it. Raises Broken when what is quoted is no expression."""
+    if isinstance(hint, ast.Constant) and isinstance(hint.value, str):
+        try:
+            return ast.copy_location(ast.parse(hint.value.strip(), mode="eval").body, hint)
+        except (SyntaxError, ValueError, RecursionError, MemoryError):
+            raise module.problem(f"{hint.value[:40]!r} is no type hint", hint.lineno) from None
+    return hint
+
+
+def without_none(hint: ast.expr, module: Module, resolver: Resolver) -> tuple[ast.expr, bool]:
+    """Give what `X | None`, `Optional[X]` or `Union[X, None]` is about, and whether None is allowed."""
+    hint = plain(hint, module)
+    members = [plain(member, module) for member in _members(hint, module, resolver)]
+    rest = [member for member in members if not _is_none(member)]
+    if len(rest) == 1 and len(members) > 1:
+        return rest[0], True
+    return hint, False
+
+
+def _members(hint: ast.expr, module: Module, resolver: Resolver) -> list[ast.expr]:
+    match hint:
+        case ast.BinOp(left=left, op=ast.BitOr(), right=right):
+            return [*_members(plain(left, module), module, resolver), *_members(plain(right, module), module, resolver)]
+        case ast.Subscript(value=value, slice=inner):
+            match resolver.expression(value, module):
+                case External(dotted="typing.Optional"):
+                    return [*_members(plain(inner, module), module, resolver), ast.Constant(None)]
+                case External(dotted="typing.Union"):
+                    return list(inner.elts) if isinstance(inner, ast.Tuple) else [inner]
+    return [hint]
+
+
+def _is_none(hint: ast.expr) -> bool:
+    return isinstance(hint, ast.Constant) and hint.value is None
+
+
+def meaning(hint: ast.expr, module: Module, owner: ClassInfo | None, resolver: Resolver) -> Symbol | None:
+    """Give what a hint names."""
+    return resolver.expression(plain(hint, module), module, owner)
+
+
+def parameter_type_of(
+    hint: ast.expr, module: Module, owner: ClassInfo | None, resolver: Resolver
+) -> tuple[ParameterType, ClassInfo | None]:
+    """Give the parameter type that a hint means, with the enumeration when it is one. Raises Broken naming the hint."""
+    symbol = meaning(hint, module, owner, resolver)
+    found: ParameterType | None = None
+    if isinstance(symbol, ClassInfo):
+        kind = enum_kind(symbol, resolver)
+        if kind is not None and (found := by_annotation(kind)) is not None:
+            return found, symbol
+    elif isinstance(symbol, External) and (symbol.dotted in _SCALARS or symbol.dotted == _PICTURE):
+        found = by_annotation(symbol.dotted)
+    elif (name := framework_name(symbol)) is not None and name not in ("StrEnum", "IntEnum", "Image"):
+        found = by_annotation(name)
+    if found is None:
+        raise unsupported(hint, module, symbol)
+    return found, None
+
+
+def unsupported(hint: ast.expr, module: Module, symbol: Symbol | None) -> Broken:
+    """Make the error that says that a hint is no parameter type."""
+    shown = shown_hint(plain(hint, module))
+    if symbol is None and isinstance(plain(hint, module), ast.Name):
+        return module.problem(f"the name {shown} is not defined", hint.lineno)
+    return module.problem(f"the type {shown} is not supported", hint.lineno)
+
+
+def shown_hint(hint: ast.expr) -> str:
+    """Give a hint as it is written."""
+    try:
+        return ast.unparse(hint)[:60]
+    except (RecursionError, ValueError):
+        return "of this parameter"
+
+
+def results(hint: ast.expr, module: Module, resolver: Resolver) -> list[ast.expr]:
+    """Give the hints of the results: none for None, several for `tuple[A, B]`, else one."""
+    hint = plain(hint, module)
+    if _is_none(hint):
+        return []
+    if isinstance(hint, ast.Subscript):
+        symbol = resolver.expression(hint.value, module)
+        if isinstance(symbol, External) and symbol.dotted in ("builtins.tuple", "typing.Tuple"):
+            return list(hint.slice.elts) if isinstance(hint.slice, ast.Tuple) else [hint.slice]
+    return [hint]
+
+
+def normal(hint: ast.expr | None, module: Module, resolver: Resolver) -> str:
+    """Give a hint in a form in which equal meanings are equal: older spellings, quotes and order do not count."""
+    if hint is None:
+        return ""
+    hint = plain(hint, module)
+    members = _members(hint, module, resolver)
+    if len(members) > 1:
+        return "|".join(sorted(normal(member, module, resolver) for member in members))
+    match hint:
+        case ast.Subscript(value=value, slice=inner):
+            elements = inner.elts if isinstance(inner, ast.Tuple) else [inner]
+            return f"{normal(value, module, resolver)}[{','.join(normal(e, module, resolver) for e in elements)}]"
+        case ast.Constant(value=value):
+            return repr(value)
+        case ast.Name() | ast.Attribute():
+            symbol = resolver.expression(hint, module)
+            name = (hint.id if isinstance(hint, ast.Name) else hint.attr) if symbol is None else _end(symbol, hint)
+            return {"List": "list", "Set": "set", "Dict": "dict", "Tuple": "tuple"}.get(name, name)
+        case _:
+            return shown_hint(hint)
+
+
+def _end(symbol: Symbol, hint: ast.Name | ast.Attribute) -> str:
+    if isinstance(symbol, External):
+        return symbol.dotted.rpartition(".")[2]
+    if isinstance(symbol, ClassInfo):
+        return symbol.name
+    return hint.id if isinstance(hint, ast.Name) else hint.attr

@@ -1,0 +1,356 @@
+"""The sources of all object types, and what follows from them."""
+
+import ast
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from arcor2_hw.analysis.actions import ActionReader
+from arcor2_hw.analysis.hierarchy import Hierarchy, is_known_library
+from arcor2_hw.analysis.module import ClassInfo, Import, Module
+from arcor2_hw.analysis.robots import robot_meta
+from arcor2_hw.analysis.settings import SettingsReader
+from arcor2_hw.analysis.source import Broken, Problem, SourceFile, sendable
+from arcor2_hw.analysis.symbols import External, Resolver, is_framework
+from arcor2_hw.data.base import UNSET, Data
+from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ParameterMeta
+from arcor2_hw.data.robot import RobotMeta
+from arcor2_hw.exceptions import InvalidData, NotFound
+
+BUILT_IN: Final = (
+    "Camera",
+    "CollisionObject",
+    "Generic",
+    "GenericWithPose",
+    "MultiArmRobot",
+    "Robot",
+    "VirtualCollisionObject",
+)
+"""The object types that the protocol names as built in; our other bases are no types of their own for clients."""
+
+UPLOADED: Final = "object_types"
+"""The package in which uploaded types lie beside each other."""
+
+NO_DESCRIPTION: Final = "No description available."
+
+_OURS: Final = Path(__file__).resolve().parents[1]
+
+
+class TypeAnalysis(Data, frozen=True):
+    """What the source of one object type says.
+
+    is_object_type: false for a helper or mixin that does not derive from Generic; it is no type for clients.
+    robot: None for what is no robot, and for what may not be placed. implemented: the optional methods of our bases
+    that it really has. bases: the object types it derives from, nearest first. mixins: classes before its base.
+    modules: the other files it needs, each after those that it needs itself; without ours.
+    """
+
+    meta: ObjectTypeMeta
+    actions: tuple[ObjectAction, ...] = ()
+    robot: RobotMeta | None = None
+    implemented: frozenset[str] = frozenset()
+    bases: tuple[str, ...] = ()
+    mixins: tuple[str, ...] = ()
+    modules: tuple[SourceFile, ...] = ()
+    is_object_type: bool = True
+    problem: Problem | None = None
+
+
+class Library:
+    """Sources by type name; our bases are built in. Nothing that is read is imported. For use on one thread."""
+
+    def __init__(self, files: Iterable[SourceFile] = ()) -> None:
+        self._files: dict[str, SourceFile] = {}
+        self._by_module: dict[str, SourceFile] = {}
+        self._roots: dict[str, Path] = {"arcor2_hw": _OURS.parent}
+        self._modules: dict[str, Module | Broken | None] = {}
+        self._analyses: dict[str, TypeAnalysis] = {}
+        self._forget()
+        for file in files:
+            self.add(file)
+
+    # -------------------------------------------------------------------------------- content
+    def add(self, file: SourceFile) -> None:
+        """Put a source in, in the place of one of the same name. InvalidData for the name of a built-in type."""
+        if file.name in BUILT_IN:
+            raise InvalidData(f"{file.name} is built in and cannot be replaced")
+        if not file.name:
+            raise InvalidData("a source needs the name of its object type")
+        if file.name in self._files:
+            self.remove(file.name)
+        self._files[file.name] = file
+        dotted = _dotted(file)
+        self._by_module[dotted] = file
+        top = dotted.partition(".")[0]
+        if file.path and top != UPLOADED:
+            up = dotted.count(".") + (1 if file.is_package else 0)
+            parents = Path(file.path).parents
+            if up < len(parents):
+                self._roots.setdefault(top, parents[up])
+        self._modules.clear()
+        self._forget()
+
+    def remove(self, name: str) -> None:
+        """Take a source out; NotFound when there is none of that name."""
+        file = self._file(name)
+        del self._files[name]
+        self._by_module.pop(_dotted(file), None)
+        # Several types may share a module.
+        for other in self._files.values():
+            if _dotted(other) == _dotted(file):
+                self._by_module[_dotted(other)] = other
+        self._modules.clear()
+        self._forget()
+
+    def names(self) -> list[str]:
+        """Give the names of all types, the built-in ones first."""
+        return [*BUILT_IN, *self._files]
+
+    def __contains__(self, name: object) -> bool:
+        return name in BUILT_IN or name in self._files
+
+    def file(self, name: str) -> SourceFile:
+        """Give the source of an added type; NotFound."""
+        return self._file(name)
+
+    def _file(self, name: str) -> SourceFile:
+        try:
+            return self._files[name]
+        except KeyError:
+            raise NotFound(f"there is no source of an object type {name}") from None
+
+    def _forget(self) -> None:
+        self._analyses.clear()
+        resolver = Resolver(self._load)
+        self._hierarchy = Hierarchy(resolver)
+        self._actions = ActionReader(self._hierarchy)
+        self._settings = SettingsReader(self._hierarchy, self._actions)
+
+    # -------------------------------------------------------------------------------- modules
+    def _load(self, dotted: str) -> Module | None:
+        """Give a module by its full name: uploaded, of an added distribution, or ours. Raises Broken."""
+        if dotted not in self._modules:
+            try:
+                file = self._by_module.get(dotted) or self._on_disk(dotted)
+                parsed = None if file is None else Module(msgspec.structs.replace(file, module=dotted))
+                self._modules[dotted] = parsed
+            except Broken as error:
+                self._modules[dotted] = error
+        found = self._modules[dotted]
+        if isinstance(found, Broken):
+            raise Broken(str(found), found.problem.path, found.problem.line)
+        return found
+
+    def _on_disk(self, dotted: str) -> SourceFile | None:
+        top, _, rest = dotted.partition(".")
+        root = self._roots.get(top)
+        if root is None or not rest or not all(part.isidentifier() for part in rest.split(".")):
+            return None
+        if top == "arcor2_hw" and not rest.startswith("objects"):
+            return None  # parameter types and data classes are known by their names
+        base = root.joinpath(*dotted.split("."))
+        for path, is_package in ((base.with_suffix(".py"), False), (base / "__init__.py", True)):
+            try:
+                return SourceFile("", dotted, path.read_bytes(), str(path), is_package)
+            except (FileNotFoundError, NotADirectoryError):
+                continue
+            except OSError as error:
+                raise Broken(f"this cannot be read: {error.strerror}", str(path), 1) from None
+        return None
+
+    def _needed(self, module: Module) -> list[SourceFile]:
+        """Give the files that a module needs, each after those it needs itself. Raises Broken when one is missing."""
+        done: dict[str, SourceFile] = {}
+        seen = {module.dotted}
+
+        def visit(of: Module) -> None:
+            for found in of.imports:
+                for wanted in self._imported(of, found):
+                    if wanted.dotted not in seen and not _is_ours(wanted.dotted):
+                        seen.add(wanted.dotted)
+                        visit(wanted)
+                        done[wanted.dotted] = self._by_module.get(wanted.dotted, wanted.file)
+
+        visit(module)
+        return list(done.values())
+
+    def _imported(self, module: Module, found: Import) -> list[Module]:
+        """Give the modules that an import statement runs, as far as they are read at all."""
+        try:
+            first = self._load(found.module)
+            second = self._load(f"{found.module}.{found.name}") if found.name not in (None, "*") else None
+        except Broken:
+            if found.guarded:
+                return []
+            raise
+        if found.relative and first is None and second is None and not found.guarded:
+            shown = found.module.rpartition(".")[2]
+            raise module.problem(f"the module {shown} that it imports does not exist", found.line)
+        if second is not None and first is not None and found.name in first.bindings:
+            second = None  # the name is one of the package, not the module of the same name
+        return [each for each in (first, second) if each is not None]
+
+    # -------------------------------------------------------------------------------- analysis
+    def analyse(self, name: str) -> TypeAnalysis:
+        """Tell what the source of a type says; NotFound for an unknown name.
+
+        What is wrong with the source is told in `problem`, and disables the type; it never raises.
+        """
+        if name not in self._analyses:
+            self._analyses[name] = self._analyse(name)
+        return self._analyses[name]
+
+    def _analyse(self, name: str) -> TypeAnalysis:
+        if name in BUILT_IN:
+            module = self._load("arcor2_hw.objects")
+            found = self._hierarchy.resolver.name(name, module) if module is not None else None
+            if not isinstance(found, ClassInfo):
+                raise NotFound(f"the installation lacks the base class {name}")
+            return self._of_class(name, found, ())
+        file = self._file(name)
+        base = ""
+        needed: tuple[SourceFile, ...] = ()
+        try:
+            module = self._load(_dotted(file))
+            assert module is not None
+            info = module.bindings.get(name)
+            if not isinstance(info, ClassInfo):
+                raise module.problem(f"there is no class {name} here", 1)
+            needed = tuple(self._needed(module))
+            if not info.node.bases:
+                return self._helper(name, needed)
+            self._check_base(info)
+            if not self._hierarchy.derives_from(info, "Generic"):
+                return self._helper(name, needed)
+            return self._of_class(name, info, needed)
+        except Broken as error:
+            problem = error.problem
+        except (RecursionError, MemoryError):
+            path = file.path or f"{_dotted(file).replace('.', '/')}.py"
+            problem = Problem("this is nested too deeply to be read", sendable(path), 1)
+        meta = ObjectTypeMeta(name, NO_DESCRIPTION, base=base, abstract=True, disabled=True, problem=str(problem))
+        return TypeAnalysis(meta, modules=needed, problem=problem)
+
+    def _check_base(self, info: ClassInfo) -> None:
+        """Raise Broken when the base cannot be obtained: its file is broken, or nobody knows it."""
+        for each in self._hierarchy.lineage(info)[1:]:
+            if isinstance(each, External) and not is_known_library(each) and each.dotted != "builtins.object":
+                bases = self._hierarchy.bases(info)
+                if each == bases[-1]:
+                    raise info.problem(f"{info.name}: the base {each.dotted} cannot be obtained", info.node.bases[-1])
+
+    def _helper(self, name: str, needed: tuple[SourceFile, ...]) -> TypeAnalysis:
+        return TypeAnalysis(ObjectTypeMeta(name, abstract=True), modules=needed, is_object_type=False)
+
+    def _of_class(self, name: str, info: ClassInfo, needed: tuple[SourceFile, ...]) -> TypeAnalysis:
+        hierarchy = self._hierarchy
+        problem: Problem | None = None
+        settings: list[ParameterMeta] = []
+        abstract = True
+        robot: RobotMeta | None = None
+        bases = self._bases(info)
+        try:
+            abstract = bool(hierarchy.attribute(info, "_ABSTRACT", True)) or bool(hierarchy.unimplemented(info))
+            settings = self._settings.settings(info)
+            if hierarchy.derives_from(info, "Robot") and not abstract:
+                robot = robot_meta(name, info, hierarchy)
+        except Broken as error:
+            problem = error.problem
+        meta = ObjectTypeMeta(
+            name,
+            _description(info),
+            built_in=name in BUILT_IN,
+            base=bases[0] if bases else "",
+            has_pose=hierarchy.derives_from(info, "GenericWithPose"),
+            abstract=abstract,
+            disabled=problem is not None,
+            problem=UNSET if problem is None else str(problem),
+            settings=settings,
+        )
+        direct = hierarchy.bases(info)
+        return TypeAnalysis(
+            meta,
+            tuple(self._all_actions(info, bases)),
+            robot,
+            frozenset() if name in BUILT_IN else hierarchy.implemented_hooks(info),
+            tuple(bases),
+            tuple(base.name if isinstance(base, ClassInfo) else base.dotted for base in direct[:-1]),
+            needed,
+            problem=problem,
+        )
+
+    def _type_name(self, info: ClassInfo) -> str | None:
+        """Give the name under which clients know a class, None when they do not."""
+        if is_framework(info):
+            return info.name if info.name in BUILT_IN else None
+        file = self._files.get(info.name)
+        return info.name if file is not None and _dotted(file) == info.module.dotted else None
+
+    def _bases(self, info: ClassInfo) -> list[str]:
+        """Give the object types that a class derives from by its bases, nearest first."""
+        return [name for each in self._chain(info)[1:] if (name := self._type_name(each)) is not None]
+
+    def _chain(self, info: ClassInfo) -> list[ClassInfo]:
+        """Give a class, its base, the base of that and so on: mixins do not count."""
+        chain: list[ClassInfo] = []
+        current: ClassInfo | None = info
+        while current is not None and current not in chain:
+            chain.append(current)
+            current = self._hierarchy.base(current)
+        return chain
+
+    def _all_actions(self, info: ClassInfo, bases: list[str]) -> list[ObjectAction]:
+        """Give own and inherited actions, nearest ancestors first, each level by name.
+
+        What a mixin or a class unknown to clients defines belongs to the type that brings it in.
+        """
+        if self._type_name(info) in BUILT_IN:
+            return list(self._actions.actions(info, info).values())
+        levels: dict[str, dict[str, ObjectAction]] = {}
+        inherited: set[str] = set()
+        taken: set[str] = set()
+        homes = self._homes(info)
+        for each in self._hierarchy.ancestors(info):
+            own = self._actions.actions(each, info)
+            for name, found in own.items():
+                if name in taken:
+                    inherited.add(name)
+                else:
+                    levels.setdefault(homes[each], {})[name] = found
+            taken |= set(each.members)
+        result: list[ObjectAction] = []
+        for level in (info.name, *bases):
+            for name, found in sorted(levels.get(level, {}).items()):
+                origin: str | msgspec.UnsetType = UNSET if level == info.name else level
+                if level == info.name and name in inherited and bases:
+                    origin = bases[0]
+                result.append(msgspec.structs.replace(found, origins=origin))
+        return result
+
+    def _homes(self, info: ClassInfo) -> dict[ClassInfo, str]:
+        """Give for each ancestor the known type that brought it in first."""
+        chain = self._chain(info)
+        names: list[str] = []
+        for each in chain:
+            names.append(self._type_name(each) or (names[-1] if names else info.name))
+        homes: dict[ClassInfo, str] = {}
+        for each, name in zip(reversed(chain), reversed(names), strict=True):
+            for ancestor in self._hierarchy.ancestors(each):
+                homes.setdefault(ancestor, name)
+        return homes
+
+
+def _dotted(file: SourceFile) -> str:
+    """Give the full name of a file's module; uploaded ones are given a package."""
+    return file.module if "." in file.module else f"{UPLOADED}.{file.module}"
+
+
+def _is_ours(dotted: str) -> bool:
+    return dotted.partition(".")[0] == "arcor2_hw"
+
+
+def _description(info: ClassInfo) -> str:
+    text = (ast.get_docstring(info.node) or "").strip()
+    return sendable(text.partition("\n")[0].strip()) or NO_DESCRIPTION

@@ -1,0 +1,191 @@
+"""One module as it is bound: which names stand for which classes, functions, imports and values."""
+
+import ast
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+from arcor2_hw.analysis.source import Broken, SourceFile
+
+FunctionNode: TypeAlias = ast.FunctionDef | ast.AsyncFunctionDef
+
+
+@dataclass(slots=True)
+class Import:
+    """A name that comes from elsewhere; `name` is None for the module itself."""
+
+    module: str
+    name: str | None
+    line: int
+    relative: bool
+    guarded: bool
+
+
+@dataclass(slots=True)
+class Value:
+    """A name bound to an expression, or only annotated."""
+
+    expression: ast.expr | None
+    annotation: ast.expr | None
+    line: int
+
+
+Binding: TypeAlias = "ClassInfo | FunctionNode | Import | Value"
+
+
+@dataclass(slots=True, eq=False)
+class ClassInfo:
+    """A class statement with its members, in the order in which they were first bound."""
+
+    name: str
+    node: ast.ClassDef
+    module: "Module"
+    members: dict[str, Binding] = field(default_factory=dict)
+    marks: dict[tuple[str, str], ast.expr] = field(default_factory=dict)
+    """What is assigned to attributes of members: {("move", "__action__"): expression}."""
+
+    def problem(self, text: str, node: ast.AST | None = None) -> Broken:
+        """Make the error that says `text` at `node`, or at the class statement."""
+        return self.module.problem(text, getattr(node, "lineno", self.node.lineno))
+
+    def function(self, name: str) -> FunctionNode | None:
+        """Give the method that the class itself defines under this name."""
+        found = self.members.get(name)
+        return found if isinstance(found, ast.FunctionDef | ast.AsyncFunctionDef) else None
+
+
+class Module:
+    """A parsed source file. Raises Broken, with file and line, when it cannot be parsed."""
+
+    def __init__(self, file: SourceFile) -> None:
+        self.file = file
+        self.dotted = file.module
+        self.is_package = file.is_package
+        self.bindings: dict[str, Binding] = {}
+        self.stars: list[Import] = []
+        self.imports: list[Import] = []
+        self.path = file.path or f"{file.module.replace('.', '/')}.py"
+        try:
+            tree = ast.parse(file.source)
+        except SyntaxError as error:
+            raise self.problem(f"this is not Python: {error.msg}", error.lineno or 1) from None
+        except (RecursionError, MemoryError):
+            raise self.problem("this is nested too deeply to be read", 1) from None
+        except ValueError as error:
+            raise self.problem(f"this is not text: {error}", 1) from None
+        try:
+            self._bind(tree.body, self.bindings, None)
+        except RecursionError:
+            raise self.problem("this is nested too deeply to be read", 1) from None
+
+    def problem(self, text: str, line: int) -> Broken:
+        """Make the error that says `text` at `line` of this file."""
+        return Broken(text, self.path, line)
+
+    # -------------------------------------------------------------------------------- binding
+    def _bind(self, body: Sequence[ast.stmt], scope: dict[str, Binding], owner: ClassInfo | None) -> None:
+        for statement, sure in _statements(body):
+            match statement:
+                case ast.FunctionDef() | ast.AsyncFunctionDef():
+                    if not (statement.name in scope and _extends_property(statement)):
+                        _set(scope, statement.name, statement, sure)
+                case ast.ClassDef():
+                    info = ClassInfo(statement.name, statement, self)
+                    self._bind(statement.body, info.members, info)
+                    _set(scope, statement.name, info, sure)
+                case ast.Import() | ast.ImportFrom():
+                    self._bind_import(statement, scope, sure)
+                case ast.Assign(targets=targets, value=value):
+                    for target in targets:
+                        self._assign(target, value, scope, owner, sure)
+                case ast.AnnAssign(target=ast.Name(id=name), value=value):
+                    _set(scope, name, Value(value, statement.annotation, statement.lineno), sure)
+                case _:
+                    pass
+
+    def _assign(
+        self, target: ast.expr, value: ast.expr, scope: dict[str, Binding], owner: ClassInfo | None, sure: bool
+    ) -> None:
+        match target:
+            case ast.Name(id=name):
+                _set(scope, name, Value(value, None, target.lineno), sure)
+            case ast.Attribute(value=ast.Name(id=member), attr=attribute) if owner is not None:
+                owner.marks[member, attribute] = value
+            case ast.Attribute(value=ast.Name(id=name), attr=attribute):
+                # Tester.CANCEL_MAPPING = {...} after the class
+                found = scope.get(name)
+                if isinstance(found, ClassInfo):
+                    _set(found.members, attribute, Value(value, None, target.lineno), sure)
+            case ast.Attribute(value=ast.Attribute(value=ast.Name(id=name), attr=member), attr=attribute):
+                # Tester.weigh.__action__ = ActionMetadata() after the class
+                found = scope.get(name)
+                if isinstance(found, ClassInfo):
+                    found.marks[member, attribute] = value
+            case _:
+                pass
+
+    def _bind_import(self, statement: ast.Import | ast.ImportFrom, scope: dict[str, Binding], sure: bool) -> None:
+        line = statement.lineno
+        if isinstance(statement, ast.Import):
+            for alias in statement.names:
+                found = Import(alias.name, None, line, False, not sure)
+                self.imports.append(found)
+                if alias.asname is None:
+                    top = alias.name.partition(".")[0]
+                    _set(scope, top, Import(top, None, line, False, not sure), sure)
+                else:
+                    _set(scope, alias.asname, found, sure)
+            return
+        module = self._absolute(statement)
+        for alias in statement.names:
+            found = Import(module, alias.name, line, statement.level > 0, not sure)
+            self.imports.append(found)
+            if alias.name == "*":
+                self.stars.append(found)
+            else:
+                _set(scope, alias.asname or alias.name, found, sure)
+
+    def _absolute(self, statement: ast.ImportFrom) -> str:
+        """Give the full name of the module that a `from` statement names."""
+        if statement.level == 0:
+            return statement.module or ""
+        parts = self.dotted.split(".")
+        up = statement.level - (1 if self.file.is_package else 0)
+        if up >= len(parts):
+            raise self.problem("this relative import leads out of the package", statement.lineno)
+        return ".".join([*parts[: len(parts) - up], *([statement.module] if statement.module else [])])
+
+
+def _statements(body: Sequence[ast.stmt], sure: bool = True) -> Iterator[tuple[ast.stmt, bool]]:
+    """Give the statements that run when the module is imported, each with whether it certainly does.
+
+    Of alternatives the first one counts: what `try` binds, not what its handlers put in its place.
+    """
+    for statement in body:
+        match statement:
+            case ast.If(body=then, orelse=other):
+                yield from _statements(then, False)
+                yield from _statements(other, False)
+            case ast.Try(body=then, handlers=handlers, orelse=other, finalbody=final):
+                yield from _statements(then, sure and not handlers)
+                for handler in handlers:
+                    yield from _statements(handler.body, False)
+                yield from _statements(other, False)
+                yield from _statements(final, sure)
+            case ast.With(body=then):
+                yield from _statements(then, sure)
+            case _:
+                yield statement, sure
+
+
+def _set(scope: dict[str, Binding], name: str, binding: Binding, sure: bool) -> None:
+    if sure or name not in scope:
+        scope[name] = binding
+
+
+def _extends_property(node: FunctionNode) -> bool:
+    """Tell whether this is the setter of a property that stands above it."""
+    return any(
+        isinstance(decorator, ast.Attribute) and decorator.attr in {"setter", "getter", "deleter"}
+        for decorator in node.decorator_list
+    )

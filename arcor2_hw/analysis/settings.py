@@ -1,0 +1,133 @@
+"""The settings of an object type: the dataclass that its constructor asks for."""
+
+import ast
+from typing import Final
+
+from arcor2_hw.actions.json_values import encode
+from arcor2_hw.actions.parameter_types import Extra
+from arcor2_hw.analysis.actions import ActionReader, described_parameters
+from arcor2_hw.analysis.constants import enum_members
+from arcor2_hw.analysis.hierarchy import Hierarchy
+from arcor2_hw.analysis.hints import meaning, parameter_type_of, plain, without_none
+from arcor2_hw.analysis.module import ClassInfo, Value
+from arcor2_hw.analysis.source import Broken
+from arcor2_hw.analysis.symbols import External, framework_name, is_framework
+from arcor2_hw.data.base import UNSET, Unset
+from arcor2_hw.data.object_type import ParameterMeta
+from arcor2_hw.exceptions import InvalidData
+
+_KINDS: Final = frozenset({"boolean", "integer", "double", "string", "string_enum", "integer_enum"})
+
+
+class SettingsReader:
+    """Reads the settings of object types."""
+
+    def __init__(self, hierarchy: Hierarchy, actions: ActionReader) -> None:
+        self._hierarchy = hierarchy
+        self._resolver = hierarchy.resolver
+        self._actions = actions
+
+    def settings(self, info: ClassInfo) -> list[ParameterMeta]:
+        """Give the settings in the order of the constructor. Raises Broken when they cannot be told."""
+        found = self._class(info)
+        return [] if found is None else self._fields(found)
+
+    def _class(self, info: ClassInfo) -> ClassInfo | None:
+        """Give the dataclass that `settings` of `__init__` is annotated with; None when the type has no settings."""
+        constructor = self._hierarchy.method(info, "__init__")
+        if constructor is None or is_framework(constructor[0]):
+            return None
+        owner, node = constructor
+        for argument in [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]:
+            if argument.arg != "settings":
+                continue
+            if argument.annotation is None:
+                raise owner.problem(f"{owner.name}: settings is not annotated", argument)
+            hint, _ = without_none(argument.annotation, owner.module, self._resolver)
+            symbol = meaning(hint, owner.module, owner, self._resolver)
+            if not isinstance(symbol, ClassInfo) or not self._hierarchy.derives_from(symbol, "Settings"):
+                raise owner.problem(f"{owner.name}: settings is no dataclass derived from Settings", argument)
+            return symbol
+        return None
+
+    def _fields(self, info: ClassInfo) -> list[ParameterMeta]:
+        """Give the fields as dataclasses do: those of ancestors first, a repeated one at its first place."""
+        ordinary: dict[str, ParameterMeta] = {}
+        keyword_only: set[str] = set()
+        for each in reversed(list(self._hierarchy.ancestors(info))):
+            decorator = self._decorator(each)
+            if decorator is None or framework_name(each) is not None:
+                continue
+            after = _keyword(decorator, "kw_only")
+            descriptions = described_parameters(ast.get_docstring(each.node))
+            for name, member in each.members.items():
+                if not isinstance(member, Value) or member.annotation is None:
+                    continue
+                hint = plain(member.annotation, each.module)
+                symbol = self._resolver.expression(
+                    hint.value if isinstance(hint, ast.Subscript) else hint, each.module, each
+                )
+                if symbol == External("typing.ClassVar"):
+                    continue
+                if symbol == External("dataclasses.KW_ONLY"):
+                    after = True
+                    continue
+                expression, in_constructor, kw_only = self._field(member, each)
+                if not in_constructor:
+                    continue
+                ordinary[name] = self._setting(each, name, member.annotation, expression, descriptions.get(name, UNSET))
+                keyword_only.discard(name)
+                if after or kw_only:
+                    keyword_only.add(name)
+        return [
+            *(meta for name, meta in ordinary.items() if name not in keyword_only),
+            *(meta for name, meta in ordinary.items() if name in keyword_only),
+        ]
+
+    def _decorator(self, info: ClassInfo) -> ast.expr | None:
+        for decorator in info.node.decorator_list:
+            function = decorator.func if isinstance(decorator, ast.Call) else decorator
+            if self._resolver.expression(function, info.module) == External("dataclasses.dataclass"):
+                return decorator
+        return None
+
+    def _field(self, member: Value, info: ClassInfo) -> tuple[ast.expr | None, bool, bool]:
+        """Give default, whether the constructor takes the field, whether by keyword only."""
+        expression = member.expression
+        if isinstance(expression, ast.Call) and self._resolver.expression(
+            expression.func, info.module, info
+        ) == External("dataclasses.field"):
+            given = {keyword.arg: keyword.value for keyword in expression.keywords}
+            if "default_factory" in given:
+                raise info.problem("the default of a setting has to stand in the source", expression)
+            in_constructor = not _is(given.get("init"), False)
+            return given.get("default"), in_constructor, _is(given.get("kw_only"), True)
+        return expression, True, False
+
+    def _setting(
+        self, info: ClassInfo, name: str, hint: ast.expr, expression: ast.expr | None, description: str | Unset
+    ) -> ParameterMeta:
+        try:
+            kind, enumeration = parameter_type_of(hint, info.module, info, self._resolver)
+            if kind.name not in _KINDS:
+                raise info.problem(f"a setting cannot be of type {kind.name}", hint)
+            extra: str | Unset = UNSET
+            if enumeration is not None:
+                members = enum_members(enumeration, self._resolver) or {}
+                extra = encode(Extra(allowed_values=list(dict.fromkeys(members.values()))))
+            default = self._actions.default(info, kind, enumeration, expression)
+        except Broken as error:
+            raise Broken(f"setting {name}: {error}", error.problem.path, error.problem.line) from None
+        except InvalidData as error:
+            raise info.problem(f"setting {name}: {error}", hint) from None
+        return ParameterMeta(name, kind.name, description=description, default_value=default, extra=extra)
+
+
+def _is(expression: ast.expr | None, value: bool) -> bool:
+    return isinstance(expression, ast.Constant) and expression.value is value
+
+
+def _keyword(decorator: ast.expr, name: str) -> bool:
+    return isinstance(decorator, ast.Call) and any(
+        keyword.arg == name and _is(keyword.value, True) for keyword in decorator.keywords
+    )

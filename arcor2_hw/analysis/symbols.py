@@ -1,0 +1,196 @@
+"""From a name in one module to what it means, through the imports of any number of files."""
+
+import ast
+import builtins
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, TypeAlias
+
+from arcor2_hw.analysis.module import ClassInfo, FunctionNode, Import, Module, Value
+
+
+@dataclass(frozen=True, slots=True)
+class External:
+    """Something in a module that is not read: `builtins.int`, `numpy.ndarray`, `arcor2_hw.data.geometry.Pose`."""
+
+    dotted: str
+
+
+@dataclass(frozen=True, slots=True)
+class ModuleSymbol:
+    """A module that can be read."""
+
+    module: Module
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """A name bound to an expression, with the module and class in which its own names are looked up."""
+
+    value: Value
+    module: Module
+    owner: ClassInfo | None
+
+
+@dataclass(frozen=True, slots=True)
+class Function:
+    """A function or method."""
+
+    node: FunctionNode
+    module: Module
+
+
+Symbol: TypeAlias = ClassInfo | ModuleSymbol | Constant | Function | External
+Load: TypeAlias = Callable[[str], Module | None]
+
+_BASES: Final = "arcor2_hw.objects"
+_COMMON: Final = {
+    **dict.fromkeys(("IntEnum", "StrEnum"), "arcor2_hw.actions"),
+    **dict.fromkeys(("Orientation", "Pose", "Position"), "arcor2_hw.data.geometry"),
+    "ActionMetadata": "arcor2_hw.data.object_type",
+    "ActionPoint": "arcor2_hw.data.project",
+    "Joint": "arcor2_hw.data.robot",
+    "ProjectRobotJoints": "arcor2_hw.data.project",
+}
+_OLDER_MODULES: Final = {
+    "arcor2_object_types.abstract": _BASES,
+    "arcor2.exceptions": "arcor2_hw.exceptions",
+    "arcor2.data.robot": "arcor2_hw.data.robot",
+    "arcor2.data.object_type": "arcor2_hw.data.object_type",
+    "arcor2.data.camera": "arcor2_hw.data.camera",
+}
+_OLDER_NAMES: Final = {"Arcor2Exception": "Arcor2Error"}
+
+FRAMEWORK: Final = frozenset({"arcor2_hw", "arcor2", "arcor2_object_types"})
+"""Top-level packages whose names are ours."""
+
+_DEPTH: Final = 40
+"""So many steps from import to import are followed; more are a circle."""
+
+
+def our_spelling(module: str, name: str) -> tuple[str, str]:
+    """Give module and name as we spell them for what older object types import (protocol, 9.6)."""
+    if module == "arcor2.data.common" and name in _COMMON:
+        return _COMMON[name], name
+    return _OLDER_MODULES.get(module, module), (
+        _OLDER_NAMES.get(name, name) if module.startswith(("arcor2.", "arcor2_object_types")) else name
+    )
+
+
+def dotted_name(expression: ast.expr) -> list[str] | None:
+    """Give the parts of `a.b.c`, None for any other expression."""
+    parts: list[str] = []
+    while isinstance(expression, ast.Attribute):
+        parts.append(expression.attr)
+        expression = expression.value
+    if not isinstance(expression, ast.Name):
+        return None
+    parts.append(expression.id)
+    parts.reverse()
+    return parts
+
+
+class Resolver:
+    """Finds what names mean; `load` gives a module by its dotted name, None when it is not to be read."""
+
+    def __init__(self, load: Load) -> None:
+        self._load = load
+
+    def expression(self, expression: ast.expr, module: Module, owner: ClassInfo | None = None) -> Symbol | None:
+        """Give what a dotted name means; None when it is bound nowhere, or is no dotted name."""
+        parts = dotted_name(expression)
+        return None if parts is None else self.parts(parts, module, owner)
+
+    def parts(
+        self, parts: list[str], module: Module, owner: ClassInfo | None = None, depth: int = _DEPTH
+    ) -> Symbol | None:
+        """Give what the dotted name made of `parts` means, seen from `module`, or from the body of `owner`."""
+        if depth <= 0:
+            return None
+        found: Symbol | None = None
+        if owner is not None and parts[0] in owner.members:
+            found = self._bound(owner.members[parts[0]], owner.module, owner, depth - 1)
+        if found is None:
+            found = self.name(parts[0], module, depth - 1)
+        for part in parts[1:]:
+            found = self._attribute(found, part, depth - 1)
+        return found
+
+    def name(self, name: str, module: Module, depth: int = _DEPTH) -> Symbol | None:
+        """Give what a name means at the top level of a module."""
+        if depth <= 0:
+            return None
+        if name in module.bindings:
+            return self._bound(module.bindings[name], module, None, depth - 1)
+        for star in module.stars:
+            source = self._load(star.module)
+            if source is not None and (found := self.name(name, source, depth - 1)) is not None:
+                return found if not (isinstance(found, External) and found.dotted.startswith("builtins.")) else None
+        return External(f"builtins.{name}") if hasattr(builtins, name) else None
+
+    def _bound(
+        self, binding: "ClassInfo | FunctionNode | Import | Value", module: Module, owner: ClassInfo | None, depth: int
+    ) -> Symbol | None:
+        match binding:
+            case ClassInfo():
+                return binding
+            case Import():
+                return self._imported(binding, depth)
+            case Value(expression=expression):
+                # A name for a name: `Joints = ProjectRobotJoints`.
+                parts = dotted_name(expression) if expression is not None else None
+                if parts is not None and depth > 0:
+                    aliased = self.parts(parts, module, owner, depth - 1)
+                    if isinstance(aliased, ClassInfo | External | ModuleSymbol):
+                        return aliased
+                return Constant(binding, module, owner)
+            case _:
+                return Function(binding, module)
+
+    def _imported(self, found: Import, depth: int) -> Symbol | None:
+        if found.name is None:
+            module = self._load(found.module)
+            return ModuleSymbol(module) if module is not None else External(found.module)
+        return self._member(found.module, found.name, depth)
+
+    def _member(self, dotted: str, name: str, depth: int) -> Symbol | None:
+        dotted, name = our_spelling(dotted, name)
+        if (source := self._load(dotted)) is not None:
+            if name in source.bindings or source.stars:
+                return self.name(name, source, depth - 1)
+            submodule = self._load(f"{dotted}.{name}")
+            return ModuleSymbol(submodule) if submodule is not None else None
+        submodule = self._load(f"{dotted}.{name}")
+        return ModuleSymbol(submodule) if submodule is not None else External(f"{dotted}.{name}")
+
+    def _attribute(self, symbol: Symbol | None, name: str, depth: int) -> Symbol | None:
+        match symbol:
+            case ModuleSymbol(module=module):
+                if name in module.bindings:
+                    return self.name(name, module, depth)
+                submodule = self._load(f"{module.dotted}.{name}")
+                return ModuleSymbol(submodule) if submodule is not None else None
+            case External(dotted=dotted):
+                return self._member(dotted, name, depth)
+            case ClassInfo():
+                if name in symbol.members:
+                    return self._bound(symbol.members[name], symbol.module, symbol, depth)
+                return None
+            case _:
+                return None
+
+
+def framework_name(symbol: Symbol | None) -> str | None:
+    """Give the last name of something of ours, None for anything else."""
+    if isinstance(symbol, External):
+        top, _, rest = symbol.dotted.partition(".")
+        return rest.rpartition(".")[2] if top in FRAMEWORK and rest else None
+    if isinstance(symbol, ClassInfo) and is_framework(symbol):
+        return symbol.name
+    return None
+
+
+def is_framework(info: ClassInfo) -> bool:
+    """Tell whether this is one of our abstract bases (stock types are ordinary types)."""
+    dotted = info.module.dotted
+    return dotted.startswith(_BASES) and not dotted.startswith(f"{_BASES}.stock")
