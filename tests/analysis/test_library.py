@@ -1,0 +1,800 @@
+"""What the analysis tells of object types, over files, spellings and everything that may be wrong."""
+
+import json
+import re
+import textwrap
+import time
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from arcor2_hw.analysis import BUILT_IN, Library, SourceFile, TypeAnalysis, module_name
+from arcor2_hw.data.object_type import ObjectAction
+from arcor2_hw.exceptions import InvalidData, NotFound
+
+NEW = """
+    from arcor2_hw.actions import IntEnum, StrEnum, action
+    from arcor2_hw.data.geometry import Pose, Position
+    from arcor2_hw.data.project import ProjectRobotJoints
+    from arcor2_hw.objects import Camera, CollisionObject, Generic, GenericWithPose, MultiArmRobot, Robot, Settings
+"""
+
+
+def library(**sources: str) -> Library:
+    return Library(
+        SourceFile(name, module_name(name), textwrap.dedent(NEW) + textwrap.dedent(source))
+        for name, source in sources.items()
+    )
+
+
+def analyse(source: str, name: str = "T", **others: str) -> TypeAnalysis:
+    return library(**{name: source}, **others).analyse(name)
+
+
+def the_action(body: str, head: str = "", attributes: str = "") -> ObjectAction:
+    """Give the one action of a type whose class has this body."""
+    source = f"{textwrap.dedent(head)}\nclass T(Generic):\n    _ABSTRACT = False\n"
+    source += textwrap.indent(textwrap.dedent(attributes) + "\n" + textwrap.dedent(body), "    ")
+    found = analyse(source)
+    assert found.problem is None, found.problem
+    (action,) = found.actions
+    return action
+
+
+def plain(value: object) -> object:
+    return msgspec.to_builtins(value)
+
+
+# ------------------------------------------------------------------------------------------------ names, built-in
+@pytest.mark.parametrize(
+    ("name", "module"),
+    [
+        ("AbstractDobot", "abstract_dobot"),
+        ("DobotM1", "dobot_m1"),
+        ("Box2", "box2"),
+        ("ERPSystem", "erp_system"),
+        ("URRobot5e", "ur_robot5e"),
+        ("My_Type", "my__type"),
+        ("M1", "M1"),
+        ("VGC10", "VGC10"),
+    ],
+)
+def test_module_names(name: str, module: str) -> None:
+    assert module_name(name) == module
+
+
+def without_texts(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: without_texts(each) for key, each in value.items() if key != "description"}
+    return [without_texts(each) for each in value] if isinstance(value, list) else value
+
+
+def test_the_built_in_types_are_those_of_the_protocol(spec: Path) -> None:
+    stated = json.loads((spec / "protocol.json").read_text())["built_in_object_types"]
+    empty = Library()
+    assert sorted(stated) == sorted(BUILT_IN) == sorted(empty.names())
+    for name, wanted in stated.items():
+        found = empty.analyse(name)
+        assert found.problem is None
+        assert found.meta.description
+        assert without_texts(json.loads(msgspec.json.encode(found.meta))) == wanted["meta"]
+        assert without_texts(json.loads(msgspec.json.encode(found.actions))) == wanted["actions"]
+
+
+# ------------------------------------------------------------------------------------------------ recorded sessions
+DOBOT = {
+    "AbstractDobot": '''
+        """Older spelling throughout."""
+        from dataclasses import dataclass
+        from typing import Optional
+
+        from arcor2.data.common import ActionMetadata, Joint, Pose, StrEnum
+        from arcor2.data.robot import RobotType
+        from arcor2.exceptions import Arcor2Exception
+        from arcor2_object_types.abstract import Robot, Settings
+
+        class DobotException(Arcor2Exception):
+            pass
+
+        @dataclass
+        class UrlSettings(Settings):
+            url: str
+
+        class MoveType(StrEnum):
+            LINEAR: str = "LINEAR"
+            JOINTS: str = "JOINTS"
+            JUMP: str = "JUMP"
+
+        class AbstractDobot(Robot):
+            """An arm."""
+            robot_type = RobotType.SCARA
+
+            def __init__(self, obj_id: str, name: str, pose: Pose, settings: Settings) -> None:
+                super().__init__(obj_id, name, pose, settings)
+
+            def get_end_effectors_ids(self) -> set[str]:
+                return {"default"}
+
+            def get_end_effector_pose(self, end_effector: str) -> Pose:
+                return Pose()
+
+            def robot_joints(self, include_gripper: bool = False) -> list[Joint]:
+                return []
+
+            def grippers(self) -> set[str]:
+                return set()
+
+            def suctions(self) -> set[str]:
+                return {"default"}
+
+            def move_to_pose(self, end_effector_id: str, target_pose: Pose, speed: float, safe: bool = True,
+                             linear: bool = True) -> None:
+                self.move(target_pose, MoveType.LINEAR)
+
+            def move_to_joints(self, target_joints: list[Joint], speed: float, safe: bool = True) -> None:
+                self.go(target_joints)
+
+            def home(self, *, an: Optional[str] = None) -> None:
+                """Home."""
+
+            def move(self, pose: Pose, move_type: MoveType = MoveType.JOINTS, velocity: float = 50.0,
+                     acceleration: float = 50.0, safe: bool = True, *, an: Optional[str] = None) -> None:
+                """Moves.
+
+                :param pose: Where to.
+                :param move_type: How.
+                :param velocity: Speed.
+                :param acceleration: Acceleration.
+                :param safe: Around things.
+                :return:
+                """
+                assert 0.0 <= velocity <= 100.0
+                assert 0.0 <= acceleration <= 100.0
+
+            def pick(self, pick_pose: Pose, velocity: float = 50.0, vertical_offset: float = 0.05,
+                     safe_approach: bool = True, safe_pick: bool = False, *, an: Optional[str] = None) -> None:
+                """Picks.
+
+                :param pick_pose: Where.
+                :param velocity: Speed.
+                :param vertical_offset: How far above.
+                :param safe_approach: Around things.
+                :param safe_pick: Around things.
+                """
+                assert 0.0 <= velocity <= 100.0
+
+            def place(self, place_pose: Pose, velocity: float = 50.0, vertical_offset: float = 0.05,
+                      safe_approach: bool = True, safe_place: bool = False, *, an: Optional[str] = None) -> None:
+                """Places.
+
+                :param place_pose: Where.
+                :param velocity: Speed.
+                :param vertical_offset: How far above.
+                :param safe_approach: Around things.
+                :param safe_place: Around things.
+                """
+                assert 0.0 <= velocity <= 100.0
+
+            def release(self, *, an: Optional[str] = None) -> None:
+                """Release."""
+
+            def suck(self, *, an: Optional[str] = None) -> None:
+                """Suck."""
+
+            home.__action__ = ActionMetadata()  # type: ignore
+            move.__action__ = ActionMetadata()  # type: ignore
+            suck.__action__ = ActionMetadata()  # type: ignore
+            release.__action__ = ActionMetadata()  # type: ignore
+            pick.__action__ = ActionMetadata(composite=True)  # type: ignore
+            place.__action__ = ActionMetadata(composite=True)  # type: ignore
+    ''',
+    "DobotM1": '''
+        from dataclasses import dataclass
+        from arcor2.data.common import Pose
+        from .abstract_dobot import AbstractDobot, UrlSettings as Base
+
+        @dataclass
+        class DobotSettings(Base):
+            url: str = "http://fit-demo-dobot-m1:5018"
+
+        class DobotM1(AbstractDobot):
+            """M1."""
+            _ABSTRACT = False
+            urdf_package_name = "dobot-m1.zip"
+
+            def __init__(self, obj_id: str, name: str, pose: Pose, settings: DobotSettings) -> None:
+                super().__init__(obj_id, name, pose, settings)
+
+            def get_hand_teaching_mode(self) -> bool:
+                return True
+
+            def set_hand_teaching_mode(self, enabled: bool) -> None:
+                self.put(enabled)
+    ''',
+    "DobotMagician": '''
+        from dataclasses import dataclass
+        from typing import List, Optional
+        from arcor2.data.common import Joint, Pose
+        from arcor2.exceptions import Arcor2NotImplemented
+        from .abstract_dobot import AbstractDobot, UrlSettings as Base
+
+        @dataclass
+        class DobotSettings(Base):
+            url: str = "http://fit-demo-dobot-magician:5018"
+
+        class DobotMagician(AbstractDobot):
+            """Magician."""
+            _ABSTRACT = False
+            urdf_package_name = "dobot-magician.zip"
+
+            def __init__(self, obj_id: str, name: str, pose: Pose, settings: DobotSettings) -> None:
+                super().__init__(obj_id, name, pose, settings)
+
+            def inverse_kinematics(self, end_effector_id: str, pose: Pose, start_joints: Optional[List[Joint]] = None,
+                                   avoid_collisions: bool = True) -> List[Joint]:
+                return []
+
+            def forward_kinematics(self, end_effector_id: str, joints: List[Joint]) -> Pose:
+                return Pose()
+
+            def set_hand_teaching_mode(self, enabled: bool) -> None:
+                """Not this one."""
+                raise Arcor2NotImplemented("No hand teaching.")
+    ''',
+}
+
+
+def recorded(spec: Path) -> dict[str, list]:
+    """Give the data of the answers in the first recorded session."""
+    answers = {}
+    for line in (spec / "traces" / "01_connect_register.jsonl").read_text().splitlines():
+        message = json.loads(line)["msg"]
+        if isinstance(message, dict) and message.get("response") in ("GetObjectTypes", "GetActions", "GetRobotMeta"):
+            answers[message["response"]] = message["data"]
+    assert len(answers) == 3
+    return answers
+
+
+def test_types_of_a_recorded_session_come_out_as_recorded(spec: Path) -> None:
+    answers = recorded(spec)
+    lib = Library(SourceFile(name, module_name(name), textwrap.dedent(source)) for name, source in DOBOT.items())
+    metas = {meta["type"]: meta for meta in answers["GetObjectTypes"]}
+    for name in DOBOT:
+        found = lib.analyse(name)
+        assert found.problem is None, found.problem
+        wanted = {key: value for key, value in metas[name].items() if key != "modified"}
+        assert without_texts(json.loads(msgspec.json.encode(found.meta))) == without_texts(wanted)
+    actions = json.loads(msgspec.json.encode(lib.analyse("DobotMagician").actions))
+    assert without_texts(actions) == without_texts(answers["GetActions"])
+    # Every text that the recording has is there, and no other.
+    for ours, theirs in zip(actions, answers["GetActions"], strict=True):
+        assert ("description" in ours) == ("description" in theirs)
+        for a, b in zip(ours["parameters"], theirs["parameters"], strict=True):
+            assert ("description" in a) == ("description" in b)
+    robots = [json.loads(msgspec.json.encode(lib.analyse(name).robot)) for name in ("DobotM1", "DobotMagician")]
+    assert robots == answers["GetRobotMeta"]
+    assert lib.analyse("AbstractDobot").robot is None
+    assert lib.analyse("DobotM1").bases == ("AbstractDobot", "Robot", "GenericWithPose", "Generic")
+    assert [file.name for file in lib.analyse("DobotM1").modules] == ["AbstractDobot"]
+    assert lib.analyse("DobotM1").implemented >= {"move_to_pose", "set_hand_teaching_mode", "get_hand_teaching_mode"}
+    assert "set_hand_teaching_mode" not in lib.analyse("DobotMagician").implemented
+
+
+def test_a_generated_type() -> None:
+    found = Library(
+        [
+            SourceFile(
+                "MyBox",
+                "my_box",
+                "from arcor2_object_types.abstract import CollisionObject\n\n\n"
+                "class MyBox(CollisionObject):\n    _ABSTRACT = False\n",
+            )
+        ]
+    ).analyse("MyBox")
+    assert found.problem is None
+    assert (found.meta.base, found.meta.has_pose, found.meta.abstract) == ("CollisionObject", True, False)
+    assert [(a.name, a.origins) for a in found.actions] == [
+        ("set_enabled", "CollisionObject"),
+        ("update_pose", "GenericWithPose"),
+    ]
+
+
+# ------------------------------------------------------------------------------------------------ actions
+def test_every_parameter_type_is_announced() -> None:
+    action = the_action(
+        """
+        @action
+        def every(self, a: bool, b: int, c: float, d: str, e: Colour, f: Level, g: Pose, h: Position,
+                  i: ProjectRobotJoints, j: Image.Image, *, an: str | None = None) -> tuple[bool, Image.Image]:
+            return True, j
+        """,
+        head="""
+        from PIL import Image
+
+        class Colour(StrEnum):
+            RED = "red"
+            BLUE = "blue"
+
+        class Level(IntEnum):
+            LOW = -1
+            HIGH = 7
+        """,
+    )
+    assert [parameter.type for parameter in action.parameters] == [
+        "boolean", "integer", "double", "string", "string_enum", "integer_enum", "pose", "position", "joints", "image",
+    ]  # fmt: skip
+    assert action.parameters[4].extra == '{"allowed_values":["red","blue"]}'
+    assert action.parameters[5].extra == '{"allowed_values":[-1,7]}'
+    assert action.returns == ["boolean", "image"]
+    assert not action.disabled
+
+
+def test_enumerations_of_other_files_and_of_the_class_itself() -> None:
+    found = analyse(
+        """
+        from . import modes
+        from .modes import Mode as Renamed
+
+        class T(Generic):
+            class Inner(IntEnum):
+                ONE = 1
+                TWO = ONE + 1
+
+            @action
+            def act(self, a: Renamed = Renamed.FAST, b: modes.Mode = modes.DEFAULT, c: Inner = Inner.TWO,
+                    d: "Renamed" = Renamed.SLOW, *, an: None | str = None) -> Inner:
+                return c
+        """,
+        Modes='class Mode(StrEnum):\n    FAST = "f"\n    SLOW = "s"\nDEFAULT = Mode.SLOW\nclass Modes:\n    pass\n',
+    )
+    (action,) = found.actions
+    assert action.problem is msgspec.UNSET
+    assert [p.default_value for p in action.parameters] == ['"f"', '"s"', "2", '"s"']
+    assert action.parameters[2].extra == '{"allowed_values":[1,2]}'
+    assert action.returns == ["integer_enum"]
+    assert [file.name for file in found.modules] == ["Modes"]
+
+
+def test_defaults_that_are_no_literals_are_followed() -> None:
+    action = the_action(
+        """
+        @action
+        def act(self, a: float = SPEED, b: float = math.pi / 2, c: int = -COUNT, d: float = 3, e: float = LIMIT, *,
+                f: str = "x", an: str | None = None) -> None:
+            pass
+        """,
+        head="import math\nfrom typing import Final\nSPEED: Final = 0.25\nCOUNT = 3\n",
+        attributes="LIMIT = SPEED * 2\n",
+    )
+    assert [p.default_value for p in action.parameters] == ["0.25", "1.5707963267948966", "-3", "3.0", "0.5", '"x"']
+
+
+@pytest.mark.parametrize(
+    ("statement", "extra"),
+    [
+        ("assert 0.0 <= p <= 1.0", '{"minimum":0.0,"maximum":1.0}'),
+        ("assert 0.0 <= p <= 1.0, 'message'", '{"minimum":0.0,"maximum":1.0}'),
+        ("assert 0.0 < p <= 1.0", None),
+        ("assert -1.0 <= p <= 1.0", None),
+        ("assert 0.0 <= q <= 1.0", None),
+        ("assert p <= 1.0", None),
+        ("if q:\n        assert 0.0 <= p <= 1.0", None),
+    ],
+)
+def test_ranges(statement: str, extra: str | None) -> None:
+    action = the_action(
+        f"@action\ndef act(self, p: float, *, an: str | None = None) -> None:\n    q = p\n    {statement}\n"
+    )
+    assert action.parameters[0].extra == (msgspec.UNSET if extra is None else extra)
+
+
+def test_dynamic_values_and_cancelling() -> None:
+    for attributes in (
+        'DYNAMIC_PARAMS = {"item": ("items", {"store"})}\nCANCEL_MAPPING = {"act": "cancel"}',
+        "def items(self, store: str) -> set[str]: ...\ndef cancel(self): ...\n"
+        'DYNAMIC_PARAMS = {"item": DynamicParamTuple(items.__name__, {"store"})}\n'
+        'CANCEL_MAPPING: CancelDict = {"act": cancel.__name__}',
+    ):
+        action = the_action(
+            "@action\ndef act(self, store: str, item: str, *, an: str | None = None) -> None: ...",
+            attributes=attributes,
+        )
+        assert action.meta.cancellable
+        assert [(p.dynamic_value, p.dynamic_value_parents) for p in action.parameters] == [
+            (False, msgspec.UNSET),
+            (True, {"store"}),
+        ]
+    after = analyse("""
+        class T(Generic):
+            @action
+            def act(self, *, an: str | None = None) -> None: ...
+            def halt(self): ...
+        T.CANCEL_MAPPING = {T.act.__name__: T.halt.__name__}
+    """)
+    assert after.actions[0].meta.cancellable
+
+
+AN = "*, an: str | None = None"
+
+
+@pytest.mark.parametrize(
+    ("method", "problem"),
+    [
+        (f"def act(self, a: dict, {AN}) -> None: ...", "act: parameter a: the type dict is not supported"),
+        (f"def act(self, a, {AN}) -> None: ...", "act: parameter a is not annotated"),
+        (f"def act(self, a: Nope, {AN}) -> None: ...", "act: parameter a: the name Nope is not defined"),
+        (f"def act(self, a: 'int[', {AN}) -> None: ...", "is no type hint"),
+        (f"def act(self, {AN}): ...", "the return annotation is missing"),
+        (f"def act(self, {AN}) -> list[int]: ...", "act: result: the type list\\[int\\] is not supported"),
+        ("def act(self, *, an: str = '') -> None: ...", "`an` is annotated"),
+        ("def act(self, *, an=None) -> None: ...", "`an` is annotated"),
+        ("def act(self, a: int) -> None: ...", "the last parameter of an action is `an"),
+        ("def act(self, an: str | None, a: int) -> None: ...", "the last parameter of an action is `an"),
+        ("def act(self, *a: int, an: str | None = None) -> None: ...", "names its parameters"),
+        (f"async def act(self, {AN}) -> None: ...", "synchronous"),
+        (f"def act(self, a: float, {AN}) -> None:\n    assert 0 <= a <= 1", "has to be of type double too"),
+        (f"def act(self, a: int = 'x', {AN}) -> None: ...", "parameter a: default: 'x' is not an integer"),
+        (f"def act(self, a: bool = 1, {AN}) -> None: ...", "parameter a: default: 1 is not true or false"),
+        (f"def act(self, a: float = None, {AN}) -> None: ...", "parameter a: default: None is not a number"),
+        (f"def act(self, a: float = compute(), {AN}) -> None: ...", r"compute\(\) cannot be told from the source"),
+        (f"def act(self, a: E = 'c', {AN}) -> None: ...", "the default is no member of E"),
+        (f"def act(self, a: Empty, {AN}) -> None: ...", "the enumeration Empty has no members"),
+        (f"def act(self, a: Odd, {AN}) -> None: ...", "Odd.A is no StrEnum member: 1"),
+        (f"def act(self, a: enum.Enum, {AN}) -> None: ...", "the type enum.Enum is not supported"),
+        (f"@staticmethod\ndef act(self, {AN}) -> None: ...", "an ordinary method"),
+    ],
+)
+def test_what_disables_an_action_and_nothing_but_the_action(method: str, problem: str) -> None:
+    head = "import enum\nclass E(StrEnum):\n    A = 'a'\nclass Empty(StrEnum): ...\nclass Odd(StrEnum):\n    A = 1\n"
+    source = f"{head}\nclass T(Generic):\n    _ABSTRACT = False\n" + textwrap.indent(f"@action\n{method}\n", "    ")
+    found = analyse(source + f"    @action\n    def fine(self, {AN}) -> None: ...\n")
+    assert found.problem is None
+    assert not found.meta.disabled
+    act, fine = found.actions
+    assert (act.disabled, fine.disabled) == (True, False)
+    assert isinstance(act.problem, str)
+    assert re.search(problem, act.problem), act.problem
+    assert act.problem.startswith("object_types/T.py:")
+    line = int(act.problem.split(":")[1])
+    assert line >= (9 if "Empty" in method or "Odd" in method else 13)  # where the fault is
+
+
+def test_inheritance_of_actions() -> None:
+    lib = library(
+        Base="""
+        class Base(GenericWithPose):
+            @action
+            def kept(self, *, an: str | None = None) -> None: ...
+            @action
+            def replaced(self, *, an: str | None = None) -> None: ...
+            @action
+            def dropped(self, *, an: str | None = None) -> None: ...
+            @action(hidden=True)
+            def hidden(self, *, an: str | None = None) -> None: ...
+        """,
+        Mixin="""
+        class Mixin:
+            @action(composite=True)
+            def mixed(self, *, an: str | None = None) -> bool:
+                return True
+        """,
+        Derived="""
+        from .base import Base
+        from .mixin import Mixin
+
+        class Derived(Mixin, Base):
+            @action
+            def replaced(self, *, an: str | None = None) -> None: ...
+            def dropped(self, *, an: str | None = None) -> None: ...
+            @action
+            def own(self, *, an: str | None = None) -> None: ...
+        """,
+        Last="from .derived import Derived\nclass Last(Derived):\n    pass\n",
+    )
+    derived = lib.analyse("Derived")
+    assert [(a.name, a.origins) for a in derived.actions] == [
+        ("mixed", msgspec.UNSET),
+        ("own", msgspec.UNSET),
+        ("replaced", "Base"),
+        ("kept", "Base"),
+        ("update_pose", "GenericWithPose"),
+    ]
+    assert derived.actions[0].meta.composite
+    assert derived.mixins == ("Mixin",)
+    assert [file.name for file in derived.modules] == ["Base", "Mixin"]
+    last = lib.analyse("Last")
+    assert [(a.name, a.origins) for a in last.actions] == [
+        ("mixed", "Derived"),
+        ("own", "Derived"),
+        ("replaced", "Derived"),
+        ("kept", "Base"),
+        ("update_pose", "GenericWithPose"),
+    ]
+    assert [file.name for file in last.modules] == ["Base", "Mixin", "Derived"]
+    mixin = lib.analyse("Mixin")
+    assert not mixin.is_object_type
+    assert mixin.problem is None
+
+
+def test_offers_of_our_bases_become_actions_when_they_are_implemented() -> None:
+    found = analyse("""
+        from PIL import Image
+        class T(Camera):
+            _ABSTRACT = False
+            @action
+            def color_image(self, *, an: str | None = None) -> Image.Image:
+                return self.grab()
+    """)
+    assert (found.actions[0].name, found.actions[0].origins) == ("color_image", msgspec.UNSET)
+    assert "depth_image" not in [a.name for a in found.actions]
+    assert not found.meta.abstract
+    missing = analyse("class T(Camera):\n    _ABSTRACT = False\n")
+    assert missing.meta.abstract  # color_image is missing
+
+
+# ------------------------------------------------------------------------------------------------ types
+def test_abstract_types() -> None:
+    lib = library(
+        A="class A(Generic):\n    pass\n",
+        B="from .A import A\nclass B(A):\n    _ABSTRACT = False\n",
+        C="from .B import B\nclass C(B):\n    pass\n",
+        D=(
+            "import abc\nfrom .B import B\nclass D(B):\n"
+            "    @property\n    @abc.abstractmethod\n    def x(self): ...\n    @x.setter\n    def x(self, v): ...\n"
+        ),
+        E="from .D import D\nclass E(D):\n    x = 1\n",
+    )
+    assert {name: lib.analyse(name).meta.abstract for name in "ABCDE"} == {
+        "A": True, "B": False, "C": False, "D": True, "E": False,
+    }  # fmt: skip
+
+
+def test_settings_as_dataclasses_order_them() -> None:
+    lib = library(
+        Base="""
+        from dataclasses import KW_ONLY, dataclass, field
+        from typing import ClassVar
+        class Kind(IntEnum):
+            A = 1
+            B = 2
+        @dataclass
+        class BaseSettings(Settings):
+            '''Ours.
+
+            :param host: where it is
+            '''
+            host: str
+            KINDS: ClassVar[int] = 3
+            later: bool = field(default=True, kw_only=True)
+            never: int = field(default=1, init=False)
+            port: int = 502
+        class Base(Generic):
+            def __init__(self, obj_id: str, name: str, settings: BaseSettings) -> None: ...
+        """,
+        Derived="""
+        import dataclasses
+        from .base import Base, BaseSettings, Kind
+        @dataclasses.dataclass(frozen=True)
+        class Mine(BaseSettings):
+            kind: Kind = Kind.B
+            port: int = 503
+            slow: float = 1
+        class Derived(Base):
+            def __init__(self, obj_id: str, name: str, settings: "None | Mine" = None) -> None: ...
+        """,
+        Heir="from .derived import Derived\nclass Heir(Derived):\n    pass\n",
+    )
+    shown = [(s.name, s.type, s.default_value) for s in lib.analyse("Base").meta.settings]
+    assert shown == [("host", "string", msgspec.UNSET), ("port", "integer", "502"), ("later", "boolean", "true")]
+    assert lib.analyse("Base").meta.settings[0].description == "where it is"
+    derived = lib.analyse("Derived").meta.settings
+    assert [(s.name, s.default_value) for s in derived] == [
+        ("host", msgspec.UNSET), ("port", "503"), ("kind", "2"), ("slow", "1.0"), ("later", "true"),
+    ]  # fmt: skip
+    assert derived[2].extra == '{"allowed_values":[1,2]}'
+    assert lib.analyse("Heir").meta.settings == derived
+
+
+ROBOT = """
+from arcor2_hw.data.robot import Joint
+from arcor2_hw.exceptions import Arcor2NotImplemented
+class T(Robot):
+    _ABSTRACT = False
+    def get_end_effectors_ids(self): ...
+    def get_end_effector_pose(self, end_effector): ...
+    def robot_joints(self, include_gripper=False): ...
+    def grippers(self): ...
+    def suctions(self): ...
+    def stop(self) -> None:
+        {stop}
+    def move_to_joints(self, target_joints: list[Joint], speed: {speed}, safe: bool = {safe}) -> None:
+        self.go()
+"""
+
+
+@pytest.mark.parametrize(
+    ("stop", "speed", "safe", "features"),
+    [
+        ("self.halt()", "float", "True", {"stop", "move_to_joints"}),
+        ("raise Arcor2NotImplemented", "float", "True", {"move_to_joints"}),
+        ("raise Arcor2NotImplemented('no')", "float", "True", {"move_to_joints"}),
+        ("raise ValueError", "int", "True", {"stop"}),
+        ("pass", "'float'", "False", {"stop"}),
+    ],
+)
+def test_features_of_robots(stop: str, speed: str, safe: str, features: set[str]) -> None:
+    found = analyse(ROBOT.format(stop=stop, speed=speed, safe=safe))
+    assert found.problem is None
+    assert found.robot is not None
+    assert {name for name, has in plain(found.robot.features).items() if has} == features
+    assert not found.robot.multi_arm
+
+
+def test_a_robot_with_several_arms() -> None:
+    found = analyse("""
+        from arcor2_hw.data.robot import RobotType
+        class T(MultiArmRobot):
+            _ABSTRACT = False
+            robot_type = RobotType("cartesian").value if False else RobotType.CARTESIAN
+            def get_arm_ids(self): ...
+            def get_end_effectors_ids(self, arm_id=None): ...
+            def get_end_effector_pose(self, end_effector, arm_id=None): ...
+            def robot_joints(self, include_gripper=False, arm_id=None): ...
+            def grippers(self, arm_id=None): ...
+            def suctions(self, arm_id=None): ...
+            def stop(self, arm_id: str | None = None) -> None:
+                self.halt(arm_id)
+            def set_hand_teaching_mode(self, enabled: bool) -> None:
+                self.soft()
+    """)
+    assert found.problem is not None
+    assert "robot_type is no member of RobotType" in found.problem.text
+    good = analyse("""
+        class T(MultiArmRobot):
+            _ABSTRACT = False
+            def get_arm_ids(self): ...
+            def get_end_effectors_ids(self, arm_id=None): ...
+            def get_end_effector_pose(self, end_effector, arm_id=None): ...
+            def robot_joints(self, include_gripper=False, arm_id=None): ...
+            def grippers(self, arm_id=None): ...
+            def suctions(self, arm_id=None): ...
+            def stop(self, arm_id: str | None = None) -> None:
+                self.halt(arm_id)
+            def set_hand_teaching_mode(self, enabled: bool) -> None:
+                self.soft()
+    """)
+    assert good.robot is not None
+    assert good.robot.multi_arm
+    assert good.robot.features.stop
+    assert not good.robot.features.hand_teaching  # the arm is missing in its signature
+    assert good.implemented == {"stop", "set_hand_teaching_mode"}
+
+
+# ------------------------------------------------------------------------------------------------ problems
+@pytest.mark.parametrize(
+    ("source", "text", "line"),
+    [
+        ("class T(Generic:\n", "this is not Python", 6),
+        ("class Other(Generic): ...\n", "there is no class T here", 1),
+        ("\nclass T(Nothing): ...\n", "the base Nothing cannot be obtained", 7),
+        ("from vendor_sdk import Base\nclass T(Base): ...\n", "the base vendor_sdk.Base cannot be obtained", 7),
+        ("from .missing import Base\nclass T(Base): ...\n", "the module missing that it imports does not exist", 6),
+        ("from arcor2_hw.objects import Nope\nclass T(Nope): ...\n", "the base Nope cannot be obtained", 7),
+        ("from ..far import Base\nclass T(Base): ...\n", "leads out of the package", 6),
+        ("class T(T): ...\n", "its own ancestor", 6),
+        ("class A(Generic): ...\nclass T(Generic, A): ...\n", "contradict each other", 7),
+        ("class T(Generic):\n    _ABSTRACT = compute()\n", "cannot be told from the source", 7),
+        (
+            "class T(Generic):\n    def __init__(self, settings: int): ...\n",
+            "settings is no dataclass derived from Settings",
+            7,
+        ),
+        (
+            "from dataclasses import dataclass\n@dataclass\nclass S(Settings):\n    a: list\n"
+            "class T(Generic):\n    def __init__(self, settings: S): ...\n",
+            "setting a: the type list is not supported",
+            9,
+        ),
+    ],
+)
+def test_problems_are_named_with_file_and_line(source: str, text: str, line: int) -> None:
+    found = analyse(source)
+    assert found.problem is not None
+    assert text in found.problem.text
+    assert (found.problem.path, found.problem.line) == ("object_types/T.py", line)
+    assert found.meta.disabled
+    assert found.meta.problem == str(found.problem) == f"object_types/T.py:{line}: {found.problem.text}"
+
+
+def test_a_problem_in_another_file_names_that_file() -> None:
+    lib = library(
+        Broken="class Broken(Generic)\n",
+        T="from .broken import Broken\nclass T(Broken): ...\n",
+    )
+    assert str(lib.analyse("T").problem).startswith("object_types/broken.py:6: this is not Python")
+    lib.add(SourceFile("Broken", "broken", NEW.replace("    ", "") + "class Broken(Generic): ...\n"))
+    assert lib.analyse("T").problem is None
+    assert lib.analyse("T").meta.base == "Broken"
+    lib.remove("Broken")
+    assert "does not exist" in str(lib.analyse("T").problem)
+
+
+def test_bases_in_a_circle_over_files() -> None:
+    lib = library(
+        One="from .two import Two\nclass One(Two): ...\n",
+        Two="from .one import One\nclass Two(One): ...\n",
+    )
+    for name in ("One", "Two"):
+        assert "is its own ancestor" in str(lib.analyse(name).problem)
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        b"\xff\xfe\x00class",
+        b"# -*- coding: nonsense -*-\n",
+        "a\0b",
+        'x = "\ud800"',
+        "-" * 100000 + "1",
+        "x" + ".x" * 50000,
+        "(" * 1000,
+        "class T(Generic):\n    x = " + "1+" * 900 + "1",
+        "from .t import *\nclass T(x): ...",
+        "from .t import T as T\nclass U(T): ...",
+        "T = T\n",
+        "A = B\nB = A\nclass T(A): ...",
+        "import t\nclass T(t.t.t.t): ...",
+    ],
+)
+def test_hopeless_sources_are_told_and_do_no_harm(source: str | bytes) -> None:
+    found = Library([SourceFile("T", "t", source)]).analyse("T")
+    assert found.problem is not None
+    assert found.problem.line >= 1
+    msgspec.json.encode(found.meta)
+
+
+def test_a_file_in_another_encoding_is_read() -> None:
+    source = '# -*- coding: latin-1 -*-\nfrom arcor2_hw.objects import Generic\nclass T(Generic):\n    "Wägt."\n'
+    assert Library([SourceFile("T", "t", source.encode("latin-1"))]).analyse("T").meta.description == "Wägt."
+
+
+def test_guarded_imports_may_fail() -> None:
+    found = analyse("""
+        from typing import TYPE_CHECKING
+        if TYPE_CHECKING:
+            from .nowhere import X
+        try:
+            from .fast import speed
+        except ImportError:
+            speed = 1.0
+        class T(Generic):
+            _ABSTRACT = False
+    """)
+    assert found.problem is None
+
+
+def test_names_that_are_refused() -> None:
+    with pytest.raises(InvalidData, match="Robot is built in"):
+        Library([SourceFile("Robot", "robot", "")])
+    with pytest.raises(NotFound, match="Nobody"):
+        Library().analyse("Nobody")
+
+
+def test_twenty_types_are_analysed_within_a_tenth_of_a_second() -> None:
+    sources = [
+        SourceFile(f"{name}{n}", module_name(f"{name}{n}"), textwrap.dedent(source).replace(name, f"{name}{n}"))
+        for n in range(20)
+        for name, source in DOBOT.items()
+        if name == "AbstractDobot"
+    ]
+    best = min(_duration(sources) for _ in range(3))
+    assert best < 0.1, f"{best:.3f} s for {len(sources)} types"
+
+
+def _duration(sources: list[SourceFile]) -> float:
+    began = time.process_time()
+    lib = Library(sources)
+    for name in lib.names():
+        assert lib.analyse(name).problem is None
+    return time.process_time() - began
