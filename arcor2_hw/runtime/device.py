@@ -169,6 +169,13 @@ class Device:
         found = getattr(instance, "stop", None)
         return found if callable(found) and getattr(found, "__func__", None) is not Robot.stop else None
 
+    def cancelled_by(self, action: str) -> str:
+        """Name the method that cancels an action; InvalidData when nothing does."""
+        method = type(self.require()).CANCEL_MAPPING.get(action)
+        if method is None:
+            raise InvalidData(f"{self.name}.{action} cannot be cancelled")
+        return method
+
     def begin_stop(self, notify: Callable[[Job], None] | None = None) -> tuple[Job, Job | None] | None:
         """Send `stop` past everything else; gives the call and the call that it interrupts, None without `stop`."""
         stop = self.stop_method

@@ -237,11 +237,12 @@ class Host:
         try:
             device = self._cell[message.object_id]
             answer = self._answer(message.id, device)
-            if message.method == "stop":
+            method = device.cancelled_by(message.method) if message.cancel else message.method
+            if method == "stop":
                 self._stop_motion(m.StopMotion(message.id, message.object_id))
                 return
-            job, own = device.prepare(message.method, message.arguments, message.control, answer)
-            lane = device.stop_lane if message.urgent else device.lane_for(message.method)
+            job, own = device.prepare(method, message.arguments, message.control, answer)
+            lane = device.stop_lane if message.cancel else device.lane_for(method)
             lane.submit(job)
         except Exception as error:  # noqa: BLE001 - a call that cannot be made is an answer too
             told = error if device is None else describe(device, error)

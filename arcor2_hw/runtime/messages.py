@@ -69,8 +69,8 @@ class RunPackage(ToHost, frozen=True):
 class Call(ToHost, frozen=True):
     """Call a method on its device's executor. Answer: CallDone or CallFailed with this id.
 
-    control: take control first when it is not ours. urgent: on the stop lane, past what the device is doing (it is how
-    an action is cancelled). deadline: seconds; None: the method's own.
+    control: take control first when it is not ours. cancel: call what the object type says cancels `method`, past what
+    the device is doing. deadline: seconds; None: the method's own.
     """
 
     id: int
@@ -78,7 +78,7 @@ class Call(ToHost, frozen=True):
     method: str
     arguments: dict[str, bytes] = field(default_factory=dict)
     control: bool = False
-    urgent: bool = False
+    cancel: bool = False
     deadline: float | None = None
 
 

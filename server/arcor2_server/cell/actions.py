@@ -1,0 +1,91 @@
+"""One action executed by itself, online: its arguments worked out, its result told and kept."""
+
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+import structlog
+
+from arcor2_hw.actions.parameter_types import parameter_type, read_reference
+from arcor2_hw.data.base import Data
+from arcor2_hw.data.object_type import ObjectAction
+from arcor2_hw.data.project import Action, ActionParameter, ActionParameterType, parse_link
+from arcor2_hw.data.project_index import ProjectLookup
+from arcor2_hw.exceptions import Arcor2Error, InvalidData
+from arcor2_server.rpc.registry import RequestRefused
+
+if TYPE_CHECKING:
+    from arcor2_server.cell.online import OnlineCell
+
+log = structlog.get_logger(__name__)
+
+
+class RunningAction:
+    """The action that is being executed."""
+
+    def __init__(self, action_id: str, object_id: str, method: str) -> None:
+        self.action_id = action_id
+        self.object_id = object_id
+        self.method = method
+        self.cancelled = False
+
+
+class PreparedAction(Data, frozen=True):
+    """All that a call needs."""
+
+    action_id: str
+    object_id: str
+    method: str
+    arguments: dict[str, Any]
+    returns: int
+
+
+def argument(parameter: ActionParameter, lookup: ProjectLookup, results: dict[str, list[str]]) -> Any:
+    """Give what a parameter stands for at execution. RequestRefused for a link without a result, InvalidData."""
+    if parameter.type == ActionParameterType.LINK:
+        try:
+            action_id, _, index = parse_link(read_reference(parameter))
+        except ValueError as error:
+            raise InvalidData(f"parameter {parameter.name}: {error}") from error
+        kept = results.get(action_id)
+        if kept is None or index >= len(kept):
+            name = lookup.action(action_id)[1].name
+            raise RequestRefused(f"Parameter {parameter.name} needs a result of the action {name}: execute that first.")
+        return msgspec.Raw(kept[index].encode())
+    if parameter.type == ActionParameterType.PROJECT_PARAMETER:
+        return msgspec.Raw(lookup.parameter(read_reference(parameter)).value.encode())
+    return parameter_type(parameter.type).value(parameter, lookup)
+
+
+def prepare(action: Action, meta: ObjectAction, lookup: ProjectLookup, results: dict[str, list[str]]) -> PreparedAction:
+    """Work out the call of an action. RequestRefused, InvalidData, NotFound say what is missing."""
+    try:
+        object_id, method = action.parse_type()
+    except ValueError as error:
+        raise InvalidData(str(error)) from error
+    arguments = {parameter.name: argument(parameter, lookup, results) for parameter in action.parameters}
+    return PreparedAction(action.id, object_id, method, arguments, len(meta.returns))
+
+
+def split_results(raw: bytes, returns: int) -> list[str]:
+    """Give the results of a call as the protocol lists them."""
+    if not raw:
+        return []
+    if returns > 1:
+        return [bytes(part).decode() for part in msgspec.json.decode(raw, type=list[msgspec.Raw])]
+    return [raw.decode()]
+
+
+async def execute(cell: "OnlineCell", prepared: PreparedAction, running: RunningAction) -> None:
+    """Call the method and tell how it ended."""
+    results: list[str] | None = None
+    error: str | None = None
+    try:
+        raw = await cell.call(prepared.object_id, prepared.method, prepared.arguments, control=True)
+        results = split_results(raw, prepared.returns)
+    except Arcor2Error as caught:
+        error = str(caught)
+        log.info("action failed", action=prepared.action_id, reason=error, detail=caught.detail)
+    except msgspec.MsgspecError as caught:
+        error = f"The action gave something else than it declares: {caught}"
+    finally:
+        cell.action_ended(running, results, error)

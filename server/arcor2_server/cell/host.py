@@ -1,0 +1,331 @@
+"""One cell host as the server sees it: a process, a socket, what it says, and when it falls silent or ends."""
+
+import asyncio
+import itertools
+import os
+import signal
+import socket
+import sys
+from collections.abc import Mapping
+from typing import Any, Final, Protocol, TypeVar, cast
+
+import msgspec
+import structlog
+
+from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, DeviceTimeout
+from arcor2_hw.runtime import messages as m
+
+log = structlog.get_logger(__name__)
+T = TypeVar("T", bound=m.ToServer)
+
+LONGEST_LINE: Final = 64 * 1024
+"""Bytes of one line of a program's or driver's output that are kept."""
+GOES_WITHIN: Final = 3.0
+"""Seconds a host has to end by itself once it should; then it is killed."""
+ANSWERS_WITHIN: Final = 5.0
+"""Seconds beyond a call's own deadline after which the host itself is to blame for the missing answer."""
+
+
+class CellError(Arcor2Error):
+    """What went wrong in the cell host, with the code and the name that the error has there."""
+
+    def __init__(self, data: m.ErrorData) -> None:
+        super().__init__(data.message, data.detail)
+        self.code = data.code  # type: ignore[misc]
+        self.type = data.type
+        self.object_id = data.object_id
+
+
+class HostUser(Protocol):
+    """Who uses a host: told of everything that answers no question."""
+
+    def host_said(self, host: "CellHost", message: m.ServerBound) -> None:
+        """Take a message."""
+
+    def host_silent(self, host: "CellHost", silent: bool) -> None:
+        """Learn that the host does not answer, or answers again."""
+
+    def host_ended(self, host: "CellHost", reason: str) -> None:
+        """Learn that the host is gone; called once, with nothing after it."""
+
+
+class _Wire(asyncio.Protocol):
+    """Cuts the stream into messages."""
+
+    def __init__(self, host: "CellHost") -> None:
+        self._host = host
+        self._buffer = bytearray()
+        self.transport: asyncio.Transport | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self.transport = cast("asyncio.Transport", transport)
+
+    def data_received(self, data: bytes) -> None:
+        buffer = self._buffer
+        buffer += data
+        start = 0
+        try:
+            while len(buffer) - start >= m.PREFIX_SIZE:
+                end = start + m.PREFIX_SIZE + m.body_length(bytes(buffer[start : start + m.PREFIX_SIZE]))
+                if len(buffer) < end:
+                    break
+                self._host._heard(m.decode_server_bound(bytes(buffer[start + m.PREFIX_SIZE : end])))
+                start = end
+        except (msgspec.MsgspecError, ValueError):
+            log.exception("the cell host sent what is no message", pid=self._host.pid)
+            self._host.kill()
+            return
+        del buffer[:start]
+
+    def connection_lost(self, error: Exception | None) -> None:  # noqa: ARG002 - the process tells why
+        self._host._disconnected()
+
+
+class CellHost:
+    """A running host. `user` is set by who takes it."""
+
+    def __init__(self, process: asyncio.subprocess.Process) -> None:
+        self.process = process
+        self.user: HostUser | None = None
+        self.ready: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self.ended: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self.reason = ""
+        """Why the host is gone; empty while it is not."""
+        self._wire = _Wire(self)
+        self._number = itertools.count(1)
+        self._calls: dict[int, asyncio.Future[bytes]] = {}
+        self._waiting: list[tuple[type[m.ToServer], asyncio.Future[Any]]] = []
+        self._heard_at = asyncio.get_running_loop().time()
+        self._silent = False
+        self._lost = asyncio.Event()
+        self._tasks: list[asyncio.Task[None]] = []
+
+    @classmethod
+    async def start(cls, environment: Mapping[str, str] = os.environ) -> "CellHost":
+        """Start the process; it is usable once `ready` is done."""
+        ours, theirs = socket.socketpair()
+        try:
+            process = await asyncio.create_subprocess_exec(
+                sys.executable, "-P", "-m", "arcor2_hw.runtime.host", "--fd", str(theirs.fileno()),
+                pass_fds=[theirs.fileno()],
+                stdin=asyncio.subprocess.DEVNULL,
+                stdout=asyncio.subprocess.PIPE,
+                stderr=asyncio.subprocess.STDOUT,
+                # One thread per device is what the host is built of; a pool of the linear algebra only costs memory.
+                env={"OPENBLAS_NUM_THREADS": "1", **environment},
+                start_new_session=True,  # Ctrl-C is for the server, which ends the host in order
+            )  # fmt: skip
+        except BaseException:
+            ours.close()
+            raise
+        finally:
+            theirs.close()
+        host = cls(process)
+        await asyncio.get_running_loop().create_unix_connection(lambda: host._wire, sock=ours)
+        host._tasks = [
+            asyncio.create_task(host._read_output(), name=f"output of cell host {process.pid}"),
+            asyncio.create_task(host._watch_end(), name=f"end of cell host {process.pid}"),
+            asyncio.create_task(host._watch_silence(), name=f"silence of cell host {process.pid}"),
+        ]
+        return host
+
+    @property
+    def pid(self) -> int:
+        """Give the process id."""
+        return self.process.pid
+
+    @property
+    def alive(self) -> bool:
+        """Tell whether the host has not ended."""
+        return not self.reason
+
+    # -------------------------------------------------------------------------------- saying
+    def send(self, message: m.ToHost) -> None:
+        """Say something; dropped when the host is gone, which its user learns anyway."""
+        transport = self._wire.transport
+        if transport is not None and not transport.is_closing():
+            transport.write(m.encode(message))
+
+    async def expect(self, kind: type[T], timeout: float | None = None) -> T:
+        """Wait for the next message of a kind; ConnectionLost when the host ends before, TimeoutError."""
+        future: asyncio.Future[T] = asyncio.get_running_loop().create_future()
+        if self.reason:
+            raise ConnectionLost(self.reason)
+        self._waiting.append((kind, future))
+        async with asyncio.timeout(timeout):
+            return await future
+
+    async def call(
+        self,
+        object_id: str,
+        method: str,
+        arguments: Mapping[str, bytes] | None = None,
+        *,
+        control: bool = False,
+        cancel: bool = False,
+        deadline: float | None = None,
+    ) -> bytes:
+        """Call a method of a device, or with `cancel` what cancels it; gives the result as JSON, empty for None.
+
+        Raises CellError with what the device said, ConnectionLost when the host ends meanwhile.
+        """
+        number = next(self._number)
+        message = m.Call(number, object_id, method, dict(arguments or {}), control, cancel, deadline)
+        return await self._ask(number, message, deadline)
+
+    async def stop_motion(self, object_id: str = "") -> None:
+        """Call `stop` past whatever goes on; of all devices when none is named. CellError, ConnectionLost."""
+        number = next(self._number)
+        await self._ask(number, m.StopMotion(number, object_id), None)
+
+    async def _ask(self, number: int, message: m.ToHost, deadline: float | None) -> bytes:
+        if self.reason:
+            raise ConnectionLost(self.reason)
+        future: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
+        self._calls[number] = future
+        self.send(message)
+        try:
+            async with asyncio.timeout(None if deadline is None else deadline + ANSWERS_WITHIN):
+                return await future
+        except TimeoutError:
+            raise DeviceTimeout("The cell host does not answer.", f"pid {self.pid}") from None
+        finally:
+            self._calls.pop(number, None)
+
+    # -------------------------------------------------------------------------------- ending
+    def kill(self) -> None:
+        """Kill the process."""
+        if self.process.returncode is None:
+            self.process.kill()
+
+    async def close(self, timeout: float = GOES_WITHIN) -> None:
+        """Close the socket: the host stops motion, disconnects and ends; killed when it does not. Waits for the end."""
+        if self._wire.transport is not None:
+            self._wire.transport.close()
+        await self.gone(timeout)
+
+    async def gone(self, timeout: float = GOES_WITHIN) -> None:
+        """Wait until the process has ended, and kill it after `timeout` s."""
+        try:
+            async with asyncio.timeout(timeout):
+                await asyncio.shield(self.ended)
+        except TimeoutError:
+            log.warning("cell host killed: it did not end by itself", pid=self.pid)
+            self.kill()
+            await asyncio.shield(self.ended)
+        finally:
+            await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    def _disconnected(self) -> None:
+        self._lost.set()
+
+    async def _watch_end(self) -> None:
+        """Tell the end as soon as either the process or its socket is gone."""
+        waiting = asyncio.create_task(self.process.wait())
+        lost = asyncio.create_task(self._lost.wait())
+        await asyncio.wait({waiting, lost}, return_when=asyncio.FIRST_COMPLETED)
+        # What it said last is still on its way when the process is gone; the exit status when the socket is.
+        await asyncio.wait({waiting if lost.done() else lost}, timeout=0.2)
+        if not waiting.done():
+            self._tell_end("the cell host closed its connection")
+            _, late = await asyncio.wait({waiting}, timeout=GOES_WITHIN)
+            if late:
+                self.kill()
+        code = await waiting
+        lost.cancel()
+        await asyncio.gather(lost, return_exceptions=True)
+        if self._wire.transport is not None:
+            self._wire.transport.abort()
+        self._tell_end(_reason(code))
+        self.ended.set_result(None)
+
+    def _tell_end(self, reason: str) -> None:
+        if self.reason:
+            return
+        self.reason = reason
+        error = ConnectionLost(reason)
+        for future in [*self._calls.values(), *(future for _, future in self._waiting), self.ready]:
+            if not future.done():
+                future.set_exception(error)
+                future.exception()  # nobody may be waiting
+        self._waiting.clear()
+        if self.user is not None:
+            self.user.host_ended(self, reason)
+
+    # -------------------------------------------------------------------------------- hearing
+    def _heard(self, message: m.ServerBound) -> None:
+        self._heard_at = asyncio.get_running_loop().time()
+        if self._silent:
+            self._tell_silence(False)
+        match message:
+            case m.Heartbeat():
+                return
+            case m.Ready():
+                if not self.ready.done():
+                    self.ready.set_result(None)
+                return
+            case m.CallDone():
+                if (future := self._calls.get(message.id)) is not None and not future.done():
+                    future.set_result(message.value)
+                return
+            case m.CallFailed():
+                if (future := self._calls.get(message.id)) is not None and not future.done():
+                    future.set_exception(CellError(message.error))
+                return
+        for waiting in self._waiting:
+            kind, expected = waiting
+            if isinstance(message, kind):
+                self._waiting.remove(waiting)
+                if not expected.done():
+                    expected.set_result(message)
+                break
+        if self.user is not None:
+            self.user.host_said(self, message)
+
+    async def _watch_silence(self) -> None:
+        loop = asyncio.get_running_loop()
+        while self.alive and not self._lost.is_set():
+            if not self._silent and self.ready.done() and loop.time() - self._heard_at > m.SILENCE_LIMIT:
+                self._tell_silence(True)
+            try:
+                async with asyncio.timeout(m.HEARTBEAT_PERIOD):
+                    await self._lost.wait()
+            except TimeoutError:
+                continue
+
+    def _tell_silence(self, silent: bool) -> None:
+        self._silent = silent
+        if self.user is not None:
+            self.user.host_silent(self, silent)
+
+    async def _read_output(self) -> None:
+        """Take what script, drivers and vendor libraries print; a line of any length is taken in pieces."""
+        stream = self.process.stdout
+        assert stream is not None
+        line = bytearray()
+        while chunk := await stream.read(65536):
+            *whole, rest = chunk.split(b"\n")
+            for part in whole:
+                line += part[: LONGEST_LINE - len(line)]
+                self._heard_line(bytes(line))
+                line.clear()
+            line += rest[: LONGEST_LINE - len(line)]
+        if line:
+            self._heard_line(bytes(line))
+
+    def _heard_line(self, line: bytes) -> None:
+        message = m.LogLine("info", line.decode(errors="backslashreplace"))
+        if self.user is not None:
+            self.user.host_said(self, message)
+        else:
+            log.info("cell host", pid=self.pid, text=message.text)
+
+
+def _reason(code: int) -> str:
+    if code < 0:
+        try:
+            name = signal.Signals(-code).name
+        except ValueError:
+            name = f"signal {-code}"
+        return f"the cell host was killed by {name}"
+    return f"the cell host ended with status {code}" if code else "the cell host ended"

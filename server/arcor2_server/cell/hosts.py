@@ -1,0 +1,77 @@
+"""Cell hosts in store: one spare stands by with the common imports done, so that a start costs no start of Python."""
+
+import asyncio
+import contextlib
+from typing import Final
+
+import structlog
+
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.cell.host import CellHost, HostUser
+
+log = structlog.get_logger(__name__)
+
+READY_WITHIN: Final = 20.0
+"""Seconds for the start of Python and the common imports on a machine that is busy."""
+
+
+class CellHosts:
+    """Gives hosts away. Who took one calls `prepare` again once it is up, and the processors are free for a start."""
+
+    def __init__(self) -> None:
+        self._spare: asyncio.Task[CellHost] | None = None
+        self._given: set[CellHost] = set()
+        self._closed = False
+
+    def prepare(self) -> None:
+        """Begin to start the spare, unless there is one."""
+        if self._spare is None and not self._closed:
+            self._spare = asyncio.create_task(self._start(), name="spare cell host")
+            self._spare.add_done_callback(_look)
+
+    async def take(self, user: HostUser) -> CellHost:
+        """Give a host that is ready, started now if there is no spare. Arcor2Error when none can be started."""
+        while True:
+            self.prepare()
+            if self._spare is None:
+                raise Arcor2Error("The server is ending.")
+            spare, self._spare = self._spare, None
+            host = await spare
+            if host.alive:
+                break
+            await host.gone()
+        host.user = user
+        self._given.add(host)
+        host.ended.add_done_callback(lambda _: self._given.discard(host))
+        return host
+
+    async def close(self) -> None:
+        """End all hosts."""
+        self._closed = True
+        hosts = set(self._given)
+        spare, self._spare = self._spare, None
+        if spare is not None:
+            spare.cancel()
+            with contextlib.suppress(Arcor2Error, asyncio.CancelledError):
+                hosts.add(await spare)
+        await asyncio.gather(*(host.close() for host in hosts))
+
+    async def _start(self) -> CellHost:
+        host = await CellHost.start()
+        try:
+            async with asyncio.timeout(READY_WITHIN):
+                await asyncio.shield(host.ready)
+        except (TimeoutError, Arcor2Error) as error:
+            host.kill()
+            await host.gone()
+            raise Arcor2Error("No cell host can be started.", str(error)) from error
+        except BaseException:
+            host.kill()
+            await host.gone()
+            raise
+        return host
+
+
+def _look(spare: "asyncio.Task[CellHost]") -> None:
+    if not spare.cancelled() and (error := spare.exception()) is not None:
+        log.error("no spare cell host", reason=str(error), detail=getattr(error, "detail", ""))

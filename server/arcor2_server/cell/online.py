@@ -1,0 +1,389 @@
+"""The scene when it is online: its state, its host, calls to its devices, streams to those who subscribed."""
+
+import asyncio
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+import msgspec
+import structlog
+
+from arcor2_hw.actions.json_values import encode
+from arcor2_hw.data.base import UNSET, Unset
+from arcor2_hw.data.events import ActionResultData, Event, SceneStateData, SceneStateEnum
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.object_type import ObjectModel
+from arcor2_hw.data.robot import Joint
+from arcor2_hw.data.rpc import RobotEventKind
+from arcor2_hw.data.scene import Scene, SceneObject
+from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, DeviceTimeout
+from arcor2_hw.runtime import messages as m
+from arcor2_server.cell.actions import RunningAction
+from arcor2_server.cell.devices import DeviceBoard, DeviceStatus
+from arcor2_server.cell.host import CellHost
+from arcor2_server.cell.hosts import CellHosts
+from arcor2_server.client import Client
+from arcor2_server.locks import PROJECT, SCENE, SERVER
+from arcor2_server.rpc.registry import RequestRefused, make_event
+
+if TYPE_CHECKING:
+    from arcor2_server.services import Services
+
+log = structlog.get_logger(__name__)
+
+START_WITHIN: Final = 60.0
+"""Seconds for importing object types (which may hang) and connecting; the host gives each device less."""
+STOP_WITHIN: Final = 5.0
+"""Seconds in which the host says that it has closed the devices; it allows itself two."""
+_STREAMS: Final = {"RobotJoints": RobotEventKind.JOINTS, "RobotEef": RobotEventKind.EEF_POSE}
+
+
+class OnlineCell:
+    """One scene, offline or online. What it asks of devices raises CellError, ConnectionLost, DeviceTimeout."""
+
+    def __init__(self, services: "Services") -> None:
+        self.hosts = CellHosts()
+        self.state = SceneStateEnum.STOPPED
+        self.running_action: RunningAction | None = None
+        self.results: dict[str, list[str]] = {}
+        """Results of executed actions by action id, as JSON; forgotten when the scene goes offline."""
+        self.moving: set[str] = set()
+        """Robots that move because a request said so."""
+        self._services = services
+        self._host: CellHost | None = None
+        self._task: asyncio.Task[None] | None = None
+        self._answer: asyncio.Future[m.ErrorData | None] | None = None
+        self._subscribers: dict[tuple[str, RobotEventKind], set[Client]] = {}
+        self._board = DeviceBoard()
+        self._background: set[asyncio.Task[None]] = set()
+        services.hub.on_leave.append(self._forget_client)
+
+    # -------------------------------------------------------------------------------- state
+    @property
+    def online(self) -> bool:
+        """Tell whether the scene is online."""
+        return self.state is SceneStateEnum.STARTED
+
+    def require_online(self) -> None:
+        """RequestRefused unless the scene is online."""
+        if not self.online:
+            raise RequestRefused("The scene is offline: start it first.")
+
+    def require_offline(self) -> None:
+        """RequestRefused unless the scene is offline."""
+        if self.state is not SceneStateEnum.STOPPED:
+            raise RequestRefused("The scene is online: stop it first.")
+
+    def devices(self) -> list[DeviceStatus]:
+        """Give what the devices of the scene say of themselves; none while it is offline."""
+        return self._board.statuses() if self.state is not SceneStateEnum.STOPPED else []
+
+    def _tell(self, state: SceneStateEnum, message: str = "") -> None:
+        self.state = state
+        log.info("scene", state=state.value, reason=message)
+        self._services.hub.broadcast(make_event("SceneState", SceneStateData(state, message or UNSET)))
+
+    # -------------------------------------------------------------------------------- going online
+    async def begin_start(self, *, dry_run: bool = False) -> None:
+        """Begin to bring the scene up: returns when that is allowed, the rest is told by SceneState.
+
+        RequestRefused, Locked.
+        """
+        services = self._services
+        services.session.require_scene_open()
+        self.require_offline()
+        if services.execution.busy:
+            raise RequestRefused("A program is running: stop it first.")
+        if services.session.project is None and (locked := services.locks.write_locked_roots()):
+            raise RequestRefused(f"Something is being edited: {', '.join(locked)}.")
+        await services.locks.acquire(SERVER, SCENE, PROJECT)
+        try:
+            self.require_offline()
+            if not dry_run:
+                self.state = SceneStateEnum.STARTING
+                self._task = asyncio.create_task(self._start(services.session.require_scene()), name="scene start")
+        finally:
+            if self._task is None:
+                services.locks.release(SERVER, SCENE, PROJECT)
+
+    async def _start(self, scene: Scene) -> None:
+        self._tell(SceneStateEnum.STARTING)
+        self._board.clear()
+        self._board.show(scene.objects)
+        try:
+            problem = await self._bring_up(scene)
+        except Arcor2Error as error:
+            problem = str(error)
+        except Exception as error:
+            log.exception("scene start failed")
+            problem = f"An error inside the server: {error}"
+        if problem is None:
+            self._done(SceneStateEnum.STARTED)
+            self.hosts.prepare()
+            return
+        self._tell(SceneStateEnum.STOPPING, problem)
+        host, self._host = self._host, None
+        if host is not None:
+            await host.close()
+        self._gone_offline(problem)
+
+    async def _bring_up(self, scene: Scene) -> str | None:
+        """Give why the scene did not come up, None when it did."""
+        services = self._services
+        names = {obj.type for obj in scene.objects}
+        models: dict[str, ObjectModel] = {}
+        for name in names:
+            model = services.types.meta(name).object_model
+            if not isinstance(model, Unset):
+                models[name] = model
+        project = services.session.project
+        message = m.OpenScene(
+            scene,
+            services.types.type_codes(names),
+            models,
+            [] if project is None else project.object_overrides,
+            services.settings.streaming_period,
+        )
+        self._answer = asyncio.get_running_loop().create_future()
+        host = self._host = await self.hosts.take(self)
+        host.send(message)
+        try:
+            async with asyncio.timeout(START_WITHIN):
+                error = await self._answer
+        except TimeoutError:
+            host.kill()
+            return f"The scene did not come up within {START_WITHIN:g} s."
+        if error is None:
+            return None
+        if error.detail:
+            log.warning("scene start failed", reason=error.message, detail=error.detail)
+        return error.message
+
+    def _done(self, state: SceneStateEnum, message: str = "") -> None:
+        self._task = None
+        self._answer = None
+        self._services.locks.release(SERVER, SCENE, PROJECT)
+        self._tell(state, message)
+
+    def _gone_offline(self, message: str = "") -> None:
+        self._host = None
+        self.results.clear()
+        self.moving.clear()
+        self._subscribers.clear()
+        self._done(SceneStateEnum.STOPPED, message)
+        self.hosts.prepare()
+
+    # -------------------------------------------------------------------------------- going offline
+    async def begin_stop(self, *, dry_run: bool = False) -> None:
+        """Begin to take the scene down: returns when that is allowed, the rest is told by SceneState."""
+        services = self._services
+        services.session.require_scene_open()
+        if not self.online:
+            raise RequestRefused("The scene is not online.")
+        if self.running_action is not None:
+            raise RequestRefused("An action is running: wait for it, or cancel it.")
+        await services.locks.acquire(SERVER, SCENE, PROJECT)
+        try:
+            self.require_online()
+            if not dry_run:
+                self.state = SceneStateEnum.STOPPING
+                self._task = asyncio.create_task(self._stop(), name="scene stop")
+        finally:
+            if self._task is None:
+                services.locks.release(SERVER, SCENE, PROJECT)
+
+    async def _stop(self) -> None:
+        self._tell(SceneStateEnum.STOPPING)
+        host = self._host
+        problem = ""
+        if host is not None:
+            self._answer = asyncio.get_running_loop().create_future()
+            host.send(m.CloseScene())
+            try:
+                async with asyncio.timeout(STOP_WITHIN):
+                    error = await self._answer
+                problem = "" if error is None else error.message
+            except ConnectionLost as lost:
+                problem = str(lost)
+            except TimeoutError:
+                problem = "The devices could not be closed in time."
+                host.kill()
+            await host.gone()
+        self._gone_offline(problem)
+
+    async def close(self) -> None:
+        """End with the server: the hosts stop motion and disconnect by themselves."""
+        tasks = [task for task in (self._task, *self._background) if task is not None]
+        await self.hosts.close()
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    # -------------------------------------------------------------------------------- from the host
+    def host_said(self, host: CellHost, message: m.ServerBound) -> None:
+        """Take a message of the host."""
+        match message:
+            case m.StreamEvent():
+                if host is self._host and (kind := _STREAMS.get(message.event)) is not None:
+                    clients = self._subscribers.get((message.object_id, kind))
+                    if clients:
+                        self._services.hub.stream(message.event, message.object_id, message.encoded, clients)
+            case m.SceneOpened():
+                self._answered(None)
+            case m.SceneFailed() | m.SceneClosed():
+                self._answered(message.error)
+            case m.DeviceChanged():
+                self._board.changed(message)
+                log.info(
+                    "device",
+                    id=message.object_id,
+                    connection=message.connection.value,
+                    health=message.health.value,
+                    alarms=[alarm.text for alarm in message.alarms],
+                    control=message.control_owner,
+                )
+            case m.LogLine():
+                log.info("cell host", level=message.level, text=message.text, object=message.object_id)
+
+    def _answered(self, error: m.ErrorData | None) -> None:
+        if self._answer is not None and not self._answer.done():
+            self._answer.set_result(error)
+
+    def host_silent(self, host: CellHost, silent: bool) -> None:
+        """Note that the host does not answer, or answers again."""
+        if host is self._host:
+            self._board.answering = not silent
+            log.warning("cell host does not answer" if silent else "cell host answers again", pid=host.pid)
+
+    def host_ended(self, host: CellHost, reason: str) -> None:
+        """Go offline with the reason when the host is gone."""
+        if host is not self._host:
+            return
+        if self._answer is not None and not self._answer.done():
+            self._answer.set_exception(ConnectionLost(reason[:1].upper() + reason[1:] + "."))
+        elif self.online:
+            message = f"Lost the devices: {reason}."
+            self._tell(SceneStateEnum.STOPPING, message)
+            self._gone_offline(message)
+
+    # -------------------------------------------------------------------------------- calls
+    def _online_host(self) -> CellHost:
+        self.require_online()
+        assert self._host is not None
+        return self._host
+
+    async def call(
+        self,
+        object_id: str,
+        method: str,
+        args: Mapping[str, Any] | None = None,
+        *,
+        control: bool = False,
+        deadline: float | None = None,
+    ) -> bytes:
+        """Call a method of an object; gives the result as JSON, empty for None."""
+        encoded = {name: _json(value) for name, value in (args or {}).items()}
+        return await self._online_host().call(object_id, method, encoded, control=control, deadline=deadline)
+
+    async def cancel(self, object_id: str, action: str) -> None:
+        """Call what cancels an action of an object, past the action."""
+        await self._online_host().call(object_id, action, cancel=True, deadline=STOP_WITHIN)
+
+    async def stop_motion(self, object_id: str = "") -> None:
+        """Stop an object, or all, past whatever they do."""
+        await self._online_host().stop_motion(object_id)
+
+    async def ask(self, kind: type[Any], object_id: str, method: str, args: Mapping[str, Any] | None = None) -> Any:
+        """Call a method that only observes, and read its result as `kind`."""
+        raw = await self.call(object_id, method, args, deadline=OBSERVE_WITHIN)
+        try:
+            return msgspec.json.decode(raw, type=kind)
+        except msgspec.MsgspecError as error:
+            raise Arcor2Error(f"{method} gave something else than it should.", str(error)) from error
+
+    async def robot_joints(self, robot_id: str, arm_id: str | None = None, *, gripper: bool = False) -> list[Joint]:
+        """Give the present joint values of a robot."""
+        args: dict[str, Any] = {"include_gripper": gripper} | self.arm(robot_id, arm_id)
+        joints: list[Joint] = await self.ask(list[Joint], robot_id, "robot_joints", args)
+        return joints
+
+    async def end_effector_pose(self, robot_id: str, end_effector: str, arm_id: str | None = None) -> Pose:
+        """Give the present pose of an end effector in the world."""
+        arm = self.arm(robot_id, arm_id)
+        if end_effector not in await self.ask(set[str], robot_id, "get_end_effectors_ids", arm):
+            raise RequestRefused(f"{self.robot(robot_id).name} has no end effector {end_effector!r}.")
+        args = {"end_effector": end_effector} | arm
+        pose: Pose = await self.ask(Pose, robot_id, "get_end_effector_pose", args)
+        return pose
+
+    async def object_pose_changed(self, object_id: str, pose: Pose) -> None:
+        """Tell the live instance that it stands elsewhere."""
+        await self.call(object_id, "set_pose", {"pose": pose}, deadline=OBSERVE_WITHIN)
+
+    def robot(self, robot_id: str) -> SceneObject:
+        """Give the scene object of a robot; NotFound, RequestRefused when it is none."""
+        found = self._services.session.scene_object(robot_id)
+        if not self._services.types.derives_from(found.type, "Robot"):
+            raise RequestRefused(f"{found.name} is not a robot.")
+        return found
+
+    def arm(self, robot_id: str, arm_id: str | None) -> dict[str, Any]:
+        """Give the argument that names the arm; RequestRefused unless it is there exactly for multi-arm robots."""
+        robot = self.robot(robot_id)
+        multi_arm = self._services.types.robot_meta(robot.type).multi_arm
+        if multi_arm and arm_id is None:
+            raise RequestRefused(f"{robot.name} has several arms: name one.")
+        if not multi_arm and arm_id is not None:
+            raise RequestRefused(f"{robot.name} has one arm: do not name it.")
+        return {} if arm_id is None else {"arm_id": arm_id}
+
+    # -------------------------------------------------------------------------------- subscriptions
+    def subscribe(self, client: Client, robot_id: str, what: RobotEventKind, send: bool) -> None:
+        """Send a robot's state to a client, or no longer; RequestRefused when it was not sent."""
+        clients = self._subscribers.setdefault((robot_id, what), set())
+        if send:
+            clients.add(client)
+        elif client not in clients:
+            raise RequestRefused("This was not subscribed to.")
+        else:
+            clients.discard(client)
+        self._tell_subscribed(robot_id)
+
+    def _tell_subscribed(self, robot_id: str) -> None:
+        wanted = {what: bool(self._subscribers.get((robot_id, what))) for what in RobotEventKind}
+        if self._host is not None:
+            self._host.send(m.Subscribe(robot_id, wanted[RobotEventKind.JOINTS], wanted[RobotEventKind.EEF_POSE]))
+
+    def _forget_client(self, client: Client) -> None:
+        for (robot_id, _), clients in list(self._subscribers.items()):
+            if client in clients:
+                clients.discard(client)
+                self._tell_subscribed(robot_id)
+
+    # -------------------------------------------------------------------------------- in the background
+    def spawn(self, work: Any, name: str) -> None:
+        """Run what goes on after a request was answered."""
+        task = asyncio.create_task(work, name=name)
+        self._background.add(task)
+        task.add_done_callback(self._background.discard)
+
+    def action_ended(self, action: RunningAction, results: list[str] | None, error: str | None) -> None:
+        """Forget the running action, keep its results, and tell everybody unless it was cancelled."""
+        self.running_action = None
+        if results is not None and self.online:
+            self.results[action.action_id] = results
+        if not action.cancelled:
+            data = ActionResultData(action.action_id, results or UNSET, error or UNSET)
+            self._services.hub.broadcast(Event("ActionResult", data=data))
+
+
+OBSERVE_WITHIN: Final = 5.0
+"""Seconds for reading a value; a device on a local network answers within one."""
+
+
+def _json(value: Any) -> bytes:
+    if isinstance(value, msgspec.Raw):
+        return bytes(value)
+    return encode(value).encode()
+
+
+__all__ = ["ConnectionLost", "DeviceTimeout", "OnlineCell"]

@@ -1,0 +1,279 @@
+"""The Execution service: packages, and the one program that runs (protocol, section 12)."""
+
+import asyncio
+from collections.abc import Coroutine, Iterable
+from typing import TYPE_CHECKING, Any, Final, TypeVar
+
+import msgspec
+import structlog
+
+from arcor2_hw.data.base import UNSET
+from arcor2_hw.data.events import (
+    ChangeType,
+    Event,
+    MainScreen,
+    PackageInfoData,
+    PackageStateData,
+    ProjectExceptionData,
+    ShowMainScreenData,
+)
+from arcor2_hw.data.package import PackageStateEnum, PackageSummary
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.runtime import messages as m
+from arcor2_server.build.versions import check_versions
+from arcor2_server.cell.devices import DeviceBoard, DeviceStatus
+from arcor2_server.cell.host import CellHost
+from arcor2_server.packages import Packages
+from arcor2_server.rpc.registry import RequestRefused, make_event
+
+if TYPE_CHECKING:
+    from arcor2_server.services import Services
+
+log = structlog.get_logger(__name__)
+T = TypeVar("T")
+S = PackageStateEnum
+
+STOP_WITHIN: Final = 5.0
+"""Seconds a stopped program has to end by itself before its host is killed."""
+SPARE_AFTER: Final = 1.0
+"""Seconds after the first action when the next spare host is started: it must not slow down the one that begins."""
+RUN_STATES: Final = frozenset({S.RUNNING, S.PAUSING, S.PAUSED, S.RESUMING})
+_IDLE: Final = frozenset({S.UNDEFINED, S.STOPPED})
+
+
+class Execution:
+    """Runs one package at a time, in a cell host of its own. Requests that a state forbids raise RequestRefused."""
+
+    def __init__(self, services: "Services") -> None:
+        self.packages = Packages(services.settings.packages_dir)
+        self.state = S.UNDEFINED
+        self.package_id = ""
+        self.stop_within = STOP_WITHIN
+        self.last_error: m.ErrorData | None = None
+        """What ended the last program, None when it ended as meant or was stopped."""
+        self._services = services
+        self._host: CellHost | None = None
+        self._info: bytes | None = None
+        self._before: bytes | None = None
+        self._board = DeviceBoard()
+        self._killing: asyncio.TimerHandle | None = None
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    # -------------------------------------------------------------------------------- state
+    @property
+    def running(self) -> bool:
+        """Tell whether a program is in a run state: running, pausing, paused or resuming."""
+        return self.state in RUN_STATES
+
+    @property
+    def busy(self) -> bool:
+        """Tell whether a program holds devices: from its start until it has stopped."""
+        return self.state not in _IDLE
+
+    def devices(self) -> list[DeviceStatus]:
+        """Give what the devices of the running program say of themselves."""
+        return self._board.statuses() if self.busy else []
+
+    def greeting(self) -> list[Event]:
+        """Give the events that tell a new connection of the running program; none when none runs."""
+        if self._info is None:
+            return []
+        known = [encoded for encoded in (self._info, self._before) if encoded is not None]
+        return [self._state_event(), *(msgspec.json.decode(encoded, type=Event) for encoded in known)]
+
+    def _state_event(self) -> Event:
+        return make_event("PackageState", PackageStateData(self.state, self.package_id or UNSET))
+
+    def _enter(self, state: PackageStateEnum) -> None:
+        self.state = state
+        log.info("package", id=self.package_id, state=state.value)
+        self._services.hub.broadcast(self._state_event())
+
+    # -------------------------------------------------------------------------------- packages
+    async def list(self) -> list[PackageSummary]:
+        """Give all packages."""
+        return await asyncio.to_thread(self.packages.all)
+
+    async def upload(self, package_id: str, data: str) -> PackageSummary:
+        """Take a package as a zip in base64, in place of one of the same id."""
+        self._require_not_used(package_id)
+        return await asyncio.to_thread(self.packages.upload, package_id, data)
+
+    async def delete(self, package_id: str) -> PackageSummary:
+        """Delete a package that does not run."""
+        self._require_not_used(package_id)
+        return await asyncio.to_thread(self.packages.delete, package_id)
+
+    async def rename(self, package_id: str, name: str) -> PackageSummary:
+        """Give a package another name."""
+        return await asyncio.to_thread(self.packages.rename, package_id, name)
+
+    async def added(self, package_id: str) -> None:
+        """Tell everybody of a package that was written among the others, after the answer that is being given."""
+        summary = await asyncio.to_thread(self.packages.summary, package_id)
+        event = make_event("PackageChanged", summary, ChangeType.ADD)
+        asyncio.get_running_loop().call_soon(self._services.hub.broadcast, event)
+
+    def _require_not_used(self, package_id: str) -> None:
+        if self.busy and package_id == self.package_id:
+            raise RequestRefused("This package is running: stop it first.")
+
+    # -------------------------------------------------------------------------------- commands
+    async def run(self, package_id: str, start_paused: bool = False, breakpoints: Iterable[str] = ()) -> None:
+        """Begin to run a package: `started` is told at once, the rest as it happens."""
+        self._require_idle()
+        directory = await asyncio.to_thread(self.packages.directory, package_id)
+        self._require_idle()
+        self.package_id = package_id
+        self.last_error = None
+        self._info = self._before = None
+        self._board.clear()
+        self._enter(S.STARTED)
+        period = self._services.settings.streaming_period
+        message = m.RunPackage(package_id, str(directory.resolve()), start_paused, sorted(breakpoints), period)
+        self._spawn(self._begin(message), "program start")
+        self._spawn(self._note_run(package_id), "note of the run")
+
+    def _require_idle(self) -> None:
+        if self.busy:
+            raise RequestRefused(f"A package is {self.state.value}: stop it first.")
+        if self._services.cell.state.value != "stopped":
+            raise RequestRefused("The scene is online: stop it first, its devices are in use.")
+
+    async def _begin(self, message: m.RunPackage) -> None:
+        try:
+            host = await self._services.cell.hosts.take(self)
+        except Arcor2Error as error:
+            self._fail(str(error), type(error).__name__)
+            self._ended()
+            return
+        self._host = host
+        host.send(message)
+
+    async def _note_run(self, package_id: str) -> None:
+        try:
+            directory = await asyncio.to_thread(self.packages.directory, package_id)
+            for difference in await asyncio.to_thread(check_versions, directory):
+                log.warning("package was built with another version", package=package_id, difference=difference)
+            await asyncio.to_thread(self.packages.mark_executed, package_id)
+        except Arcor2Error as error:
+            log.warning("run not noted", package=package_id, reason=str(error))
+
+    def stop(self) -> None:
+        """Stop the program: devices first, then the script; its host is killed when it does not end in time."""
+        host = self._require(RUN_STATES, "stopped")
+        self._enter(S.STOPPING)
+        host.send(m.StopProgram())
+        self._killing = asyncio.get_running_loop().call_later(self.stop_within, self._kill, host)
+
+    def pause(self) -> None:
+        """Let no further action begin."""
+        host = self._require({S.RUNNING}, "paused")
+        self._enter(S.PAUSING)
+        host.send(m.Pause())
+
+    def resume(self) -> None:
+        """Let a paused program go on."""
+        host = self._require({S.PAUSED}, "resumed")
+        self._enter(S.RESUMING)
+        host.send(m.Resume())
+
+    def step(self) -> None:
+        """Let a paused program go on for one action."""
+        host = self._require({S.PAUSED}, "stepped")
+        self._enter(S.RESUMING)
+        host.send(m.Step())
+
+    def _require(self, states: "set[PackageStateEnum] | frozenset[PackageStateEnum]", what: str) -> CellHost:
+        if self.state not in states or self._host is None:
+            raise RequestRefused(f"The package is {self.state.value} and cannot be {what}.")
+        return self._host
+
+    def _kill(self, host: CellHost) -> None:
+        log.warning("program killed: it did not stop", package=self.package_id, within=self.stop_within)
+        host.kill()
+
+    async def close(self) -> None:
+        """End with the server; the hosts, which the cell ends, stop motion and disconnect by themselves."""
+        if self._killing is not None:
+            self._killing.cancel()
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    # -------------------------------------------------------------------------------- from the host
+    def host_said(self, host: CellHost, message: m.ServerBound) -> None:
+        """Take a message of the program's host."""
+        hub = self._services.hub
+        match message:
+            case m.StreamEvent():
+                hub.stream(message.event, message.object_id, message.encoded)
+            case m.ProgramEvent():
+                self._remember(message)
+                hub.broadcast_encoded(message.event, message.encoded)
+            case m.ProgramChanged():
+                self._program_changed(host, message)
+            case m.DeviceChanged():
+                self._board.changed(message)
+            case m.LogLine():
+                log.info("program", level=message.level, text=message.text, object=message.object_id)
+
+    def _remember(self, message: m.ProgramEvent) -> None:
+        match message.event:
+            case "PackageInfo":
+                self._info = message.encoded
+                info = msgspec.json.decode(message.encoded, type=_InfoEvent)
+                self._board.show(info.data.scene.objects)
+                asyncio.get_running_loop().call_later(SPARE_AFTER, self._services.cell.hosts.prepare)
+            case "ActionStateBefore":
+                self._before = message.encoded
+            case "ActionStateAfter":
+                self._before = None
+
+    def _program_changed(self, host: CellHost, message: m.ProgramChanged) -> None:
+        if message.state == "stopped":
+            self.last_error = message.error
+            self._ended()
+            self._spawn(host.gone(), "end of the program's host")
+        elif self.state is not S.STOPPING:
+            state = S(message.state)
+            if self.state is not state:
+                self._enter(state)
+
+    def host_silent(self, host: CellHost, silent: bool) -> None:
+        """Note that the host does not answer, or answers again."""
+        if host is self._host:
+            self._board.answering = not silent
+            log.warning("program does not answer" if silent else "program answers again", package=self.package_id)
+
+    def host_ended(self, host: CellHost, reason: str) -> None:
+        """Report a program whose host is gone although the program had not ended."""
+        if host is not self._host:
+            return
+        if self.state is not S.STOPPING:
+            self._fail(f"The program was lost: {reason}.", "ConnectionLost")
+        self._ended()
+
+    def _fail(self, message: str, kind: str) -> None:
+        self.last_error = m.ErrorData("error", kind, message)
+        self._services.hub.broadcast(make_event("ProjectException", ProjectExceptionData(message, kind)))
+
+    def _ended(self) -> None:
+        self._host = None
+        self._info = self._before = None
+        if self._killing is not None:
+            self._killing.cancel()
+            self._killing = None
+        self._enter(S.STOPPED)
+        screen = ShowMainScreenData(MainScreen.PACKAGES_LIST, self.package_id)
+        self._services.hub.broadcast(make_event("ShowMainScreen", screen))
+        self._services.cell.hosts.prepare()
+
+    def _spawn(self, work: Coroutine[Any, Any, None], name: str) -> None:
+        task = asyncio.create_task(work, name=name)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+
+class _InfoEvent(msgspec.Struct):
+    data: PackageInfoData

@@ -1,0 +1,203 @@
+"""Packages on disk: one directory each, by id; uploads are checked before anything of them is in place."""
+
+import base64
+import binascii
+import os
+import re
+import shutil
+import stat
+import tempfile
+import zipfile
+from io import BytesIO
+from pathlib import Path, PurePosixPath
+from typing import Any, Final
+
+import humps
+import msgspec
+import structlog
+
+from arcor2_hw.data.base import UNSET, Unset, now
+from arcor2_hw.data.package import PackageMeta, PackageSummary, ProjectMeta
+from arcor2_hw.data.project import BareProject
+from arcor2_hw.exceptions import InvalidPackage, NotFound, StorageError
+
+log = structlog.get_logger(__name__)
+
+MAX_FILES: Final = 10_000
+MAX_SIZE: Final = 512 * 1024 * 1024
+"""Bytes that all files of an upload may have when unpacked, counted while unpacking: a zip may lie about it."""
+_CHUNK: Final = 1 << 20
+_ID: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,127}")
+_NEVER_BUILT: Final = PackageMeta("N/A", "1970-01-01T00:00:00+00:00")
+
+
+class Packages:
+    """The directory of packages. Everything here reads or writes files: call it in a thread."""
+
+    def __init__(self, root: Path) -> None:
+        self._root = root
+
+    def checked(self, package_id: str) -> Path:
+        """Give where a package of that id is, or would be; InvalidPackage for what is no id."""
+        if not _ID.fullmatch(package_id):
+            raise InvalidPackage(f"{package_id[:80]!r} is no id of a package.")
+        return self._root / package_id
+
+    def directory(self, package_id: str) -> Path:
+        """Give the directory of a package; NotFound when there is none."""
+        path = self.checked(package_id)
+        if not (path / "script.py").is_file():
+            raise NotFound(f"There is no package {package_id}.")
+        return path
+
+    def all(self) -> list[PackageSummary]:
+        """Give all packages, newest first."""
+        if not self._root.is_dir():
+            return []
+        found = [
+            self.summary(path.name)
+            for path in self._root.iterdir()
+            if _ID.fullmatch(path.name) and (path / "script.py").is_file()
+        ]
+        return sorted(found, key=lambda summary: summary.package_meta.built, reverse=True)
+
+    def summary(self, package_id: str) -> PackageSummary:
+        """Give one package; NotFound."""
+        path = self.directory(package_id)
+        try:
+            meta = msgspec.json.decode((path / "package.json").read_bytes(), type=PackageMeta)
+        except (OSError, msgspec.MsgspecError):
+            meta = _NEVER_BUILT
+        return PackageSummary(package_id, meta, _project_meta(path / "data" / "project.json"))
+
+    def rename(self, package_id: str, name: str) -> PackageSummary:
+        """Give a package another name; NotFound, InvalidPackage for an empty name, StorageError."""
+        if not name:
+            raise InvalidPackage("A package needs a name.")
+        self._set(package_id, name=name)
+        return self.summary(package_id)
+
+    def mark_executed(self, package_id: str) -> None:
+        """Note that a package was run now; NotFound, StorageError."""
+        self._set(package_id, executed=now())
+
+    def _set(self, package_id: str, **values: str) -> None:
+        path = self.directory(package_id) / "package.json"
+        try:
+            known: Any = msgspec.json.decode(path.read_bytes())
+        except (OSError, msgspec.MsgspecError):
+            known = None
+        if not isinstance(known, dict):
+            known = msgspec.to_builtins(_NEVER_BUILT)
+        try:
+            _write_whole(path, msgspec.json.format(msgspec.json.encode(known | values), indent=2))
+        except OSError as error:
+            raise StorageError(f"The package {package_id} cannot be written: {error.strerror}.") from error
+
+    def delete(self, package_id: str) -> PackageSummary:
+        """Delete a package; gives what it was. NotFound, StorageError."""
+        summary = self.summary(package_id)
+        try:
+            self._discard(self.directory(package_id))
+        except OSError as error:
+            raise StorageError(f"The package {package_id} cannot be deleted: {error.strerror}.") from error
+        return summary
+
+    def _discard(self, path: Path) -> None:
+        """Take a directory away at once, and its files after that."""
+        grave = Path(tempfile.mkdtemp(prefix=".old-", dir=self._root))
+        path.rename(grave / path.name)
+        shutil.rmtree(grave, ignore_errors=True)
+
+    def upload(self, package_id: str, data: str) -> PackageSummary:
+        """Put a zip (base64) in the place of a package. InvalidPackage says what is wrong with it, StorageError."""
+        target = self.checked(package_id)
+        try:
+            content = base64.b64decode(data, validate=True)
+        except (binascii.Error, ValueError) as error:
+            raise InvalidPackage(f"The package is not base64: {error}.") from error
+        try:
+            self._root.mkdir(parents=True, exist_ok=True)
+            temporary = Path(tempfile.mkdtemp(prefix=".new-", dir=self._root))
+        except OSError as error:
+            raise StorageError(f"Packages cannot be written: {error.strerror}.") from error
+        try:
+            unpack(content, temporary)
+            if not (temporary / "script.py").is_file():
+                raise InvalidPackage("The package has no script.py.")
+            temporary.chmod(0o755)
+            if target.exists():
+                self._discard(target)
+            temporary.rename(target)
+        except OSError as error:
+            raise StorageError(f"The package cannot be written: {error.strerror}.") from error
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
+        return self.summary(package_id)
+
+
+def unpack(content: bytes, directory: Path) -> None:
+    """Unpack a zip into an empty directory. InvalidPackage when it is damaged, leads outside, or is too large."""
+    left = MAX_SIZE
+    try:
+        with zipfile.ZipFile(BytesIO(content)) as archive:
+            entries = archive.infolist()
+            if len(entries) > MAX_FILES:
+                raise InvalidPackage(f"The package has more than {MAX_FILES} files.")
+            for entry in entries:
+                target = directory / _inside(entry)
+                if entry.is_dir():
+                    target.mkdir(parents=True, exist_ok=True)
+                    continue
+                target.parent.mkdir(parents=True, exist_ok=True)
+                with archive.open(entry) as source, target.open("xb") as file:
+                    while chunk := source.read(_CHUNK):
+                        left -= len(chunk)
+                        if left < 0:
+                            raise InvalidPackage(f"The package is larger than {MAX_SIZE} bytes when unpacked.")
+                        file.write(chunk)
+    except FileExistsError as error:
+        raise InvalidPackage("The package has one file twice.") from error
+    except NotADirectoryError as error:
+        raise InvalidPackage("The package has a file inside of a file.") from error
+    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, ValueError) as error:
+        raise InvalidPackage(f"The package is no usable zip: {error}.") from error
+
+
+def _inside(entry: zipfile.ZipInfo) -> PurePosixPath:
+    name = entry.filename
+    path = PurePosixPath(name)
+    kind = stat.S_IFMT(entry.external_attr >> 16)
+    if not path.parts or path.is_absolute() or ".." in path.parts or "\\" in name or ":" in path.parts[0]:
+        raise InvalidPackage(f"The package has a file outside of itself: {name[:80]!r}.")
+    if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
+        raise InvalidPackage(f"The package has something that is no file: {name[:80]!r}.")
+    return path
+
+
+def _project_meta(path: Path) -> ProjectMeta | Unset:
+    try:
+        raw = path.read_bytes()
+    except OSError:
+        return UNSET
+    try:
+        project = msgspec.json.decode(raw, type=BareProject)
+    except msgspec.MsgspecError:
+        try:
+            project = msgspec.convert(humps.decamelize(msgspec.json.decode(raw)), BareProject)
+        except (msgspec.MsgspecError, ValueError):
+            log.warning("package with a damaged project", file=str(path))
+            return UNSET
+    if isinstance(project.modified, Unset):
+        return UNSET
+    return ProjectMeta(project.id, project.name, project.description, project.modified)
+
+
+def _write_whole(path: Path, content: bytes) -> None:
+    """Write a file so that it is either the old or the new one, whatever happens."""
+    temporary = path.with_name(f".{path.name}.new")
+    with temporary.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+    temporary.replace(path)
