@@ -1,0 +1,133 @@
+"""Observing: the life of a driver's connection, kept by a thread of its own: opened, watched, lost, back."""
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from typing import Final
+
+from arcor2_hw.data.device import Connection
+from arcor2_hw.exceptions import ConnectionLost, DeviceError, NotConnected
+
+ATTEMPT_TIMEOUT: Final = 2.0
+"""Seconds an attempt to come back may take: a device on a local network answers in one."""
+FIRST_PAUSE: Final = 0.1
+"""Seconds before the first attempt: a device that resets a connection takes the next at once."""
+LONGEST_PAUSE: Final = 2.0
+"""Seconds between attempts in the end: a device that was switched on is seen before its operator has walked back."""
+STOP_WITHIN: Final = 0.9
+"""Seconds `stop` waits for the thread; disconnect may take one."""
+
+log = logging.getLogger(__name__)
+
+
+class Observing:
+    """Keeps a connection that only observes. Control never comes back by itself; that is the driver's to take.
+
+    open_(timeout): opens, raises DeviceError. watch(stopping): blocks while all is well, returns soon after `stopping`
+    is set, raises DeviceError when the connection is lost. close(): closes, harmless when closed. lost(error): told
+    once per loss, before the connection is closed.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        open_: Callable[[float], None],
+        watch: Callable[[threading.Event], None],
+        close: Callable[[], None],
+        lost: Callable[[DeviceError], None] = lambda _: None,
+    ) -> None:
+        self.what = what
+        self._open, self._watch, self._close, self._tell_lost = open_, watch, close, lost
+        self._life = threading.Lock()
+        self._stopping = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._state = Connection.OFFLINE
+        self._reason: DeviceError | None = None
+
+    @property
+    def state(self) -> Connection:
+        """Tell how the connection is; it is "back" until `settled` is called."""
+        return self._state
+
+    @property
+    def online(self) -> bool:
+        """Tell whether the device is observed now."""
+        return self._state in (Connection.ONLINE, Connection.BACK)
+
+    def settled(self) -> None:
+        """Note that somebody has taken note of the connection being back."""
+        if self._state is Connection.BACK:
+            self._state = Connection.ONLINE
+
+    def check(self) -> None:
+        """Return when the device is observed. Raises NotConnected, or ConnectionLost with what it was lost by."""
+        if self.online:
+            return
+        if self._state is Connection.LOST:
+            raise ConnectionLost(f"the connection to {self.what} is lost", str(self._reason or ""))
+        raise NotConnected(f"{self.what} is not connected", str(self._reason or ""))
+
+    def start(self, timeout: float) -> None:
+        """Open within `timeout` s and watch from then on; harmless when it was started. Raises what open_ raises."""
+        with self._life:
+            if self._thread is not None:
+                self.check()
+                return
+            self._state = Connection.CONNECTING
+            try:
+                self._open(timeout)
+            except BaseException as e:
+                self._close()
+                self._state = Connection.FAILED
+                self._reason = e if isinstance(e, DeviceError) else None
+                raise
+            self._reason = None
+            self._stopping = threading.Event()
+            self._state = Connection.ONLINE
+            self._thread = threading.Thread(
+                target=self._run, args=(self._stopping,), name=f"observing {self.what}", daemon=True
+            )
+            self._thread.start()
+
+    def stop(self) -> None:
+        """Close and be offline; harmless when it is. A thread that does not end in time is left to end by itself."""
+        with self._life:
+            thread, self._thread = self._thread, None
+            self._stopping.set()
+            if thread is not None and thread is not threading.current_thread():
+                thread.join(STOP_WITHIN)
+            self._state = Connection.OFFLINE
+
+    def _run(self, stopping: threading.Event) -> None:
+        try:
+            while not stopping.is_set():
+                try:
+                    self._watch(stopping)
+                except DeviceError as e:
+                    self._come_back(stopping, e)
+        finally:
+            self._close()
+
+    def _come_back(self, stopping: threading.Event, loss: DeviceError) -> None:
+        if stopping.is_set():
+            return
+        self._reason = loss
+        self._state = Connection.LOST
+        log.warning("%s lost: %s", self.what, loss)
+        self._tell_lost(loss)
+        since, pause = time.monotonic(), FIRST_PAUSE
+        while True:
+            self._close()
+            if stopping.wait(pause):
+                return
+            pause = min(2.0 * pause, LONGEST_PAUSE)
+            try:
+                self._open(ATTEMPT_TIMEOUT)
+            except DeviceError as e:
+                self._reason = e
+                continue
+            if not stopping.is_set():
+                self._state = Connection.BACK
+                log.warning("%s back after %.1f s", self.what, time.monotonic() - since)
+            return

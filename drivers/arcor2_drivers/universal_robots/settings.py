@@ -1,0 +1,79 @@
+"""Settings of a Universal Robots arm, checked when they are given."""
+
+import dataclasses
+import math
+
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.exceptions import OutOfRange
+from arcor2_hw.objects import Settings
+
+MANUAL_TCP_SPEED = 0.25
+"""m/s: the most a client may ask for in manual mode (ISO 10218-1, reduced speed)."""
+
+
+def within(name: str, value: float, low: float, high: float) -> None:
+    """Raise OutOfRange, naming the parameter, unless the value lies in the range."""
+    if not (math.isfinite(value) and low <= value <= high):
+        raise OutOfRange(f"{name} must be {low:g} to {high:g}, not {value!r}")
+
+
+@dataclasses.dataclass
+class UrSettings(Settings):
+    """SI units. A negative payload mass means that nobody has stated it: control is refused until somebody does."""
+
+    host: str
+    payload_mass: float = -1.0
+    payload_cog_x: float = 0.0
+    payload_cog_y: float = 0.0
+    payload_cog_z: float = 0.0
+    tcp_x: float = 0.0
+    tcp_y: float = 0.0
+    tcp_z: float = 0.0
+    tcp_rx: float = 0.0
+    tcp_ry: float = 0.0
+    tcp_rz: float = 0.0
+    max_tcp_speed: float = 1.0
+    max_joint_speed: float = 1.05
+    tcp_acceleration: float = 1.2
+    joint_acceleration: float = 1.4
+    stop_deceleration: float = 5.0
+    watchdog_frequency: float = 10.0
+    use_upper_range_registers: bool = True
+    gripper_output: int = 0
+    part_sensor_input: int = -1
+    gripper_time: float = 0.3
+
+    def __post_init__(self) -> None:
+        if not self.host.strip():
+            raise OutOfRange("host must be the address of the controller")
+        if self.payload_mass >= 0.0:
+            within("payload_mass", self.payload_mass, 0.0, 40.0)
+        for axis in "xyz":
+            within(f"payload_cog_{axis}", getattr(self, f"payload_cog_{axis}"), -1.0, 1.0)
+            within(f"tcp_{axis}", getattr(self, f"tcp_{axis}"), -1.0, 1.0)
+            within(f"tcp_r{axis}", getattr(self, f"tcp_r{axis}"), -2.0 * math.pi, 2.0 * math.pi)
+        within("max_tcp_speed", self.max_tcp_speed, 0.01, 3.0)
+        within("max_joint_speed", self.max_joint_speed, 0.01, math.pi)
+        within("tcp_acceleration", self.tcp_acceleration, 0.05, 15.0)
+        within("joint_acceleration", self.joint_acceleration, 0.05, 40.0)
+        within("stop_deceleration", self.stop_deceleration, 0.5, 15.0)
+        # Below 5 Hz the arm could not rest within the 0.5 s that the type declares.
+        within("watchdog_frequency", self.watchdog_frequency, 5.0, 50.0)
+        if self.gripper_output != -1:
+            within("gripper_output", self.gripper_output, 0, 17)
+        if self.part_sensor_input != -1:
+            within("part_sensor_input", self.part_sensor_input, 0, 17)
+        within("gripper_time", self.gripper_time, 0.0, 10.0)
+
+    @property
+    def tcp(self) -> Pose:
+        """Give the TCP in the flange."""
+        return Pose(
+            Position(self.tcp_x, self.tcp_y, self.tcp_z),
+            Orientation.from_rotation_vector(self.tcp_rx, self.tcp_ry, self.tcp_rz),
+        )
+
+    @property
+    def payload_cog(self) -> tuple[float, float, float]:
+        """Give the payload's centre of gravity in the flange, m."""
+        return self.payload_cog_x, self.payload_cog_y, self.payload_cog_z

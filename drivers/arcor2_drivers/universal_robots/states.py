@@ -1,0 +1,82 @@
+"""The controller's numbers as the states of a robot: mode, safety, program; and what keeps it from moving.
+
+Source: Universal Robots, "RTDE guide": robot_mode, safety_mode, runtime_state.
+"""
+
+import enum
+from typing import Final
+
+from arcor2_hw.data.robot import Power, Safety
+
+
+class Runtime(enum.IntEnum):
+    """runtime_state."""
+
+    STOPPING = 0
+    STOPPED = 1
+    PLAYING = 2
+    PAUSING = 3
+    PAUSED = 4
+    RESUMING = 5
+
+
+MODE_IDLE: Final = 5
+MODE_RUNNING: Final = 7
+
+MODE_NAMES: Final = {
+    -1: "no controller",
+    0: "disconnected",
+    1: "safety configuration to be confirmed",
+    2: "booting",
+    3: "power off",
+    4: "power on",
+    5: "idle, brakes closed",
+    6: "backdrive",
+    7: "running",
+    8: "updating firmware",
+}
+
+_SAFETY: Final = {
+    1: Safety.NORMAL,
+    2: Safety.REDUCED,
+    3: Safety.PROTECTIVE_STOP,
+    4: Safety.RECOVERY,
+    5: Safety.SAFEGUARD_STOP,
+    6: Safety.EMERGENCY_STOP,
+    7: Safety.EMERGENCY_STOP,
+    8: Safety.VIOLATION,
+    9: Safety.FAULT,
+    10: Safety.FAULT,
+    11: Safety.FAULT,
+    12: Safety.SAFEGUARD_STOP,
+    13: Safety.ENABLING_STOP,
+}
+
+MAY_MOVE: Final = frozenset({Safety.NORMAL, Safety.REDUCED})
+
+REMEDIES: Final = {
+    Safety.PROTECTIVE_STOP: "look why the arm was stopped, then acknowledge the protective stop",
+    Safety.SAFEGUARD_STOP: "close the guard, then start the motion again",
+    Safety.EMERGENCY_STOP: "release the emergency stop, then switch the arm on again",
+    Safety.ENABLING_STOP: "hold the enabling device in its middle position",
+    Safety.RECOVERY: "move the arm back within its limits at the pendant",
+    Safety.VIOLATION: "look why a safety limit was exceeded, then restart the safety system",
+    Safety.FAULT: "read the log at the pendant, then restart the safety system",
+}
+
+
+def safety_of(safety_mode: int) -> Safety:
+    """Give what safety_mode means; a number not known is a fault."""
+    return _SAFETY.get(safety_mode, Safety.FAULT)
+
+
+def power_of(robot_mode: int) -> Power:
+    """Give what robot_mode says of the drives."""
+    if robot_mode >= MODE_IDLE and robot_mode != 8:
+        return Power.IDLE_BRAKED if robot_mode == MODE_IDLE else Power.OPERATIONAL
+    return Power.OFF
+
+
+def program_plays(runtime: int) -> bool:
+    """Tell whether some program plays, or waits to go on."""
+    return runtime not in (Runtime.STOPPED, Runtime.STOPPING)

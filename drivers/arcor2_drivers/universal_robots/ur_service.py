@@ -1,0 +1,184 @@
+"""UrServiced: what a person does with the arm: jog, guide by hand, switch on, acknowledge stops."""
+
+import logging
+import math
+import time
+from collections.abc import Callable
+from typing import Final, Literal
+
+from rtde_control import RTDEControlInterface
+
+from arcor2_hw.data.geometry import Orientation
+from arcor2_hw.data.robot import Control, Safety
+from arcor2_hw.exceptions import DeviceTimeout, InvalidData, NotFound, NotInControl, OutOfRange, Refused
+
+from .frames import turned, world_from_base
+from .observer import Sample
+from .settings import within
+from .states import MODE_IDLE, MODE_RUNNING, safety_of
+from .ur_arm import UrArm
+from .ur_observed import JOINTS
+
+POWER_WITHIN: Final = 20.0
+"""Seconds from "power on" to idle: a controller takes six, one that checks its joints longer."""
+BRAKES_WITHIN: Final = 20.0
+SAFETY_WITHIN: Final = 5.0
+POLL: Final = 0.02
+
+log = logging.getLogger(__name__)
+
+
+class UrServiced(UrArm):
+    """A Universal Robots arm and the people around it."""
+
+    _ABSTRACT = True
+
+    # -------------------------------------------------------------------------------- by hand, and by speed
+    def get_hand_teaching_mode(self) -> bool:
+        """Tell whether the arm can be moved by hand."""
+        return self._teaching and self._is_ours()
+
+    def set_hand_teaching_mode(self, enabled: bool) -> None:
+        """Make the arm movable by hand, or stiff again. Refused without a stated payload, or while moving."""
+        if self._payload is None:
+            raise Refused(f"{self.name}: hand teaching needs a stated payload_mass")
+        session = self._controlled()
+        if enabled and self.move_in_progress:
+            raise Refused(f"{self.name} is moving already")
+        if enabled:
+            session.do("hand teaching", lambda rtde: bool(rtde.teachMode()))
+        else:
+            session.do("the end of hand teaching", lambda rtde: bool(rtde.endTeachMode()))
+        self._teaching = enabled
+
+    def jog(
+        self,
+        twist: tuple[float, float, float, float, float, float] | None = None,
+        joint_velocities: list[float] | None = None,
+        frame: Literal["world", "base", "tool", "user"] = "world",
+        valid_for: float = 0.2,
+    ) -> None:
+        """Move with a velocity that runs out by itself `valid_for` s from now. Raises OutOfRange, Refused as a move."""
+        within("valid_for", valid_for, 0.01, 1.0)
+        if (twist is None) == (joint_velocities is None):
+            raise OutOfRange("jog needs either twist or joint_velocities")
+        stops = self._stops
+        with self._moving():
+            session = self._controlled()
+            if joint_velocities is not None:
+                limit = min(self._ur.max_joint_speed, self._joint_speed_cap())
+                velocities = [*joint_velocities]
+                if len(velocities) != len(JOINTS):
+                    raise OutOfRange(f"joint_velocities must have {len(JOINTS)} numbers")
+                for name, value in zip(JOINTS, velocities, strict=True):
+                    within(f"velocity of {name}", value, -limit, limit)
+                ramp = self._ur.joint_acceleration
+
+                def start(rtde: RTDEControlInterface) -> bool:
+                    return bool(rtde.speedJ(velocities, ramp, valid_for))
+
+            else:
+                assert twist is not None
+                linear, angular = self._turned_twist(twist, frame)
+                within(
+                    "speed of the twist", math.hypot(*linear), 0.0, min(self._ur.max_tcp_speed, self._tcp_speed_cap())
+                )
+                within("angular speed of the twist", math.hypot(*angular), 0.0, self._ur.max_joint_speed)
+                ramp = self._ur.tcp_acceleration
+
+                def start(rtde: RTDEControlInterface) -> bool:
+                    return bool(rtde.speedL([*linear, *angular], ramp, valid_for))
+
+            session.speed("a jog", lambda rtde: self._stops != stops or start(rtde), valid_for)
+
+    def _turned_twist(
+        self, twist: tuple[float, float, float, float, float, float], frame: str
+    ) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        base = world_from_base(self._pose).orientation.inverted()
+        by = {
+            "world": base,
+            "base": base * self._pose.orientation,
+            "tool": Orientation.from_rotation_vector(*self._observer.sample().tcp[3:]),
+        }.get(frame)
+        if by is None:
+            raise Refused(f"{self.name} has no frame {frame!r} to jog in")
+        return turned(twist[:3], by), turned(twist[3:], by)
+
+    # -------------------------------------------------------------------------------- what only a person decides
+    def power_on(self) -> None:
+        """Switch drive power on; brakes stay closed. Raises NotInControl in local control, Refused, DeviceTimeout."""
+        if self._observer.sample().robot_mode >= MODE_IDLE:
+            return
+        self._order("power on", "Powering on")
+        self._await("be switched on", lambda sample: sample.robot_mode >= MODE_IDLE, POWER_WITHIN)
+
+    def release_brakes(self) -> None:
+        """Release the brakes; the arm does not move. Raises NotInControl in local control, Refused, DeviceTimeout."""
+        mode = self._observer.sample().robot_mode
+        if mode == MODE_RUNNING:
+            return
+        if mode < MODE_IDLE:
+            raise Refused(f"{self.name} has no power; the brakes cannot be released")
+        self._order("brake release", "Brake releasing")
+        self._await("release its brakes", lambda sample: sample.robot_mode == MODE_RUNNING, BRAKES_WITHIN)
+
+    def acknowledge(self, code: str) -> None:
+        """Refuse: a safety stop is acknowledged by a person by name; NotFound when `code` does not stand."""
+        if code not in {alarm.code for alarm in self.alarms()}:
+            raise NotFound(f"{self.name} has no alarm {code}")
+        raise Refused(f"{code} of {self.name} needs the person who looked: acknowledge_protective_stop(confirmed_by)")
+
+    def acknowledge_protective_stop(self, confirmed_by: str) -> None:
+        """Unlock a protective stop; the old program is stopped before, so its motion does not continue.
+
+        Raises Refused with the controller's words while it does not let itself be unlocked (5 s from the stop on).
+        """
+        self._confirmed(confirmed_by)
+        if safety_of(self._observer.sample().safety_mode) is not Safety.PROTECTIVE_STOP:
+            raise Refused(f"{self.name} is in no protective stop")
+        self._end_old_program("a protective stop was acknowledged")
+        log.warning("%s: protective stop acknowledged by %s", self.name, confirmed_by)
+        self._order("unlock protective stop", "Protective stop releasing")
+        self._await(
+            "leave the protective stop",
+            lambda sample: safety_of(sample.safety_mode) is not Safety.PROTECTIVE_STOP,
+            SAFETY_WITHIN,
+        )
+
+    def restart_safety(self, confirmed_by: str) -> None:
+        """Restart the safety system after a fault or violation; the arm is without power afterwards."""
+        self._confirmed(confirmed_by)
+        if safety_of(self._observer.sample().safety_mode) not in (Safety.FAULT, Safety.VIOLATION):
+            raise Refused(f"{self.name} has neither a fault nor a violation of its safety system")
+        self._end_old_program("the safety system was restarted")
+        log.warning("%s: safety system restarted by %s", self.name, confirmed_by)
+        self._order("restart safety", "Restarting safety")
+        self._await(
+            "restart its safety system",
+            lambda sample: safety_of(sample.safety_mode) not in (Safety.FAULT, Safety.VIOLATION),
+            POWER_WITHIN,
+        )
+
+    def _end_old_program(self, why: str) -> None:
+        if self._session is not None:
+            self._session.end(NotInControl(f"control of {self.name} ended: {why}"))
+        self._take_again = False
+        self._order("stop", "Stopped")
+
+    def _confirmed(self, confirmed_by: str) -> None:
+        if not confirmed_by.strip():
+            raise InvalidData("confirmed_by must name the person who looked at the robot")
+
+    def _order(self, command: str, expected: str) -> None:
+        if not self._has_dashboard:
+            raise Refused(f"{self.name} has no dashboard server: {command!r} has to be done at the pendant")
+        if self._at_pendant(max_age=0.0)[0] is Control.LOCAL:
+            raise NotInControl(f"{self.name} is in local control: {command!r} has to be done at the pendant")
+        self._dashboard.do(command, expected)
+
+    def _await(self, what: str, holds: Callable[[Sample], bool], within_s: float) -> None:
+        until = time.monotonic() + within_s
+        while not holds(self._observer.sample(max_age=0.5)):
+            if time.monotonic() > until:
+                raise DeviceTimeout(f"{self.name} did not {what} within {within_s:g} s")
+            time.sleep(POLL)

@@ -1,0 +1,204 @@
+"""UrTasks: the actions that a Universal Robots arm offers to programs."""
+
+import time
+from collections.abc import Callable
+from typing import ClassVar, Final
+
+from arcor2_hw.actions import StrEnum, action
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.project import ProjectRobotJoints
+from arcor2_hw.exceptions import Cancelled, DeviceFault, DeviceTimeout, OutOfRange, Refused
+
+from .ur_service import UrServiced
+
+POLL: Final = 0.005
+OUTPUT_WITHIN: Final = 0.5
+"""Seconds after which a switched output must be seen switched: some ten of the controller's cycles, and the network."""
+NOTHING_HELD: Final = "nothing_held"
+PART_LOST: Final = "part_lost"
+PART_STICKS: Final = "part_sticks"
+
+
+class MoveType(StrEnum):
+    """How the TCP gets to its target."""
+
+    LINEAR = "linear"
+    JOINT = "joint"
+
+
+def behind(pose: Pose, distance: float) -> Pose:
+    """Give the pose `distance` m behind another along the tool's axis."""
+    return pose * Pose(Position(0.0, 0.0, -distance))
+
+
+class UrTasks(UrServiced):
+    """A Universal Robots arm at work."""
+
+    _ABSTRACT = True
+    CANCEL_MAPPING: ClassVar[dict[str, str]] = {
+        "move": "stop",
+        "move_to": "stop",
+        "pick": "stop",
+        "place": "stop",
+        "wait_for_input": "stop",
+    }
+
+    @action
+    def move(
+        self,
+        pose: Pose,
+        move_type: MoveType = MoveType.LINEAR,
+        speed: float = 0.25,
+        acceleration: float = 0.5,
+        *,
+        an: str | None = None,
+    ) -> None:
+        """Move the TCP to a pose.
+
+        :param pose: where to
+        :param move_type: in a line, or all joints together
+        :param speed: fraction of the configured maximum
+        :param acceleration: fraction of the configured maximum
+        """
+        assert 0.01 <= speed <= 1.0
+        assert 0.01 <= acceleration <= 1.0
+        self._move_pose(pose, move_type is MoveType.LINEAR, speed, acceleration)
+
+    @action
+    def move_to(
+        self, joints: ProjectRobotJoints, speed: float = 0.25, acceleration: float = 0.5, *, an: str | None = None
+    ) -> None:
+        """Move to stored joint values, all joints arriving together.
+
+        :param joints: where to
+        :param speed: fraction of the configured maximum
+        :param acceleration: fraction of the configured maximum
+        """
+        assert 0.01 <= speed <= 1.0
+        assert 0.01 <= acceleration <= 1.0
+        self._move_joints(self._checked_joints(joints.joints), speed, acceleration)
+
+    @action
+    def pick(
+        self, pose: Pose, approach: float = 0.1, speed: float = 0.5, slow_speed: float = 0.1, *, an: str | None = None
+    ) -> None:
+        """Pick a part: approach along the tool, grip, wait until it is held, retreat.
+
+        :param pose: where the part is gripped
+        :param approach: distance from which it is approached, m
+        :param speed: fraction of the maximum on the way there
+        :param slow_speed: fraction of the maximum at the part
+        """
+        assert 0.0 <= approach <= 0.5
+        assert 0.01 <= speed <= 1.0
+        assert 0.01 <= slow_speed <= 1.0
+        output = self._gripper_output()
+        above = behind(pose, approach)
+        self._move_pose(above, False, speed, 0.5)
+        self._move_pose(pose, True, slow_speed, 0.5)
+        self._switch(output, True)
+        held = self._part_comes(True)
+        self._move_pose(above, True, slow_speed, 0.5)
+        if not held:
+            self._switch(output, False)
+            raise DeviceFault(f"{self.name} picked nothing", f"input {self._ur.part_sensor_input}", NOTHING_HELD)
+        if self._senses_part() and not self.get_digital_input(self._ur.part_sensor_input):
+            raise DeviceFault(f"{self.name} lost the part on the way up", fault_code=PART_LOST)
+
+    @action
+    def place(
+        self, pose: Pose, approach: float = 0.1, speed: float = 0.5, slow_speed: float = 0.1, *, an: str | None = None
+    ) -> None:
+        """Place the part that is held: approach along the tool, let go, retreat.
+
+        :param pose: where the part is let go
+        :param approach: distance from which it is approached, m
+        :param speed: fraction of the maximum on the way there
+        :param slow_speed: fraction of the maximum at the place
+        """
+        assert 0.0 <= approach <= 0.5
+        assert 0.01 <= speed <= 1.0
+        assert 0.01 <= slow_speed <= 1.0
+        output = self._gripper_output()
+        above = behind(pose, approach)
+        self._move_pose(above, False, speed, 0.5)
+        if self._senses_part() and not self.get_digital_input(self._ur.part_sensor_input):
+            raise DeviceFault(f"{self.name} lost the part on the way", fault_code=PART_LOST)
+        self._move_pose(pose, True, slow_speed, 0.5)
+        self._switch(output, False)
+        gone = self._part_comes(False)
+        self._move_pose(above, True, slow_speed, 0.5)
+        if not gone:
+            raise DeviceFault(f"the part sticks to the gripper of {self.name}", fault_code=PART_STICKS)
+
+    @action
+    def set_digital_output(self, output: int, value: bool, *, an: str | None = None) -> None:
+        """Switch a digital output and see it switched; it keeps its state when the robot loses the hub.
+
+        :param output: 0 to 7 standard, 8 to 15 configurable, 16 and 17 at the tool
+        :param value: on or off
+        """
+        assert 0 <= output <= 17
+        self._switch(output, value)
+
+    @action
+    def get_digital_input(self, number: int, *, an: str | None = None) -> bool:
+        """Read a digital input.
+
+        :param number: 0 to 7 standard, 8 to 15 configurable, 16 and 17 at the tool
+        """
+        assert 0 <= number <= 17
+        return bool(self._observer.sample().inputs >> number & 1)
+
+    @action(deadline=None)
+    def wait_for_input(self, number: int, value: bool, timeout: float = 10.0, *, an: str | None = None) -> None:
+        """Wait until a digital input has a value.
+
+        :param number: 0 to 7 standard, 8 to 15 configurable, 16 and 17 at the tool
+        :param value: on or off
+        :param timeout: seconds after which it fails
+        """
+        assert 0 <= number <= 17
+        assert 0.0 <= timeout <= 3600.0
+        stops = self._stops
+
+        def seen() -> bool:
+            if self._stops != stops:
+                raise Cancelled(f"waiting for input {number} of {self.name} was stopped")
+            return self.get_digital_input(number) is value
+
+        if not self._within(timeout, seen):
+            raise DeviceTimeout(f"input {number} of {self.name} was not {'on' if value else 'off'} in {timeout:g} s")
+
+    # -------------------------------------------------------------------------------- gripper and outputs
+    def _gripper_output(self) -> int:
+        if self._ur.gripper_output < 0:
+            raise Refused(f"{self.name} has no gripper: gripper_output is not set")
+        return self._ur.gripper_output
+
+    def _senses_part(self) -> bool:
+        return self._ur.part_sensor_input >= 0
+
+    def _part_comes(self, held: bool) -> bool:
+        """Wait for the gripper: for the sensor's word if there is one, else for the time it takes."""
+        if not self._senses_part():
+            time.sleep(self._ur.gripper_time)
+            return True
+        number = self._ur.part_sensor_input
+        return self._within(max(self._ur.gripper_time, 0.1), lambda: self.get_digital_input(number) is held)
+
+    def _switch(self, output: int, value: bool) -> None:
+        if not 0 <= output <= 17:
+            raise OutOfRange(f"output must be 0 to 17, not {output}")
+        self._controlled().set_output(output, value)
+        if not self._within(OUTPUT_WITHIN, lambda: bool(self._observer.sample().outputs >> output & 1) is value):
+            raise DeviceFault(f"output {output} of {self.name} did not switch {'on' if value else 'off'}")
+
+    @staticmethod
+    def _within(seconds: float, holds: Callable[[], bool]) -> bool:
+        until = time.monotonic() + seconds
+        while not holds():
+            if time.monotonic() > until:
+                return False
+            time.sleep(POLL)
+        return True
