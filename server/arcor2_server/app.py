@@ -3,7 +3,7 @@
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from importlib.metadata import version
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from litestar import Litestar, Response, Router, WebSocket, get, websocket
 from litestar.openapi import OpenAPIConfig
@@ -64,10 +64,10 @@ async def running_services(settings: ServerSettings) -> AsyncIterator[Services]:
             locks=locks,
             storage=storage,
             types=types,
-            session=None,  # type: ignore[arg-type]
-            cell=None,  # type: ignore[arg-type]
-            execution=None,  # type: ignore[arg-type]
-            build=None,  # type: ignore[arg-type]
+            session=cast("Session", None),  # these know the others, and are made below
+            cell=cast("OnlineCell", None),
+            execution=cast("Execution", None),
+            build=cast("BuildService", None),
         )
         services.session = Session(services)
         await services.session.open()
@@ -77,6 +77,9 @@ async def running_services(settings: ServerSettings) -> AsyncIterator[Services]:
         services.build = BuildService(services)
         locks.tree = services.session
         locks.stored = _is_known(services)
+        stack.push_async_callback(services.session.close)
+        await services.session.open()
+        stack.push_async_callback(services.cell.close)
         yield services
 
 

@@ -24,6 +24,10 @@ log = structlog.get_logger(__name__)
 
 UNREADABLE: Final = "Error"
 """What stands as the answered request when that could not be read."""
+LONGEST_NAME: Final = 200
+"""Characters up to which the name of a request that does not exist is repeated."""
+LONGEST_REASON: Final = 4000
+"""Characters of a refusal: what it quotes may be as long as the request."""
 _decode_request = msgspec.json.Decoder(Request).decode
 _decode_anything = msgspec.json.Decoder().decode
 
@@ -35,7 +39,12 @@ class _Head(Struct):
     request: str = UNREADABLE
 
 
-_decode_head = msgspec.json.Decoder(_Head).decode
+class _ReadableHead(Struct):
+    id: int
+    request: str
+
+
+_decode_head = msgspec.json.Decoder(_ReadableHead).decode
 
 
 class Route(Struct, frozen=True):
@@ -188,11 +197,11 @@ class Endpoint:
         except RequestRefused as error:
             # Data in a refusal means that a part was done, and its events are true.
             partly = error.data is not UNSET
-            self._answer(client, request, context if partly else None, False, error.data, str(error))
+            self._answer(client, request, context if partly else None, False, error.data, _shortened(str(error)))
             return
         except Arcor2Error as error:
             if error.detail:
-                log.info("request refused", request=rpc.name, reason=str(error), detail=error.detail)
+                log.info("request refused", request=rpc.name, reason=_shortened(str(error)), detail=error.detail)
             self._refuse(client, request, str(error))
             return
         self._answer(client, request, context, True, UNSET if data is None else data)
@@ -216,22 +225,30 @@ class Endpoint:
             broadcast(event)
 
     def _refuse(self, client: Client, request: "Request | _Head", message: str) -> None:
+        name = request.request if len(request.request) <= LONGEST_NAME else UNREADABLE
+        message = _shortened(message)
         if log.is_enabled_for(logging.DEBUG):
-            log.debug("refused", client=client.number, request=request.request, message=message)
+            log.debug("refused", client=client.number, request=name, message=message)
         try:
-            answer = encode(Response(request.id, request.request, False, [message]))
+            answer = encode(Response(request.id, name, False, [message]))
         except UnicodeEncodeError:
             # A name with half a surrogate pair can be read but not sent back.
             answer = encode(Response(request.id, UNREADABLE, False, [ascii(message)]))
         client.put(answer)
 
 
+def _shortened(message: str) -> str:
+    return message if len(message) <= LONGEST_REASON else message[:LONGEST_REASON] + " …"
+
+
 def _read_head(text: str) -> _Head:
     """Read what can be read of the id and name of a message that is no request, or is too long."""
     try:
-        return _decode_head(text)
+        readable = _decode_head(text)
     except (msgspec.DecodeError, RecursionError):
         pass
+    else:
+        return _Head(readable.id, readable.request)
     try:
         content = _decode_anything(text)
     except (msgspec.DecodeError, RecursionError):

@@ -1,15 +1,31 @@
 """What the server knows of object types: built-in, installed and uploaded ones, read by analysis, never imported."""
 
+import asyncio
 from collections.abc import Iterable
 from pathlib import Path
 
+import msgspec
+import structlog
 from msgspec import Struct
+from msgspec.structs import replace
 
+from arcor2_hw.analysis import (
+    Enumeration,
+    InstalledType,
+    Library,
+    SourceFile,
+    TypeAnalysis,
+    installed_types,
+    module_name,
+)
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ObjectTypeSource
 from arcor2_hw.data.robot import RobotMeta
+from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_hw.runtime.messages import TypeCode
 from arcor2_server.storage import Storage
+
+log = structlog.get_logger(__name__)
 
 
 class PackageType(Data, frozen=True):
@@ -31,93 +47,259 @@ class PackageType(Data, frozen=True):
 class Changes(Struct, frozen=True):
     """What `refresh` found: for ChangedObjectTypes remove, update and add, in this order."""
 
-    removed: list[ObjectTypeMeta]
-    updated: list[ObjectTypeMeta]
-    added: list[ObjectTypeMeta]
+    removed: list[ObjectTypeMeta] = []
+    updated: list[ObjectTypeMeta] = []
+    added: list[ObjectTypeMeta] = []
 
     def __bool__(self) -> bool:
         return bool(self.removed or self.updated or self.added)
 
 
+class _Known(Struct, frozen=True):
+    """Everything that follows from the sources, made anew and put in place as a whole."""
+
+    analyses: dict[str, TypeAnalysis] = {}
+    metas: dict[str, ObjectTypeMeta] = {}
+
+
 class ObjectTypes:
-    """The registry. Look-ups raise NotFound for a type or action that is not known."""
+    """The registry. Look-ups raise NotFound for a type or action that is not known.
+
+    `revision` grows with every change of what is known.
+    """
 
     def __init__(self, storage: Storage) -> None:
-        self._storage = storage
         self.revision = 0
-        """Grows with every change of what is known."""
+        self._storage = storage
+        self._library = Library()
+        self._installed: dict[str, InstalledType] = {}
+        self._uploaded: dict[str, ObjectTypeSource] = {}
+        self._known = _Known()
+        self._read_at = -1
+        self._untold = Changes()
+        self._reading = asyncio.Lock()
 
+    # ------------------------------------------------------------------------------------------------ life
     async def load(self) -> None:
         """Read built-in, installed and uploaded types."""
-        raise NotImplementedError
+        async with self._reading:
+            await asyncio.to_thread(self._read_installed)
+            await self._read_uploaded()
 
     async def refresh(self) -> Changes:
-        """Take in what was put straight into storage since the last time."""
-        raise NotImplementedError
+        """Take in what was put straight into storage since the last time; gives what clients do not know yet."""
+        if self._storage.types_revision == self._read_at and not self._untold:
+            return self._untold
+        async with self._reading:
+            if self._storage.types_revision != self._read_at:
+                await self._read_uploaded()
+            changes, self._untold = self._untold, Changes()
+        return changes
 
+    def _read_installed(self) -> None:
+        for installed in installed_types():
+            self._installed[installed.name] = installed
+            if installed.file is not None:
+                self._library.add(installed.file)
+
+    async def _read_uploaded(self) -> None:
+        first = self._read_at == -1
+        revision = self._storage.types_revision
+        stored = {one.id: one for one in await self._storage.object_types()}
+        for name in self._uploaded.keys() - stored.keys():
+            del self._uploaded[name]
+            self._library.remove(name)
+        for name, one in stored.items():
+            if self._uploaded.get(name) == one:
+                continue
+            if name in self._installed:
+                log.warning("uploaded object type ignored: one of that name is installed", type=name)
+                continue
+            try:
+                self._library.add(SourceFile(name, module_name(name), one.source))
+            except InvalidData as error:
+                log.warning("uploaded object type ignored", type=name, reason=str(error))
+                continue
+            self._uploaded[name] = one
+        # Off the event loop: a hundred types take a moment to read.
+        known = await asyncio.to_thread(self._analyse)
+        if not first:
+            self._note(self._known.metas, known.metas)
+        self._known = known
+        self._read_at = revision
+        self.revision += 1
+
+    def _analyse(self) -> _Known:
+        analyses = {name: self._library.analyse(name) for name in self._library.names()}
+        metas = {}
+        for name, analysis in analyses.items():
+            if not analysis.is_object_type:
+                continue
+            meta = analysis.meta
+            if (one := self._uploaded.get(name)) is not None:
+                meta = replace(meta, object_model=one.model, modified=one.modified)
+            metas[name] = meta
+        for name, installed in self._installed.items():
+            if installed.file is None:
+                metas[name] = ObjectTypeMeta(name, abstract=True, disabled=True, problem=str(installed.problem))
+                analyses[name] = TypeAnalysis(metas[name], problem=installed.problem)
+        return _Known(analyses, dict(sorted(metas.items())))
+
+    def _note(self, before: dict[str, ObjectTypeMeta], after: dict[str, ObjectTypeMeta]) -> None:
+        """Remember what clients have to be told."""
+        self._untold = Changes(
+            self._untold.removed + [meta for name, meta in before.items() if name not in after],
+            self._untold.updated + [meta for name, meta in after.items() if before.get(name, meta) != meta],
+            self._untold.added + [meta for name, meta in after.items() if name not in before],
+        )
+
+    def _told(self, name: str) -> None:
+        """Leave out of what is untold what the caller tells himself."""
+        self._untold = Changes(
+            *([meta for meta in metas if meta.type != name] for metas in msgspec.structs.astuple(self._untold))
+        )
+
+    # ------------------------------------------------------------------------------------------------ look-ups
     def names(self) -> list[str]:
         """Give the names of all types."""
-        raise NotImplementedError
+        return list(self._known.metas)
 
     def known(self, name: str) -> bool:
         """Tell whether there is such a type."""
-        raise NotImplementedError
+        return name in self._known.metas
 
     def metas(self) -> list[ObjectTypeMeta]:
         """Give all types, by name, built-in and disabled ones too."""
-        raise NotImplementedError
+        return list(self._known.metas.values())
 
     def meta(self, name: str) -> ObjectTypeMeta:
         """Give one type."""
-        raise NotImplementedError
+        try:
+            return self._known.metas[name]
+        except KeyError:
+            raise NotFound(f"There is no object type {name!r}.") from None
+
+    def _analysis(self, name: str) -> TypeAnalysis:
+        self.meta(name)
+        return self._known.analyses[name]
 
     def bases(self, name: str) -> list[str]:
         """Give the names of all ancestors of a type, the nearest first, without the type itself."""
-        raise NotImplementedError
+        return list(self._analysis(name).bases)
 
     def derives_from(self, name: str, base: str) -> bool:
         """Tell whether a type is, or derives from, `base`."""
-        raise NotImplementedError
+        return name == base or base in self._analysis(name).bases
 
     def actions(self, name: str) -> list[ObjectAction]:
         """Give the actions of a type: inherited and disabled ones too, hidden ones not."""
-        raise NotImplementedError
+        return [action for action in self._analysis(name).actions if not action.meta.hidden]
 
     def action(self, type_name: str, name: str) -> ObjectAction:
         """Give one action, also a hidden one."""
-        raise NotImplementedError
+        for action in self._analysis(type_name).actions:
+            if action.name == name:
+                return action
+        raise NotFound(f"The object type {type_name} has no action {name!r}.")
+
+    def enumerations(self, name: str) -> dict[tuple[str, str], Enumeration]:
+        """Give the enumerations that the actions of a type take, by action and parameter."""
+        return self._analysis(name).enumerations
 
     def robot_metas(self) -> list[RobotMeta]:
         """Give the features of all non-abstract robot types."""
-        raise NotImplementedError
+        found = (self._known.analyses[name].robot for name in self._known.metas)
+        return [robot for robot in found if robot is not None]
 
     def robot_meta(self, name: str) -> RobotMeta:
         """Give the features of one robot type; NotFound when it is no robot."""
-        raise NotImplementedError
+        if (robot := self._analysis(name).robot) is None:
+            raise NotFound(f"The object type {name} is no robot.")
+        return robot
 
     def implements(self, name: str, method: str) -> bool:
         """Tell whether a type really has an optional method, by itself or by an ancestor."""
-        raise NotImplementedError
+        return method in self._analysis(name).implemented
 
+    def is_uploaded(self, name: str) -> bool:
+        """Tell whether a type was uploaded, and so can be changed and deleted."""
+        return name in self._uploaded
+
+    # ------------------------------------------------------------------------------------------------ code
     def type_code(self, name: str) -> TypeCode:
         """Give how the cell host gets at one type."""
-        raise NotImplementedError
+        self.meta(name)
+        return self._code(name)
+
+    def _code(self, name: str) -> TypeCode:
+        if (one := self._uploaded.get(name)) is not None:
+            return TypeCode(name, module=module_name(name), source=one.source)
+        if (installed := self._installed.get(name)) is not None:
+            return TypeCode(name, entry_point=installed.entry_point)
+        return TypeCode(name, entry_point=f"arcor2_hw.objects:{name}")
+
+    def _with_needed(self, names: Iterable[str]) -> list[str]:
+        """Give types and the uploaded modules that they need, each after those that it needs itself."""
+        found: dict[str, None] = {}
+        for name in names:
+            for file in self._analysis(name).modules:
+                if file.name in self._uploaded:
+                    found[file.name] = None
+            found[name] = None
+        return list(found)
 
     def type_codes(self, names: Iterable[str]) -> list[TypeCode]:
         """Give how the cell host gets at types and at the uploaded modules they need, bases and mixins first."""
-        raise NotImplementedError
+        return [self._code(name) for name in self._with_needed(names)]
 
     def sources_for(self, names: Iterable[str]) -> list[PackageType]:
-        """Give what a package needs of types, with their uploaded bases and mixins first."""
-        raise NotImplementedError
+        """Give what a package needs of types, with their uploaded bases and mixins first; nothing for built-in ones."""
+        found = []
+        for name in self._with_needed(names):
+            if (one := self._uploaded.get(name)) is not None:
+                found.append(PackageType(name, module_name(name), source=one.source))
+            elif (installed := self._installed.get(name)) is not None:
+                found.append(
+                    PackageType(
+                        name,
+                        module_name(name),
+                        entry_point=installed.entry_point,
+                        folder=Path(installed.folder) if installed.folder else None,
+                        distribution=installed.distribution,
+                        version=installed.version,
+                    )
+                )
+        return found
 
+    # ------------------------------------------------------------------------------------------------ changes
     async def add(self, source: ObjectTypeSource) -> ObjectTypeMeta:
-        """Save an uploaded type (new, or of changed source or model) and analyse it.
+        """Save an uploaded type (new, or of changed source or model) and analyse it; the caller tells the clients.
 
         InvalidData for the name of a built-in or installed type.
         """
-        raise NotImplementedError
+        self._refuse_given(source.id, "replaced")
+        async with self._reading:
+            await self._storage.put_object_type(source)
+            await self._read_uploaded()
+            self._told(source.id)
+        return self.meta(source.id)
 
     async def remove(self, name: str) -> ObjectTypeMeta:
         """Delete an uploaded type; gives its last meta. InvalidData for a built-in or installed type, NotFound."""
-        raise NotImplementedError
+        self._refuse_given(name, "deleted")
+        meta = self.meta(name)
+        async with self._reading:
+            await self._storage.delete_object_type(name)
+            await self._read_uploaded()
+            self._told(name)
+        return meta
+
+    def _refuse_given(self, name: str, what: str) -> None:
+        if name in self._installed:
+            installed = self._installed[name]
+            raise InvalidData(
+                f"The object type {name} belongs to {installed.distribution or 'an installed distribution'}"
+                f" and cannot be {what}."
+            )
+        if name in self._library and name not in self._uploaded:
+            raise InvalidData(f"The object type {name} is built in and cannot be {what}.")

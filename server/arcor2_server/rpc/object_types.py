@@ -1,12 +1,19 @@
 """Requests about object types."""
 
-from msgspec import Raw
+import ast
 
+from msgspec import UNSET, Raw
+
+from arcor2_hw.data.base import Unset, is_valid_name
 from arcor2_hw.data.events import ChangeType, Event
-from arcor2_hw.data.rpc import TypeArgs
+from arcor2_hw.data.object_type import ObjectTypeMeta, ObjectTypeSource
+from arcor2_hw.data.rpc import DeleteObjectTypesData, IdArgs, TypeArgs
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.runtime.messages import TypeCode
 from arcor2_server.hub import encode
+from arcor2_server.locks import ADDING_OBJECT
 from arcor2_server.object_types import Changes
-from arcor2_server.rpc.registry import Context, make_event, rpc
+from arcor2_server.rpc.registry import Context, RequestRefused, make_event, rpc
 
 
 def change_events(changes: Changes) -> list[Event]:
@@ -48,3 +55,116 @@ async def get_robot_meta(context: Context, args: None) -> Raw:  # noqa: ARG001
     types, kept = context.services.types, context.services.kept
     revisions = (types.revision,)
     return kept.get("GetRobotMeta", revisions) or kept.keep("GetRobotMeta", revisions, encode(types.robot_metas()))
+
+
+@rpc("ObjectTypeUsage")
+async def object_type_usage(context: Context, args: IdArgs) -> set[str]:
+    """Give the scenes in which an object type is used."""
+    return await _scenes_with(context, args.id)
+
+
+async def _scenes_with(context: Context, name: str) -> set[str]:
+    storage = context.services.storage
+    scenes = [await storage.scene(listed.id) for listed in await storage.scenes()]
+    return {scene.id for scene in scenes if any(placed.type == name for placed in scene.objects)}
+
+
+# ------------------------------------------------------------------------------------------------ new ones
+@rpc("NewObjectType")
+async def new_object_type(context: Context, args: ObjectTypeMeta) -> None:
+    """Make an object type that is its base under another name, with a collision model where the base takes one."""
+    async with context.services.locks.auto(context.user, ADDING_OBJECT):
+        _check_new(context, args)
+        if context.dry_run:
+            return
+        source = ObjectTypeSource(
+            args.type,
+            derived_source(args.type, context.services.types.type_code(args.base), args.description),
+            description=args.description or UNSET,
+            model=args.object_model,
+        )
+        context.emit("ChangedObjectTypes", [await context.services.types.add(source)], ChangeType.ADD)
+
+
+def _check_new(context: Context, new: ObjectTypeMeta) -> None:
+    types = context.services.types
+    if types.known(new.type):
+        raise RequestRefused(f"There is an object type called {new.type} already: choose another name.")
+    if not is_valid_name(new.type):
+        raise RequestRefused(f"{new.type!r} is no valid name: letters, digits and _, no keyword, no name of Python's.")
+    base = types.meta(new.base)
+    if base.disabled:
+        raise RequestRefused(f"The object type {base.type} cannot be used{_because(base)}.")
+    if types.derives_from(base.type, "Robot"):
+        raise RequestRefused("A robot's object type has to be written, not only derived.")
+    if isinstance(new.object_model, Unset):
+        if types.derives_from(base.type, "CollisionObject"):
+            raise RequestRefused(f"An object type derived from {base.type} needs a collision model.")
+        return
+    if not types.derives_from(base.type, "CollisionObject"):
+        raise RequestRefused(f"An object type derived from {base.type} takes no collision model.")
+    try:
+        model = new.object_model.model()
+    except ValueError as error:
+        raise RequestRefused(f"A collision model is needed: {error}.") from None
+    if model.id != new.type:
+        raise RequestRefused(f"The model of {new.type} needs the id {new.type}, not {model.id}.")
+
+
+def _because(meta: ObjectTypeMeta) -> str:
+    return "" if isinstance(meta.problem, Unset) else f" ({meta.problem})"
+
+
+def derived_source(name: str, base: TypeCode, description: str = "") -> str:
+    """Give the module of a type that only derives from another one."""
+    module, _, imported = base.entry_point.partition(":")
+    come_from = ast.ImportFrom(module or base.module, [ast.alias(imported or base.name)], 0 if module else 1)
+    body: list[ast.stmt] = [ast.Expr(ast.Constant(description))] if description else []
+    body.append(ast.Assign([ast.Name("_ABSTRACT", ast.Store())], ast.Constant(False)))
+    derived = ast.ClassDef(name, [ast.Name(imported or base.name, ast.Load())], [], body, [])
+    return ast.unparse(ast.fix_missing_locations(ast.Module([come_from, derived], []))) + "\n"
+
+
+# ------------------------------------------------------------------------------------------------ deleted ones
+@rpc("DeleteObjectTypes")
+async def delete_object_types(context: Context, args: set[str] | None) -> list[DeleteObjectTypesData] | None:
+    """Delete the named uploaded types, or all of them; those that are in use stay, and are answered with why."""
+    services = context.services
+    user = context.user
+    wanted = sorted(args) if args is not None else [name for name in services.types.names() if _given(context, name)]
+    async with services.locks.auto(user, *(name for name in wanted if services.types.known(name))):
+        failed = []
+        # What derives from others goes first, so that a whole family can be deleted at once.
+        for name in sorted(wanted, key=lambda name: -len(_ancestors(context, name))):
+            try:
+                await _check_unused(context, name)
+                if not context.dry_run:
+                    context.emit_first("ChangedObjectTypes", [await services.types.remove(name)], ChangeType.REMOVE)
+            except Arcor2Error as error:
+                failed.append(DeleteObjectTypesData(name, str(error)))
+    if failed:
+        raise RequestRefused(f"These object types were not deleted: {', '.join(one.id for one in failed)}.", failed)
+    return None
+
+
+def _given(context: Context, name: str) -> bool:
+    return context.services.types.is_uploaded(name)
+
+
+def _ancestors(context: Context, name: str) -> list[str]:
+    types = context.services.types
+    return types.bases(name) if types.known(name) else []
+
+
+async def _check_unused(context: Context, name: str) -> None:
+    types, session = context.services.types, context.services.session
+    if types.meta(name).built_in:
+        raise RequestRefused(f"The object type {name} is built in.")
+    if not types.is_uploaded(name):
+        raise RequestRefused(f"The object type {name} belongs to an installed driver: uninstall that.")
+    if derived := [other for other in types.names() if other != name and name in types.bases(other)]:
+        raise RequestRefused(f"The object type {name} is the base of {', '.join(derived)}.")
+    if (opened := session.scene) is not None and any(placed.type == name for placed in opened.objects):
+        raise RequestRefused(f"The object type {name} is used in the open scene {opened.name}.")
+    if scenes := await _scenes_with(context, name):
+        raise RequestRefused(f"The object type {name} is used in the scenes {', '.join(sorted(scenes))}.")

@@ -1,0 +1,117 @@
+"""Two people at one server: names, locks, and what happens to them when one leaves."""
+
+from tests.server.core.serving import ServerProcess, talking
+
+
+async def test_lock_is_told_to_all_after_the_answer(server: ServerProcess) -> None:
+    async with talking(server.url, "ann") as ann, talking(server.url, "bob") as bob, talking(server.url) as nobody:
+        await ann.socket.send('{"id": 1, "request": "WriteLock", "args": {"object_id": "SCENE"}}')
+        assert await ann.receive() == {"id": 1, "response": "WriteLock", "result": True}
+        told = {"event": "ObjectsLocked", "data": {"object_ids": ["SCENE"], "owner": "ann"}}
+        for talker in (ann, bob, nobody):
+            assert await talker.event("ObjectsLocked") == told
+        # A lock that is held already is granted again without a word.
+        await ann.granted("WriteLock", {"object_id": "SCENE"})
+        await ann.nothing_more()
+        await bob.refused("WriteLock", {"object_id": "SCENE"})
+        await bob.refused("WriteUnlock", {"object_id": "SCENE"})
+        await bob.refused("ReadLock", {"object_id": "SCENE"})
+        await ann.granted("WriteUnlock", {"object_id": "SCENE"})
+        for talker in (ann, bob, nobody):
+            assert (await talker.event("ObjectsUnlocked"))["data"] == told["data"]
+        await bob.granted("ReadLock", {"object_id": "SCENE"})
+        await ann.refused("WriteLock", {"object_id": "SCENE"})
+        await bob.granted("ReadUnlock", {"object_id": "SCENE"})
+        for talker in (ann, bob):
+            await talker.nothing_more()
+
+
+async def test_tree_is_widened_and_narrowed(server: ServerProcess) -> None:
+    async with talking(server.url, "ann") as ann:
+        await ann.refused("UpdateLock", {"object_id": "PROJECT", "new_type": "TREE"})
+        await ann.granted("WriteLock", {"object_id": "PROJECT"})
+        await ann.event("ObjectsLocked")
+        await ann.granted("UpdateLock", {"object_id": "PROJECT", "new_type": "TREE"})
+        # The tree is the id alone: nothing more is locked.
+        assert (await ann.event("ObjectsLocked"))["data"]["object_ids"] == []
+        await ann.refused("UpdateLock", {"object_id": "PROJECT", "new_type": "TREE"})
+        await ann.granted("UpdateLock", {"object_id": "PROJECT", "new_type": "OBJECT"})
+        assert (await ann.event("ObjectsUnlocked"))["data"]["object_ids"] == []
+        await ann.granted("WriteUnlock", {"object_id": "PROJECT"})
+
+
+async def test_locks_need_a_name_and_something_known(server: ServerProcess) -> None:
+    async with talking(server.url) as talker:
+        await talker.refused("WriteLock", {"object_id": "SCENE"})
+        await talker.granted("RegisterUser", {"user_name": "ann"})
+        assert "nothing_known" in await talker.refused("WriteLock", {"object_id": "nothing_known"})
+        await talker.refused("UpdateLock", {"object_id": "SCENE", "new_type": "tree"})
+
+
+async def test_name_is_given_once(server: ServerProcess) -> None:
+    async with talking(server.url, "ann"), talking(server.url) as second:
+        await second.refused("RegisterUser", {"user_name": ""})
+        await second.refused("RegisterUser", {"user_name": "ann"})
+        await second.granted("RegisterUser", {"user_name": "bob"})
+        await second.granted("RegisterUser", {"user_name": "bob"})
+    async with talking(server.url, "ann"), talking(server.url, "bob"):
+        pass
+
+
+async def test_name_moves_from_a_connection_that_does_not_answer(server: ServerProcess) -> None:
+    async with talking(server.url, "ann") as gone:
+        gone.socket.transport.pause_reading()
+        async with talking(server.url) as back:
+            await back.granted("RegisterUser", {"user_name": "ann"})
+            await back.granted("WriteLock", {"object_id": "SCENE"})
+            gone.socket.transport.resume_reading()
+            # The old connection is nobody now.
+            assert "log" in await gone.refused("WriteLock", {"object_id": "PROJECT"})
+            await back.granted("WriteUnlock", {"object_id": "SCENE"})
+
+
+async def test_who_comes_later_learns_of_the_locks(server: ServerProcess) -> None:
+    async with talking(server.url, "ann") as ann:
+        for item in ("SCENE", "PROJECT"):
+            await ann.granted("WriteLock", {"object_id": item})
+        async with talking(server.url) as bob:
+            await bob.nothing_more()
+            await bob.granted("RegisterUser", {"user_name": "bob"})
+            told = await bob.event("ObjectsLocked")
+            assert told["data"] == {"object_ids": ["PROJECT", "SCENE"], "owner": "ann"}
+            await bob.nothing_more()
+        for item in ("SCENE", "PROJECT"):
+            await ann.granted("WriteUnlock", {"object_id": item})
+
+
+async def test_locks_of_one_who_left_are_released_after_a_time(server: ServerProcess) -> None:
+    async with talking(server.url, "bob") as bob:
+        async with talking(server.url, "ann") as ann:
+            await ann.granted("WriteLock", {"object_id": "SCENE"})
+            await ann.granted("ReadLock", {"object_id": "ACTION"})
+        await bob.event("ObjectsLocked")
+        await bob.refused("WriteLock", {"object_id": "SCENE"})
+        told = await bob.event("ObjectsUnlocked")
+        assert told["data"] == {"object_ids": ["SCENE"], "owner": "ann"}
+        for item in ("SCENE", "ACTION"):
+            await bob.granted("WriteLock", {"object_id": item})
+            await bob.event("ObjectsLocked")
+            await bob.granted("WriteUnlock", {"object_id": item})
+            await bob.event("ObjectsUnlocked")
+        await bob.nothing_more()
+
+
+async def test_one_who_comes_back_in_time_keeps_his_locks(server: ServerProcess) -> None:
+    async with talking(server.url, "bob") as bob:
+        async with talking(server.url, "ann") as ann:
+            await ann.granted("WriteLock", {"object_id": "SCENE"})
+        await bob.event("ObjectsLocked")
+        async with talking(server.url, "ann") as ann:
+            assert (await ann.event("ObjectsLocked"))["data"] == {"object_ids": ["SCENE"], "owner": "ann"}
+            # Longer than the time-out: his own second connection ends it, the first one's time does not.
+            for _ in range(40):
+                await bob.refused("WriteLock", {"object_id": "SCENE"})
+                await bob.nothing_more()
+                await ann.socket.ping()
+            await ann.granted("WriteUnlock", {"object_id": "SCENE"})
+            await bob.event("ObjectsUnlocked")
