@@ -1,0 +1,107 @@
+"""Runs the tutorials as they stand: writes their files, types their commands, compares what they say is printed."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+TUTORIALS = sorted((Path(__file__).parents[2] / "docs" / "tutorials").glob("*.md"))
+BLOCK = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+TIMEOUT = 60
+
+
+def expected(lines: list[str]) -> re.Pattern[str]:
+    """A pattern that the output must contain: `...` stands for anything."""
+    return re.compile(".*?".join(".*?".join(map(re.escape, line.split("..."))) for line in lines), re.DOTALL)
+
+
+def commands(text: str) -> Iterator[tuple[str, list[str]]]:
+    """The commands of a console block, each with the lines printed after it."""
+    command, printed = "", []
+    for line in text.splitlines():
+        if line.startswith("$ "):
+            if command:
+                yield command, printed
+            command, printed = line[2:], []
+        else:
+            printed.append(line)
+    yield command, printed
+
+
+class Background:
+    """A command that stays; its output is read until the lines that say it is ready."""
+
+    def __init__(self, command: str, wanted: list[str], directory: Path, environment: dict[str, str]) -> None:
+        self.process = subprocess.Popen(
+            ["bash", "-c", f"exec {command}"],
+            cwd=directory,
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        self.output = ""
+        self.ready = threading.Event()
+        self.pattern = expected(wanted)
+        self.thread = threading.Thread(target=self.read)
+        self.thread.start()
+
+    def read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            self.output += line
+            if self.pattern.search(self.output):
+                self.ready.set()
+        self.ready.set()
+        self.process.stdout.close()
+
+    def stop(self) -> None:
+        self.process.send_signal(signal.SIGTERM)
+        try:
+            self.process.wait(10)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        self.thread.join()
+
+
+@pytest.mark.parametrize("tutorial", TUTORIALS, ids=lambda path: path.stem)
+def test_tutorial(tutorial: Path, tmp_path: Path) -> None:
+    environment = dict(os.environ, PATH=f"{Path(sys.executable).parent}:{os.environ['PATH']}")
+    background: list[Background] = []
+    ran = 0
+    try:
+        for kind, info, text in BLOCK.findall(tutorial.read_text()):
+            if title := re.search(r'title="([\w.]+)"', info):
+                (tmp_path / title.group(1)).write_text(text)
+            elif kind == "console" and "background" in info:
+                for command, printed in commands(text):
+                    started = Background(command, printed, tmp_path, environment)
+                    background.append(started)
+                    assert started.ready.wait(TIMEOUT), f"{command}\n{started.output}"
+                    assert started.pattern.search(started.output), f"{command}\n{started.output}"
+            elif kind == "console":
+                for command, printed in commands(text):
+                    done = subprocess.run(
+                        ["bash", "-c", command],
+                        cwd=tmp_path,
+                        env=environment,
+                        capture_output=True,
+                        text=True,
+                        timeout=TIMEOUT,
+                        check=False,
+                    )
+                    output = done.stdout + done.stderr
+                    assert done.returncode == 0, f"{command}\n{output}"
+                    assert expected(printed).search(output), f"{command}\n{output}"
+                    ran += 1
+    finally:
+        for started in reversed(background):
+            started.stop()
+    assert ran > 0, "the tutorial runs nothing"
