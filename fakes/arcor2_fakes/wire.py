@@ -5,6 +5,7 @@ import contextlib
 import os
 import socket
 import struct
+from collections import deque
 from collections.abc import Callable
 from typing import Any, Protocol, cast
 
@@ -12,6 +13,7 @@ from arcor2_fakes.control import ControlServer
 
 FAULTS = ("silence", "reset", "half_frame", "garbage", "slow", "refuse", "heal")
 _RESET_ON_CLOSE = struct.pack("ii", 1, 0)  # struct linger: on, 0 s: closing sends RST
+_TIMER_GRAIN = 0.001  # s, of the event loop
 _MAX_UNSENT = (
     1 << 20
 )  # a client that does not read must not fill the fake's memory; frames are dropped as a full device would
@@ -90,6 +92,7 @@ class Connection(asyncio.Protocol):
         self.closed: Callable[[], None] = lambda: None
         self.alive = False
         self._torn = False  # half a frame went out: nothing sensible can follow
+        self._late: deque[tuple[float, bytes]] = deque()  # (when due, frame), in order
         self._transport: asyncio.Transport
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -121,8 +124,11 @@ class Connection(asyncio.Protocol):
             if data:
                 self._transport.write(data)
             return False
-        if faults.delay > 0.0:
-            asyncio.get_running_loop().call_later(faults.delay, self._late, data)
+        if faults.delay > 0.0 or self._late:
+            loop = asyncio.get_running_loop()
+            self._late.append((loop.time() + faults.delay, data))
+            if len(self._late) == 1:
+                loop.call_later(faults.delay, self._send_late)
         else:
             self._transport.write(data)
         return True
@@ -141,13 +147,22 @@ class Connection(asyncio.Protocol):
             self._transport.abort()
 
     def heal(self) -> None:
-        """Drops a connection that half a frame went out on; there is no way back into step."""
+        """Sends what is late; drops a connection that half a frame went out on, for there is no way back into step."""
         if self._torn:
             self.reset()
+        elif self.alive:
+            for _, data in self._late:
+                self._transport.write(data)
+        self._late.clear()
 
-    def _late(self, data: bytes) -> None:
-        if self.alive and not self._torn and not self.wire.faults.silent:
-            self._transport.write(data)
+    def _send_late(self) -> None:
+        loop = asyncio.get_running_loop()
+        if not self.alive or self._torn or self.wire.faults.silent:
+            self._late.clear()
+        while self._late and self._late[0][0] <= loop.time() + _TIMER_GRAIN:
+            self._transport.write(self._late.popleft()[1])
+        if self._late:
+            loop.call_at(self._late[0][0], self._send_late)
 
 
 class TcpWire:

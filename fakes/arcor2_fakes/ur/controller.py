@@ -73,6 +73,7 @@ class Controller:
         self.analog_outputs = [0.0, 0.0]
         self.commands: deque[dict[str, Any]] = deque(maxlen=_KEPT)
         self.stops: deque[dict[str, Any]] = deque(maxlen=_KEPT)
+        self.stops_seen = 0
         self.watchdog_trips = 0
         self.programs_killed = 0
         self.changed: Callable[[], None] = lambda: None
@@ -367,4 +368,5 @@ class Controller:
 
     def note_stop(self, via: str, code: int | str) -> None:
         """Remembers a frame that asks for a stop, at its arrival."""
+        self.stops_seen += 1
         self.stops.append({"t": time.monotonic(), "via": via, "code": code})

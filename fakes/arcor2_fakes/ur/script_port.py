@@ -47,6 +47,8 @@ class ScriptPort:
             except (ValueError, TypeError, LookupError) as e:
                 log.info("secondary program %s: runtime error: %s", name, e)
             return
+        if kind == "line" and name.startswith(("stopj", "stopl", "halt")):
+            self.controller.note_stop("script", name)
         program: Program
         if ControlScript.is_one(text):
             program = ControlScript(self.controller, text)

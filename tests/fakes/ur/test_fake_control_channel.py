@@ -159,6 +159,30 @@ async def test_faults_of_a_wire(server):
     wire.close()
 
 
+async def test_slow_frames_keep_their_order(server):
+    connections = []
+    wire = TcpWire("device", "127.0.0.1", 0, connections.append)
+    await wire.listen()
+    reader, writer = await asyncio.open_connection(*parse_address(wire.address))
+    while not connections:
+        await asyncio.sleep(0.001)
+    (connection,) = connections
+    await wire.fault("slow", 0.05)
+    connection.send(b"1")
+    await asyncio.sleep(0.02)
+    connection.send(b"2")
+    await wire.fault("slow", 0.0)
+    connection.send(b"3")
+    assert await reader.readexactly(3) == b"123"
+    await wire.fault("slow", 60.0)
+    connection.send(b"4")
+    await wire.fault("heal")
+    connection.send(b"5")
+    assert await reader.readexactly(2) == b"45"
+    await close(writer)
+    wire.close()
+
+
 @pytest.mark.parametrize("text", ["", "host", ":1", "a:b", "a:70000"])
 def test_addresses_that_are_none(text):
     with pytest.raises(ValueError):

@@ -425,6 +425,18 @@ report(done=done, truth=fake.do("truth"))
     ur.control.wait_until(lambda t: t["watchdog_trips"] == 1, within=1.0)
 
 
+@pytest.mark.parametrize("version", ["3.15", "5.4", "5.12", "10.12"])
+def test_control_of_other_versions(start_ur, version):
+    ur = start_ur("--controller-version", version, *(["--frequency", "125"] if version.startswith("3.") else []))
+    seen = ur.library("""
+control = Control(host)
+moved = control.moveJ([0.2] + HOME[1:], 3.0, 20.0)
+report(moved=moved, truth=fake.do("truth"))
+""")
+    assert seen["moved"]
+    assert seen["truth"]["q"][0] == pytest.approx(0.2)
+
+
 def test_hand_guiding_only_in_freedrive(ur):
     seen = ur.library("""
 control = Control(host, 500.0)
