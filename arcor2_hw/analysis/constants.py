@@ -90,6 +90,8 @@ def constant(
                 return -again(operand)
             case ast.UnaryOp(op=ast.UAdd(), operand=operand):
                 return +again(operand)
+            case ast.UnaryOp(op=ast.Not(), operand=operand):
+                return not again(operand)
             case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
                 a, b = again(left), again(right)
                 if type(a) in (int, float) and type(b) in (int, float):

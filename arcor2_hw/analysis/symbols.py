@@ -118,15 +118,21 @@ class Resolver:
 
     def name(self, name: str, module: Module, depth: int = _DEPTH) -> Symbol | None:
         """Give what a name means at the top level of a module."""
+        if (found := self._own(name, module, depth)) is not None:
+            return found
+        return External(f"builtins.{name}") if hasattr(builtins, name) else None
+
+    def _own(self, name: str, module: Module, depth: int) -> Symbol | None:
+        """Give what a module itself binds, or takes over by `from x import *`."""
         if depth <= 0:
             return None
         if name in module.bindings:
             return self._bound(module.bindings[name], module, None, depth - 1)
         for star in module.stars:
             source = self._load(star.module)
-            if source is not None and (found := self.name(name, source, depth - 1)) is not None:
-                return found if not (isinstance(found, External) and found.dotted.startswith("builtins.")) else None
-        return External(f"builtins.{name}") if hasattr(builtins, name) else None
+            if source is not None and (found := self._own(name, source, depth - 1)) is not None:
+                return found
+        return None
 
     def _bound(
         self, binding: "ClassInfo | FunctionNode | Import | Value", module: Module, owner: ClassInfo | None, depth: int
