@@ -3,7 +3,7 @@
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from importlib.metadata import version
-from typing import Any, Final, cast
+from typing import Any, cast
 
 from litestar import Litestar, Response, Router, WebSocket, get, websocket
 from litestar.openapi import OpenAPIConfig
@@ -17,12 +17,16 @@ from arcor2_server.execution import Execution
 from arcor2_server.hub import Hub
 from arcor2_server.locks import Locks
 from arcor2_server.object_types import ObjectTypes
+from arcor2_server.rest import ROUTES
+from arcor2_server.rest.answers import ROLE
 
 # Imported for their handlers.
 from arcor2_server.rpc import (  # noqa: F401
     action_points,
     actions,
+    build,
     copying,
+    execution,
     general,
     joints,
     lists,
@@ -32,6 +36,7 @@ from arcor2_server.rpc import (  # noqa: F401
     orientations,
     parameters,
     project,
+    robot,
     scene,
     scene_objects,
 )
@@ -40,9 +45,6 @@ from arcor2_server.session import Session
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import Storage
 from arcor2_server.users import Users
-
-ROLE: Final = "role"
-"""The key of a route's `opt` under which it declares the least role that may use it."""
 
 
 @asynccontextmanager
@@ -77,9 +79,8 @@ async def running_services(settings: ServerSettings) -> AsyncIterator[Services]:
         services.build = BuildService(services)
         locks.tree = services.session
         locks.stored = _is_known(services)
-        stack.push_async_callback(services.session.close)
-        await services.session.open()
         stack.push_async_callback(services.cell.close)
+        stack.push_async_callback(services.execution.close)
         yield services
 
 
@@ -108,7 +109,7 @@ def create_app(services: Services) -> Litestar:
     """Make the application around parts that are up."""
     endpoint = Endpoint(services)
     app = Litestar(
-        route_handlers=[ready, arserver],
+        route_handlers=[ready, arserver, *ROUTES],
         openapi_config=OpenAPIConfig(
             title="ARCOR2-HW",
             version=version("arcor2-hw"),
@@ -119,4 +120,5 @@ def create_app(services: Services) -> Litestar:
         logging_config=None,
     )
     app.state.endpoint = endpoint
+    app.state.services = services
     return app

@@ -8,7 +8,7 @@ import gc
 import signal
 import socket
 import sys
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import IO, Annotated
 
@@ -82,7 +82,7 @@ async def run(settings: ServerSettings, listener: socket.socket) -> None:
     from arcor2_server.app import create_app, running_services
 
     async with running_services(settings) as services:
-        server = Server(configuration(create_app(services), settings), settings.host)
+        server = Server(configuration(create_app(services), settings), settings.host, services.cell.hosts.prepare)
         loop = asyncio.get_running_loop()
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, server.end)
@@ -119,9 +119,10 @@ def configuration(app: object, settings: ServerSettings) -> uvicorn.Config:
 class Server(uvicorn.Server):
     """uvicorn's server, which says when it is ready and leaves signals to us."""
 
-    def __init__(self, config: uvicorn.Config, host: str) -> None:
+    def __init__(self, config: uvicorn.Config, host: str, when_ready: Callable[[], None]) -> None:
         super().__init__(config)
         self._host = host
+        self._when_ready = when_ready
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Start, then say where."""
@@ -130,6 +131,7 @@ class Server(uvicorn.Server):
             host = f"[{self._host}]" if ":" in self._host else self._host
             sys.stdout.write(f"ready ws://{host}:{sockets[0].getsockname()[1]}\n")
             sys.stdout.flush()
+            self._when_ready()
 
     @contextlib.contextmanager
     def capture_signals(self) -> Generator[None, None, None]:
