@@ -1,5 +1,6 @@
 """Object type source to metadata, from text alone: what is read is never imported."""
 
+from arcor2_hw.analysis.enumerations import Enumeration
 from arcor2_hw.analysis.installed import GROUP, InstalledType, installed_types
 from arcor2_hw.analysis.library import BUILT_IN, Library, TypeAnalysis
 from arcor2_hw.analysis.source import Problem, SourceFile, module_name
@@ -7,6 +8,7 @@ from arcor2_hw.analysis.source import Problem, SourceFile, module_name
 __all__ = [
     "BUILT_IN",
     "GROUP",
+    "Enumeration",
     "InstalledType",
     "Library",
     "Problem",

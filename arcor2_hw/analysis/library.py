@@ -6,8 +6,10 @@ from pathlib import Path
 from typing import Final
 
 import msgspec
+from msgspec import field
 
 from arcor2_hw.analysis.actions import ActionReader
+from arcor2_hw.analysis.enumerations import Enumeration, enumerations_of
 from arcor2_hw.analysis.hierarchy import Hierarchy, is_known_library
 from arcor2_hw.analysis.module import ClassInfo, Import, Module
 from arcor2_hw.analysis.robots import robot_meta
@@ -44,6 +46,7 @@ class TypeAnalysis(Data, frozen=True):
     is_object_type: false for a helper or mixin that does not derive from Generic; it is no type for clients.
     robot: None for what is no robot, and for what may not be placed. implemented: the optional methods of our bases
     that it really has. bases: the object types it derives from, nearest first. mixins: classes before its base.
+    enumerations: what its actions take, by action and parameter.
     modules: the other files it needs, each after those that it needs itself; without ours.
     """
 
@@ -56,6 +59,7 @@ class TypeAnalysis(Data, frozen=True):
     modules: tuple[SourceFile, ...] = ()
     is_object_type: bool = True
     problem: Problem | None = None
+    enumerations: dict[tuple[str, str], Enumeration] = field(default_factory=dict)
 
 
 class Library:
@@ -270,15 +274,17 @@ class Library:
             settings=settings,
         )
         direct = hierarchy.bases(info)
+        actions = tuple(self._all_actions(info, bases))
         return TypeAnalysis(
             meta,
-            tuple(self._all_actions(info, bases)),
+            actions,
             robot,
             frozenset() if name in BUILT_IN else hierarchy.implemented_hooks(info),
             tuple(bases),
             tuple(base.name if isinstance(base, ClassInfo) else base.dotted for base in direct[:-1]),
             needed,
             problem=problem,
+            enumerations=enumerations_of(info, actions, hierarchy),
         )
 
     def _type_name(self, info: ClassInfo) -> str | None:

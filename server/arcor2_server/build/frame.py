@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from arcor2_hw.actions.parameter_types import PARAMETER_TYPES
+from arcor2_hw.analysis import Enumeration
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectAction
 from arcor2_hw.data.parameter import Parameter
@@ -27,17 +28,11 @@ _FIXED: Final = ("ActionPoints", "Resources", "aps", "error", "main", "print_exc
 
 
 @dataclass(frozen=True, slots=True)
-class Enumeration:
-    """An enumeration that a parameter takes: where a script imports it from, and its members by value."""
-
-    module: str
-    name: str
-    members: Mapping[str | int, str]
-
-
-@dataclass(frozen=True, slots=True)
 class TypeFacts:
-    """What a script needs of one object type. `enumerations` by action and parameter."""
+    """What a script needs of one object type.
+
+    enumerations: by action and parameter, with the module from which the script imports them.
+    """
 
     module: str
     actions: Mapping[str, ObjectAction]
@@ -194,4 +189,5 @@ class References:
         kind = self._enumerations.get((self._method, parameter.name))
         if kind is None or value not in kind.members:
             raise InvalidData(f"parameter {parameter.name}: {value!r} is no member of its enumeration")
-        return expressions.dotted(self._frame.imported(kind.module, kind.name), (kind.members[value],))
+        first, *inner = kind.name.split(".")
+        return expressions.dotted(self._frame.imported(kind.module, first), (*inner, kind.members[value]))

@@ -20,7 +20,7 @@ def identifier(text: str) -> str:
         name = f"_{name.lstrip('_')}"
     if not name or name[0].isdigit():
         name = f"_{name}"
-    return f"{name}_" if keyword.iskeyword(name) or keyword.issoftkeyword(name) else name
+    return f"{name}_" if keyword.iskeyword(name) else name
 
 
 def class_name(text: str) -> str:
@@ -43,9 +43,10 @@ class Names:
             if name not in self._taken:
                 self._taken.add(name)
                 return name
+        stem = wanted if wanted.endswith("_") else f"{wanted}_"
         number = self._next.get(wanted, 2)
-        while f"{wanted}_{number}" in self._taken:
+        while f"{stem}{number}" in self._taken:
             number += 1
         self._next[wanted] = number + 1
-        self._taken.add(name := f"{wanted}_{number}")
+        self._taken.add(name := f"{stem}{number}")
         return name

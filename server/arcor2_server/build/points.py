@@ -5,7 +5,7 @@ The generated classes ask `Resources` (arcor2_hw.runtime.resources) for `positio
 action point.
 """
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -46,13 +46,13 @@ def _text(value: str) -> str:
     return f'"{shown[1:-1]}"' if shown[0] == "'" and '"' not in shown else shown
 
 
-def _class(name: str, title: str, fields: Iterable[str], properties: Iterable[tuple[str, str, str]]) -> str:
+def _class(name: str, title: str, fields: Sequence[str], properties: Sequence[tuple[str, str, str]]) -> str:
     lines = [
         f"class {name}:",
         f'    """{title}"""',
         "",
         "    def __init__(self, res: Resources) -> None:",
-        f"        self.{_OWN_FIELD} = res",
+        *([f"        self.{_OWN_FIELD} = res"] if properties or not fields else []),
         *(f"        {line}" for line in fields),
     ]
     for attribute, kind, call in properties:

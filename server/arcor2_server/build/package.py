@@ -1,0 +1,81 @@
+"""A package as files, in a directory or a zip: the same files give the same bytes."""
+
+import io
+import os
+import shutil
+import stat
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path, PurePosixPath
+from typing import Final
+
+from arcor2_hw.exceptions import InvalidPackage, StorageError
+
+Files = Mapping[str, bytes]
+"""Content by path, relative, with slashes."""
+
+_EPOCH: Final = (1980, 1, 1, 0, 0, 0)
+"""The earliest time a zip can hold; a real one would make two zips of the same files differ."""
+_MODE: Final = (stat.S_IFREG | 0o644) << 16
+
+
+def _checked(path: str) -> str:
+    parts = PurePosixPath(path).parts
+    if not parts or path.startswith("/") or ".." in parts or "\\" in path or "\0" in path:
+        raise InvalidPackage(f"a package cannot have a file {path!r}")
+    return path
+
+
+def to_zip(files: Files) -> bytes:
+    """Give the files as a zip, in order of their paths."""
+    with io.BytesIO() as buffer:
+        with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive:
+            for path in sorted(files):
+                entry = zipfile.ZipInfo(_checked(path), _EPOCH)
+                entry.compress_type = zipfile.ZIP_DEFLATED
+                entry.external_attr = _MODE
+                entry.create_system = 3  # Unix, on whatever it is made
+                archive.writestr(entry, files[path])
+        return buffer.getvalue()
+
+
+def write(files: Files, directory: Path) -> None:
+    """Write the files as `directory`, which appears whole or not at all, and durably.
+
+    StorageError when that is not possible.
+    """
+    try:
+        directory.parent.mkdir(parents=True, exist_ok=True)
+        # On the same file system, for the rename, and with a leading dot, which no package id has.
+        temporary = Path(tempfile.mkdtemp(prefix=f".{directory.name}-", dir=directory.parent))
+    except OSError as error:
+        raise StorageError(f"packages cannot be written into {directory.parent}: {error.strerror}") from error
+    try:
+        # script.py last: a directory is a package by it, even one that a crash left behind.
+        for path, content in sorted(files.items(), key=lambda entry: entry[0] == "script.py"):
+            file = temporary / _checked(path)
+            file.parent.mkdir(parents=True, exist_ok=True)
+            _write(file, content)
+        temporary.chmod(0o755)
+        temporary.rename(directory)
+        _sync(directory.parent)
+    except OSError as error:
+        raise StorageError(f"package {directory.name} cannot be written: {error.strerror}", str(directory)) from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _write(file: Path, content: bytes) -> None:
+    with file.open("wb") as stream:
+        stream.write(content)
+        stream.flush()
+        os.fsync(stream.fileno())
+
+
+def _sync(directory: Path) -> None:
+    descriptor = os.open(directory, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,150 @@
+"""The Build service: gathers what a project needs, makes its program, and writes the package."""
+
+import asyncio
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import msgspec
+from msgspec import field
+
+from arcor2_hw.analysis import Enumeration
+from arcor2_hw.data.base import Data, Unset, new_id, now
+from arcor2_hw.data.object_type import ObjectAction, ObjectModel
+from arcor2_hw.data.package import PackageMeta
+from arcor2_hw.data.project import Project
+from arcor2_hw.data.scene import Scene
+from arcor2_hw.exceptions import InvalidProject, NotFound
+from arcor2_server.build import package, points, script, snapshot, versions
+from arcor2_server.build.frame import TypeFacts
+from arcor2_server.object_types import ObjectTypes, PackageType
+
+if TYPE_CHECKING:
+    from arcor2_server.services import Services
+
+
+class Ingredients(Data, frozen=True):
+    """All that a package is made of. Gathered on the event loop, worked on beside it."""
+
+    name: str
+    scene: Scene
+    project: Project
+    types: list[PackageType]
+    facts: dict[str, TypeFacts]
+    models: dict[str, ObjectModel]
+    built: str
+    enumerations: dict[str, list[Enumeration]] = field(default_factory=dict)
+    """By object type, for those whose code is copied from an installed driver, as the driver defines them."""
+    source: str | None = None
+    """The script of a project without logic, where one is stored."""
+
+
+def _facts(types: ObjectTypes, scene: Scene, project: Project, code: Iterable[PackageType]) -> dict[str, TypeFacts]:
+    """Give what the script needs of the types in the scene: their modules, and the actions that the project uses."""
+    carried = {one.name: one for one in code}
+    type_of = {obj.id: obj.type for obj in scene.objects}
+    actions: dict[str, dict[str, ObjectAction]] = {name: {} for name in type_of.values()}
+    for point in project.action_points:
+        for action in point.actions:
+            object_id, _, method = action.type.partition("/")
+            name = type_of.get(object_id)
+            if name is None or method in actions[name]:
+                continue
+            try:
+                actions[name][method] = types.action(name, method)
+            except NotFound:
+                continue  # refused where the logic uses it
+    facts: dict[str, TypeFacts] = {}
+    for name, used in actions.items():
+        one = carried.get(name)
+        module = f"{snapshot.FOLDER}.{one.module}" if one is not None else "arcor2_hw.objects"
+        kinds = {key: kind for key, kind in types.enumerations(name).items() if key[0] in used}
+        if one is not None and not one.source:
+            # The copy of a driver's folder may be called otherwise; the type's own module gives them all.
+            kinds = {key: msgspec.structs.replace(kind, module=module) for key, kind in kinds.items()}
+        facts[name] = TypeFacts(module, used, kinds)
+    return facts
+
+
+def files_of(made_of: Ingredients) -> dict[str, bytes]:
+    """Give the files of a package (protocol, section 11). Raises InvalidProject, NotFound."""
+    project, scene = made_of.project, made_of.scene
+    if project.has_logic:
+        source = script.from_logic(scene, project, made_of.facts)
+    elif made_of.source is not None:
+        source = made_of.source
+        script.check_syntax(source)
+    else:
+        source = script.without_logic(scene, project, made_of.facts)
+    files = snapshot.files_of(made_of.types, made_of.enumerations)
+    files |= {
+        "script.py": source.encode(),
+        "action_points.py": points.source(project).encode(),
+        "data/scene.json": _document(scene),
+        "data/project.json": _document(project),
+        "package.json": _document(PackageMeta(made_of.name, made_of.built)),
+    }
+    for module, model in made_of.models.items():
+        files[f"data/models/{module}.json"] = _document(model)
+    files[versions.FILE] = _document(versions.present(snapshot.imported_packages(files)))
+    return files
+
+
+def _document(value: Data) -> bytes:
+    return msgspec.json.format(msgspec.json.encode(value), indent=2) + b"\n"
+
+
+class BuildService:
+    """Builds packages. Errors: NotFound (project, scene, object type), InvalidProject, StorageError."""
+
+    def __init__(self, services: "Services") -> None:
+        self._services = services
+
+    async def gather(self, project_id: str, package_name: str = "") -> Ingredients:
+        """Give what a package of a saved project is made of; without a name it gets the project's."""
+        storage, types = self._services.storage, self._services.types
+        project = await storage.project(project_id)
+        scene = await storage.scene(project.scene_id)
+        used = dict.fromkeys(obj.type for obj in scene.objects)
+        for name in used:
+            if (meta := types.meta(name)).disabled:
+                problem = "" if isinstance(meta.problem, Unset) else f": {meta.problem}"
+                raise InvalidProject(f"object type {name} cannot be used{problem}")
+        extra = [] if isinstance(project.project_objects_ids, Unset) else project.project_objects_ids
+        # Bases too: an uploaded type may derive from an installed one.
+        code = types.sources_for([*(each for name in used for each in (*reversed(types.bases(name)), name)), *extra])
+        modules = {one.name: one.module for one in code}
+        models = {
+            modules[name]: model
+            for name in used
+            if name in modules and not isinstance(model := types.meta(name).object_model, Unset)
+        }
+        source: str | None = None
+        if not project.has_logic:
+            try:
+                source = await storage.project_source(project_id)
+            except NotFound:
+                source = None
+        return Ingredients(
+            package_name or project.name,
+            scene,
+            project,
+            code,
+            _facts(types, scene, project, code),
+            models,
+            now(),
+            {name: list(types.enumerations(name).values()) for name in used},
+            source,
+        )
+
+    async def build(self, project_id: str, package_name: str) -> str:
+        """Write the package of a saved project among the packages; gives its id."""
+        made_of = await self.gather(project_id, package_name)
+        package_id = new_id("pkg")
+        directory = self._services.settings.packages_dir / package_id
+        await asyncio.to_thread(lambda: package.write(files_of(made_of), directory))
+        return package_id
+
+    async def publish(self, project_id: str, package_name: str = "") -> bytes:
+        """Give the package of a saved project as a zip."""
+        made_of = await self.gather(project_id, package_name)
+        return await asyncio.to_thread(lambda: package.to_zip(files_of(made_of)))

@@ -1,0 +1,142 @@
+"""The code of object types as a package carries it: uploaded modules, and for a driver a copy of its own folder."""
+
+import ast
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from arcor2_hw.analysis import Enumeration
+from arcor2_hw.exceptions import InvalidProject
+from arcor2_server.build.naming import Names
+from arcor2_server.build.style import docstring
+from arcor2_server.object_types import PackageType
+
+FOLDER: Final = "object_types"
+_LEFT_OUT: Final = frozenset({"__pycache__", ".mypy_cache", ".ruff_cache", ".pytest_cache"})
+_MODULE: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+
+class _Imports(NamedTuple):
+    absolute: frozenset[str]
+    """Dotted names of what may be modules."""
+    level: int
+    """The most leading dots of a relative import."""
+
+
+@lru_cache(maxsize=1024)
+def _imports(source: bytes) -> _Imports:
+    """Give what a source imports."""
+    try:
+        tree = ast.parse(source)
+    except (SyntaxError, ValueError):
+        return _Imports(frozenset(), 0)  # what is wrong with it is for the analysis to say
+    found: set[str] = set()
+    level = 0
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            level = max(level, node.level)
+            if node.level == 0 and node.module:
+                found.add(node.module)
+                found.update(f"{node.module}.{alias.name}" for alias in node.names)
+    return _Imports(frozenset(found), level)
+
+
+def imported_packages(files: Mapping[str, bytes]) -> set[str]:
+    """Give the names of the packages that the Python files among `files` import."""
+    return {
+        name.partition(".")[0]
+        for path, content in files.items()
+        if path.endswith(".py")
+        for name in _imports(content).absolute
+    }
+
+
+def _files_below(folder: Path) -> Iterator[Path]:
+    for path in sorted(folder.rglob("*")):
+        inner = path.relative_to(folder)
+        hidden = any(part in _LEFT_OUT or part.startswith(".") for part in inner.parts)
+        if not hidden and path.suffix != ".pyc" and path.is_file() and path.resolve().is_relative_to(folder.resolve()):
+            yield path
+
+
+def _inside(one: PackageType, folder: Path) -> tuple[str, str]:
+    """Give the dotted name of a driver's folder, and of the type's module within it ("" for the folder itself)."""
+    module = one.entry_point.partition(":")[0].split(".")
+    for end in range(len(module), 0, -1):
+        if module[end - 1] == folder.name:
+            return ".".join(module[:end]), ".".join(module[end:])
+    raise InvalidProject(
+        f"object type {one.name}: its entry point {one.entry_point} is not in its folder {folder.name}"
+    )
+
+
+def _check_own(one: PackageType, path: Path, content: bytes, own: str) -> None:
+    """Refuse a driver that imports itself by its full name: the package would run the hub's code, not its own.
+
+    Likewise one that imports, with more dots than its file lies deep, from outside of its folder.
+    """
+    if path.suffix != ".py" or one.folder is None:
+        return
+    imports = _imports(content)
+    if imports.level > len(path.relative_to(one.folder).parts):
+        raise InvalidProject(
+            f"object type {one.name}: {path.name} imports from outside of the folder {one.folder.name}"
+        )
+    vendor = own.partition(".")[0]
+    for name in imports.absolute:
+        if name == own or name.startswith(f"{own}.") or (vendor != "arcor2_hw" and name.partition(".")[0] == vendor):
+            raise InvalidProject(
+                f"object type {one.name}: {path.name} imports {name}; a driver must import its own folder relatively"
+            )
+
+
+def _given(one: PackageType, own: str, copied: str, inner: str, kinds: Iterable[Enumeration]) -> bytes:
+    """Give the module that stands for an installed type: its class, and the enumerations that its actions take."""
+    place = f".{copied}{'.' if inner else ''}{inner}"
+    given = {one.entry_point.partition(":")[2] or one.name: place}
+    for kind in kinds:
+        inside = kind.module == own or kind.module.startswith(f"{own}.")
+        source = f".{copied}{kind.module.removeprefix(own)}" if inside else kind.module
+        name = kind.name.partition(".")[0]
+        if "." in kind.name and given.get(name) == place:
+            continue  # nested in the type itself
+        if given.setdefault(name, source) != source:
+            raise InvalidProject(f"object type {one.name}: its actions take two things called {name}")
+    about = docstring(f"{one.name} of {one.distribution} {one.version}, as it was when this package was built.")
+    lines = [f"from {source} import {name} as {name}" for name, source in given.items()]
+    return "\n".join([about, "", *lines, ""]).encode()
+
+
+def files_of(types: Iterable[PackageType], enumerations: Mapping[str, Iterable[Enumeration]]) -> dict[str, bytes]:
+    """Give the files of object types by their path in a package.
+
+    `enumerations`: by type, what its actions take. Raises InvalidProject naming the type that cannot be copied.
+    """
+    types = list(types)
+    files: dict[str, bytes] = {f"{FOLDER}/__init__.py": b""}
+    for one in types:
+        if not _MODULE.fullmatch(one.module):
+            raise InvalidProject(f"object type {one.name}: {one.module!r} is no name of a module")
+        if one.source:
+            files[f"{FOLDER}/{one.module}.py"] = one.source.encode()
+    names = Names(one.module for one in types)
+    folders: dict[Path, str] = {}
+    for one in types:
+        if one.source:
+            continue
+        if one.folder is None or not one.folder.is_dir():
+            raise InvalidProject(f"object type {one.name} is not in a folder of its own and cannot be copied")
+        own, inner = _inside(one, one.folder)
+        if one.folder not in folders:
+            folders[one.folder] = copied = names.claim(one.folder.name, f"{one.folder.name}_driver")
+            for path in _files_below(one.folder):
+                content = path.read_bytes()
+                _check_own(one, path, content, own)
+                files[f"{FOLDER}/{copied}/{path.relative_to(one.folder).as_posix()}"] = content
+        copied = folders[one.folder]
+        files[f"{FOLDER}/{one.module}.py"] = _given(one, own, copied, inner, enumerations.get(one.name, ()))
+    return files

@@ -1,0 +1,83 @@
+"""Versions of what a package does not carry: Python, this library, and the distributions that its drivers import."""
+
+import importlib.metadata
+import inspect
+import platform
+import re
+import sys
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+import msgspec
+from msgspec import field
+
+from arcor2_hw.data.base import Data
+
+FILE: Final = "versions.json"
+_OURS: Final = "arcor2-hw"
+_SEPARATORS: Final = re.compile(r"[-_.]+")
+"""Names of distributions that differ in these alone are the same (PEP 503)."""
+
+
+class Versions(Data, frozen=True):
+    """The content of versions.json."""
+
+    arcor2_hw: str
+    python: str
+    distributions: dict[str, str] = field(default_factory=dict)
+
+
+@cache
+def _distributions() -> dict[str, str]:
+    """Give for every importable name the distribution that it comes from.
+
+    importlib.metadata.packages_distributions of Python 3.11 does not see compiled modules that stand alone.
+    """
+    found: dict[str, str] = {}
+    for distribution in importlib.metadata.distributions():
+        name = _SEPARATORS.sub("-", distribution.metadata["Name"]).lower()
+        for path in distribution.files or ():
+            first = path.parts[0]
+            module = first if len(path.parts) > 1 else inspect.getmodulename(first)
+            if module and module.isidentifier():
+                found.setdefault(module, name)
+    return found
+
+
+def present(imported: Iterable[str]) -> Versions:
+    """Give the versions in use here, of the distributions that give the packages `imported`."""
+    known = _distributions()
+    wanted = {known[name] for name in imported if name in known and name not in sys.stdlib_module_names} - {_OURS}
+    return Versions(
+        importlib.metadata.version(_OURS),
+        platform.python_version(),
+        {name: importlib.metadata.version(name) for name in sorted(wanted)},
+    )
+
+
+def check_versions(package: Path) -> list[str]:
+    """Give a sentence for each difference between what a package was built with and what is here.
+
+    A package without versions.json (an older one, or one built elsewhere) has none.
+    """
+    try:
+        built = msgspec.json.decode((package / FILE).read_bytes(), type=Versions)
+    except FileNotFoundError:
+        return []
+    except (OSError, msgspec.MsgspecError) as error:
+        return [f"{FILE} of the package cannot be read: {error}"]
+    differences = []
+    here = platform.python_version()
+    if built.python.split(".")[:2] != here.split(".")[:2]:
+        differences.append(f"The package was built for Python {built.python}, here is {here}.")
+    for name, version in {_OURS: built.arcor2_hw, **built.distributions}.items():
+        try:
+            found = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            differences.append(f"The package was built with {name} {version}, which is not installed here.")
+            continue
+        if found != version:
+            differences.append(f"The package was built with {name} {version}, here is {found}.")
+    return differences

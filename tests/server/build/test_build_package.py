@@ -1,0 +1,390 @@
+"""Packages: what is in them, that they run by themselves, that type checkers and zip tools accept them."""
+
+import asyncio
+import contextlib
+import io
+import itertools
+import json
+import os
+import subprocess
+import sys
+import types
+import zipfile
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+import arcor2_hw.objects
+from arcor2_hw.analysis import Enumeration, InstalledType, SourceFile
+from arcor2_hw.data.base import UNSET
+from arcor2_hw.data.object_type import Box, Model3dType, ObjectModel, ObjectTypeSource
+from arcor2_hw.data.project import END, START, Project
+from arcor2_hw.data.project_index import ProjectIndex, global_pose
+from arcor2_hw.data.rpc import BuildProjectArgs, BuildProjectData
+from arcor2_hw.exceptions import InvalidPackage, InvalidProject, NotFound, StorageError
+from arcor2_server.build import package, versions
+from arcor2_server.build.service import BuildService, Ingredients, files_of
+from arcor2_server.object_types import ObjectTypes, PackageType
+from arcor2_server.rpc.build import build_project
+from arcor2_server.rpc.registry import Context, RequestRefused
+from arcor2_server.settings import ServerSettings
+from arcor2_server.storage import Storage
+from tests.server.build import workplace
+
+ROOT = Path(__file__).parents[3]
+STOCK = Path(arcor2_hw.objects.__file__).parent / "stock"
+MODELS = {"table": ObjectModel(Model3dType.BOX, box=Box("table", 1.0, 1.0, 0.02))}
+
+
+@pytest.fixture
+def driver(tmp_path: Path) -> PackageType:
+    folder = tmp_path / "vendor" / "acme_devices" / "acme_reader"
+    for name, content in workplace.DRIVER.items():
+        file = folder / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(content)
+    entry = "acme_devices.acme_reader.reader:AcmeReader"
+    return PackageType("AcmeReader", "acme_reader", "", entry, folder, "acme-devices", "2.1")
+
+
+@pytest.fixture
+def code(driver: PackageType) -> list[PackageType]:
+    entry = "arcor2_hw.objects.stock.flow_actions:FlowActions"
+    return [
+        PackageType("Arm", "arm", workplace.ARM),
+        driver,
+        PackageType("FlowActions", "flow_actions", "", entry, STOCK, "arcor2-hw", "0.1.0"),
+        PackageType("table", "table", workplace.TABLE),
+    ]
+
+
+@pytest.fixture
+def made_of(code: list[PackageType]) -> Ingredients:
+    built = "2026-11-21T06:43:11.414039+00:00"
+    return Ingredients(
+        "Boards",
+        workplace.scene(),
+        workplace.project(),
+        code,
+        workplace.FACTS,
+        dict(MODELS),
+        built,
+        {"AcmeReader": [Enumeration("acme_devices.acme_reader.codes", "Mode", {1: "ONCE", 2: "TWICE"})]},
+    )
+
+
+# ------------------------------------------------------------------------------------------------ content
+def test_a_script_and_its_points_read_well(made_of: Ingredients) -> None:
+    files = files_of(made_of)
+    for name, golden in (("script.py", "workplace_script.txt"), ("action_points.py", "workplace_points.txt")):
+        assert files[name].decode() == Path(__file__).with_name(golden).read_text()
+
+
+def test_content(made_of: Ingredients) -> None:
+    files = files_of(made_of)
+    assert set(files) == {
+        "script.py",
+        "action_points.py",
+        "package.json",
+        "versions.json",
+        "data/scene.json",
+        "data/project.json",
+        "data/models/table.json",
+        "object_types/__init__.py",
+        "object_types/arm.py",
+        "object_types/table.py",
+        "object_types/acme_reader.py",
+        "object_types/flow_actions.py",
+        *(f"object_types/acme_reader_driver/{name}" for name in workplace.DRIVER if "pycache" not in name),
+        *(f"object_types/stock/{file.name}" for file in STOCK.glob("*.py")),
+    }
+    assert json.loads(files["package.json"]) == {"name": "Boards", "built": made_of.built}
+    assert msgspec.json.decode(files["data/project.json"], type=Project) == made_of.project
+    assert b"null" not in files["data/scene.json"]
+    assert files["object_types/__init__.py"] == b""
+    recorded = json.loads(files["versions.json"])
+    assert recorded["distributions"] == {"msgspec": msgspec.__version__}
+
+
+def test_a_zip_is_the_same_bytes_each_time_and_gives_back_all(made_of: Ingredients) -> None:
+    files = files_of(made_of)
+    shuffled = dict(sorted(files.items(), key=lambda entry: hash(entry[0])))
+    packed = package.to_zip(files)
+    assert package.to_zip(shuffled) == packed
+    with zipfile.ZipFile(io.BytesIO(packed)) as archive:
+        assert archive.testzip() is None
+        assert {entry.filename: archive.read(entry) for entry in archive.infolist()} == files
+
+
+@pytest.mark.parametrize("path", ["../evil.py", "/etc/passwd", "a/../../b", "a\\..\\b", ""])
+def test_no_file_leaves_its_package(path: str, tmp_path: Path) -> None:
+    with pytest.raises(InvalidPackage):
+        package.to_zip({path: b""})
+    with pytest.raises(InvalidPackage):
+        package.write({path: b""}, tmp_path / "packages" / "pkg_1")
+    assert not any((tmp_path / "packages").iterdir())
+
+
+@pytest.mark.parametrize("module", ["../evil", "", "a.b", "a/b", "ä"])
+def test_no_file_is_named_by_a_bad_type(module: str, made_of: Ingredients) -> None:
+    made_of.types.append(PackageType("Bad", module, "x = 1"))
+    with pytest.raises(InvalidProject, match="Bad"):
+        files_of(made_of)
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["from acme_devices.acme_reader import codes", "import acme_devices.other", "from acme_devices import other"],
+)
+def test_a_driver_that_would_run_the_hubs_code_is_refused(line: str, driver: PackageType, made_of: Ingredients) -> None:
+    assert driver.folder is not None
+    (driver.folder / "codes.py").write_text(f"def late():\n    {line}\n")
+    with pytest.raises(InvalidProject, match=r"AcmeReader: codes\.py imports acme_devices"):
+        files_of(made_of)
+    (driver.folder / "codes.py").write_text("from ..other import FIRST\n")
+    with pytest.raises(InvalidProject, match=r"AcmeReader: codes\.py imports from outside"):
+        files_of(made_of)
+
+
+def test_links_out_of_a_drivers_folder_are_not_followed(
+    driver: PackageType, made_of: Ingredients, tmp_path: Path
+) -> None:
+    assert driver.folder is not None
+    (tmp_path / "secret").write_text("secret")
+    (driver.folder / "innocent.txt").symlink_to(tmp_path / "secret")
+    assert not [name for name in files_of(made_of) if name.endswith("innocent.txt")]
+
+
+def test_two_drivers_with_folders_of_one_name(driver: PackageType, made_of: Ingredients, tmp_path: Path) -> None:
+    other = tmp_path / "other" / "acme_reader"
+    other.mkdir(parents=True)
+    (other / "__init__.py").write_text("class Other: ...\n")
+    made_of.types.append(PackageType("Other", "other", "", "acme_reader:Other", other, "other", "1"))
+    files = files_of(made_of)
+    assert b"from .acme_reader_2 import Other as Other" in files["object_types/other.py"]
+    assert files["object_types/acme_reader_2/__init__.py"] == b"class Other: ...\n"
+
+
+# ------------------------------------------------------------------------------------------------ running
+@pytest.fixture
+def directory(made_of: Ingredients, tmp_path: Path) -> Path:
+    target = tmp_path / "packages" / "pkg_1"
+    package.write(files_of(made_of), target)
+    return target
+
+
+def test_a_package_runs_on_its_own_code(directory: Path, driver: PackageType) -> None:
+    assert driver.folder is not None
+    (driver.folder / "codes.py").write_text("FIRST = 100\n")  # the hub was upgraded since
+    done = subprocess.run(
+        [sys.executable, "script.py"],
+        cwd=directory,
+        env={**os.environ, "PYTHONPATH": str(driver.folder.parents[1]), "ARCOR2_STREAMING_PERIOD": "0"},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    events = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
+    assert not [event for event in events if event["event"] == "ProjectException"], done.stdout + done.stderr
+    names = {a.id: a.name for point in workplace.project().action_points for a in point.actions}
+    ran = [names[event["data"]["action_id"]] for event in events if event["event"] == "ActionStateBefore"]
+    cycle = ["boards left?", "scan code", "above feeder", "pick", "known?"]
+    assert ran == [*cycle, "into good box", "back", *cycle, "throw away", "back", "boards left?", "finish"]
+    results = [e["data"]["results"][0] for e in events if e["event"] == "ActionStateAfter" and "results" in e["data"]]
+    assert f"{directory}/object_types/acme_reader_driver/reader.py" in results[1]
+    used = [e["data"] for e in events if e["event"] == "ActionStateBefore" and e["data"]["action_id"].endswith("box")]
+    project = workplace.project()
+    good = global_pose(ProjectIndex(workplace.scene(), project), project.action_points[1])
+    assert json.loads(used[0]["parameters"][0]) == json.loads(msgspec.json.encode(good))
+    assert used[0]["action_point_ids"] == ["acp_good"]
+
+
+def test_a_type_checker_accepts_a_package(directory: Path, pytestconfig: pytest.Config) -> None:
+    assert pytestconfig.cache is not None
+    (directory / "wrong.py").write_text(
+        "from action_points import ActionPoints\n\n\ndef use(aps: ActionPoints) -> None:\n    aps.good.poses.nope\n"
+    )
+    done = subprocess.run(
+        [
+            *(sys.executable, "-m", "mypy", "--strict", "--config-file=", "--no-error-summary"),
+            *("--cache-dir", str(pytestconfig.cache.mkdir("mypy_packages")), "--explicit-package-bases"),
+            *("script.py", "action_points.py", "object_types", "wrong.py"),
+        ],
+        cwd=directory,
+        env={**os.environ, "MYPYPATH": f"{directory}:{ROOT}"},
+        capture_output=True,
+        text=True,
+        timeout=110,
+    )
+    assert [line.split(":")[0] for line in done.stdout.splitlines()] == ["wrong.py"], done.stdout + done.stderr
+    assert '"GoodPoses" has no attribute "nope"' in done.stdout
+
+
+def test_versions_that_differ_are_named(directory: Path) -> None:
+    assert versions.check_versions(directory) == []
+    file = directory / "versions.json"
+    built = json.loads(file.read_bytes())
+    built["distributions"] = {"msgspec": "0.1", "no-such-distribution": "3"}
+    built["python"] = "3.9.1"
+    file.write_text(json.dumps(built))
+    assert [line.partition(" with ")[2].partition(",")[0] for line in versions.check_versions(directory)[1:]] == [
+        "msgspec 0.1",
+        "no-such-distribution 3",
+    ]
+    assert "Python 3.9.1" in versions.check_versions(directory)[0]
+    file.write_text("{")
+    assert "cannot be read" in versions.check_versions(directory)[0]
+    file.unlink()
+    assert versions.check_versions(directory) == []
+
+
+def test_compiled_modules_that_stand_alone_have_their_distribution() -> None:
+    assert versions.present({"rtde_control", "pymodbus", "json"}).distributions.keys() == {"ur-rtde", "pymodbus"}
+
+
+def test_a_package_appears_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sync = os.fsync
+    left = iter((None, OSError(28, "No space left on device")))
+
+    def full(descriptor: int) -> None:
+        if (error := next(left)) is not None:
+            raise error
+        sync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(StorageError, match="No space left"):
+        package.write({"a": b"", "b": b"", "script.py": b""}, tmp_path / "pkg_1")
+    assert list(tmp_path.iterdir()) == []
+
+
+# ------------------------------------------------------------------------------------------------ service
+@pytest.fixture
+async def service(
+    code: list[PackageType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> AsyncIterator[tuple[BuildService, Storage]]:
+    """Give a Build service on a real storage and registry; the driver is installed as far as those can tell."""
+    settings = ServerSettings(data_dir=tmp_path / "data")
+    settings.data_dir.mkdir()
+    storage = await Storage.open(settings)
+    installed = []
+    for one in code:
+        if one.source:
+            await storage.put_object_type(ObjectTypeSource(one.name, one.source, model=MODELS.get(one.name, UNSET)))
+        else:
+            module = one.entry_point.partition(":")[0]
+            path = Path(str(one.folder)) / f"{module.rpartition('.')[2]}.py"
+            file = SourceFile(one.name, module, path.read_text(), str(path))
+            installed.append(
+                InstalledType(one.name, one.entry_point, one.distribution, one.version, str(one.folder), file)
+            )
+    monkeypatch.setattr("arcor2_server.object_types.installed_types", lambda: installed)
+    object_types = ObjectTypes(storage)
+    await object_types.load()
+    await storage.put_scene(workplace.scene())
+    services: Any = types.SimpleNamespace(settings=settings, storage=storage, types=object_types)
+    yield BuildService(services), storage
+    await storage.close()
+
+
+async def test_a_build_lands_among_the_packages(service: tuple[BuildService, Storage], tmp_path: Path) -> None:
+    build, storage = service
+    await storage.put_project(workplace.project())
+    package_id = await build.build("pro_1", "Boards")
+    directory = tmp_path / "data" / "packages" / package_id
+    assert package_id.startswith("pkg_")
+    assert [entry.name for entry in directory.parent.iterdir()] == [package_id]
+    assert json.loads((directory / "package.json").read_bytes())["name"] == "Boards"
+    model = msgspec.json.decode((directory / "data" / "models" / "table.json").read_bytes(), type=ObjectModel)
+    assert model == MODELS["table"]
+    reader = (directory / "object_types" / "acme_reader.py").read_text()
+    assert "from .acme_reader_driver.codes import Mode as Mode" in reader
+    assert (directory / "script.py").read_text() == Path(__file__).with_name("workplace_script.txt").read_text()
+    with zipfile.ZipFile(io.BytesIO(await build.publish("pro_1"))) as archive:
+        assert archive.read("action_points.py") == (directory / "action_points.py").read_bytes()
+        assert json.loads(archive.read("package.json"))["name"] == "Sort boards"
+
+
+async def test_the_event_loop_goes_on_during_a_build(service: tuple[BuildService, Storage]) -> None:
+    build, storage = service
+    project = workplace.project()
+    long = [workplace.action(f"a{n}", "obj_flow/finish") for n in range(1500)]
+    names = [START, *(one.name for one in long), END]
+    logic = [workplace.step(start, end) for start, end in itertools.pairwise(names)]
+    [point, *_] = project.action_points
+    points = [msgspec.structs.replace(point, actions=long)]
+    await storage.put_project(msgspec.structs.replace(project, action_points=points, logic=logic))
+    made_of = await build.gather("pro_1")
+    turns = 0
+
+    async def turn() -> None:
+        nonlocal turns
+        while True:
+            await asyncio.sleep(0)
+            turns += 1
+
+    turning = asyncio.create_task(turn())
+    publishing = asyncio.create_task(asyncio.to_thread(files_of, made_of))
+    await asyncio.wait_for(build.publish("pro_1"), 60)
+    await publishing
+    turning.cancel()
+    # A build on the loop would leave a handful of turns, around its other waits.
+    assert turns > 100
+
+
+async def test_projects_without_logic(service: tuple[BuildService, Storage], tmp_path: Path) -> None:
+    build, storage = service
+    await storage.put_project(msgspec.structs.replace(workplace.project(), has_logic=False, logic=[]))
+    made_of = await build.gather("pro_1")
+    empty = files_of(made_of)["script.py"].decode()
+    assert "while" not in empty
+    assert "reader: AcmeReader" in empty
+    await storage.put_project_source("pro_1", "print(1)\n")
+    assert files_of(await build.gather("pro_1"))["script.py"] == b"print(1)\n"
+    await storage.put_project_source("pro_1", "fine = 1\ndef broken(:\n")
+    with pytest.raises(InvalidProject, match="line 2"):
+        await build.build("pro_1", "x")
+    assert not (tmp_path / "data" / "packages").exists()
+
+
+async def test_what_is_missing_is_named(service: tuple[BuildService, Storage]) -> None:
+    build, storage = service
+    with pytest.raises(NotFound, match="pro_none"):
+        await build.build("pro_none", "x")
+    scene = workplace.scene()
+    await storage.put_scene(msgspec.structs.replace(scene, objects=[*scene.objects[1:]]))
+    await storage.put_project(workplace.project())
+    with pytest.raises(InvalidProject, match="obj_robot"):
+        await build.build("pro_1", "x")
+
+
+async def test_the_request_builds_under_the_lock_of_the_project() -> None:
+    seen: list[str] = []
+
+    class Locks:
+        @contextlib.asynccontextmanager
+        async def auto(self, user: str, *ids: str) -> AsyncIterator[None]:
+            seen.append(f"locked {user} {ids}")
+            yield
+            seen.append("unlocked")
+
+    class Build:
+        async def build(self, project_id: str, name: str) -> str:
+            seen.append(f"build {project_id} {name}")
+            return "pkg_1"
+
+    class Execution:
+        async def added(self, package_id: str) -> None:
+            seen.append(f"added {package_id}")
+
+    services: Any = types.SimpleNamespace(locks=Locks(), build=Build(), execution=Execution())
+    client: Any = types.SimpleNamespace(user="ann")
+    args = BuildProjectArgs("pro_1", "Boards")
+    assert await build_project(Context(services, client), args) == BuildProjectData("pkg_1")
+    assert seen == ["locked ann ('pro_1',)", "build pro_1 Boards", "unlocked", "added pkg_1"]
+    client.user = None
+    with pytest.raises(RequestRefused):
+        await build_project(Context(services, client), args)
