@@ -37,7 +37,7 @@ def until(holds, within=5.0):
         time.sleep(0.002)
 """
 
-_hosts = (f"127.{os.getpid() % 200 + 20}.{n // 250 + 1}.{n % 250 + 1}" for n in itertools.count())
+_hosts = (f"127.{(os.getpid() >> 8) % 200 + 20}.{os.getpid() % 256}.{n % 250 + 1}" for n in itertools.count())
 
 
 @dataclass
