@@ -40,7 +40,7 @@ async def opening_allowed(context: Context) -> AsyncIterator[None]:
 
 def require_no_program(context: Context) -> None:
     """RequestRefused while a package runs."""
-    if context.services.execution.running:
+    if context.services.execution.busy:
         raise RequestRefused("A program is running: stop it first.")
 
 

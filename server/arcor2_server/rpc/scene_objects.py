@@ -142,9 +142,11 @@ async def update_object_pose(context: Context, args: UpdateObjectPoseArgs) -> No
 
 async def move_object(context: Context, obj: SceneObject, pose: Pose) -> None:
     """Give an object another pose, and the live one too while online."""
-    await _update(context, replace(obj, pose=pose))
+    # First where it may fail: a refused request must not leave an edit behind that nobody was told of.
     if not context.dry_run and context.services.cell.online:
         await context.services.cell.object_pose_changed(obj.id, pose)
+    obj = context.services.session.scene_object(obj.id)
+    await _update(context, replace(obj, pose=pose))
 
 
 @rpc("UpdateObjectPoseUsingRobot")

@@ -192,10 +192,10 @@ class Person:
         await self.desk.endpoint._handle(self.client, json.dumps(request))
         return next(m for m in reversed(self._record.messages) if m.get("id") == request["id"] and "response" in m)
 
-    async def ask(self, name: str, dry_run: bool = False, **args: Any) -> Any:
+    async def ask(self, request_name: str, /, *, dry_run: bool = False, **args: Any) -> Any:
         """Send a request; gives the answer's data, raises Refused with its message."""
         self._number += 1
-        request: dict[str, Any] = {"id": self._number, "request": name, "dry_run": dry_run}
+        request: dict[str, Any] = {"id": self._number, "request": request_name, "dry_run": dry_run}
         if args:
             request["args"] = args
         answer = await self.send(request)
@@ -251,7 +251,7 @@ async def open_desk(directory: Path, **settings: Any) -> AsyncIterator[Desk]:
     storage = await Storage.open(chosen)
     locks = Locks(chosen.lock_retries, chosen.lock_retry_wait)
     users = Users(hub, locks, chosen)
-    execution: Any = SimpleNamespace(running=False, greeting=list)
+    execution: Any = SimpleNamespace(busy=False, greeting=list)
     services = Services(
         settings=chosen,
         hub=hub,

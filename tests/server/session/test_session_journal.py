@@ -1,0 +1,254 @@
+"""What was acknowledged is there after a crash; what cannot be kept is refused and taken back."""
+
+import asyncio
+import os
+import random
+import signal
+import sqlite3
+import sys
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from arcor2_hw.exceptions import StorageError
+from arcor2_server.session import journal as journal_module
+from arcor2_server.session.changes import Kind
+from tests.server.session.desk import Desk, Person, Refused, open_desk
+
+REPOSITORY = Path(__file__).resolve().parents[3]
+
+
+async def open_project(alice: Person, points: int = 1) -> None:
+    await alice.ask("NewScene", name="scene")
+    await alice.ask("AddObjectToScene", name="time", type="TimeActions")
+    await alice.ask("SaveScene")
+    await alice.ask("NewProject", scene_id=alice.desk.session.require_scene().id, name="project")
+    for number in range(points):
+        await add_point(alice, f"p{number}")
+    alice.take()
+
+
+async def add_point(person: Person, name: str) -> None:
+    await person.ask("AddActionPoint", name=name, position={"x": 0, "y": 0, "z": 0})
+
+
+def point_names(desk: Desk) -> list[str]:
+    return [point.name for point in desk.session.require_project().action_points]
+
+
+@pytest.mark.parametrize("moment", [0.1, 0.35])
+async def test_kill_in_the_middle_of_edits(tmp_path: Path, moment: float) -> None:
+    process = await asyncio.create_subprocess_exec(
+        sys.executable,
+        "-m",
+        "tests.server.session.editing_server",
+        str(tmp_path),
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.DEVNULL,
+        cwd=REPOSITORY,
+        env=os.environ | {"PYTHONPATH": str(REPOSITORY)},
+    )
+    assert process.stdout is not None
+    acknowledged = []
+    try:
+        async with asyncio.timeout(30):
+            acknowledged += await _lines(process.stdout, 50)
+        await asyncio.sleep(random.uniform(0, moment))
+        process.send_signal(signal.SIGKILL)
+        acknowledged += await _lines(process.stdout, 1_000_000)
+    finally:
+        if process.returncode is None:
+            process.kill()
+        await process.wait()
+    async with open_desk(tmp_path) as desk:
+        project = desk.session.require_project()
+        kept = [action.name for point in project.action_points for action in point.actions]
+        missing = set(acknowledged) - set(kept)
+        assert not missing
+        assert len(acknowledged) >= 50
+        # Nobody waits for more than one answer: beyond what was acknowledged there is at most one edit of each.
+        assert len(kept) <= len(acknowledged) + 8
+        assert desk.session.project_changed
+        assert not desk.session.scene_changed
+        # It is a document like any other: it goes on, and is saved.
+        alice = await desk.person("alice")
+        await add_point(alice, "afterwards")
+        await alice.ask("SaveProject")
+        assert not desk.session.has_changes
+
+
+async def _lines(stream: asyncio.StreamReader, count: int) -> list[str]:
+    found = []
+    while len(found) < count and (line := await stream.readline()).endswith(b"\n"):
+        kind, _, name = line.decode().strip().partition(" ")
+        if kind == "acknowledged":
+            found.append(name)
+    return found
+
+
+async def test_a_restart_goes_on_where_it_was(tmp_path: Path) -> None:
+    async with open_desk(tmp_path) as desk:
+        alice = await desk.person("alice")
+        await open_project(alice)
+        await alice.ask("SaveProject")
+        await add_point(alice, "unsaved")
+        await alice.lock(desk.session.require_project().action_points[0].id)
+        scene, project = desk.session.scene, desk.session.project
+        history = list(desk.session.history)
+    async with open_desk(tmp_path) as desk:
+        assert (desk.session.scene, desk.session.project) == (scene, project)
+        assert list(desk.session.history) == history
+        assert desk.session.has_changes
+        assert desk.services.locks.announced() == {}
+        names = [event.event for event in desk.session.greeting()]
+        assert names == ["OpenProject", "SceneState"]
+        saved = await desk.services.storage.project(desk.session.require_project().id)
+        assert [point.name for point in saved.action_points] == ["p0"]
+        alice = await desk.person("alice")
+        await alice.ask("CloseProject", force=True)
+    async with open_desk(tmp_path) as desk:
+        assert desk.session.greeting() == []
+        assert desk.session.scene is None
+
+
+async def test_a_new_scene_survives_without_ever_being_saved(tmp_path: Path) -> None:
+    async with open_desk(tmp_path) as desk:
+        alice = await desk.person("alice")
+        await alice.ask("NewScene", name="scene")
+        await alice.ask("AddObjectToScene", name="time", type="TimeActions")
+    async with open_desk(tmp_path) as desk:
+        assert [obj.name for obj in desk.session.require_scene().objects] == ["time"]
+        assert desk.session.scene_changed
+        assert await desk.services.storage.scenes() == []
+
+
+async def test_the_journal_stays_short(tmp_path: Path) -> None:
+    async with open_desk(tmp_path, history_limit=10) as desk:
+        alice = await desk.person("alice")
+        await open_project(alice)
+        for number in range(1, 45):
+            await add_point(alice, f"p{number}")
+        expected, project = [f"p{number}" for number in range(45)], desk.session.project
+        assert point_names(desk) == expected
+    with sqlite3.connect(tmp_path / "journal.sqlite") as connection:
+        (rows,) = connection.execute("select count(*) from edit").fetchone()
+        assert 10 <= rows <= 20
+    connection.close()
+    async with open_desk(tmp_path, history_limit=10) as desk:
+        assert desk.session.project == project
+        assert desk.session.has_changes
+        assert len(desk.session.history) == 10
+        # The edits that are kept lead back step by step.
+        document = desk.session.document
+        for edit in reversed(desk.session.history):
+            document.apply([change.inverse() for change in reversed(edit.changes)])
+        assert [item.value.name for item in document.of_kind(Kind.POINT)] == expected[:-10]
+
+
+@pytest.mark.parametrize("damage", ["garbage", "truncated", "row", "gap", "newer", "strange"])
+async def test_a_damaged_journal_is_set_aside(tmp_path: Path, damage: str, capsys: pytest.CaptureFixture[str]) -> None:
+    async with open_desk(tmp_path) as desk:
+        alice = await desk.person("alice")
+        await open_project(alice, points=30)
+        await alice.ask("SaveProject")
+        await add_point(alice, "one")
+        await add_point(alice, "two")
+        await add_point(alice, "three")
+        key = desk.session.require_project().id
+    path = tmp_path / "journal.sqlite"
+    statements = {
+        "row": "update edit set changes = x'5b5b5d5d'",
+        "gap": "delete from edit where number = (select max(number) - 1 from edit)",
+        "newer": "pragma user_version = 99",
+        "strange": "drop table base",
+    }
+    if damage == "garbage":
+        path.write_bytes(b"no database at all" * 1000)
+    elif damage == "truncated":
+        path.write_bytes(path.read_bytes()[:5000])
+    else:
+        connection = sqlite3.connect(path)
+        connection.execute(statements[damage])
+        connection.commit()
+        connection.close()
+    capsys.readouterr()
+    async with open_desk(tmp_path) as desk:
+        assert desk.session.greeting() == []
+        alice = await desk.person("alice")
+        await alice.ask("OpenProject", id=key)
+        assert len(point_names(desk)) == 30
+        await add_point(alice, "again")
+    printed = capsys.readouterr().out.splitlines()
+    assert [line for line in printed if "set aside" in line and "journal.damaged-" in line]
+    assert len(list(tmp_path.glob("journal.damaged-*.sqlite"))) == 1
+    async with open_desk(tmp_path) as desk:
+        assert point_names(desk)[-1] == "again"
+
+
+async def test_a_second_server_on_the_same_data_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(journal_module, "BUSY_TIMEOUT", 0.05)
+    async with open_desk(tmp_path):
+        with pytest.raises(StorageError, match=r"journal\.sqlite"):
+            async with open_desk(tmp_path):
+                pass
+
+
+async def test_what_cannot_be_kept_is_taken_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    async with open_desk(tmp_path) as desk:
+        alice, bob = await desk.person("alice"), await desk.person("bob")
+        await open_project(alice, points=2)
+        await alice.ask("SaveProject")
+        before, number = desk.session.project, len(desk.session.history)
+        write, failing = journal_module._write, True
+
+        def full(connection: sqlite3.Connection, job: object) -> None:
+            if failing:
+                raise sqlite3.OperationalError("database or disk is full")
+            write(connection, job)  # type: ignore[arg-type]
+
+        monkeypatch.setattr(journal_module, "_write", full)
+        bob.take()
+        edits = [add_point(person, f"new{n}") for n, person in enumerate((alice, bob, alice, bob))]
+        results = await asyncio.gather(*edits, return_exceptions=True)
+        assert all(isinstance(result, Refused) for result in results)
+        assert any("disk is full" in str(result) for result in results)
+        assert bob.events() == []
+        assert desk.session.project == before
+        assert not desk.session.has_changes
+        assert len(desk.session.history) == number
+        failing = False
+        await add_point(alice, "kept")
+        assert point_names(desk) == ["p0", "p1", "kept"]
+    async with open_desk(tmp_path) as desk:
+        assert point_names(desk) == ["p0", "p1", "kept"]
+
+
+async def test_an_edit_during_a_save_is_not_taken_for_saved(
+    desk: Desk, alice: Person, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    await open_project(alice)
+    put = desk.services.storage.put_project
+
+    async def slow(project):  # type: ignore[no-untyped-def]
+        item = desk.session.document.of_kind(Kind.POINT)[0]
+        change = desk.session.document.update(Kind.POINT, item.id, replace(item.value, name="meanwhile"))
+        await desk.session.commit("bob", [change])
+        return await put(project)
+
+    monkeypatch.setattr(desk.services.storage, "put_project", slow)
+    await alice.ask("SaveProject")
+    assert desk.session.project_changed
+    assert point_names(desk) == ["meanwhile"]
+
+
+async def test_a_caller_who_goes_away_does_not_take_his_edit_with_him(desk: Desk, alice: Person) -> None:
+    await open_project(alice)
+    task = asyncio.create_task(add_point(alice, "last"))
+    while point_names(desk)[-1] != "last":
+        await asyncio.sleep(0)
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+    await add_point(alice, "later")
+    assert point_names(desk) == ["p0", "last", "later"]
+    assert not desk.session._pending

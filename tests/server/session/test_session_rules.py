@@ -1,0 +1,373 @@
+"""Checks and geometry as pure functions: loops in the logic, problems, parents of action points."""
+
+import math
+import time
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from arcor2_hw.data.base import UNSET
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.object_type import ObjectAction
+from arcor2_hw.data.parameter import Parameter
+from arcor2_hw.data.project import (
+    Action,
+    ActionParameter,
+    ActionPoint,
+    Flow,
+    LogicItem,
+    NamedOrientation,
+    Project,
+    ProjectLogicIf,
+    ProjectParameter,
+)
+from arcor2_hw.data.project_index import global_pose
+from arcor2_hw.data.scene import Scene, SceneObject
+from arcor2_hw.exceptions import Arcor2Error, InvalidData
+from arcor2_server.session.aftermath import project_after
+from arcor2_server.session.changes import Kind
+from arcor2_server.session.checks import project_problems, scene_problems
+from arcor2_server.session.document import Document
+from arcor2_server.session.logic import check_logic_item
+from arcor2_server.session.placing import changes_for_parent
+from tests.server.session.desk import RecordedTypes
+
+RANDOM = SceneObject("rnd", "RandomActions", UNSET, [], "obj_r")
+TIME = SceneObject("time", "TimeActions", UNSET, [], "obj_t")
+URL = Parameter("url", "string", '"http://127.0.0.1:5018"')
+ROBOT = SceneObject("robot", "DobotMagician", Pose(), [URL], "obj_d")
+FLOW = [Flow()]
+
+
+@pytest.fixture(scope="module")
+def types() -> RecordedTypes:
+    return RecordedTypes()
+
+
+# ------------------------------------------------------------------------------------------------ logic
+def meta_of(action: Action) -> ObjectAction:
+    return ObjectAction("random", returns=["boolean", "double"])
+
+
+def branching(*names: str) -> Document:
+    flows = [[Flow(outputs=[f"{name}_b", f"{name}_d"])] for name in names]
+    actions = [Action(name, "obj_r/random", name, [], flow) for name, flow in zip(names, flows, strict=True)]
+    point = ActionPoint("p", Position(), id="acp", actions=actions)
+    return Document.of(Scene("s", id="scn", objects=[RANDOM]), Project("p", "scn", id="pro", action_points=[point]))
+
+
+def step(start: str, end: str, condition: str = "", value: str = "true", key: str = "") -> LogicItem:
+    return LogicItem(start, end, ProjectLogicIf(condition, value) if condition else UNSET, key or f"{start}>{end}")
+
+
+def add(document: Document, item: LogicItem) -> None:
+    check_logic_item(document, meta_of, item)
+    document.apply([document.add(Kind.LOGIC, item.id, item)])
+
+
+@pytest.mark.parametrize(
+    ("item", "reason"),
+    [
+        (step("START", "END"), "straight"),
+        (step("a", "a"), "itself"),
+        (step("a", "nobody"), "nobody"),
+        (step("END", "a"), "start at END"),
+        (step("a", "START"), "end at START"),
+        (step("a/other", "c"), "names no action"),
+        (step("START", "c"), "START leads to"),
+        (step("a", "b", "a/default/0", "false", "again"), "already"),
+        (step("a", "c"), "needs a condition"),
+        (step("a", "c", "a/default/0", " true"), "same condition"),
+        (step("a", "c", "a/default/1"), "only boolean"),
+        (step("a", "c", "a/default/2"), "result number 2"),
+        (step("a", "c", "a/other/0"), "result number"),
+        (step("a", "c", "a"), "not understood"),
+        (step("a", "c", "a/default/0", '"yes"'), "true or false"),
+        (step("c", "a"), "loop"),
+        (step("c", "b"), "loop"),
+    ],
+)
+def test_steps_that_are_refused(item: LogicItem, reason: str) -> None:
+    document = branching("a", "b", "c", "d")
+    add(document, step("START", "a"))
+    add(document, step("a", "b", "a/default/0"))
+    add(document, step("b", "c"))
+    with pytest.raises(Arcor2Error, match=reason):
+        check_logic_item(document, meta_of, item)
+
+
+def test_steps_that_are_allowed() -> None:
+    document = branching("a", "b", "c")
+    add(document, step("START", "a"))
+    add(document, step("a", "b", "a/default/0", "true"))
+    add(document, step("a/default", "c", "a/default/0", "false"))
+    add(document, step("b", "c"))
+    # Turning a step round is no loop by itself: the step that is replaced does not count.
+    check_logic_item(document, meta_of, step("c", "b", key="b>c"))
+    with pytest.raises(InvalidData, match="loop"):
+        check_logic_item(document, meta_of, step("c", "b", key="new"))
+    add(document, step("c", "END"))
+
+
+def test_eighteen_diamonds_and_a_long_chain_are_checked_in_time() -> None:
+    document = branching("s", *(f"{side}{n}" for n in range(18) for side in "lrj"))
+    at = "s"
+    for n in range(18):
+        add(document, step(at, f"l{n}", f"{at}/default/0", "true"))
+        add(document, step(at, f"r{n}", f"{at}/default/0", "false"))
+        add(document, step(f"l{n}", f"j{n}"))
+        add(document, step(f"r{n}", f"j{n}"))
+        at = f"j{n}"
+    began = time.perf_counter()
+    with pytest.raises(InvalidData, match="loop"):
+        add(document, step(at, "s"))
+    assert time.perf_counter() - began < 0.05  # 2**18 paths would take a second at the least
+
+    names = [f"c{n}" for n in range(1000)]
+    chain = branching(*names)
+    began = time.perf_counter()
+    for one, other in zip(names[-2::-1], names[:0:-1], strict=True):  # from the end: each check walks the whole rest
+        add(chain, step(one, other))
+    assert time.perf_counter() - began < 3
+    with pytest.raises(InvalidData, match="loop"):
+        add(chain, step("c999", "c0"))
+
+
+# ------------------------------------------------------------------------------------------------ problems
+def pick(name: str, **changes: Any) -> Action:
+    action = Action(name, "obj_t/sleep", f"act_{name}", [ActionParameter("seconds", "double", "0.5")], FLOW)
+    return replace(action, **changes)
+
+
+def project(*points: ActionPoint, **fields: Any) -> Project:
+    return Project("p", "scn", id="pro", action_points=list(points), **fields)
+
+
+SCENE = Scene("s", id="scn", objects=[TIME, RANDOM, ROBOT])
+
+
+@pytest.mark.parametrize(
+    ("obj", "problem"),
+    [
+        (SceneObject("x", "Nothing", UNSET, [], "o"), "not known"),
+        (SceneObject("x y", "TimeActions", UNSET, [], "o"), "valid name"),
+        (SceneObject("x", "Robot", Pose(), [], "o"), "abstract"),
+        (SceneObject("x", "TimeActions", Pose(), [], "o"), "no pose"),
+        (SceneObject("x", "WeighingMachine", UNSET, [], "o"), "needs a pose"),
+        (replace(ROBOT, parameters=[Parameter("url", "integer", "1")]), "type string"),
+        (replace(ROBOT, parameters=[URL, Parameter("bogus", "string", '""')]), "no setting bogus"),
+        (replace(ROBOT, parameters=[URL, URL]), "twice"),
+    ],
+)
+def test_problems_of_scenes(types: RecordedTypes, obj: SceneObject, problem: str) -> None:
+    assert any(problem in p for p in scene_problems(Scene("s", objects=[obj]), types))
+    assert scene_problems(SCENE, types) == []
+
+
+@pytest.mark.parametrize(
+    ("wrong", "problem"),
+    [
+        (project(replace(ActionPoint("p", Position(), "nowhere", id="a"))), "neither"),
+        (project(ActionPoint("p", Position(), "obj_t", id="a")), "has no pose"),
+        (project(ActionPoint("p", Position(), "b", id="a"), ActionPoint("q", Position(), "a", id="b")), "itself"),
+        (project(parameters=[ProjectParameter("n", "double", "[1]", id="x")]), "truth value"),
+        (project(ActionPoint("p", Position(), id="a", actions=[pick("x", type="gone/sleep")])), "gone"),
+        (project(ActionPoint("p", Position(), id="a", actions=[pick("x", type="obj_t/run")])), "run"),
+        (project(ActionPoint("p", Position(), id="a", actions=[pick("x", type="sleep")])), "not <object id>"),
+        (project(ActionPoint("p", Position(), id="a", actions=[pick("x", flows=[])])), "one flow"),
+        (project(ActionPoint("p", Position(), id="a", actions=[pick("x", flows=[Flow(outputs=["r"])])])), "returns 0"),
+        (project(ActionPoint("p", Position(), id="a", actions=[pick("x", parameters=[])])), "seconds is missing"),
+        (project(ActionPoint("p", Position(), id="a", actions=[pick("x"), pick("x", id="y")])), "more than one"),
+        (replace(project(), scene_id="other"), "another scene"),
+    ],
+)
+def test_problems_of_projects(types: RecordedTypes, wrong: Project, problem: str) -> None:
+    found = project_problems(SCENE, wrong, types)
+    assert len(found) >= 1
+    assert any(problem in p for p in found), found
+
+
+@pytest.mark.parametrize(
+    ("parameter", "reason"),
+    [
+        (("double", "1"), "fraction"),
+        (("integer", "1"), "type double"),
+        (("project_parameter", '"pco_text"'), "is string"),
+        (("project_parameter", '"pco_none"'), "pco_none"),
+        (("project_parameter", "5"), "JSON string"),
+        (("link", '"act_x/default/0"'), "same action"),
+        (("link", '"act_bool/default/0"'), "is boolean"),
+        (("link", '"act_silent/default/0"'), "name its results"),
+        (("link", '"act_double/default/1"'), "number 1"),
+        (("link", '"act_double"'), "not <action id>"),
+        (("project_parameter", '"pco_ok"'), ""),
+        (("link", '"act_double/default/0"'), ""),
+        (("double", "0.25"), ""),
+    ],
+)
+def test_parameters_of_actions(types: RecordedTypes, parameter: tuple[str, str], reason: str) -> None:
+    def random(name: str, method: str, *outputs: str) -> Action:
+        given = [ActionParameter("probability", "double", "0.5")] if method == "random_bool" else []
+        return Action(name, f"obj_r/{method}", f"act_{name}", given, [Flow(outputs=list(outputs))])
+
+    point = ActionPoint(
+        "p",
+        Position(),
+        id="a",
+        actions=[
+            random("bool", "random_bool", "b"),
+            random("silent", "random_double"),
+            random("double", "random_double", "d"),
+            pick("x", parameters=[ActionParameter("seconds", *parameter)]),
+        ],
+    )
+    texts = [ProjectParameter("t", "string", '"x"', id="pco_text"), ProjectParameter("k", "double", "1.0", id="pco_ok")]
+    found = project_problems(SCENE, project(point, parameters=texts), types)
+    assert found == [] if not reason else (len(found) == 1 and reason in found[0]), found
+
+
+def test_problems_cost_in_proportion(types: RecordedTypes) -> None:
+    """Parents in one chain and results linked from action to action: the worst for a check that looks round."""
+
+    def chain(size: int) -> Project:
+        points = []
+        for n in range(size):
+            orientation = NamedOrientation("o", Orientation(), f"ori_{n}")
+            value = f'"act_{n - 1}/default/0"' if n else "0.5"
+            parameter = ActionParameter("probability", "link" if n else "double", value)
+            returned = [Flow(outputs=[f"r{n}"])]
+            kept = [
+                Action(f"d{n}", "obj_r/random_double", f"act_{n}", [], returned),
+                Action(f"b{n}", "obj_r/random_bool", f"bct_{n}", [parameter], FLOW),
+                Action(f"m{n}", "obj_d/move", f"mct_{n}", [ActionParameter("pose", "pose", f'"ori_{n}"')], FLOW),
+            ]
+            parent = f"acp_{n - 1}" if n else UNSET
+            points.append(
+                ActionPoint(f"p{n}", Position(), parent, id=f"acp_{n}", orientations=[orientation], actions=kept)
+            )
+        return project(*points)
+
+    def cost(size: int) -> float:
+        subject = chain(size)
+        best = math.inf
+        for _ in range(3):
+            began = time.perf_counter()
+            assert project_problems(SCENE, subject, types) == []
+            best = min(best, time.perf_counter() - began)
+        return best
+
+    assert cost(1000) < 25 * cost(100)  # ten times the size; a square would be a hundred times the time
+
+
+# ------------------------------------------------------------------------------------------------ parents
+angles = st.floats(-math.pi, math.pi)
+lengths = st.floats(-2, 2)
+orientations = st.builds(Orientation.from_rotation_vector, angles, angles, angles)
+poses = st.builds(Pose, st.builds(Position, lengths, lengths, lengths), orientations)
+
+
+def same(one: Pose, other: Pose) -> bool:
+    return one.position.distance_to(other.position) < 1e-9 and one.orientation.angle_to(other.orientation) < 1e-7
+
+
+@settings(max_examples=60, deadline=None)
+@given(first=poses, second=poses, local=poses, below=poses, order=st.permutations(["obj_a", "obj_b", "", "acp_w"]))
+def test_nothing_moves_when_the_parent_changes(
+    first: Pose, second: Pose, local: Pose, below: Pose, order: list[str]
+) -> None:
+    scene = Scene(
+        "s",
+        id="scn",
+        objects=[SceneObject("a", "T", first, [], "obj_a"), SceneObject("b", "T", second, [], "obj_b")],
+    )
+
+    def point(key: str, pose: Pose, parent: str) -> ActionPoint:
+        return ActionPoint(
+            key,
+            pose.position,
+            parent or UNSET,
+            id=key,
+            orientations=[NamedOrientation("o", pose.orientation, f"o{key}")],
+        )
+
+    document = Document.of(
+        scene,
+        project(
+            point("acp_w", second, "obj_b"),
+            point("acp", local, "obj_a"),
+            point("acp_1", below, "acp"),
+            point("acp_2", below, "acp_1"),
+        ),
+    )
+    names = ("acp", "acp_1", "acp_2")
+
+    def places() -> list[Pose]:
+        pairs = [document.orientation(f"o{name}") for name in names]
+        return [global_pose(document, holder, named.orientation) for holder, named in pairs]
+
+    before, origin = places(), encode(document)
+    done = []
+    for parent in order:
+        if parent == (document.action_point("acp").parent or ""):
+            continue
+        changes, changed = changes_for_parent(document, "acp", parent)
+        assert changed[0] == "acp"
+        assert set(changed) <= set(names)
+        document.apply(changes)
+        done.append(changes)
+        assert all(map(same, places(), before))
+        assert (document.action_point("acp").parent or "") == parent
+    for changes in reversed(done):
+        document.apply([change.inverse() for change in reversed(changes)])
+    assert encode(document) == origin
+
+
+def encode(document: Document) -> list[Any]:
+    return document.items()
+
+
+def test_a_turned_parent_turns_what_is_stated_below_it() -> None:
+    turned = Pose(Position(1, 0, 0), Orientation.from_rotation_vector(0, 0, math.pi / 2))
+    scene = Scene("s", id="scn", objects=[SceneObject("a", "T", turned, [], "obj_a")])
+    points = [
+        ActionPoint("p", Position(1, 1, 0), id="acp"),
+        ActionPoint("c", Position(1, 0, 0), "acp", id="c", orientations=[NamedOrientation("o", Orientation(), "ori")]),
+    ]
+    document = Document.of(scene, project(*points))
+    changes, changed = changes_for_parent(document, "acp", "obj_a")
+    document.apply(changes)
+    assert changed == ["acp", "c"]
+    # By hand: seen from the object, whose x axis points along the world's y.
+    assert document.action_point("acp").position.distance_to(Position(1, 0, 0)) < 1e-12
+    assert document.action_point("c").position.distance_to(Position(0, -1, 0)) < 1e-12
+    assert document.orientation("ori")[1].orientation.angle_to(turned.orientation.inverted()) < 1e-12
+
+
+def test_a_parent_that_hangs_below_is_refused() -> None:
+    points = [ActionPoint("p", Position(), id="a"), ActionPoint("q", Position(), "a", id="b")]
+    document = Document.of(Scene("s", id="scn"), project(*points))
+    for parent in ("a", "b"):
+        with pytest.raises(InvalidData, match="itself"):
+            changes_for_parent(document, "a", parent)
+
+
+def test_a_project_after_an_object_was_removed() -> None:
+    """Points stay where they were in the world; actions of the object go, with their steps and overrides."""
+    turned = Pose(Position(1, 2, 3), Orientation.from_rotation_vector(0, 0, 1))
+    scale = SceneObject("scale", "WeighingMachine", turned, [], "obj_s")
+    scene = Scene("s", id="scn", objects=[scale, TIME])
+    weigh = Action("w", "obj_s/weigh", "act_w", [], FLOW)
+    before = project(
+        ActionPoint("p", Position(1, 0, 0), "obj_s", id="acp", actions=[weigh, pick("x")]),
+        logic=[step("START", "act_w"), step("act_w", "act_x"), step("act_x", "END")],
+    )
+    after = project_after(scene, before, removed=["obj_s"], moved=[])
+    where = global_pose(Document.of(scene, before), before.action_points[0])
+    assert after.action_points[0].parent is UNSET
+    assert after.action_points[0].position.distance_to(where.position) < 1e-9
+    assert [action.name for action in after.action_points[0].actions] == ["x"]
+    assert [item.id for item in after.logic] == ["act_x>END"]
+    assert project_after(scene, before, removed=["other"], moved=[]) is before
