@@ -7,13 +7,11 @@ import signal
 import sys
 from collections.abc import Awaitable, Callable
 from contextvars import ContextVar
-from contextvars import ContextVar
 
 import msgspec
 import uvloop
 
 _PARENT_WATCH_PERIOD = 0.2  # s
-_told_to_end: ContextVar[asyncio.Event] = ContextVar("told_to_end")
 _PARENT = os.getppid()
 _told_to_end: ContextVar[asyncio.Event] = ContextVar("told_to_end")
 
@@ -24,22 +22,13 @@ def announce(**addresses: object) -> None:
     sys.stdout.flush()
 
 
-def _listen_for_the_end() -> asyncio.Event:
-    end = asyncio.Event()
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        loop.add_signal_handler(number, end.set)
-    return end
-
-
 async def until_told_to_end() -> None:
-    """Returns on SIGTERM, SIGINT, or when the parent process has gone.
+    """Returns on SIGTERM, SIGINT, or when the parent process has gone. To be called within `run`.
 
     The parent is watched by its id, not by PR_SET_PDEATHSIG: that one fires when the *thread* that started us ends.
     """
-    end = _told_to_end.get(None) or _listen_for_the_end()
-    parent = os.getppid()
-    while os.getppid() == parent:
+    end = _told_to_end.get()
+    while os.getppid() == _PARENT:
         try:
             async with asyncio.timeout(_PARENT_WATCH_PERIOD):
                 await end.wait()
@@ -53,7 +42,11 @@ def run(main: Callable[[], Awaitable[None]], name: str) -> int:
     logging.basicConfig(stream=sys.stderr, level=logging.INFO, format=f"{name}: %(message)s")
 
     async def body() -> None:
-        _told_to_end.set(_listen_for_the_end())  # before the ready line: a signal may follow it at once
+        end = asyncio.Event()
+        _told_to_end.set(end)
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGTERM, signal.SIGINT):  # before anything is announced: a signal may follow at once
+            loop.add_signal_handler(number, end.set)
         await main()
 
     try:

@@ -1,12 +1,12 @@
-"""The fake's control channel: the truth about the arm, and everything that may happen to a controller from outside.
+"""The fake's control channel: the truth about the arm, and all that may happen to a controller from outside.
 
-To read and subscribe: `truth` (everything), `pose` (the little a world follows at a high rate). To read: `stops` (frames
-that ask for a stop, stamped at arrival), `commands_taken` (motions really run), `popup`. To do, with `on` true or false:
-`safeguard_stop` (`reports_paused`), `emergency_stop` (`system`), `reduced`, `remote_control`, `foreign_program`, `power`,
-`contact`, `fieldbus` (owns registers 0 to 23). To do: `protective_stop`, `violation`, `fault`, `boot`, `brake_release`,
-`operational_mode` mode, `set_input` bit on, `speed_slider` fraction, `place` q (set-up: elsewhere at once), `guide` q
-speed (by hand, in freedrive only), `in_use` and `not_found` names of RTDE variables. The faults of the wires rtde, script
-and dashboard are those of `arcor2_fakes.wire`.
+To read and subscribe: `truth` (everything), `pose` (the little a world follows at a high rate). To read: `stops`
+(frames that ask for a stop, stamped at arrival), `commands_taken` (motions really run), `popup`. To do, with `on` true
+or false: `safeguard_stop` (`reports_paused`), `emergency_stop` (`system`), `reduced`, `remote_control`,
+`foreign_program`, `power`, `contact`, `fieldbus` (owns registers 0 to 23). To do: `protective_stop`, `violation`,
+`fault`, `boot`, `brake_release`, `operational_mode` mode, `set_input` bit on, `speed_slider` fraction, `place` q (a
+test's set-up), `guide` q speed (by hand, in freedrive only), `in_use` and `not_found` names of RTDE variables. The
+faults of the wires rtde, script and dashboard are those of `arcor2_fakes.wire`.
 """
 
 import math
