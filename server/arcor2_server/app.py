@@ -5,7 +5,9 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from importlib.metadata import version
 from typing import Any, cast
 
-from litestar import Litestar, Response, Router, WebSocket, get, websocket
+from litestar import Litestar, Request, Response, Router, WebSocket, get, websocket
+from litestar.exceptions import MethodNotAllowedException, NotFoundException
+from litestar.exceptions.responses import create_exception_response
 from litestar.openapi import OpenAPIConfig
 from litestar.openapi.plugins import JsonRenderPlugin
 
@@ -105,6 +107,14 @@ async def arserver(socket: WebSocket[Any, Any, Any]) -> None:
     await socket.app.state.endpoint.serve(socket)
 
 
+def no_such_route(request: Request[Any, Any, Any], error: MethodNotAllowedException) -> Response[Any]:
+    """Answer 404 where only the websocket is: Litestar takes that for a route without the method."""
+    allowed = {name.lower(): value for name, value in (error.headers or {}).items()}.get("allow")
+    if allowed in (None, "websocket"):
+        return create_exception_response(request, NotFoundException())
+    return create_exception_response(request, error)
+
+
 def create_app(services: Services) -> Litestar:
     """Make the application around parts that are up."""
     endpoint = Endpoint(services)
@@ -116,6 +126,7 @@ def create_app(services: Services) -> Litestar:
             openapi_router=Router("/openapi", route_handlers=[], opt={ROLE: Role.OPERATOR}),
             render_plugins=[JsonRenderPlugin()],
         ),
+        exception_handlers={MethodNotAllowedException: no_such_route},
         on_shutdown=[endpoint.close],
         logging_config=None,
     )

@@ -5,6 +5,7 @@ import sys
 from importlib.metadata import version
 
 from cyclopts import App
+from cyclopts.exceptions import CycloptsError
 
 from arcor2_server.cli.status import ExitStatus
 
@@ -14,18 +15,25 @@ app = App(
     version=lambda: f"arcor2-hw {version('arcor2-hw')}",
     version_flags=["--version"],
     result_action="return_value",
+    exit_on_error=False,
+    print_error=False,
+    suppress_keyboard_interrupt=False,
 )
-app.command("arcor2_server.cli.serve:serve")
-app.command("arcor2_server.cli.demo:demo")
-app.command("arcor2_server.cli.package:app", name="package")
-app.command("arcor2_server.cli.device:app", name="device")
-app.command("arcor2_server.cli.analyse:analyse")
+app.command("arcor2_server.cli.serve:serve", help="Run the server until it is told to end.")
+app.command("arcor2_server.cli.demo:demo", help="Bring up the demo workplace and run its program.")
+app.command("arcor2_server.cli.package:app", name="package", help="List the packages of a server, or run one.")
+app.command("arcor2_server.cli.device:app", name="device", help="List the devices that can be used.")
+app.command("arcor2_server.cli.analyse:analyse", help="Show what an object type offers, and what is wrong with it.")
 
 
 def main() -> None:
     """Run the command line; the process ends with an ExitStatus."""
     try:
-        status = app(exit_on_error=False, print_error=False)
+        status = app()
+    except CycloptsError as error:
+        # One line: which option, and what is wrong with it.
+        sys.stderr.write(f"arcor2-hw: {' '.join(str(error).split())} Try --help.\n")
+        status = ExitStatus.USAGE
     except KeyboardInterrupt:
         status = ExitStatus.INTERRUPTED
     except BrokenPipeError:

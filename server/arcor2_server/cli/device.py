@@ -1,0 +1,96 @@
+"""`arcor2-hw device`: which devices can be used here, and how those in operation are."""
+
+import http.client
+import sys
+import urllib.error
+import urllib.request
+from typing import Annotated, Any, Final
+
+import msgspec
+from cyclopts import App, Parameter
+from rich.console import Console
+from rich.table import Table
+
+from arcor2_hw.analysis import Library, installed_types
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.object_type import ObjectTypeMeta
+from arcor2_server.cli.status import ExitStatus
+
+app = App(name="device", help="List the devices that can be used here, or show how those in operation are.")
+
+DEFAULT_URL: Final = "http://127.0.0.1:6789"
+PIPE_WIDTH: Final = 240
+TIMEOUT: Final = 5.0
+"""Seconds in which a server answers."""
+
+
+@app.command(name="list")
+def list_devices() -> int:
+    """List the device types that are installed on this machine; no driver is loaded for it."""
+    installed = installed_types()
+    if not installed:
+        sys.stdout.write("No device types are installed: install a driver, or upload a type to a server.\n")
+        return ExitStatus.OK
+    library = Library(one.file for one in installed if one.file is not None)
+    table = Table("type", "kind", "actions", "comes with", "description", box=None, pad_edge=False)
+    broken: list[str] = []
+    for one in installed:
+        origin = f"{one.distribution} {one.version}".strip()
+        if one.file is None:
+            table.add_row(one.name, "", "", origin, f"[red]cannot be used: {one.problem}")
+            broken.append(one.name)
+            continue
+        found = library.analyse(one.name)
+        text = _described(found.meta)
+        if found.meta.disabled:
+            broken.append(one.name)
+        table.add_row(one.name, found.meta.base, str(len(found.actions)), origin, text)
+    _console().print(table)
+    return ExitStatus.ANALYSIS_PROBLEMS if broken else ExitStatus.OK
+
+
+def _described(meta: ObjectTypeMeta) -> str:
+    if meta.disabled and not isinstance(meta.problem, Unset):
+        return f"[red]cannot be used: {meta.problem}"
+    return meta.description
+
+
+@app.command
+def status(*, url: Annotated[str, Parameter(help="Where the server listens.")] = DEFAULT_URL) -> int:
+    """Show connection, health and alarms of the devices that a running server has in operation."""
+    try:
+        devices = _devices(url.replace("ws://", "http://", 1).rstrip("/"))
+    except (OSError, ValueError, http.client.HTTPException, msgspec.DecodeError) as error:
+        reason = getattr(error, "reason", None) or error
+        sys.stderr.write(f"arcor2-hw device status: {url}: {reason}\n")
+        return ExitStatus.NO_SERVER
+    if not devices:
+        sys.stdout.write("No device is in operation: start a scene or run a package first.\n")
+        return ExitStatus.OK
+    columns = sorted({key for device in devices for key in device})
+    table = Table(*columns, box=None, pad_edge=False)
+    for device in devices:
+        table.add_row(*(_shown(device.get(column)) for column in columns))
+    _console().print(table)
+    return ExitStatus.OK
+
+
+def _devices(url: str) -> list[dict[str, Any]]:
+    if not url.startswith("http://"):
+        raise ValueError("this is no address of a server; it looks like http://127.0.0.1:6789")
+    with urllib.request.urlopen(f"{url}/api/devices", timeout=TIMEOUT) as answer:  # noqa: S310 - checked above
+        return msgspec.json.decode(answer.read(), type=list[dict[str, Any]])
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, list):
+        return "; ".join(_shown(item) for item in value)
+    if isinstance(value, dict):
+        return str(value.get("text") or value)
+    return "" if value is None else str(value)
+
+
+def _console() -> Console:
+    # A pipe has no width: without one, rich would fold columns to 80 characters.
+    console = Console(highlight=False)
+    return console if console.is_terminal else Console(highlight=False, width=PIPE_WIDTH)
