@@ -254,6 +254,32 @@ os.kill(os.getpid(), 9)
     assert ur.do("truth")["watchdog_trips"] == 1
 
 
+@pytest.mark.parametrize("fault", ["silence", "half_frame", "reset"])
+def test_cable_cut_in_mid_move_ends_at_rest_and_stays_there(ur, fault):
+    seen = ur.library(f"""
+import threading
+control = Control(host, 500.0)
+control.setWatchdog(10.0)
+control.moveJ([3.0] + HOME[1:], 1.0, 5.0, True)
+def kick():
+    while True:
+        control.kickWatchdog()
+        time.sleep(0.03)
+threading.Thread(target=kick, daemon=True).start()
+until(lambda: fake.do("truth")["q"][0] > 0.2)
+fake.do("{fault}", wire="rtde")
+cut = time.monotonic()
+until(lambda: not fake.do("truth")["moving"])
+took, resting = time.monotonic() - cut, fake.do("truth")["q"]
+fake.do("heal", wire="rtde")
+time.sleep(0.5)
+report(took=took, resting=resting, later=fake.do("truth")["q"], truth=fake.do("truth"))
+""")
+    assert seen["took"] < 0.5
+    assert seen["resting"][0] < 2.0
+    assert seen["later"] == seen["resting"]
+
+
 def test_protective_stop_seen_and_unlocked(ur):
     seen = ur.library("""
 receive = Receive(host, 500.0, ["timestamp", "safety_status_bits", "actual_q", "runtime_state"])
