@@ -1,0 +1,118 @@
+"""Time of a build against the number of actions: a saved project through storage, program, files and the rename."""
+
+import asyncio
+import tempfile
+import time
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, Final
+
+import msgspec
+
+from arcor2_hw.data.geometry import Orientation, Position
+from arcor2_hw.data.object_type import ObjectTypeSource
+from arcor2_hw.data.project import (
+    END,
+    START,
+    Action,
+    ActionParameter,
+    ActionPoint,
+    Flow,
+    LogicItem,
+    NamedOrientation,
+    Project,
+    ProjectLogicIf,
+)
+from arcor2_hw.data.scene import Scene, SceneObject
+from arcor2_server.build.service import BuildService
+from arcor2_server.object_types import ObjectTypes
+from arcor2_server.settings import ServerSettings
+from arcor2_server.storage import Storage
+from benchmarks.figures import Figure, Report, median
+
+SIZES: Final = (250, 500, 1000, 2000)
+ROUNDS: Final = 9
+_SOURCE: Final = '''"""A machine that is only built for, never run."""
+
+from arcor2_hw.actions import action
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.objects import Generic
+
+
+class Bench(Generic):
+    """A machine."""
+
+    _ABSTRACT = False
+
+    @action
+    def move(self, pose: Pose, speed: float = 0.5, *, an: str | None = None) -> None:
+        """Move."""
+        assert 0.0 <= speed <= 1.0
+
+    @action
+    def test(self, *, an: str | None = None) -> bool:
+        """Test."""
+        return True
+'''
+_SCENE: Final = Scene("bench", objects=[SceneObject("bench", "Bench", id="obj_bench")], id="scn_bench")
+
+
+def project(size: int) -> Project:
+    """Make a project of `size` actions: in each group of four a test, one way for true, one for false, and the join."""
+    actions, logic = [], [LogicItem(START, "act_0", id="lit_start")]
+    for n in range(size):
+        group, place = divmod(n, 4)
+        if place == 0:
+            parameters: list[ActionParameter] = []
+        else:
+            parameters = [
+                ActionParameter("pose", "pose", '"ori_bench"'),
+                ActionParameter("speed", "double", "0.25"),
+            ]
+        flow = Flow(outputs=[f"passed_{group}"] if place == 0 else [])
+        method = "move" if place else "test"
+        actions.append(Action(f"action {n}", f"obj_bench/{method}", f"act_{n}", parameters, [flow]))
+        after = {0: (1, 2), 1: (2,), 2: (1,), 3: (1,)}[place]
+        for way, step in enumerate(after):
+            end = f"act_{n + step}" if n + step < size else END
+            when: Any = (
+                ProjectLogicIf(f"act_{n}/default/0", "false" if way else "true") if place == 0 else msgspec.UNSET
+            )
+            logic.append(LogicItem(f"act_{n}", end, when, f"lit_{n}_{way}"))
+    orientations = [NamedOrientation("default", Orientation(), "ori_bench")]
+    point = ActionPoint("ap", Position(), id="acp_bench", orientations=orientations, actions=actions)
+    return Project(f"bench {size}", _SCENE.id, id=f"pro_{size}", action_points=[point], logic=logic)
+
+
+async def build(report: Report) -> None:
+    """Report the time of a build of 1,000 actions, with the times of other sizes beside it."""
+    with tempfile.TemporaryDirectory() as directory:
+        settings = ServerSettings(data_dir=Path(directory))
+        storage = await Storage.open(settings)
+        try:
+            await storage.put_object_type(ObjectTypeSource("Bench", _SOURCE))
+            types = ObjectTypes(storage)
+            await types.load()
+            await storage.put_scene(_SCENE)
+            services: Any = SimpleNamespace(settings=settings, storage=storage, types=types)
+            service = BuildService(services)
+            times: dict[int, list[float]] = {size: [] for size in SIZES}
+            for size in SIZES:
+                await storage.put_project(project(size))
+            await service.build(f"pro_{SIZES[0]}", "warm")
+            for _ in range(ROUNDS):
+                for size in SIZES:
+                    begin = time.perf_counter()
+                    await service.build(f"pro_{size}", "bench")
+                    times[size].append((time.perf_counter() - begin) * 1e3)
+        finally:
+            await storage.close()
+    medians = {size: median(samples) for size, samples in times.items()}
+    note = ", ".join(f"{size} actions {value:.0f} ms" for size, value in medians.items())
+    report.add(Figure("build_1000_ms", medians[1000], ROUNDS, note))
+
+
+if __name__ == "__main__":
+    figures = Report()
+    asyncio.run(build(figures))
+    figures.table()
