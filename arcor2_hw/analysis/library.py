@@ -47,7 +47,8 @@ class TypeAnalysis(Data, frozen=True):
     robot: None for what is no robot, and for what may not be placed. implemented: the optional methods of our bases
     that it really has. bases: the object types it derives from, nearest first. mixins: classes before its base.
     enumerations: what its actions take, by action and parameter.
-    modules: the other files it needs, each after those that it needs itself; without ours.
+    modules: the other files it needs, each after those that it needs itself; without ours, and without the packages
+    that they merely lie in.
     """
 
     meta: ObjectTypeMeta
@@ -70,6 +71,7 @@ class Library:
         self._by_module: dict[str, SourceFile] = {}
         self._roots: dict[str, Path] = {"arcor2_hw": _OURS.parent}
         self._modules: dict[str, Module | Broken | None] = {}
+        self._parsed: dict[str, Module] = {}  # what was read before; it is read again only when its text changed
         self._analyses: dict[str, TypeAnalysis] = {}
         self._forget()
         for file in files:
@@ -138,14 +140,20 @@ class Library:
         if dotted not in self._modules:
             try:
                 file = self._by_module.get(dotted) or self._on_disk(dotted)
-                parsed = None if file is None else Module(msgspec.structs.replace(file, module=dotted))
-                self._modules[dotted] = parsed
+                self._modules[dotted] = None if file is None else self._parse(file, dotted)
             except Broken as error:
                 self._modules[dotted] = error
         found = self._modules[dotted]
         if isinstance(found, Broken):
             raise Broken(str(found), found.problem.path, found.problem.line)
         return found
+
+    def _parse(self, file: SourceFile, dotted: str) -> Module:
+        file = msgspec.structs.replace(file, module=dotted)
+        known = self._parsed.get(dotted)
+        if known is None or known.file != file:
+            known = self._parsed[dotted] = Module(file)
+        return known
 
     def _on_disk(self, dotted: str) -> SourceFile | None:
         top, _, rest = dotted.partition(".")
@@ -225,8 +233,7 @@ class Library:
             needed = tuple(self._needed(module))
             if not info.node.bases:
                 return self._helper(name, needed)
-            self._check_base(info)
-            if not self._hierarchy.derives_from(info, "Generic"):
+            if not self._is_object_type(info):
                 return self._helper(name, needed)
             return self._of_class(name, info, needed)
         except Broken as error:
@@ -237,13 +244,19 @@ class Library:
         meta = ObjectTypeMeta(name, NO_DESCRIPTION, base=base, abstract=True, disabled=True, problem=str(problem))
         return TypeAnalysis(meta, modules=needed, problem=problem)
 
-    def _check_base(self, info: ClassInfo) -> None:
-        """Raise Broken when the base cannot be obtained: its file is broken, or nobody knows it."""
-        for each in self._hierarchy.lineage(info)[1:]:
-            if isinstance(each, External) and not is_known_library(each) and each.dotted != "builtins.object":
-                bases = self._hierarchy.bases(info)
-                if each == bases[-1]:
-                    raise info.problem(f"{info.name}: the base {each.dotted} cannot be obtained", info.node.bases[-1])
+    def _is_object_type(self, info: ClassInfo) -> bool:
+        """Tell whether a class derives from Generic. Raises Broken when that cannot be known, or by the wrong base."""
+        hierarchy = self._hierarchy
+        last = info.node.bases[-1]
+        if not hierarchy.derives_from(info, "Generic"):
+            for each in hierarchy.lineage(info):
+                if isinstance(each, External) and not is_known_library(each):
+                    raise info.problem(f"{info.name}: the base {each.dotted} cannot be obtained", last)
+            return False
+        base = hierarchy.base(info)
+        if base is None or not hierarchy.derives_from(base, "Generic"):
+            raise info.problem(f"{info.name}: the last base is no object type; mixins come before the base", last)
+        return True
 
     def _helper(self, name: str, needed: tuple[SourceFile, ...]) -> TypeAnalysis:
         return TypeAnalysis(ObjectTypeMeta(name, abstract=True), modules=needed, is_object_type=False)

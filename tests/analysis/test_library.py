@@ -684,6 +684,8 @@ def test_a_robot_with_several_arms() -> None:
         ("from ..far import Base\nclass T(Base): ...\n", "leads out of the package", 6),
         ("class T(T): ...\n", "its own ancestor", 6),
         ("class A(Generic): ...\nclass T(Generic, A): ...\n", "contradict each other", 7),
+        ("class M: ...\nclass T(Generic, M): ...\n", "mixins come before the base", 7),
+        ("import sdk\nclass B(sdk.Base): ...\nclass T(B): ...\n", "the base sdk.Base cannot be obtained", 8),
         ("class T(Generic):\n    _ABSTRACT = compute()\n", "cannot be told from the source", 7),
         (
             "class T(Generic):\n    def __init__(self, settings: int): ...\n",
