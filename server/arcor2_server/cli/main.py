@@ -22,6 +22,9 @@ app = App(
 app.command("arcor2_server.cli.serve:serve", help="Run the server until it is told to end.")
 app.command("arcor2_server.cli.demo:demo", help="Bring up the demo workplace and run its program.")
 app.command("arcor2_server.cli.package:app", name="package", help="List the packages of a server, or run one.")
+app.command(
+    "arcor2_server.cli.object_type:app", name="object-type", help="Bring object types into a server, or take them out."
+)
 app.command("arcor2_server.cli.device:app", name="device", help="List the devices that can be used.")
 app.command("arcor2_server.cli.analyse:analyse", help="Show what an object type offers, and what is wrong with it.")
 
