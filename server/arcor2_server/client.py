@@ -113,14 +113,23 @@ class Client:
         """End the connection; what waits is dropped."""
         if self._closing is not None:
             return
-        self._closing = (code, reason)
-        self._waiting.clear()
-        self._newest.clear()
-        self._bytes = 0
+        log.info("client closed", client=self.number, user=self.user, code=int(code), reason=reason)
+        self._end(code, reason)
         self._wake.set()
         if self._sending_since is not None:
             # The writer hangs in a full connection: no close frame gets through either.
             asyncio.get_running_loop().call_later(ABORT_AFTER, self._wire.abort)
+
+    def lost(self) -> None:
+        """Send nothing more: the connection is gone."""
+        if self._closing is None:
+            self._end(1006, "the connection is gone")
+
+    def _end(self, code: int, reason: str) -> None:
+        self._closing = (code, reason)
+        self._waiting.clear()
+        self._newest.clear()
+        self._bytes = 0
 
     async def ping(self, within: float) -> bool:
         """Tell whether the other side answers a ping within that many seconds."""
@@ -149,10 +158,9 @@ class Client:
                 self._wake.clear()
                 await self._wake.wait()
         except ConnectionError:
-            self._closing = self._closing or (1006, "connection lost")
+            self.lost()
 
     async def _close_wire(self, code: int, reason: str) -> None:
-        log.info("client closed", client=self.number, user=self.user, code=code, reason=reason)
         try:
             async with asyncio.timeout(ABORT_AFTER):
                 await self._wire.close(code, reason)

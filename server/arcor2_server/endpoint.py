@@ -115,7 +115,7 @@ class Endpoint:
         finally:
             self._hub.remove(client)
             self._services.users.disconnected(client)
-            client.close(1000, "")
+            client.lost()
             writer.cancel()
             await asyncio.gather(writer, return_exceptions=True)
             log.info("client disconnected", client=client.number, user=client.user)

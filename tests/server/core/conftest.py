@@ -4,9 +4,10 @@ import asyncio
 from collections.abc import Iterator
 from pathlib import Path
 
+import psutil
 import pytest
 
-from tests.server.core.serving import ServerProcess
+from tests.server.core.serving import ServerProcess, until
 
 
 @pytest.fixture(scope="module")
@@ -21,5 +22,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServerProcess]:
     )
     with asyncio.Runner() as runner:
         runner.run(process.start())
+        # The spare host comes up after `ready`; it belongs to the server, not to the test that happens to run then.
+        runner.run(until(lambda: psutil.Process(process.process.pid).children()))
         yield process
         assert runner.run(process.stop()) == 0

@@ -14,7 +14,6 @@ from typing import Any
 from websockets.asyncio.client import ClientConnection, connect
 
 COMMAND = [sys.executable, "-m", "arcor2_server.cli.main"]
-    COMMAND = [sys.executable, "/tmp/shim/run.py"]
 READY_WITHIN = 20.0
 
 
