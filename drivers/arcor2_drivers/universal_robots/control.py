@@ -1,24 +1,25 @@
-"""Control of the arm while it is ours: one thread that alone touches ur_rtde, and one that guards it.
+"""Control of the arm while it is ours: the process that holds ur_rtde, and the guard over both.
 
-The lane thread owns the library's control interface: it carries out jobs one by one, an urgent one first, and between
-them kicks the controller's watchdog. So the watchdog lives only as long as this process, this thread and the observed
-connection do. The guard ends the session, and stops the controller's program on a connection of its own, as soon as
-something is so that nothing may go on by itself. An ended session never comes back; control is taken anew.
+The guard kicks the controller's watchdog, through that process, as long as this process lives and the observed stream
+is fresh. It ends the session as soon as something is so that nothing may go on by itself: the process is killed, and
+the controller's program is stopped on a connection of its own. An ended session never comes back; control is taken anew.
 """
 
-import collections
 import contextlib
-import ctypes
+import itertools
+import json
 import logging
+import os
+import selectors
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeout
-from typing import Any, Final, TypeVar
-
-from rtde_control import RTDEControlInterface
-from rtde_io import RTDEIOInterface
+from pathlib import Path
+from typing import Any, Final
 
 from arcor2_hw.data.robot import Safety
 from arcor2_hw.exceptions import (
@@ -35,15 +36,12 @@ from .dashboard import Dashboard
 from .observer import Observer
 from .states import MAY_MOVE, REMEDIES, program_plays, safety_of
 
-T = TypeVar("T")
-
 STREAM_FREQUENCY: Final = 125.0
-"""Hz of the library's own stream: a command takes 16 ms instead of 4, the thread 5 % of a core instead of 10."""
+"""Hz of the library's own stream: a command takes 16 ms instead of 4, the process 5 % of a core instead of 10."""
 KICKS_PER_PERIOD: Final = 4.0
 """Kicks within one period of the watchdog: three may be late."""
 UNHEALTHY: Final = 0.3
-"""Seconds without an observed sample after which the watchdog is no longer kicked and the session ends; the library
-falls into endless reconnection, or crashes the process, from 2.5 s on."""
+"""Seconds without an observed sample after which the session ends; the library itself needs 2.5 to notice."""
 GUARD_PERIOD: Final = 0.01
 CALL_TIMEOUT: Final = 1.0
 """Seconds for a command that moves nothing; the library itself waits 4 to 300."""
@@ -51,111 +49,154 @@ STOP_REACTION: Final = 0.05
 """Seconds the control program may take to react to a stop before the dashboard is used: two commands of 16 ms."""
 PROGRAM_GONE: Final = 0.1
 """Seconds our program may be seen not playing before the session ends: two streams tell of it, not at one instant."""
+LAST_STOP: Final = 0.3
+"""Seconds for the dashboard to answer the stop with which a session ends."""
+
+_SCRIPT: Final = Path(__file__).with_name("control_process.py")
+_BROKEN: Final = (b"disconnected", b"could not receive", b"closed the connection", b"lost connection", b"reconnecting")
+"""What ur_rtde says, in lower case, when its connection has broken and before it connects again."""
 
 log = logging.getLogger(__name__)
-
-
-def _kept(interface: T) -> T:
-    """Keep an interface of the library from ever being destroyed.
-
-    The destructor of the control interface sleeps 0.5 s with the interpreter held, which would stall every device of
-    this process. `disconnect` has closed its sockets and ended its threads; what stays is a few kilobytes.
-    """
-    ctypes.pythonapi.Py_IncRef(ctypes.py_object(interface))
-    return interface
-
-
-class _Job:
-    def __init__(self, what: str, run: Callable[[RTDEControlInterface], Any], valid: Callable[[], bool]) -> None:
-        self.what, self.run, self.valid = what, run, valid
-        self.future: Future[Any] = Future()
 
 
 class ControlSession:
     """Control from `open` until it ends. `ended` is None while it lives, then the reason."""
 
     def __init__(self, observer: Observer, upper: bool, watchdog_frequency: float) -> None:
-        self.address = observer.host
+        self.host = observer.host
         self.upper = upper
         self.ended: DeviceError | None = None
         self._observer = observer
         self._watchdog = watchdog_frequency
         self._stop_line = Dashboard(observer.host)
-        self._jobs: collections.deque[_Job] = collections.deque()
-        self._wake = threading.Condition()
+        self._numbers = itertools.count(1)
+        self._waiting: dict[int, Future[Any]] = {}
+        self._order = threading.Lock()
         self._ending = threading.Event()
-        self._opened: Future[None] = Future()
-        self._lane = threading.Thread(target=self._run, name=f"control lane {self.address}", daemon=True)
-        self._guard = threading.Thread(target=self._watch, name=f"control guard {self.address}", daemon=True)
-        self._speeding = False
-        self._speed_until = 0.0
-        self._io: RTDEIOInterface | None = None
+        self._released = False
+        self._process: subprocess.Popen[bytes] | None = None
+        self._speed_until: float | None = None
 
-    # -------------------------------------------------------------------------------- for any thread
+    # -------------------------------------------------------------------------------- begin and end
     def open(self, timeout: float, dashboard: bool) -> None:
         """Send the control program and arm its watchdog. Raises NotInControl, DeviceTimeout, DeviceFault."""
         if dashboard:
             self._stop_line.open(timeout)
-        self._lane.start()
+        arguments = {
+            "host": self.host,
+            "frequency": STREAM_FREQUENCY,
+            "upper": self.upper,
+            "watchdog": self._watchdog,
+        }
+        opened: Future[Any] = Future()
+        self._waiting[0] = opened
+        self._process = subprocess.Popen(  # noqa: S603 - our own script
+            [sys.executable, "-P", str(_SCRIPT), json.dumps(arguments)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+        )
+        threading.Thread(target=self._listen, name=f"control answers {self.host}", daemon=True).start()
         try:
-            self._opened.result(timeout)
+            opened.result(timeout)
         except FutureTimeout:
-            error = DeviceTimeout(f"UR controller {self.address} did not start the control program in {timeout:g} s")
+            error = DeviceTimeout(f"UR controller {self.host} did not start the control program in {timeout:g} s")
             self.end(error)
-            raise error from None
-        except BaseException:
             self._stop_line.close()
-            raise
-        self._guard.start()
+            raise error from None
+        except DeviceFault as e:
+            named = self._named(e.detail)
+            self.end(named)
+            self._stop_line.close()
+            raise named from e
+        threading.Thread(target=self._watch, name=f"control guard {self.host}", daemon=True).start()
 
+    def end(self, reason: DeviceError) -> None:
+        """End the session now: the process is killed, so that no further kick and no reconnection comes from it."""
+        with self._order:
+            if self.ended is not None:
+                return
+            self.ended = reason
+            process = self._process
+            if process is not None:
+                process.kill()
+            self._ending.set()
+        if not self._released:
+            log.warning("control of UR %s ends: %s", self.host, reason)
+
+    def release(self, reason: DeviceError, wait: float) -> None:
+        """End the control program in order, and the session."""
+        self._released = True
+        with contextlib.suppress(DeviceError):
+            self.call("the end of control", "stopScript", timeout=wait)
+        self.end(reason)
+
+    def _named(self, text: str) -> DeviceError:
+        lower = text.lower()
+        if "in use" in lower or "in_use" in lower:
+            block = "24 to 47" if self.upper else "0 to 23"
+            return NotInControl(
+                f"the input registers {block} of UR controller {self.host} are used by a fieldbus or another client",
+                text,
+            )
+        if "remote control" in lower:
+            return NotInControl(f"UR controller {self.host} is in local control", text)
+        return DeviceFault(f"UR controller {self.host} does not start the control program", text)
+
+    # -------------------------------------------------------------------------------- commands, from any thread
     def call(
         self,
         what: str,
-        run: Callable[[RTDEControlInterface], T],
+        command: str,
+        *arguments: Any,
         timeout: float = CALL_TIMEOUT,
-        *,
-        urgent: bool = False,
         valid: Callable[[], bool] = lambda: True,
-    ) -> T:
-        """Run a job in the lane and give what it gives. `valid` is asked at the last moment: false drops it.
+    ) -> Any:
+        """Have a command carried out and give what it gives. `valid` is asked at the last moment: false drops it.
 
         Raises what ended the session, Cancelled when dropped, DeviceTimeout (and the session ends) when it takes longer
-        than `timeout` s, DeviceFault when the controller does not accept it.
+        than `timeout` s, DeviceFault when the library fails.
         """
-        job = _Job(what, run, valid)
-        with self._wake:
-            if self.ended is not None:
-                raise self.ended
-            if urgent:
-                self._jobs.appendleft(job)
-            else:
-                self._jobs.append(job)
-            self._wake.notify()
+        future = self._send(what, command, arguments, valid)
         try:
-            result: T = job.future.result(timeout)
+            return future.result(timeout)
         except FutureTimeout:
-            error = DeviceTimeout(f"UR controller {self.address} did not take {what} within {timeout:g} s")
+            error = DeviceTimeout(f"UR controller {self.host} did not take {what} within {timeout:g} s")
             self.end(error)
             raise error from None
-        return result
 
-    def speed(self, what: str, run: Callable[[RTDEControlInterface], bool], valid_for: float) -> None:
-        """Begin or renew a motion by speed that the lane ends `valid_for` s from now."""
-        until = time.monotonic() + valid_for
-
-        def start(rtde: RTDEControlInterface) -> bool:
-            if time.monotonic() >= until:
-                return True  # a late packet
-            self._speeding, self._speed_until = True, until
-            return run(rtde)
-
-        self.do(what, start)
-
-    def do(self, what: str, run: Callable[[RTDEControlInterface], bool], **options: Any) -> None:
+    def do(self, what: str, command: str, *arguments: Any, **options: Any) -> None:
         """As `call`, for a command that the library answers with true or false; DeviceFault on false."""
-        if not self.call(what, run, **options):
-            self._check_ended_soon()
-            raise DeviceFault(f"UR controller {self.address} did not accept {what}")
+        if not self.call(what, command, *arguments, **options):
+            if self._ending.wait(2.0 * PROGRAM_GONE) and self.ended is not None:
+                raise self.ended  # the guard was about to see why
+            raise DeviceFault(f"UR controller {self.host} did not accept {what}")
+
+    def speed(
+        self, command: str, velocities: list[float], acceleration: float, valid_for: float, valid: Callable[[], bool]
+    ) -> None:
+        """Begin or renew a motion by speed that ends `valid_for` s from now unless it is renewed."""
+        until = time.monotonic() + valid_for
+        self._speed_until = until
+        self.do(
+            "a jog",
+            command,
+            velocities,
+            acceleration,
+            valid_for,
+            valid=lambda: valid() and time.monotonic() < until,
+        )
+
+    def set_output(self, number: int, on: bool) -> None:
+        """Switch an output: 0 to 7 standard, 8 to 15 configurable, 16 and 17 of the tool."""
+        command, first = (
+            ("setStandardDigitalOut", 0)
+            if number < 8
+            else ("setConfigurableDigitalOut", 8)
+            if number < 16
+            else ("setToolDigitalOut", 16)
+        )
+        self.do(f"digital output {number}", command, number - first, on)
 
     def stop_motion(self, deceleration: float) -> None:
         """Stop what moves; by the dashboard, which ends the session, when the program does not react in time.
@@ -163,190 +204,145 @@ class ControlSession:
         Always the asynchronous stopL, the only one of the four that is run as what it is called: ur_rtde 1.6.5 runs a
         synchronous stopL as stopj until the first asynchronous stop, and stopJ as stopl from then on.
         """
-
-        def stop(rtde: RTDEControlInterface) -> None:
-            self._speeding = False
-            rtde.stopL(deceleration, True)
-
-        job = _Job("stop", stop, lambda: True)
-        with self._wake:
-            if self.ended is not None:
-                return
-            self._jobs.appendleft(job)
-            self._wake.notify()
+        self._speed_until = None
         try:
-            job.future.result(STOP_REACTION)
+            self._send("a stop", "stopL", (deceleration, True)).result(STOP_REACTION)
         except (FutureTimeout, DeviceFault):
             self.stop_by_dashboard()
         except DeviceError as e:
-            log.debug("UR %s: control ended while stopping: %s", self.address, e)
+            log.debug("UR %s: control ended while stopping: %s", self.host, e)
 
     def stop_by_dashboard(self) -> None:
         """The second path of a stop: stop the program, and with it the session."""
+        reason = Cancelled(f"the control program of UR {self.host} was stopped by the dashboard")
         try:
-            self.stop_program()
-        finally:
-            self.end(Cancelled(f"the control program of UR {self.address} was stopped by the dashboard"))
-
-    def set_output(self, number: int, on: bool) -> None:
-        """Switch an output: 0 to 7 standard, 8 to 15 configurable, 16 and 17 of the tool."""
-        io = self._io
-        assert io is not None
-
-        def switch(_: RTDEControlInterface) -> bool:
-            if number < 8:
-                done: bool = io.setStandardDigitalOut(number, on)
-            elif number < 16:
-                done = io.setConfigurableDigitalOut(number - 8, on)
-            else:
-                done = io.setToolDigitalOut(number - 16, on)
-            return done
-
-        self.do(f"digital output {number}", switch)
-
-    def stop_program(self, timeout: float = 1.0) -> None:
-        """Stop the controller's program by the dashboard, on a connection of its own."""
-        self._stop_line.do("stop", "Stopped", timeout)
-
-    def end(self, reason: DeviceError) -> None:
-        """End the session: no further job, no further kick. The first reason counts."""
-        with self._wake:
-            if self.ended is None:
-                self.ended = reason
-                log.warning("control of UR %s ends: %s", self.address, reason)
-            self._ending.set()
-            self._wake.notify_all()
-
-    def close(self, reason: DeviceError, wait: float) -> None:
-        """End the session and wait for its program to be told, at most `wait` s."""
+            self._stop_line.do("stop", "Stopped")
+        except DeviceError as e:
+            self.end(e)  # without kicks the watchdog stops it
+            raise
         self.end(reason)
-        if threading.current_thread() is not self._lane and self._lane.is_alive():
-            self._lane.join(wait)
 
-    def _check_ended_soon(self) -> None:
-        """A command answered with false mostly means that the guard is about to see why; let it."""
-        if self._ending.wait(2.0 * PROGRAM_GONE) and self.ended is not None:
-            raise self.ended
+    def _send(
+        self, what: str, command: str, arguments: tuple[Any, ...], valid: Callable[[], bool] = lambda: True
+    ) -> "Future[Any]":
+        future: Future[Any] = Future()
+        number = next(self._numbers)
+        line = json.dumps({"n": number, "do": command, "args": arguments})
+        with self._order:
+            if self.ended is not None:
+                raise self.ended
+            if not valid():
+                raise Cancelled(f"{what} was stopped before it began")
+            self._waiting[number] = future
+            self._write(line)
+        return future
 
-    # -------------------------------------------------------------------------------- the lane
-    def _run(self) -> None:
-        try:
-            rtde = self._construct()
-        except (RuntimeError, DeviceError) as e:
-            error = e if isinstance(e, DeviceError) else self._named(e)
-            if self._io is not None:
-                self._io.disconnect()
-            self.ended = error
-            self._opened.set_exception(error)
+    def _write(self, line: str) -> None:
+        assert self._process is not None
+        assert self._process.stdin is not None
+        with contextlib.suppress(OSError):  # gone: the listening thread sees it
+            os.write(self._process.stdin.fileno(), line.encode() + b"\n")
+
+    # -------------------------------------------------------------------------------- answers of the process
+    def _listen(self) -> None:
+        process = self._process
+        assert process is not None
+        assert process.stdout is not None
+        assert process.stderr is not None
+        buffers = {process.stdout: b"", process.stderr: b""}
+        with selectors.DefaultSelector() as selector:
+            for pipe in buffers:
+                selector.register(pipe, selectors.EVENT_READ)
+            while selector.get_map():
+                for key, _ in selector.select():
+                    pipe = process.stdout if key.fileobj is process.stdout else process.stderr
+                    data = os.read(key.fd, 65536)
+                    if not data:
+                        selector.unregister(pipe)
+                        continue
+                    *lines, buffers[pipe] = (buffers[pipe] + data).split(b"\n")
+                    for line in lines:
+                        self._answered(line) if pipe is process.stdout else self._said(line)
+        status = process.wait()
+        self.end(ConnectionLost(f"the control process of UR {self.host} ended with status {status}"))
+        assert process.stdin is not None
+        process.stdin.close()
+        process.stdout.close()
+        process.stderr.close()
+        with self._order:
+            waiting, self._waiting = self._waiting, {}
+        for future in waiting.values():
+            assert self.ended is not None
+            future.set_exception(self.ended)
+
+    def _answered(self, line: bytes) -> None:
+        answer = json.loads(line)
+        future = self._waiting.pop(answer["n"], None)
+        if future is None:
             return
-        try:
-            self._opened.set_result(None)
-            self._serve(rtde)
-        finally:
-            self._dispose(rtde)
+        if "error" in answer:
+            future.set_exception(DeviceFault(f"the control interface of UR {self.host} failed", answer["error"]))
+        else:
+            future.set_result(answer["data"])
 
-    def _construct(self) -> RTDEControlInterface:
-        flags = RTDEControlInterface.FLAG_UPLOAD_SCRIPT | RTDEControlInterface.FLAG_NO_EXT_FT
-        if self.upper:
-            flags |= RTDEControlInterface.FLAG_UPPER_RANGE_REGISTERS
-        # Before the watchdog is armed: this constructor holds the interpreter for 0.1 s.
-        self._io = _kept(RTDEIOInterface(self.address, False, self.upper))
-        rtde = _kept(RTDEControlInterface(self.address, STREAM_FREQUENCY, flags))
-        if not rtde.setWatchdog(self._watchdog):
-            self._dispose(rtde)
-            raise DeviceFault(f"UR controller {self.address} does not arm the watchdog of the control program")
-        return rtde
-
-    def _named(self, e: RuntimeError) -> DeviceError:
-        text = str(e)
-        if "in use" in text.lower() or "in_use" in text.lower():
-            block = "24 to 47" if self.upper else "0 to 23"
-            return NotInControl(
-                f"the input registers {block} of UR controller {self.address} are used by a fieldbus or another client",
-                text,
-            )
-        if "remote control" in text.lower():
-            return NotInControl(f"UR controller {self.address} is in local control", text)
-        return DeviceFault(f"UR controller {self.address} does not start the control program", text)
-
-    def _serve(self, rtde: RTDEControlInterface) -> None:
-        period = 1.0 / (KICKS_PER_PERIOD * self._watchdog)
-        due = 0.0
-        while True:
-            with self._wake:
-                if not self._jobs and self.ended is None:
-                    self._wake.wait(max(due - time.monotonic(), 0.0))
-                if self.ended is not None:
-                    return
-                job = self._jobs.popleft() if self._jobs else None
-            if job is not None:
-                self._carry_out(job, rtde)
-            if self._speeding and time.monotonic() >= self._speed_until:
-                self._speeding = False
-                rtde.speedStop()
-            if time.monotonic() >= due and self._healthy():
-                rtde.kickWatchdog()
-                due = time.monotonic() + period
-
-    @staticmethod
-    def _carry_out(job: _Job, rtde: RTDEControlInterface) -> None:
-        if not job.valid():
-            job.future.set_exception(Cancelled(f"{job.what} was stopped before it began"))
-            return
-        try:
-            job.future.set_result(job.run(rtde))
-        except (RuntimeError, ValueError, TypeError) as e:
-            job.future.set_exception(DeviceFault(f"{job.what} failed in the control interface", str(e)))
-
-    def _healthy(self) -> bool:
-        newest = self._observer.newest()
-        return newest is not None and newest.age < UNHEALTHY
-
-    def _dispose(self, rtde: RTDEControlInterface) -> None:
-        reason = self.ended or ConnectionLost(f"control of UR {self.address} has ended")
-        with self._wake:
-            self.ended = reason
-            jobs, self._jobs = self._jobs, collections.deque()
-        for job in jobs:
-            job.future.set_exception(reason)
-        with contextlib.suppress(RuntimeError):
-            newest = self._observer.newest()
-            if self._healthy() and newest is not None and program_plays(newest.runtime):
-                rtde.stopScript()
-        self._stop_line.close()
-        for interface in (rtde, self._io):
-            with contextlib.suppress(RuntimeError):
-                if interface is not None:
-                    interface.disconnect()
+    def _said(self, line: bytes) -> None:
+        text = line.decode("utf-8", "replace").strip()
+        if any(word in line.lower() for word in _BROKEN):
+            self.end(ConnectionLost(f"the control connection to UR {self.host} broke", text))
+        elif text:
+            log.info("UR %s: %s", self.host, text)
 
     # -------------------------------------------------------------------------------- the guard
     def _watch(self) -> None:
-        gone_since = 0.0
-        while not self._ending.wait(GUARD_PERIOD):
+        period = 1.0 / (KICKS_PER_PERIOD * self._watchdog)
+        kick = json.dumps({"do": "kickWatchdog", "args": []})
+        due = gone_since = 0.0
+        while True:
+            now = time.monotonic()
             newest = self._observer.newest()
-            if newest is None or newest.age > UNHEALTHY:
-                self.end(ConnectionLost(f"nothing is heard of UR controller {self.address}"))
-                return
-            safety = safety_of(newest.safety_mode)
-            if safety not in MAY_MOVE:
+            if newest is None or newest.age > UNHEALTHY or not self._observer.observing.online:
+                self.end(ConnectionLost(f"nothing is heard of UR controller {self.host}"))
+            elif (safety := safety_of(newest.safety_mode)) not in MAY_MOVE:
                 self._stopped_by_safety(safety)
-                return
-            if program_plays(newest.runtime):
+            elif program_plays(newest.runtime):
                 gone_since = 0.0
             elif gone_since == 0.0:
-                gone_since = time.monotonic()
-            elif time.monotonic() - gone_since > PROGRAM_GONE:
+                gone_since = now
+            elif now - gone_since > PROGRAM_GONE:
                 self.end(
-                    NotInControl(f"the control program was stopped at UR controller {self.address}, not by this driver")
+                    NotInControl(f"the control program was stopped at UR controller {self.host}, not by this driver")
                 )
-                return
+            if self._ending.is_set():
+                break
+            if self._speed_until is not None and now >= self._speed_until:
+                self._speed_until = None
+                with contextlib.suppress(DeviceError):
+                    self._send("the end of a jog", "speedStop", ())
+            if now >= due:
+                due = now + period
+                with self._order:
+                    if self.ended is None:
+                        self._write(kick)
+            self._ending.wait(GUARD_PERIOD)
+        self._last_stop()
 
     def _stopped_by_safety(self, safety: Safety) -> None:
         """End, and stop the program first: after a safeguard stop it would go on as soon as the guard closes."""
-        kind = safety.value
-        reason = SafetyStop(f"{kind.replace('_', ' ')} of UR {self.address}", REMEDIES.get(safety, ""), kind)
-        try:
-            self.stop_program()
-        except DeviceError as e:
-            log.warning("UR %s: the program could not be stopped by the dashboard: %s", self.address, e)
+        reason = SafetyStop(
+            f"{safety.value.replace('_', ' ')} of UR {self.host}", REMEDIES.get(safety, ""), safety.value
+        )
+        self._last_stop()
         self.end(reason)
+
+    def _last_stop(self) -> None:
+        """Leave no program of ours on the controller: a connection that broke may have brought it there once more."""
+        newest = self._observer.newest()
+        if not self._released and (newest is None or program_plays(newest.runtime)):
+            for _ in range(2):  # idempotent; the first attempt may meet a connection that was reset
+                try:
+                    self._stop_line.do("stop", "Stopped", LAST_STOP)
+                    break
+                except DeviceError as e:
+                    log.warning("UR %s: the program could not be stopped by the dashboard: %s", self.host, e)
+        if self._ending.is_set():
+            self._stop_line.close()

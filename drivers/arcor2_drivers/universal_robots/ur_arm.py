@@ -7,8 +7,6 @@ import time
 from collections.abc import Callable, Iterator
 from typing import ClassVar, Final
 
-from rtde_control import RTDEControlInterface
-
 from arcor2_hw.data.device import LossReaction
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Control, Joint, Mode, MoveEnd, MoveResult
@@ -100,7 +98,7 @@ class UrArm(UrObserved):
         try:
             self._tell_tool(session, self._tcp, *self._payload)
         except BaseException:
-            session.close(NotInControl(f"control of {self.name} was not taken"), 1.0)
+            session.end(NotInControl(f"control of {self.name} was not taken"))
             raise
         self._teaching = False
         self._take_again = False
@@ -118,7 +116,7 @@ class UrArm(UrObserved):
             self._stops += 1
             with contextlib.suppress(DeviceError):
                 session.stop_motion(self._ur.stop_deceleration)
-        session.close(NotInControl(f"control of {self.name} was given back"), 0.4)
+        session.release(NotInControl(f"control of {self.name} was given back"), 0.4)
 
     def control_owner(self) -> str | None:
         """Tell who has control: "us", the pendant, the program that plays, or nobody."""
@@ -155,8 +153,8 @@ class UrArm(UrObserved):
         raise NotInControl(f"control of {self.name} is not taken{why}")
 
     def _tell_tool(self, session: ControlSession, tcp: Pose, mass: float, cog: tuple[float, float, float]) -> None:
-        session.do("the tool centre point", lambda rtde: bool(rtde.setTcp(to_vector(tcp))))
-        session.do("the payload", lambda rtde: bool(rtde.setPayload(mass, list(cog))))
+        session.do("the tool centre point", "setTcp", to_vector(tcp))
+        session.do("the payload", "setPayload", mass, list(cog))
 
     def set_tool(
         self, tcp: Pose, mass: float, cog: tuple[float, float, float], inertia: tuple[float, ...] | None = None
@@ -217,7 +215,7 @@ class UrArm(UrObserved):
             return self._run(
                 session,
                 "a linear move",
-                lambda rtde: bool(rtde.moveL(vector, tcp_speed, ramp, True)),
+                ("moveL", vector, tcp_speed, ramp, True),
                 budget,
                 reached,
                 tcp_speed / self._ur.max_tcp_speed,
@@ -238,7 +236,7 @@ class UrArm(UrObserved):
         return self._run(
             session,
             "a joint move",
-            lambda rtde: bool(rtde.moveJ(q, joint_speed, ramp, True)),
+            ("moveJ", q, joint_speed, ramp, True),
             joint_budget(start.q, q, joint_speed, ramp),
             lambda sample: max(abs(a - b) for a, b in zip(sample.q, q, strict=True)) < JOINTS_REACHED,
             joint_speed / self._ur.max_joint_speed,
@@ -268,7 +266,7 @@ class UrArm(UrObserved):
         self,
         session: ControlSession,
         what: str,
-        start: Callable[[RTDEControlInterface], bool],
+        command: tuple[str, list[float], float, float, bool],
         budget: float,
         reached: Callable[[Sample], bool],
         speed: float,
@@ -277,7 +275,7 @@ class UrArm(UrObserved):
         stops, began = self._stops, time.monotonic()
         number, _ = self._observer.sample().operation(session.upper)
         try:
-            session.do(what, start, valid=lambda: self._stops == stops)
+            session.do(what, *command, valid=lambda: self._stops == stops)
             self._wait_done(session, what, number, stops, budget, reached)
         except Cancelled:
             self._wait_rest(session)
@@ -383,17 +381,14 @@ class UrArm(UrObserved):
         """Give the TCP in the world for joints, by the controller's calibration; needs control."""
         self._check_end_effector(end_effector_id)
         q, tcp = self._checked_joints(joints), to_vector(self._tcp)
-        vector = self._controlled().call("forward kinematics", lambda rtde: rtde.getForwardKinematics(q, tcp))
+        vector = self._controlled().call("forward kinematics", "getForwardKinematics", q, tcp)
         return world_from_base(self._pose) * from_vector(vector)
 
     def _solve(self, session: ControlSession, vector: list[float], near: list[float]) -> list[float]:
-        def solve(rtde: RTDEControlInterface) -> list[float]:
-            # Asked first: without a solution get_inverse_kin ends the control program with an error.
-            if not rtde.getInverseKinematicsHasSolution(vector, near):
-                return []
-            return list(rtde.getInverseKinematics(vector, near))
-
-        q = session.call("inverse kinematics", solve)
+        # Asked first: without a solution get_inverse_kin ends the control program with an error.
+        q: list[float] = []
+        if session.call("inverse kinematics", "getInverseKinematicsHasSolution", vector, near):
+            q = session.call("inverse kinematics", "getInverseKinematics", vector, near)
         if len(q) != len(JOINTS) or not all(map(math.isfinite, q)):
             position = ", ".join(f"{value:.3f}" for value in vector[:3])
             raise self.KinematicsException(

@@ -6,8 +6,6 @@ import time
 from collections.abc import Callable
 from typing import Final, Literal
 
-from rtde_control import RTDEControlInterface
-
 from arcor2_hw.data.geometry import Orientation
 from arcor2_hw.data.robot import Control, Safety
 from arcor2_hw.exceptions import DeviceTimeout, InvalidData, NotFound, NotInControl, OutOfRange, Refused
@@ -46,9 +44,9 @@ class UrServiced(UrArm):
         if enabled and self.move_in_progress:
             raise Refused(f"{self.name} is moving already")
         if enabled:
-            session.do("hand teaching", lambda rtde: bool(rtde.teachMode()))
+            session.do("hand teaching", "teachMode")
         else:
-            session.do("the end of hand teaching", lambda rtde: bool(rtde.endTeachMode()))
+            session.do("the end of hand teaching", "endTeachMode")
         self._teaching = enabled
 
     def jog(
@@ -73,10 +71,7 @@ class UrServiced(UrArm):
                 for name, value in zip(JOINTS, velocities, strict=True):
                     within(f"velocity of {name}", value, -limit, limit)
                 ramp = self._ur.joint_acceleration
-
-                def start(rtde: RTDEControlInterface) -> bool:
-                    return bool(rtde.speedJ(velocities, ramp, valid_for))
-
+                command = "speedJ"
             else:
                 assert twist is not None
                 linear, angular = self._turned_twist(twist, frame)
@@ -85,11 +80,8 @@ class UrServiced(UrArm):
                 )
                 within("angular speed of the twist", math.hypot(*angular), 0.0, self._ur.max_joint_speed)
                 ramp = self._ur.tcp_acceleration
-
-                def start(rtde: RTDEControlInterface) -> bool:
-                    return bool(rtde.speedL([*linear, *angular], ramp, valid_for))
-
-            session.speed("a jog", lambda rtde: self._stops != stops or start(rtde), valid_for)
+                command, velocities = "speedL", [*linear, *angular]
+            session.speed(command, velocities, ramp, valid_for, lambda: self._stops == stops)
 
     def _turned_twist(
         self, twist: tuple[float, float, float, float, float, float], frame: str
@@ -137,8 +129,8 @@ class UrServiced(UrArm):
         if safety_of(self._observer.sample().safety_mode) is not Safety.PROTECTIVE_STOP:
             raise Refused(f"{self.name} is in no protective stop")
         self._end_old_program("a protective stop was acknowledged")
-        log.warning("%s: protective stop acknowledged by %s", self.name, confirmed_by)
         self._order("unlock protective stop", "Protective stop releasing")
+        log.warning("%s: protective stop acknowledged by %s", self.name, confirmed_by)
         self._await(
             "leave the protective stop",
             lambda sample: safety_of(sample.safety_mode) is not Safety.PROTECTIVE_STOP,
@@ -151,8 +143,8 @@ class UrServiced(UrArm):
         if safety_of(self._observer.sample().safety_mode) not in (Safety.FAULT, Safety.VIOLATION):
             raise Refused(f"{self.name} has neither a fault nor a violation of its safety system")
         self._end_old_program("the safety system was restarted")
-        log.warning("%s: safety system restarted by %s", self.name, confirmed_by)
         self._order("restart safety", "Restarting safety")
+        log.warning("%s: safety system restarted by %s", self.name, confirmed_by)
         self._await(
             "restart its safety system",
             lambda sample: safety_of(sample.safety_mode) not in (Safety.FAULT, Safety.VIOLATION),

@@ -1,0 +1,86 @@
+"""The process that holds ur_rtde's control and I/O interfaces. Run as a script, by `control.py`; it decides nothing.
+
+A process of its own because of what ur_rtde 1.6.5 does when its connection breaks: it reconnects on its own account and
+sends its program again, which ends whatever plays on the controller by then, without the watchdog; it sometimes crashes
+the process; and its constructors and destructors hold the interpreter. A process can be killed at any moment.
+
+One request a line on standard input, `{"n": 1, "do": "moveL", "args": [...]}`, one answer a line on standard output,
+`{"n": 1, "data": ...}` or `{"n": 1, "error": "..."}`; a request without a number is not answered. At the end of the
+input the process is gone at once, whatever it is doing, and with it the kicks that the watchdog waits for.
+"""
+
+import json
+import os
+import queue
+import sys
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from rtde_control import RTDEControlInterface
+from rtde_io import RTDEIOInterface
+
+COMMANDS = (
+    "endTeachMode",
+    "getForwardKinematics",
+    "getInverseKinematics",
+    "getInverseKinematicsHasSolution",
+    "kickWatchdog",
+    "moveJ",
+    "moveL",
+    "setPayload",
+    "setTcp",
+    "speedJ",
+    "speedL",
+    "speedStop",
+    "stopL",
+    "stopScript",
+    "teachMode",
+)
+OUTPUTS = ("setConfigurableDigitalOut", "setStandardDigitalOut", "setToolDigitalOut")
+
+
+def main() -> None:
+    """Open with the arguments of the command line, a JSON object, and serve."""
+    answers = os.fdopen(os.dup(1), "w", buffering=1, encoding="utf-8")
+    os.dup2(2, 1)  # the library writes to standard output as it pleases
+    requests: queue.SimpleQueue[str] = queue.SimpleQueue()
+    threading.Thread(target=_listen, args=(requests,), daemon=True).start()
+    try:
+        commands = _open(**json.loads(sys.argv[1]))
+    except RuntimeError as e:
+        answers.write(json.dumps({"n": 0, "error": str(e)}) + "\n")
+        os._exit(1)
+    answers.write(json.dumps({"n": 0, "data": None}) + "\n")
+    while True:
+        request = json.loads(requests.get())
+        number = request.get("n")
+        try:
+            answer = {"n": number, "data": commands[request["do"]](*request["args"])}
+        except (RuntimeError, TypeError, ValueError, KeyError) as e:
+            answer = {"n": number, "error": f"{type(e).__name__}: {e}"}
+        if number is not None:
+            answers.write(json.dumps(answer) + "\n")
+        if request["do"] == "stopScript":
+            os._exit(0)
+
+
+def _listen(requests: "queue.SimpleQueue[str]") -> None:
+    for line in sys.stdin:
+        requests.put(line)
+    os._exit(0)
+
+
+def _open(host: str, frequency: float, upper: bool, watchdog: float) -> dict[str, Callable[..., Any]]:
+    io = RTDEIOInterface(host, False, upper)
+    flags = RTDEControlInterface.FLAG_UPLOAD_SCRIPT | RTDEControlInterface.FLAG_NO_EXT_FT
+    if upper:
+        flags |= RTDEControlInterface.FLAG_UPPER_RANGE_REGISTERS
+    control = RTDEControlInterface(host, frequency, flags)
+    if not control.setWatchdog(watchdog):
+        raise RuntimeError("the watchdog of the control program cannot be armed")
+    return {name: getattr(control, name) for name in COMMANDS} | {name: getattr(io, name) for name in OUTPUTS}
+
+
+if __name__ == "__main__":
+    main()
