@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -67,6 +68,20 @@ class FakeUr:
             if "RESULT " in line:  # the library writes to the same stream without line ends
                 return json.loads(line.partition("RESULT ")[2])
         raise AssertionError(f"status {run.returncode}\n{run.stdout[-3000:]}\n{run.stderr[-3000:]}")
+
+    @contextmanager
+    def library_running(self, body: str) -> Iterator[subprocess.Popen[bytes]]:
+        """Runs `body` beside the test, for faults in which the library may hang or crash."""
+        run = subprocess.Popen(
+            [sys.executable, "-c", _PRELUDE + body, self.host, self.ready["control"]],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        try:
+            yield run
+        finally:
+            run.kill()
+            run.wait()
 
 
 @pytest.fixture
