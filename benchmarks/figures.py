@@ -65,7 +65,10 @@ class Report:
             unit, goal = GOALS.get(f.name, ("", ""))
             mark = {True: "[green]reached", False: "[red]missed", None: ""}[f.reached()]
             table.add_row(f.name, f"{f.value:.4g}", unit, str(f.n), goal, mark, f.note)
-        Console(stderr=True).print(table)
+        console = Console(stderr=True)
+        if not console.is_terminal:
+            console = Console(stderr=True, width=180)
+        console.print(table)
 
 
 def median(samples: Sequence[float]) -> float:

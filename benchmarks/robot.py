@@ -1,0 +1,100 @@
+"""The robot on its wire: how late a stop arrives, and what 500 Hz of state cost and lose."""
+
+import asyncio
+import random
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from arcor2_hw.client import Client
+from arcor2_hw.data import rpc
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.parameter import Parameter
+from arcor2_hw.data.robot import Joint
+from arcor2_server.demo.processes import Child, python_module
+from arcor2_server.demo.run import free_loopback_address
+from benchmarks import serving
+from benchmarks.figures import Figure, Report, median, percentile
+from benchmarks.operation import scene_state
+
+STREAM_SECONDS = 60.0
+
+
+async def ask(control: str, do: str, **arguments: Any) -> Any:
+    """Ask the fake over its control channel."""
+    host, _, port = control.rpartition(":")
+    reader, writer = await asyncio.open_connection(host, int(port), limit=1 << 24)
+    try:
+        writer.write(msgspec.json.encode({"id": 1, "do": do, **arguments}) + b"\n")
+        answer = msgspec.json.decode(await reader.readline())
+    finally:
+        writer.close()
+    if not answer["ok"]:
+        raise RuntimeError(f"{do}: {answer['error']}")
+    return answer["data"]
+
+
+async def stop_latency(report: Report, directory: Path, host: str, control: str, n: int = 200) -> None:
+    """Measure from sending StopRobot to the stop's frame at the controller, at random phases of motions."""
+    async with serving.server(directory / "robot") as (url, _), Client(url, "bench") as client:
+        await client.call("NewScene", rpc.NewSceneArgs("robot"))
+        settings = [Parameter("host", "string", f'"{host}"'), Parameter("payload_mass", "double", "0.5")]
+        await client.call("AddObjectToScene", rpc.AddObjectToSceneArgs("robot", "UR5e", Pose(), settings))
+        robot = (await client.next_event("SceneObjectChanged")).data.id
+        await client.call("StartScene")
+        await scene_state(client, "started")
+        home: list[Joint] = await client.call("GetRobotJoints", rpc.GetRobotJointsArgs(robot))
+        away = [Joint(joint.name, joint.value + (0.8 if index == 0 else 0.0)) for index, joint in enumerate(home)]
+        samples: list[float] = []
+        targets = (away, home)
+        while len(samples) < n:
+            target = targets[len(samples) % 2]
+            await client.call("MoveToJoints", rpc.MoveToJointsArgs(robot, 0.5, target))
+            await client.next_event("RobotMoveToJoints")
+            await asyncio.sleep(0.05 + random.random() * 0.25)
+            before = len(await ask(control, "stops"))
+            sent = time.monotonic()
+            await client.call("StopRobot", rpc.StopRobotArgs(robot))
+            await client.next_event("RobotMoveToJoints")
+            stops = (await ask(control, "stops"))[before:]
+            arrived = [stop for stop in (_stamp(entry) for entry in stops) if stop >= sent]
+            if not arrived:
+                raise RuntimeError("a stop did not arrive at the controller")
+            samples.append(arrived[0] - sent)
+        await client.call("StopScene")
+        await scene_state(client, "stopped")
+    note = f"median {median(samples) * 1e3:.1f} ms, worst {max(samples) * 1e3:.1f} ms"
+    report.add(Figure("stop_latency_p99_ms", percentile(samples, 99) * 1e3, n, note))
+
+
+def _stamp(entry: Any) -> float:
+    return float(entry["monotonic"] if isinstance(entry, dict) else entry[0])
+
+
+async def stream(report: Report, host: str) -> None:
+    """Take the state for a minute in a process of its own, as the cell host does."""
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "benchmarks.stream", host, str(STREAM_SECONDS), stdout=asyncio.subprocess.PIPE
+    )
+    assert process.stdout is not None
+    result = msgspec.json.decode(await process.stdout.read())
+    await process.wait()
+    received, missed = result["received"], result["missed"]
+    report.add(Figure("ur_stream_lost", 100.0 * missed / (received + missed), received + missed, "by timestamps"))
+    report.add(Figure("ur_stream_core_percent", 100.0 * result["cpu"] / result["seconds"], 1, "of the whole process"))
+
+
+async def run(report: Report, directory: Path) -> None:
+    """Measure everything in this room."""
+    host = free_loopback_address()
+    command = python_module("arcor2_fakes.ur", "--host", host, "--control", "127.0.0.1:0")
+    fake = Child("robot", command, directory / "robot.log")
+    try:
+        addresses = await fake.start_json()
+        await stop_latency(report, directory, host, addresses["control"])
+        await stream(report, host)
+    finally:
+        await fake.stop()
