@@ -1,0 +1,1 @@
+"""The functional tester, a Modbus TCP machine (docs/devices/functional-tester.md)."""
