@@ -3,12 +3,13 @@
 import asyncio
 import logging
 import secrets
+from collections.abc import Callable
 from typing import Any, Final
 
 import msgspec
 import structlog
 from litestar import WebSocket
-from msgspec import UNSET, Struct
+from msgspec import UNSET, Raw, Struct
 
 from arcor2_hw.data.events import Event
 from arcor2_hw.data.role import Role
@@ -16,7 +17,7 @@ from arcor2_hw.data.rpc import RPCS, Request, Response, Rpc
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_server.client import Client
 from arcor2_server.hub import encode
-from arcor2_server.rpc.registry import HANDLERS, Context, Handler, RequestRefused
+from arcor2_server.rpc.registry import AT_ONCE, HANDLERS, Context, Handler, RequestRefused
 from arcor2_server.services import Services
 from arcor2_server.wire import EXTENSION, WireProtocol
 
@@ -52,6 +53,7 @@ class Route(Struct, frozen=True):
 
     rpc: Rpc
     handler: Handler | None
+    at_once: Callable[[Services], Raw | None] | None
     decode: Any
     default: Any
     """What the handler gets when the arguments are left out; UNSET when they must not be."""
@@ -68,7 +70,7 @@ def routes() -> dict[str, Route]:
                 is_struct = isinstance(rpc.args, type) and issubclass(rpc.args, Struct)
                 default = rpc.args() if is_struct else None
         decode = None if rpc.args is None else msgspec.json.Decoder(rpc.args).decode
-        table[name] = Route(rpc, HANDLERS.get(name), decode, default)
+        table[name] = Route(rpc, HANDLERS.get(name), AT_ONCE.get(name), decode, default)
     return table
 
 
@@ -146,23 +148,28 @@ class Endpoint:
             if len(text) > served:
                 self._refuse(client, _read_head(text), f"The message is longer than {served} bytes: it was not read.")
                 continue
+            try:
+                request = _decode_request(text)
+            except (msgspec.DecodeError, RecursionError) as error:
+                self._refuse(client, _read_head(text), f"This is no request: {error}.")
+                continue
+            route = self._routes.get(request.request)
+            if route is None:
+                self._refuse(client, request, f"There is no request {request.request!r}.")
+                continue
+            if route.at_once is not None and client.role >= route.rpc.role:
+                data = route.at_once(self._services)
+                if data is not None:
+                    client.put(encode(Response(request.id, request.request, True, UNSET, data)))
+                    continue
             if len(mine) >= in_flight:
                 await asyncio.wait(mine, return_when=asyncio.FIRST_COMPLETED)
-            task = create_task(self._handle(client, text))
+            task = create_task(self._handle(client, request, route))
             for held in (mine, self._tasks):
                 held.add(task)
                 task.add_done_callback(held.discard)
 
-    async def _handle(self, client: Client, text: str) -> None:
-        try:
-            request = _decode_request(text)
-        except (msgspec.DecodeError, RecursionError) as error:
-            self._refuse(client, _read_head(text), f"This is no request: {error}.")
-            return
-        route = self._routes.get(request.request)
-        if route is None:
-            self._refuse(client, request, f"There is no request {request.request!r}.")
-            return
+    async def _handle(self, client: Client, request: Request, route: Route) -> None:
         try:
             await self._run(client, request, route)
         except asyncio.CancelledError:

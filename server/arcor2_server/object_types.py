@@ -86,9 +86,14 @@ class ObjectTypes:
             await asyncio.to_thread(self._read_installed)
             await self._read_uploaded()
 
+    @property
+    def up_to_date(self) -> bool:
+        """Tell whether there is nothing that clients do not know yet."""
+        return self._storage.types_revision == self._read_at and not self._untold
+
     async def refresh(self) -> Changes:
         """Take in what was put straight into storage since the last time; gives what clients do not know yet."""
-        if self._storage.types_revision == self._read_at and not self._untold:
+        if self.up_to_date:
             return self._untold
         async with self._reading:
             if self._storage.types_revision != self._read_at:

@@ -7,7 +7,8 @@ from msgspec import Raw
 
 from arcor2_hw.data.rpc import RegisterUserArgs, SystemInfoData
 from arcor2_server.hub import encode
-from arcor2_server.rpc.registry import HANDLERS, Context, rpc
+from arcor2_server.rpc.registry import HANDLERS, Context, at_once, rpc
+from arcor2_server.services import Services
 
 VERSION: Final = "1.4.0"
 """The version of the ARServer whose behaviour this is; our own is `arcor2-hw --version`."""
@@ -37,6 +38,11 @@ async def system_info(context: Context, args: None) -> Any:  # noqa: ARG001
 def _system_info(_handlers: int) -> Raw:
     """Encode the answer once; the handlers only grow, and only until the server is up."""
     return Raw(encode(SystemInfoData(VERSION, API_VERSION, set(PARAMETER_TYPES), set(HANDLERS))))
+
+
+@at_once("SystemInfo")
+def _kept_system_info(services: Services) -> Raw:  # noqa: ARG001
+    return _system_info(len(HANDLERS))
 
 
 @rpc("RegisterUser")

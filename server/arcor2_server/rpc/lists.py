@@ -10,18 +10,30 @@ from arcor2_hw.data.rpc import IdArgs, ListProjectsData, ListScenesData
 from arcor2_hw.data.scene import Scene
 from arcor2_server.hub import encode
 from arcor2_server.rpc.object_types import notice_new_types
-from arcor2_server.rpc.registry import Context, rpc
+from arcor2_server.rpc.registry import Context, at_once, rpc
+from arcor2_server.services import Services
 
 
-def _revisions(context: Context) -> tuple[int, ...]:
-    return context.services.storage.revision, context.services.types.revision
+def _revisions(services: Services) -> tuple[int, ...]:
+    return services.storage.revision, services.types.revision
+
+
+@at_once("ListScenes")
+def _kept_scenes(services: Services) -> Raw | None:
+    return services.kept.get("ListScenes", _revisions(services)) if services.types.up_to_date else None
+
+
+@at_once("ListProjects")
+def _kept_projects(services: Services) -> Raw | None:
+    return services.kept.get("ListProjects", _revisions(services)) if services.types.up_to_date else None
 
 
 @rpc("ListScenes")
 async def list_scenes(context: Context, args: None) -> Raw:  # noqa: ARG001
     """Give all saved scenes with what is wrong with them."""
     await notice_new_types(context)
-    services, revisions = context.services, _revisions(context)
+    services = context.services
+    revisions = _revisions(services)
     if (kept := services.kept.get("ListScenes", revisions)) is not None:
         return kept
     answer = []
@@ -44,7 +56,8 @@ async def list_scenes(context: Context, args: None) -> Raw:  # noqa: ARG001
 async def list_projects(context: Context, args: None) -> Raw:  # noqa: ARG001
     """Give all saved projects with what is wrong with them."""
     await notice_new_types(context)
-    services, revisions = context.services, _revisions(context)
+    services = context.services
+    revisions = _revisions(services)
     if (kept := services.kept.get("ListProjects", revisions)) is not None:
         return kept
     answer = []

@@ -13,7 +13,8 @@ from arcor2_hw.runtime.messages import TypeCode
 from arcor2_server.hub import encode
 from arcor2_server.locks import ADDING_OBJECT
 from arcor2_server.object_types import Changes
-from arcor2_server.rpc.registry import Context, RequestRefused, make_event, rpc
+from arcor2_server.rpc.registry import Context, RequestRefused, at_once, make_event, rpc
+from arcor2_server.services import Services
 
 
 def change_events(changes: Changes) -> list[Event]:
@@ -38,6 +39,11 @@ async def get_object_types(context: Context, args: None) -> Raw:  # noqa: ARG001
     types, kept = context.services.types, context.services.kept
     revisions = (types.revision,)
     return kept.get("GetObjectTypes", revisions) or kept.keep("GetObjectTypes", revisions, encode(types.metas()))
+
+
+@at_once("GetObjectTypes")
+def _kept_object_types(services: Services) -> Raw | None:
+    return services.kept.get("GetObjectTypes", (services.types.revision,))
 
 
 @rpc("GetActions")

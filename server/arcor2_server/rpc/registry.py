@@ -3,6 +3,8 @@
 from collections.abc import Awaitable, Callable
 from typing import TYPE_CHECKING, Any, Final
 
+from msgspec import Raw
+
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.events import EVENTS, ChangeType, Event
 from arcor2_hw.data.rpc import RPCS
@@ -78,6 +80,9 @@ Handler = Callable[[Context, Any], Awaitable[Any]]
 
 HANDLERS: Final[dict[str, Handler]] = {}
 
+AT_ONCE: Final[dict[str, "Callable[[Services], Raw | None]"]] = {}
+"""For requests without arguments: gives the answer's data if it is kept, without waiting for anything."""
+
 
 def rpc(name: str) -> Callable[[Handler], Handler]:
     """Register the handler of a request that the protocol declares (arcor2_hw.data.rpc: arguments, answer, role)."""
@@ -89,5 +94,19 @@ def rpc(name: str) -> Callable[[Handler], Handler]:
             raise KeyError(f"{name} has two handlers")
         HANDLERS[name] = handler
         return handler
+
+    return register
+
+
+def at_once(
+    name: str,
+) -> "Callable[[Callable[[Services], Raw | None]], Callable[[Services], Raw | None]]":
+    """Register what answers a request without a task of its own; it gives None when the handler has to."""
+    if RPCS[name].args is not None:
+        raise KeyError(f"{name} has arguments")
+
+    def register(look: "Callable[[Services], Raw | None]") -> "Callable[[Services], Raw | None]":
+        AT_ONCE[name] = look
+        return look
 
     return register
