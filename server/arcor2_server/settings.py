@@ -87,6 +87,7 @@ _VARIABLES: Final = {
     "ARCOR2_HW_HOST": "host",
     "ARCOR2_HW_DATABASE_URL": "database_url",
     "ARCOR2_HW_HISTORY_LIMIT": "history_limit",
+    "ARCOR2_HW_DEFAULT_ROLE": "default_role",
     "ARCOR2_HW_OUTGOING_BYTES": "outgoing_bytes",
     "ARCOR2_HW_OUTGOING_AGE": "outgoing_age",
     "ARCOR2_HW_PING_INTERVAL": "ping_interval",

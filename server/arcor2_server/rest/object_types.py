@@ -4,6 +4,7 @@ from typing import Any, Final
 
 import msgspec
 from litestar import Request, Response, delete, get, put
+from litestar.params import FromPath
 from msgspec import UNSET
 
 from arcor2_hw.data.base import Data, Timestamp, Unset, is_valid_name
@@ -63,7 +64,7 @@ async def object_types(request: Request[Any, Any, Any]) -> Response[bytes]:
 
 
 @get("/object-types/{name:str}", opt={ROLE: Role.OPERATOR}, status_code=200)
-async def object_type(request: Request[Any, Any, Any], name: str) -> Response[bytes]:
+async def object_type(request: Request[Any, Any, Any], name: FromPath[str]) -> Response[bytes]:
     """Give one uploaded object type with its source."""
     try:
         return answer(_document(await services_of(request).storage.object_type(name)))
@@ -101,7 +102,7 @@ async def put_object_type(request: Request[Any, Any, Any]) -> Response[bytes]:
 
 
 @delete("/object-types/{name:str}", opt={ROLE: Role.PROGRAMMER}, status_code=200)
-async def delete_object_type(request: Request[Any, Any, Any], name: str) -> Response[bytes]:
+async def delete_object_type(request: Request[Any, Any, Any], name: FromPath[str]) -> Response[bytes]:
     """Delete an uploaded object type; a scene that uses it has a problem from then on."""
     services = services_of(request)
     try:

@@ -1,0 +1,300 @@
+"""The registry of object types on a storage, and what clients are told of it."""
+
+import re
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+from msgspec import UNSET
+
+from arcor2_hw.data.object_type import Box, ObjectModel, ObjectTypeSource, Sphere
+from arcor2_hw.exceptions import InvalidData, NotFound
+from arcor2_server.object_types import Changes, ObjectTypes
+from arcor2_server.settings import ServerSettings
+from arcor2_server.storage import Storage
+from tests.server.core.serving import ServerProcess, running, talking
+
+LAMP = '''
+"""A lamp."""
+from arcor2_hw.actions import action
+from arcor2_hw.objects import Generic
+
+
+class Lamp(Generic):
+    """Gives light.
+
+    More of it.
+    """
+
+    _ABSTRACT = False
+
+    @action
+    def switch(self, brightness: float, *, an: str | None = None) -> None:
+        """Switch.
+
+        :param brightness: how bright
+        """
+        assert 0.0 <= brightness <= 1.0
+'''
+RED = """
+from .lamp import Lamp
+from .colours import Colours
+
+
+class RedLamp(Colours, Lamp):
+    _ABSTRACT = False
+"""
+COLOURS = """
+class Colours:
+    pass
+"""
+
+
+@pytest.fixture
+async def storage(tmp_path: Path) -> AsyncIterator[Storage]:
+    opened = await Storage.open(ServerSettings(data_dir=tmp_path))
+    yield opened
+    await opened.close()
+
+
+@pytest.fixture
+async def types(storage: Storage) -> ObjectTypes:
+    registry = ObjectTypes(storage)
+    await registry.load()
+    return registry
+
+
+async def put_lamps(storage: Storage) -> None:
+    for name, source in (("Lamp", LAMP), ("RedLamp", RED), ("Colours", COLOURS)):
+        await storage.put_object_type(ObjectTypeSource(name, source))
+
+
+async def test_built_in_and_installed_types_are_known(types: ObjectTypes, spec: Path) -> None:
+    built_in = {meta.type for meta in types.metas() if meta.built_in}
+    assert built_in == {
+        "Camera",
+        "CollisionObject",
+        "Generic",
+        "GenericWithPose",
+        "MultiArmRobot",
+        "Robot",
+        "VirtualCollisionObject",
+    }
+    assert types.names() == sorted(types.names())
+    assert not types.meta("FlowActions").built_in
+    assert types.derives_from("MultiArmRobot", "GenericWithPose")
+    assert types.bases("MultiArmRobot") == ["Robot", "GenericWithPose", "Generic"]
+    assert types.type_code("FlowActions").entry_point.endswith(":FlowActions")
+    for look in (types.meta, types.actions, types.bases, types.type_code, types.robot_meta):
+        with pytest.raises(NotFound, match="Nothing"):
+            look("Nothing")
+    with pytest.raises(NotFound):
+        types.robot_meta("Generic")
+    with pytest.raises(NotFound, match="no_such_action"):
+        types.action("FlowActions", "no_such_action")
+
+
+async def test_uploaded_type(types: ObjectTypes, storage: Storage) -> None:
+    meta = await types.add(ObjectTypeSource("Lamp", LAMP))
+    assert (meta.type, meta.base, meta.description) == ("Lamp", "Generic", "Gives light.")
+    assert (meta.built_in, meta.abstract, meta.disabled) == (False, False, False)
+    assert meta.modified == (await storage.object_type("Lamp")).modified
+    (switch,) = types.actions("Lamp")
+    assert switch.name == "switch"
+    assert switch.parameters[0].extra == '{"minimum":0.0,"maximum":1.0}'
+    assert types.action("Lamp", "switch") == switch
+    assert types.is_uploaded("Lamp")
+    assert not types.is_uploaded("FlowActions")
+    removed = await types.remove("Lamp")
+    assert removed == meta
+    assert not types.known("Lamp")
+    with pytest.raises(NotFound):
+        await types.remove("Lamp")
+
+
+async def test_given_types_cannot_be_replaced_or_deleted(types: ObjectTypes, storage: Storage) -> None:
+    for name in ("Generic", "FlowActions"):
+        with pytest.raises(InvalidData, match=name):
+            await types.add(ObjectTypeSource(name, f"class {name}: ..."))
+        with pytest.raises(InvalidData, match=name):
+            await types.remove(name)
+        # Nor by putting them straight into storage.
+        before = types.meta(name)
+        await storage.put_object_type(ObjectTypeSource(name, f"class {name}: ..."))
+        assert not await types.refresh()
+        assert types.meta(name) == before
+
+
+async def test_what_is_put_straight_into_storage_is_noticed_once(types: ObjectTypes, storage: Storage) -> None:
+    assert await types.refresh() == Changes()
+    revision = types.revision
+    await put_lamps(storage)
+    assert not types.known("Lamp")
+    changes = await types.refresh()
+    # A mixin is no type for clients.
+    assert [meta.type for meta in changes.added] == ["Lamp", "RedLamp"]
+    assert (changes.removed, changes.updated) == ([], [])
+    assert types.revision > revision
+    assert not await types.refresh()
+    assert types.bases("RedLamp") == ["Lamp", "Generic"]
+
+    # A changed base changes what derives from it.
+    await storage.put_object_type(
+        ObjectTypeSource("Lamp", LAMP.replace("Gives light.", "Glows.").replace("0.0", "0.1"))
+    )
+    changes = await types.refresh()
+    assert [meta.type for meta in changes.updated] == ["Lamp"]
+    assert types.action("RedLamp", "switch").parameters[0].extra == '{"minimum":0.1,"maximum":1.0}'
+
+    await storage.delete_object_type("Lamp")
+    changes = await types.refresh()
+    assert [meta.type for meta in changes.removed] == ["Lamp"]
+    (red,) = changes.updated
+    assert red.disabled
+    assert "lamp" in str(red.problem)
+
+
+async def test_other_changes_are_kept_for_the_next_refresh(types: ObjectTypes, storage: Storage) -> None:
+    await put_lamps(storage)
+    await types.add(ObjectTypeSource("Other", LAMP.replace("Lamp", "Other")))
+    changes = await types.refresh()
+    assert [meta.type for meta in changes.added] == ["Lamp", "RedLamp"], "the caller of add tells of Other himself"
+
+
+async def test_model_belongs_to_its_type(types: ObjectTypes, storage: Storage) -> None:
+    source = "from arcor2_hw.objects import CollisionObject\n\n\nclass Crate(CollisionObject):\n    _ABSTRACT = False\n"
+    box = ObjectModel.of(Box("Crate", 1, 2, 3))
+    meta = await types.add(ObjectTypeSource("Crate", source, model=box))
+    assert meta.object_model == box
+    assert meta.has_pose
+    await storage.put_model(Sphere("Crate", 0.5))
+    changes = await types.refresh()
+    assert changes.updated[0].object_model == ObjectModel.of(Sphere("Crate", 0.5))
+
+
+async def test_broken_source_disables_the_type_and_says_where(types: ObjectTypes) -> None:
+    meta = await types.add(ObjectTypeSource("Broken", "class Broken(\n"))
+    assert meta.disabled
+    assert re.search(r"broken\.py:\d+", str(meta.problem))
+    assert types.actions("Broken") == []
+
+
+async def test_code_comes_with_what_it_needs_first(types: ObjectTypes, storage: Storage) -> None:
+    await put_lamps(storage)
+    await types.refresh()
+    codes = types.type_codes(["RedLamp", "FlowActions", "RedLamp"])
+    assert sorted(code.name for code in codes) == ["Colours", "FlowActions", "Lamp", "RedLamp"]
+    names = [code.name for code in codes]
+    assert names.index("RedLamp") > max(names.index("Lamp"), names.index("Colours"))
+    by_name = {code.name: code for code in codes}
+    assert (by_name["RedLamp"].module, by_name["RedLamp"].source) == ("red_lamp", RED)
+    assert by_name["FlowActions"].source == ""
+    packed = {one.name: one for one in types.sources_for(["RedLamp", "FlowActions", "Generic"])}
+    assert set(packed) == {"Lamp", "Colours", "RedLamp", "FlowActions"}
+    flow = packed["FlowActions"]
+    assert flow.module == "flow_actions"
+    assert flow.folder is not None
+    assert (flow.folder / "flow_actions.py").is_file()
+    assert flow.distribution == "arcor2-hw"
+    assert flow.version
+
+
+async def test_types_come_back_after_a_restart(types: ObjectTypes, storage: Storage) -> None:
+    await types.add(ObjectTypeSource("Lamp", LAMP))
+    again = ObjectTypes(storage)
+    await again.load()
+    assert again.metas() == types.metas()
+    assert await again.refresh() == Changes(), "what was there at the start is no news"
+
+
+# ------------------------------------------------------------------------------------------------ on the wire
+SPHERE = {"type": "Sphere", "sphere": {"id": "Ball", "radius": 0.1}}
+
+
+async def test_new_types_are_told_and_the_kept_answers_forgotten(server: ServerProcess) -> None:
+    async with talking(server.url, "ann") as ann, talking(server.url) as bob:
+        before = await ann.granted("GetObjectTypes")
+        assert await ann.granted("GetObjectTypes") == before
+        new = {"type": "Ball", "base": "CollisionObject", "description": "It's round.", "object_model": SPHERE}
+        assert (await ann.request("NewObjectType", new, dry_run=True))["result"]
+        assert await ann.granted("GetObjectTypes") == before
+        await ann.granted("NewObjectType", new)
+        told = await bob.event("ChangedObjectTypes")
+        assert told == await ann.event("ChangedObjectTypes")
+        assert told["change_type"] == "add"
+        (ball,) = told["data"]
+        assert (ball["type"], ball["base"], ball["has_pose"]) == ("Ball", "CollisionObject", True)
+        assert (ball["object_model"], ball["description"]) == (SPHERE, "It's round.")
+        after = await ann.granted("GetObjectTypes")
+        assert [one for one in after if one not in before] == [ball]
+        assert await bob.granted("GetObjectTypes") == after
+        assert {one["name"] for one in await bob.granted("GetActions", {"type": "Ball"})} >= {"set_enabled"}
+
+        await ann.granted("NewObjectType", {"type": "Twin", "base": "Ball", "object_model": twin(SPHERE)})
+        refusal = await ann.request("DeleteObjectTypes", ["Ball", "Generic", "Nothing"])
+        assert refusal["result"] is False
+        assert {one["id"] for one in refusal["data"]} == {"Ball", "Generic", "Nothing"}
+        assert "Twin" in next(one["error"] for one in refusal["data"] if one["id"] == "Ball")
+        # Without names, all that can be deleted is.
+        await ann.granted("DeleteObjectTypes")
+        removed = [event for event in ann.events if event.get("change_type") == "remove"]
+        assert [event["data"][0]["type"] for event in removed] == ["Twin", "Ball"]
+        assert await ann.granted("GetObjectTypes") == before
+        await ann.refused("GetActions", {"type": "Ball"})
+
+
+def twin(model: dict[str, object]) -> dict[str, object]:
+    return {"type": "Sphere", "sphere": {"id": "Twin", "radius": 0.1}}
+
+
+@pytest.mark.parametrize(
+    "new",
+    [
+        {"type": "Generic", "base": "Generic"},
+        {"type": "FlowActions", "base": "Generic"},
+        {"type": "not valid", "base": "Generic"},
+        {"type": "class", "base": "Generic"},
+        {"type": "Thing", "base": "NoSuchBase"},
+        {"type": "Thing", "base": ""},
+        {"type": "Thing", "base": "Robot"},
+        {"type": "Thing", "base": "CollisionObject"},
+        {"type": "Ball", "base": "Generic", "object_model": SPHERE},
+        {"type": "Thing", "base": "CollisionObject", "object_model": SPHERE},
+        {"type": "Thing", "base": "CollisionObject", "object_model": {"type": "None"}},
+        {"type": "Ball", "base": "CollisionObject", "object_model": {"type": "Sphere"}},
+    ],
+)
+async def test_new_type_that_makes_no_sense(server: ServerProcess, new: dict[str, object]) -> None:
+    async with talking(server.url, "ann") as ann:
+        before = await ann.granted("GetObjectTypes")
+        await ann.refused("NewObjectType", new)
+        assert await ann.granted("GetObjectTypes") == before
+        await ann.nothing_more()
+
+
+async def test_lists_follow_what_is_saved(tmp_path: Path) -> None:
+    async with running(tmp_path / "data") as server, talking(server.url, "ann") as ann:
+        assert await ann.granted("ListScenes") == []
+        await ann.granted("NewScene", {"name": "Cell", "description": "small"})
+        assert await ann.granted("ListScenes") == []
+        await ann.granted("SaveScene")
+        (listed,) = await ann.granted("ListScenes")
+        assert (listed["name"], listed["description"]) == ("Cell", "small")
+        assert "problems" not in listed
+        stored = await ann.granted("GetScene", {"id": listed["id"]})
+        assert (stored["created"], stored["modified"]) == (listed["created"], listed["modified"])
+        await ann.granted("NewObjectType", {"type": "Thing", "base": "Generic"})
+        assert await ann.granted("ObjectTypeUsage", {"id": "Thing"}) == []
+        await ann.granted("AddObjectToScene", {"name": "thing", "type": "Thing"})
+        await ann.granted("SaveScene")
+        assert await ann.granted("ObjectTypeUsage", {"id": "Thing"}) == [listed["id"]]
+        assert (await ann.request("DeleteObjectTypes", ["Thing"]))["data"][0]["id"] == "Thing"
+        await ann.refused("GetScene", {"id": "scn_nothing"})
+        await ann.refused("GetProject", {"id": "pro_nothing"})
+        assert await ann.granted("ListProjects") == []
+
+
+def test_defaults_are_not_shared() -> None:
+    assert Changes().added is not Changes().added
+    assert not Changes()
+    assert ObjectTypeSource("x", "").model is UNSET
