@@ -51,6 +51,17 @@ def _signature(function: Callable[..., Any]) -> tuple[inspect.Signature, Mapping
     return signature, {name: hint for name, hint in hints.items() if hint is not inspect.Parameter.empty}
 
 
+@functools.cache
+def _inherited(cls: type, name: str) -> Mapping[str, Any]:
+    """Give the hints of a method; what it leaves out is taken from the method that it overrides."""
+    hints: dict[str, Any] = {}
+    for base in reversed(cls.__mro__):
+        function = base.__dict__.get(name)
+        if isinstance(function, types.FunctionType):
+            hints |= _signature(function)[1]
+    return hints
+
+
 def _decode(raw: bytes, hint: Any) -> Any:
     name = hint if isinstance(hint, str) else getattr(hint, "__name__", "")
     module = "" if isinstance(hint, str) else getattr(hint, "__module__", "")
@@ -63,6 +74,8 @@ def decode_arguments(bound: Any, arguments: Mapping[str, bytes], whose: str) -> 
     """Read the arguments of a bound method by its hints; InvalidData names `whose`, the method and the parameter."""
     function = bound.__func__ if isinstance(bound, types.MethodType) else bound
     signature, hints = _signature(function)
+    if function is not bound:
+        hints = _inherited(type(bound.__self__), function.__name__)
     parameters = list(signature.parameters.values())
     takes_any = any(p.kind is p.VAR_KEYWORD for p in parameters)
     result: dict[str, Any] = {}

@@ -195,6 +195,7 @@ class Execution:
 
     async def close(self) -> None:
         """End with the server; the hosts, which the cell ends, stop motion and disconnect by themselves."""
+        self._host = None  # its end is meant now
         if self._killing is not None:
             self._killing.cancel()
         for task in self._tasks:

@@ -22,6 +22,8 @@ LONGEST_LINE: Final = 64 * 1024
 """Bytes of one line of a program's or driver's output that are kept."""
 GOES_WITHIN: Final = 3.0
 """Seconds a host has to end by itself once it should; then it is killed."""
+LAST_WORDS: Final = 0.2
+"""Seconds that the second sign of the end (socket or process) may come after the first."""
 ANSWERS_WITHIN: Final = 5.0
 """Seconds beyond a call's own deadline after which the host itself is to blame for the missing answer."""
 
@@ -223,21 +225,23 @@ class CellHost:
         """Tell the end as soon as either the process or its socket is gone."""
         waiting = asyncio.create_task(self.process.wait())
         lost = asyncio.create_task(self._lost.wait())
-        await asyncio.wait({waiting, lost}, return_when=asyncio.FIRST_COMPLETED)
-        # What it said last is still on its way when the process is gone; the exit status when the socket is.
-        await asyncio.wait({waiting if lost.done() else lost}, timeout=0.2)
-        if not waiting.done():
-            self._tell_end("the cell host closed its connection")
-            _, late = await asyncio.wait({waiting}, timeout=GOES_WITHIN)
-            if late:
-                self.kill()
-        code = await waiting
-        lost.cancel()
-        await asyncio.gather(lost, return_exceptions=True)
-        if self._wire.transport is not None:
-            self._wire.transport.abort()
-        self._tell_end(_reason(code))
-        self.ended.set_result(None)
+        try:
+            await asyncio.wait({waiting, lost}, return_when=asyncio.FIRST_COMPLETED)
+            # What it said last is still on its way when the process is gone; the exit status when the socket is.
+            await asyncio.wait({waiting if lost.done() else lost}, timeout=LAST_WORDS)
+            if not waiting.done():
+                self._tell_end("the cell host closed its connection")
+                _, late = await asyncio.wait({waiting}, timeout=GOES_WITHIN)
+                if late:
+                    self.kill()
+            self._tell_end(_reason(await waiting))
+        finally:
+            self.kill()
+            waiting.cancel()
+            lost.cancel()
+            if self._wire.transport is not None:
+                self._wire.transport.abort()
+            self.ended.set_result(None)
 
     def _tell_end(self, reason: str) -> None:
         if self.reason:

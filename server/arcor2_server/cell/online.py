@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 log = structlog.get_logger(__name__)
 
+SPARE_AFTER: Final = 0.5
+"""Seconds from the start of the server to that of the first spare host, which must not delay it."""
 START_WITHIN: Final = 60.0
 """Seconds for importing object types (which may hang) and connecting; the host gives each device less."""
 STOP_WITHIN: Final = 5.0
@@ -38,7 +40,10 @@ _STREAMS: Final = {"RobotJoints": RobotEventKind.JOINTS, "RobotEef": RobotEventK
 
 
 class OnlineCell:
-    """One scene, offline or online. What it asks of devices raises CellError, ConnectionLost, DeviceTimeout."""
+    """One scene, offline or online. Made inside the event loop.
+
+    What is asked of devices raises CellError, ConnectionLost, DeviceTimeout.
+    """
 
     def __init__(self, services: "Services") -> None:
         self.hosts = CellHosts()
@@ -55,6 +60,7 @@ class OnlineCell:
         self._subscribers: dict[tuple[str, RobotEventKind], set[Client]] = {}
         self._board = DeviceBoard()
         self._background: set[asyncio.Task[None]] = set()
+        self._preparing = asyncio.get_running_loop().call_later(SPARE_AFTER, self.hosts.prepare)
         services.hub.on_leave.append(self._forget_client)
 
     # -------------------------------------------------------------------------------- state
@@ -211,7 +217,10 @@ class OnlineCell:
         self._gone_offline(problem)
 
     async def close(self) -> None:
-        """End with the server: the hosts stop motion and disconnect by themselves."""
+        """End with the server, and the program with it: the hosts stop motion and disconnect by themselves."""
+        self._preparing.cancel()
+        self._host = None  # its end is meant now
+        await self._services.execution.close()
         tasks = [task for task in (self._task, *self._background) if task is not None]
         await self.hosts.close()
         for task in tasks:

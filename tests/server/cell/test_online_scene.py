@@ -1,0 +1,399 @@
+"""The scene online: its states, crashes, robots, single actions."""
+
+import asyncio
+import json
+import os
+import signal
+import time
+from typing import Any
+
+import pytest
+
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.project import (
+    Action,
+    ActionParameter,
+    ActionPoint,
+    Flow,
+    NamedOrientation,
+    Project,
+    ProjectParameter,
+    ProjectRobotJoints,
+)
+from arcor2_hw.data.robot import Joint
+from arcor2_hw.data.scene import Scene, SceneObject
+from arcor2_hw.exceptions import ConnectionLost
+from arcor2_server.cell.host import CellError
+from arcor2_server.rpc.registry import RequestRefused
+from tests.runtime.conftest import scene_object
+
+from .conftest import Recorder, Server, action, robot_meta, serving
+
+ARM = """
+class Arm(Robot):
+    _ABSTRACT = False
+    CANCEL_MAPPING = {"pick": "give_up"}
+
+    def __init__(self, obj_id, name, pose, settings=None):
+        super().__init__(obj_id, name, pose, settings)
+        self.stopped = threading.Event()
+        self.given_up = threading.Event()
+        self.hand = False
+        self.owner = None
+        self.at = Pose(Position(0.1, 0.2, 0.3))
+
+    def take_control(self): self.owner = "us"
+    def control_owner(self): return self.owner
+    def get_end_effectors_ids(self): return {"tool"}
+    def get_end_effector_pose(self, end_effector): return self.at
+    def robot_joints(self, include_gripper=False):
+        return [Joint("j0", 0.5)] + ([Joint("finger", 0.01)] if include_gripper else [])
+    def grippers(self): return {"fingers"}
+    def suctions(self): return set()
+    def get_hand_teaching_mode(self): return self.hand
+    def set_hand_teaching_mode(self, enabled): self.hand = enabled
+    def inverse_kinematics(self, end_effector_id, pose, start_joints=None, avoid_collisions=True):
+        if pose.position.z < 0:
+            raise Robot.KinematicsException("below the table")
+        return [Joint("j0", pose.position.x)]
+
+    def stop(self): self.stopped.set()
+
+    def move_to_pose(self, end_effector_id, target_pose: Pose, speed, safe=True, linear=True):
+        if self.owner != "us":
+            raise NotInControl("nobody has control")
+        if target_pose.position.z > 1:
+            self.stopped.clear()
+            self.stopped.wait(30)
+        self.at = target_pose
+
+    def move_to_joints(self, target_joints: list[Joint], speed, safe=True):
+        if target_joints[0].value > 3:
+            raise OutOfRange("j0 ends at 3 rad")
+
+    @action
+    def measure(self, factor: float, *, an: str | None = None) -> tuple[float, str]:
+        return factor * 2, "mm"
+
+    @action
+    def pick(self, where: Pose, offset: float, *, an: str | None = None) -> None:
+        if offset > 5 and self.given_up.wait(30):
+            self.given_up.clear()
+            raise Cancelled("given up")
+        if where.position.x != 2:
+            raise Refused(f"wrong place {where.position.x}")
+
+    def give_up(self): self.given_up.set()
+    def vanish(self): os._exit(9)
+    def freeze(self): ctypes.PyDLL(None).usleep(1_500_000)
+"""
+OBJ = "obj_arm"
+META = robot_meta("Arm", move_to_pose=True, move_to_joints=True, stop=True, inverse_kinematics=True, hand_teaching=True)
+SCENE = Scene("scene", id="scn_1", objects=[SceneObject("arm", "Arm", Pose(Position(1, 0, 0)), [], OBJ)])
+
+
+def _pick(name: str, kind: str, value: Any) -> Action:
+    parameters = [ActionParameter("where", "pose", '"ori_1"'), ActionParameter("offset", kind, json.dumps(value))]
+    return Action(name, f"{OBJ}/pick", f"act_{name}", parameters, [Flow()])
+
+
+PROJECT = Project(
+    "project",
+    "scn_1",
+    id="pro_1",
+    action_points=[
+        ActionPoint(
+            "top",
+            Position(1, 0, 0),
+            OBJ,
+            id="acp_1",
+            orientations=[NamedOrientation("o", Orientation(), "ori_1")],
+            robot_joints=[ProjectRobotJoints("j", OBJ, [Joint("j0", 0.5)], True, id="joi_1")],
+            actions=[
+                Action(
+                    "measure",
+                    f"{OBJ}/measure",
+                    "act_measure",
+                    [ActionParameter("factor", "project_parameter", '"pco_1"')],
+                    [Flow(outputs=["size", "unit"])],
+                ),
+                _pick("literal", "double", 1.0),
+                _pick("linked", "link", "act_measure/default/0"),
+                _pick("long", "double", 9.0),
+            ],
+        )
+    ],
+    parameters=[ProjectParameter("factor", "double", "1.5", id="pco_1")],
+)
+
+
+async def with_arm(server: Server) -> None:
+    server.types.add("Arm", ARM, [action("measure", "double", "string"), action("pick", cancellable=True)], META)
+    await server.open(SCENE, PROJECT)
+
+
+@serving(with_arm)
+async def test_up_and_down(arm: Server) -> None:
+    cell, client = arm.services.cell, arm.client
+    with pytest.raises(RequestRefused):
+        await arm.ask("StopScene")
+    await arm.ask("StartScene")
+    with pytest.raises(RequestRefused):
+        await arm.ask("StartScene")
+    await client.state("started")
+    assert cell.online
+    assert arm.services.locks.locked_roots() == []
+    assert [(d.name, d.type, d.answering) for d in cell.devices()] == [("arm", "Arm", True)]
+    with pytest.raises(RequestRefused):
+        await arm.ask("StartScene")
+    await arm.ask("StopScene")
+    await client.state("stopped")
+    assert not cell.online
+    await arm.start()
+
+
+@serving(with_arm)
+async def test_states_are_told_in_order_after_the_answer(arm: Server) -> None:
+    await arm.ask("StartScene")
+    await arm.client.event("response StartScene")
+    states = [(await arm.client.event("SceneState")) for _ in range(2)]
+    assert states == [{"state": "starting"}, {"state": "started"}]
+
+
+@serving()
+async def test_a_failed_start_says_why_and_a_later_one_works(server: Server) -> None:
+    source = """
+    @dataclass
+    class BoxSettings(Settings):
+        file: str
+
+    class Box(Generic):
+        _ABSTRACT = False
+        def __init__(self, obj_id, name, settings: BoxSettings):
+            super().__init__(obj_id, name, settings)
+        def connect(self, timeout=5.0):
+            if not os.path.exists(self.settings.file):
+                raise NotConnected("nobody at 192.0.2.7:502")
+    """
+    server.types.add("Box", source)
+    path = server.services.settings.data_dir / "switch"
+    await server.open(Scene("scene", id="scn_1", objects=[scene_object("box", "Box", file=str(path))]))
+    await server.ask("StartScene")
+    states = [await server.client.event("SceneState") for _ in range(3)]
+    assert [s["state"] for s in states] == ["starting", "stopping", "stopped"]
+    assert "box" in states[1]["message"]
+    assert "192.0.2.7:502" in states[1]["message"]
+    path.write_text("")
+    await server.start()
+
+
+@serving(with_arm)
+async def test_a_crash_takes_the_scene_offline_within_a_second(arm: Server) -> None:
+    await arm.start()
+    cell = arm.services.cell
+    assert cell._host is not None
+    call = asyncio.create_task(cell.call(OBJ, "pick", {"where": Pose(), "offset": 9.0}))
+    await asyncio.sleep(0.05)
+    began = time.monotonic()
+    os.kill(cell._host.pid, signal.SIGKILL)
+    stopped = await arm.client.state("stopped")
+    assert time.monotonic() - began < 1.0
+    assert "SIGKILL" in stopped["message"]
+    with pytest.raises(ConnectionLost):
+        await call
+    await arm.start()
+
+
+@serving(with_arm)
+async def test_a_driver_that_ends_the_process(arm: Server) -> None:
+    await arm.start()
+    with pytest.raises(ConnectionLost):
+        await arm.services.cell.call(OBJ, "vanish")
+    assert "status 9" in (await arm.client.state("stopped"))["message"]
+
+
+@serving(with_arm)
+async def test_silence_is_reported_and_forgiven(arm: Server) -> None:
+    await arm.start()
+    cell = arm.services.cell
+    call = asyncio.create_task(cell.call(OBJ, "freeze"))
+    async with asyncio.timeout(3):
+        while cell.devices()[0].answering:
+            await asyncio.sleep(0.02)
+        await call
+        while not cell.devices()[0].answering:
+            await asyncio.sleep(0.02)
+    assert cell.online
+
+
+@serving(with_arm)
+async def test_what_a_robot_tells(arm: Server) -> None:
+    with pytest.raises(RequestRefused):
+        await arm.ask("GetRobotJoints", {"robot_id": OBJ})
+    await arm.start()
+    assert await arm.ask("GetRobotJoints", {"robot_id": OBJ}) == [Joint("j0", 0.5)]
+    assert await arm.ask("GetEndEffectors", {"robot_id": OBJ}) == ["tool"]
+    assert await arm.ask("GetGrippers", {"robot_id": OBJ}) == ["fingers"]
+    assert await arm.ask("GetSuctions", {"robot_id": OBJ}) == []
+    pose = await arm.ask("GetEndEffectorPose", {"robot_id": OBJ, "end_effector_id": "tool"})
+    assert pose == Pose(Position(0.1, 0.2, 0.3))
+    for refused, args in [
+        ("GetRobotArms", {"robot_id": OBJ}),
+        ("GetRobotJoints", {"robot_id": OBJ, "arm_id": "left"}),
+        ("GetEndEffectorPose", {"robot_id": OBJ, "end_effector_id": "other"}),
+    ]:
+        with pytest.raises(RequestRefused):
+            await arm.ask(refused, args)
+    pose = {"position": {"x": 0.7, "y": 0, "z": 0}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}
+    args = {"robot_id": OBJ, "end_effector_id": "tool", "pose": pose}
+    assert await arm.ask("InverseKinematics", args) == [Joint("j0", 0.7)]
+    pose["position"]["z"] = -1
+    with pytest.raises(CellError, match="below the table"):
+        await arm.ask("InverseKinematics", args)
+
+
+@serving(with_arm)
+async def test_streams_go_to_subscribers_alone(arm: Server) -> None:
+    await arm.start()
+    other = Recorder("bob")
+    arm.services.hub.add(other)  # type: ignore[arg-type]
+    subscribe = {"robot_id": OBJ, "what": "joints", "send": True}
+    await arm.ask("RegisterForRobotEvent", subscribe)
+    for _ in range(2):
+        data = await arm.client.event("RobotJoints")
+    assert [j["name"] for j in data["joints"]] == ["j0", "finger"]
+    assert other.got == []
+    await arm.ask("RegisterForRobotEvent", subscribe | {"send": False})
+    with pytest.raises(RequestRefused):
+        await arm.ask("RegisterForRobotEvent", subscribe | {"send": False})
+
+
+@serving(with_arm)
+async def test_a_motion_from_start_to_end(arm: Server) -> None:
+    await arm.start()
+    locks = arm.services.locks
+    request = {"robot_id": OBJ, "end_effector_id": "tool", "speed": 0.5, "position": {"x": 1, "y": 0, "z": 0}}
+    await arm.ask("MoveToPose", request)
+    await arm.client.event("response MoveToPose")
+    start = await arm.client.event("RobotMoveToPose")
+    assert start["move_event_type"] == "start"
+    assert start["target_pose"]["position"]["x"] == 1
+    assert "message" not in start
+    assert (await arm.client.event("RobotMoveToPose"))["move_event_type"] == "end"
+    assert locks.writer_of(OBJ) is None
+    for wrong in ({"speed": 0.0}, {"speed": 1.5}):
+        with pytest.raises(RequestRefused):
+            await arm.ask("MoveToPose", request | wrong)
+    await arm.ask("MoveToJoints", {"robot_id": OBJ, "speed": 0.5, "joints": [{"name": "j0", "value": 4}]})
+    failed = await arm.client.event("RobotMoveToJoints", lambda d: d["move_event_type"] != "start")
+    assert failed["move_event_type"] == "failed"
+    assert "3 rad" in failed["message"]
+    assert locks.writer_of(OBJ) is None
+
+
+@serving(with_arm)
+async def test_stop_robot(arm: Server) -> None:
+    await arm.start()
+    with pytest.raises(RequestRefused):
+        await arm.ask("StopRobot", {"robot_id": OBJ})
+    request = {"robot_id": OBJ, "end_effector_id": "tool", "speed": 0.5, "position": {"x": 0, "y": 0, "z": 2}}
+    await arm.ask("MoveToPose", request)
+    assert arm.services.locks.writer_of(OBJ) == "alice"
+    with pytest.raises(RequestRefused):
+        await arm.ask("MoveToActionPoint", {"robot_id": OBJ, "speed": 0.5, "joints_id": "joi_1"})
+    began = time.monotonic()
+    await arm.ask("StopRobot", {"robot_id": OBJ})
+    failed = await arm.client.event("RobotMoveToPose", lambda d: d["move_event_type"] != "start")
+    assert time.monotonic() - began < 0.5
+    assert failed["move_event_type"] == "failed"
+    assert arm.services.locks.writer_of(OBJ) is None
+
+
+@serving(with_arm)
+async def test_move_to_action_point(arm: Server) -> None:
+    await arm.start()
+    args = {"robot_id": OBJ, "speed": 0.5, "orientation_id": "ori_1", "end_effector_id": "tool"}
+    await arm.ask("MoveToActionPoint", args)
+    name = "RobotMoveToActionPointOrientation"
+    assert (await arm.client.event(name, lambda d: d["move_event_type"] == "end"))["orientation_id"] == "ori_1"
+    pose = await arm.ask("GetEndEffectorPose", {"robot_id": OBJ, "end_effector_id": "tool"})
+    assert pose.position == Position(2, 0, 0)  # the point hangs on the arm, which stands at x = 1
+    await arm.ask("MoveToActionPoint", {"robot_id": OBJ, "speed": 0.5, "joints_id": "joi_1"})
+    await arm.client.event("RobotMoveToActionPointJoints", lambda d: d["move_event_type"] == "end")
+
+
+@serving(with_arm)
+async def test_steps_and_hand_teaching_need_the_lock(arm: Server) -> None:
+    await arm.start()
+    step = {"robot_id": OBJ, "end_effector_id": "tool", "axis": "x", "what": "position", "mode": "world", "step": 0.1}
+    teach = {"robot_id": OBJ, "enable": True}
+    for name, args in (("StepRobotEef", step), ("HandTeachingMode", teach)):
+        with pytest.raises(RequestRefused):
+            await arm.ask(name, args)
+    await arm.services.locks.write_lock("alice", OBJ)
+    await arm.ask("StepRobotEef", step)
+    end = await arm.client.event("RobotMoveToPose", lambda d: d["move_event_type"] == "end")
+    assert end["target_pose"]["position"] == {"x": pytest.approx(0.2), "y": 0.2, "z": 0.3}
+    await arm.ask("HandTeachingMode", teach)
+    assert await arm.client.event("HandTeachingMode") == {"robot_id": OBJ, "enabled": True}
+    with pytest.raises(RequestRefused):
+        await arm.ask("HandTeachingMode", teach)
+    with pytest.raises(RequestRefused, match="by hand"):
+        await arm.ask("StepRobotEef", step)
+
+
+async def _execute(arm: Server, action_id: str) -> dict[str, Any]:
+    await arm.ask("ExecuteAction", {"action_id": action_id})
+    await arm.client.event("response ExecuteAction")
+    assert await arm.client.event("ActionExecution") == {"action_id": action_id}
+    return await arm.client.event("ActionResult")
+
+
+@serving(with_arm)
+async def test_single_actions_with_links_and_parameters(arm: Server) -> None:
+    with pytest.raises(RequestRefused):
+        await arm.ask("ExecuteAction", {"action_id": "act_literal"})
+    await arm.start()
+    assert await _execute(arm, "act_literal") == {"action_id": "act_literal"}
+    with pytest.raises(RequestRefused, match="measure"):
+        await arm.ask("ExecuteAction", {"action_id": "act_linked"})
+    assert await _execute(arm, "act_measure") == {"action_id": "act_measure", "results": ["3.0", '"mm"']}
+    assert await _execute(arm, "act_linked") == {"action_id": "act_linked"}
+    with pytest.raises(RequestRefused):
+        await arm.ask("CancelAction")
+
+
+@serving(with_arm)
+async def test_cancel(arm: Server) -> None:
+    await arm.start()
+    await arm.ask("ExecuteAction", {"action_id": "act_long"})
+    await arm.client.event("ActionExecution")
+    for refused, args in (("ExecuteAction", {"action_id": "act_literal"}), ("StopScene", None)):
+        with pytest.raises(RequestRefused):
+            await arm.ask(refused, args)
+    await arm.ask("CancelAction")
+    await arm.client.event("ActionCancelled")
+    async with asyncio.timeout(2):
+        while arm.services.cell.running_action is not None:
+            await asyncio.sleep(0.01)
+    assert all(event["event"] != "ActionResult" for event in arm.client.got)
+    await _execute(arm, "act_literal")
+
+
+@serving(with_arm)
+async def test_an_action_cut_off_by_a_crash_ends_with_an_error(arm: Server) -> None:
+    await arm.start()
+    await arm.ask("ExecuteAction", {"action_id": "act_long"})
+    assert arm.services.cell._host is not None
+    arm.services.cell._host.kill()
+    assert "SIGKILL" in (await arm.client.event("ActionResult"))["error"]
+    assert arm.services.cell.running_action is None
+    assert arm.services.cell.results == {}
+
+
+@serving(with_arm)
+async def test_a_moved_object_moves_live(arm: Server) -> None:
+    await arm.start()
+    await arm.services.cell.object_pose_changed(OBJ, Pose(Position(5, 0, 0)))
+    raw = await arm.services.cell.call(OBJ, "pose")
+    assert json.loads(raw)["position"]["x"] == 5
