@@ -66,8 +66,11 @@ def _files_below(folder: Path) -> Iterator[Path]:
 def _inside(one: PackageType, folder: Path) -> tuple[str, str]:
     """Give the dotted name of a driver's folder, and of the type's module within it ("" for the folder itself)."""
     module = one.entry_point.partition(":")[0].split(".")
-    for end in range(len(module), 0, -1):
-        if module[end - 1] == folder.name:
+    for end in range(1, len(module) + 1):
+        *between, last = module[end:] or [""]
+        files = (folder.joinpath(*between, f"{last}.py"), folder.joinpath(*between, last, "__init__.py"))
+        # A module may be called like its folder, and that like the one above: what is there decides.
+        if module[end - 1] == folder.name and any(file.is_file() for file in files):
             return ".".join(module[:end]), ".".join(module[end:])
     raise InvalidProject(
         f"object type {one.name}: its entry point {one.entry_point} is not in its folder {folder.name}"

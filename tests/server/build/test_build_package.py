@@ -168,6 +168,18 @@ def test_two_drivers_with_folders_of_one_name(driver: PackageType, made_of: Ingr
     assert files["object_types/acme_reader_2/__init__.py"] == b"class Other: ...\n"
 
 
+@pytest.mark.parametrize("above", ["acme_devices", "acme_reader"])
+def test_a_module_called_like_its_folder(made_of: Ingredients, tmp_path: Path, above: str) -> None:
+    folder = tmp_path / "like" / above / "acme_reader"
+    folder.mkdir(parents=True)
+    (folder / "__init__.py").write_text("")
+    (folder / "acme_reader.py").write_text("class Like: ...\n")
+    entry = f"{above}.acme_reader.acme_reader:Like"
+    made_of.types.append(PackageType("Like", "like", "", entry, folder, "like", "1"))
+    files = files_of(made_of)
+    assert b"from .acme_reader_2.acme_reader import Like as Like" in files["object_types/like.py"]
+
+
 # ------------------------------------------------------------------------------------------------ running
 @pytest.fixture
 def directory(made_of: Ingredients, tmp_path: Path) -> Path:
