@@ -75,7 +75,8 @@ def decode_arguments(bound: Any, arguments: Mapping[str, bytes], whose: str) -> 
     function = bound.__func__ if isinstance(bound, types.MethodType) else bound
     signature, hints = _signature(function)
     if function is not bound:
-        hints = _inherited(type(bound.__self__), function.__name__)
+        cls: type = type(bound.__self__)
+        hints = _inherited(cls, function.__name__)
     parameters = list(signature.parameters.values())
     takes_any = any(p.kind is p.VAR_KEYWORD for p in parameters)
     result: dict[str, Any] = {}

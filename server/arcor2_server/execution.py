@@ -160,8 +160,11 @@ class Execution:
             log.warning("run not noted", package=package_id, reason=str(error))
 
     def stop(self) -> None:
-        """Stop the program: devices first, then the script; its host is killed when it does not end in time."""
-        host = self._require(RUN_STATES, "stopped")
+        """Stop the program: devices first, then the script; its host is killed when it does not end in time.
+
+        One that has just been started is refused, as the protocol says, unless its host has fallen silent.
+        """
+        host = self._require(RUN_STATES if self._board.answering else RUN_STATES | {S.STARTED}, "stopped")
         self._enter(S.STOPPING)
         host.send(m.StopProgram())
         self._killing = asyncio.get_running_loop().call_later(self.stop_within, self._kill, host)

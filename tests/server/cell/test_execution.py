@@ -35,7 +35,8 @@ class Lamp(Generic):
     def wait(self, *, an: str | None = None) -> None:
         time.sleep(30)
     @action
-    def hold_all(self, *, an: str | None = None) -> None:
+    def hold_all(self, after: float, *, an: str | None = None) -> None:
+        time.sleep(after)
         ctypes.PyDLL(None).sleep(60)
 """
 OBJ = "obj_lamp"
@@ -143,14 +144,31 @@ async def test_a_host_killed_in_a_run(server: Server) -> None:
 @serving()
 async def test_a_program_that_holds_the_interpreter_is_killed(server: Server) -> None:
     server.services.execution.stop_within = 0.3
-    write(server, 'lamp.hold_all(an="a")')
+    write(server, 'lamp.hold_all(0.2, an="a")')  # long enough for what was told to get out
     await server.ask("RunPackage", {"id": "pkg_1"})
     await server.client.event("ActionStateBefore")
+    await asyncio.sleep(0.3)
     began = time.monotonic()
     await server.ask("StopPackage")
     await server.client.state("stopped", "PackageState")
     assert time.monotonic() - began < 2.0
     assert all(event["event"] != "ProjectException" for event in server.client.got)
+
+
+@serving()
+async def test_a_program_that_falls_silent_while_it_starts_can_be_stopped(server: Server) -> None:
+    server.services.execution.stop_within = 0.1
+    write(server, "")
+    script = server.services.settings.packages_dir / "pkg_1" / "script.py"
+    script.write_text("import ctypes\nctypes.PyDLL(None).sleep(60)")
+    await server.ask("RunPackage", {"id": "pkg_1"})
+    with pytest.raises(RequestRefused):
+        await server.ask("StopPackage")
+    async with asyncio.timeout(5):
+        while server.services.execution._board.answering:
+            await asyncio.sleep(0.02)
+    await server.ask("StopPackage")
+    await server.client.state("stopped", "PackageState")
 
 
 @serving()
