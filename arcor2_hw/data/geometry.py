@@ -1,16 +1,27 @@
 """Position, orientation and pose, with the algebra of rigid motion (quaternions x, y, z, w; metres)."""
 
+import functools
 import math
 from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-import numpy.typing as npt
 from msgspec import field
-from transforms3d.quaternions import mat2quat, qconjugate, qmult, quat2mat, rotate_vector
 
 from arcor2_hw.data.base import MutableData
 
-Vector = npt.NDArray[np.float64]
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+    Vector = npt.NDArray[np.float64]
+
+
+@functools.cache
+def _quaternions() -> Any:
+    """Give transforms3d's algebra; it comes with numpy, 0.1 s that the server's start does without."""
+    from transforms3d import quaternions
+
+    return quaternions
 
 
 class Position(MutableData):
@@ -38,7 +49,9 @@ class Position(MutableData):
 
     def rotated(self, by: "Orientation") -> "Position":
         """Give this vector rotated by `by`."""
-        return Position(*map(float, rotate_vector((self.x, self.y, self.z), by.wxyz(), is_normalized=True)))
+        return Position(
+            *map(float, _quaternions().rotate_vector((self.x, self.y, self.z), by.wxyz(), is_normalized=True))
+        )
 
 
 class Orientation(MutableData):
@@ -70,7 +83,7 @@ class Orientation(MutableData):
         return (self.x, self.y, self.z, self.w)[index]
 
     def __mul__(self, other: "Orientation") -> "Orientation":
-        return Orientation.from_wxyz(qmult(self.wxyz(), other.wxyz()))
+        return Orientation.from_wxyz(_quaternions().qmult(self.wxyz(), other.wxyz()))
 
     def wxyz(self) -> tuple[float, float, float, float]:
         """Give the components with the scalar first, as transforms3d wants them."""
@@ -84,16 +97,18 @@ class Orientation(MutableData):
 
     def inverted(self) -> "Orientation":
         """Give the inverse rotation."""
-        return Orientation.from_wxyz(qconjugate(self.wxyz()))
+        return Orientation.from_wxyz(_quaternions().qconjugate(self.wxyz()))
 
-    def matrix(self) -> Vector:
+    def matrix(self) -> "Vector":
         """Give the rotation matrix, shape (3, 3)."""
-        return np.asarray(quat2mat(self.wxyz()), dtype=np.float64)
+        import numpy as np
+
+        return np.asarray(_quaternions().quat2mat(self.wxyz()), dtype=np.float64)
 
     @classmethod
-    def from_matrix(cls, matrix: Vector) -> "Orientation":
+    def from_matrix(cls, matrix: "Vector") -> "Orientation":
         """Make an orientation from a rotation matrix, shape (3, 3)."""
-        return cls.from_wxyz(mat2quat(matrix))
+        return cls.from_wxyz(_quaternions().mat2quat(matrix))
 
     @classmethod
     def from_rotation_vector(cls, x: float, y: float, z: float) -> "Orientation":
@@ -136,15 +151,17 @@ class Pose(MutableData):
         p = self.position
         return Pose(Position(-p.x, -p.y, -p.z).rotated(back), back)
 
-    def matrix(self) -> Vector:
+    def matrix(self) -> "Vector":
         """Give the homogeneous matrix, shape (4, 4)."""
+        import numpy as np
+
         result = np.eye(4)
         result[:3, :3] = self.orientation.matrix()
         result[:3, 3] = tuple(self.position)
         return result
 
     @classmethod
-    def from_matrix(cls, matrix: Vector) -> "Pose":
+    def from_matrix(cls, matrix: "Vector") -> "Pose":
         """Make a pose from a homogeneous matrix, shape (4, 4)."""
         return cls(Position(*map(float, matrix[:3, 3])), Orientation.from_matrix(matrix[:3, :3]))
 

@@ -5,6 +5,7 @@ import contextlib
 import errno
 import fcntl
 import gc
+import importlib
 import signal
 import socket
 import sys
@@ -55,6 +56,8 @@ def serve(
     log_level
         What is logged on standard error: debug, info, warning or error.
     """
+    # Start-up makes much that stays and little that goes: collecting would only look at it again and again.
+    gc.disable()
     try:
         settings = ServerSettings.from_environment(host=host, port=port, data_dir=data_dir)
         server_logging.set_up(log_level)
@@ -82,12 +85,17 @@ async def run(settings: ServerSettings, listener: socket.socket) -> None:
     from arcor2_server.app import create_app, running_services
 
     async with running_services(settings) as services:
-        server = Server(configuration(create_app(services), settings), settings.host, services.cell.hosts.prepare)
+
+        def when_ready() -> None:
+            gc.freeze()
+            gc.enable()
+            services.cell.hosts.prepare()
+            loop.run_in_executor(None, importlib.import_module, "transforms3d.quaternions")
+
         loop = asyncio.get_running_loop()
+        server = Server(configuration(create_app(services), settings), settings.host, when_ready)
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, server.end)
-        # What is loaded now stays: the collector need not look at it again.
-        gc.freeze()
         try:
             await server.serve(sockets=[listener])
         except OSError as error:
