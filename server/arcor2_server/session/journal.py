@@ -31,6 +31,9 @@ log = structlog.get_logger(__name__)
 FORMAT: Final = 1
 """Version of the file, kept in SQLite's user_version; another one is set aside as a damaged file is."""
 
+CHECKPOINT_PAGES: Final = 200
+"""Pages of the write-ahead log that are written before it starts again at its beginning."""
+
 BUSY_TIMEOUT: Final = 5.0
 """Seconds to wait for another process that has the file (a server that is just ending)."""
 
@@ -165,6 +168,7 @@ class Journal:
             return
         with closing(connection):
             self._loop.call_soon_threadsafe(_resolve, started, recovered, None)
+            _extend_log(connection)
             ending = False
             while not ending:
                 batch = [self._jobs.get()]
@@ -265,6 +269,7 @@ def _recover(connection: sqlite3.Connection) -> Recovered | None:
     connection.execute("pragma locking_mode = exclusive")
     connection.execute("pragma journal_mode = wal")
     connection.execute("pragma synchronous = full")
+    connection.execute(f"pragma wal_autocheckpoint = {CHECKPOINT_PAGES}")
     (version,) = connection.execute("pragma user_version").fetchone()
     if version == 0:
         connection.executescript(f"begin immediate; {_SCHEMA} pragma user_version = {FORMAT}; commit;")
@@ -284,6 +289,23 @@ def _recover(connection: sqlite3.Connection) -> Recovered | None:
         raise _WrongFormat("an edit is missing")
     scene, project = (msgspec.json.decode(text, type=Times) for text in row[2:])
     return Recovered(decode_items(row[0]), row[1], scene, project, edits)
+
+
+def _extend_log(connection: sqlite3.Connection) -> None:
+    """Write as much of the log as is used between checkpoints.
+
+    A commit that overwrites takes the disk half as long as one by which the file grows (0.12 ms to 0.24 ms).
+    """
+    try:
+        with connection:
+            connection.execute("begin immediate")
+            connection.execute("create table extent (content blob)")
+            connection.execute("insert into extent values (zeroblob(?))", (CHECKPOINT_PAGES * 4096,))
+        with connection:
+            connection.execute("drop table extent")
+        connection.execute("pragma wal_checkpoint(restart)").fetchall()
+    except sqlite3.Error as error:
+        log.warning("no room ahead for the journal", error=str(error))
 
 
 def _set_aside(path: Path) -> Path:

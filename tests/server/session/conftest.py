@@ -25,3 +25,15 @@ async def alice(desk: Desk) -> Person:
 async def bob(desk: Desk) -> Person:
     """Somebody else who is logged in."""
     return await desk.person("bob")
+
+
+@pytest.fixture
+async def crowd(desk: Desk) -> list[Person]:
+    """Eight more people who are logged in."""
+    return [await desk.person(f"user{number}") for number in range(8)]
+
+
+@pytest.fixture
+async def stranger(desk: Desk) -> Person:
+    """Somebody who is not logged in."""
+    return await desk.person()

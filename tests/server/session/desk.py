@@ -4,9 +4,10 @@ What is missing of a whole server is the network, the cell host and the analysis
 their own, and the same requests are sent to a real server process elsewhere.
 """
 
+import asyncio
 import contextlib
 import json
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,7 +19,6 @@ from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ObjectTypeSource, ParameterMeta
 from arcor2_hw.data.robot import Joint, RobotMeta, RobotType
 from arcor2_hw.exceptions import NotFound
-from arcor2_server.client import Client
 from arcor2_server.endpoint import Endpoint
 from arcor2_server.hub import Hub
 from arcor2_server.locks import Locks
@@ -45,6 +45,7 @@ from arcor2_server.session import Session
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import Storage
 from arcor2_server.users import Users
+from arcor2_server.wire import EXTENSION
 
 SPEC = Path(__file__).resolve().parents[4] / "shared" / "spec"
 
@@ -73,6 +74,10 @@ class RecordedTypes:
         }
         self.revision = 1
         self.news: list[ObjectTypeMeta] = []
+
+    @property
+    def up_to_date(self) -> bool:
+        return not self.news
 
     async def refresh(self) -> Changes:
         news, self.news = self.news, []
@@ -151,23 +156,29 @@ class FakeCell:
         self.moved.append((object_id, pose))
 
 
-class _Record:
-    """The wire of a client that takes everything."""
+class _Socket:
+    """A websocket whose other side is the test: it takes everything at once."""
 
-    def __init__(self) -> None:
-        self.messages: list[dict[str, Any]] = []
+    def __init__(self, take: Callable[[dict[str, Any]], None]) -> None:
+        self.incoming: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
+        self.scope = {"extensions": {EXTENSION: self}}
+        self.client = None
+        self.receive = self.incoming.get
+        self._take = take
 
-    def send_now(self, message: bytes) -> bool:
-        self.messages.append(json.loads(message))
+    async def accept(self) -> None: ...
+
+    async def send(self, message: dict[str, Any]) -> None: ...
+
+    def send_text_now(self, message: bytes) -> bool:
+        self._take(json.loads(message))
         return True
 
-    async def send(self, message: bytes) -> None:
-        self.send_now(message)
+    async def send_text(self, message: bytes) -> None:
+        self.send_text_now(message)
 
     async def ping(self) -> None:
         raise ConnectionError
-
-    async def close(self, code: int, reason: str) -> None: ...
 
     def abort(self) -> None: ...
 
@@ -177,20 +188,35 @@ class Refused(Exception):
 
 
 class Person:
-    """A client at the desk. `seen` holds all that came since it was last taken, answers and events in order."""
+    """A client at the desk, which keeps all that comes, answers and events in order, until it is taken."""
 
-    def __init__(self, desk: "Desk", name: str) -> None:
+    def __init__(self, desk: "Desk") -> None:
         self.desk = desk
-        self.name = name
-        self._record = _Record()
-        self._number = 0
-        self.client = Client(self._record, desk.services.settings)
-        desk.services.hub.add(self.client)
+        self._messages: list[dict[str, Any]] = []
+        self._answers: dict[int, asyncio.Future[dict[str, Any]]] = {}
+        self._number = 1000
+        self._socket: Any = _Socket(self._came)
+        self._served = asyncio.create_task(desk.endpoint.serve(self._socket))
+
+    def _came(self, message: dict[str, Any]) -> None:
+        self._messages.append(message)
+        if "response" in message:
+            answer = self._answers.pop(message["id"])
+            if not answer.done():
+                answer.set_result(message)
+
+    async def leave(self) -> None:
+        self._socket.incoming.put_nowait({"type": "websocket.disconnect"})
+        await self._served
 
     async def send(self, request: dict[str, Any]) -> dict[str, Any]:
         """Send a request as it stands and give the answer as it came."""
-        await self.desk.endpoint._handle(self.client, json.dumps(request))
-        return next(m for m in reversed(self._record.messages) if m.get("id") == request["id"] and "response" in m)
+        answer = self._answers[request["id"]] = asyncio.get_running_loop().create_future()
+        self._socket.incoming.put_nowait({"type": "websocket.receive", "text": json.dumps(request)})
+        await asyncio.wait((answer, self._served), return_when=asyncio.FIRST_COMPLETED)
+        if not answer.done():
+            self._served.result()
+        return answer.result()
 
     async def ask(self, request_name: str, /, *, dry_run: bool = False, **args: Any) -> Any:
         """Send a request; gives the answer's data, raises Refused with its message."""
@@ -205,7 +231,7 @@ class Person:
 
     def take(self) -> list[dict[str, Any]]:
         """Give what came since the last time."""
-        taken, self._record.messages = self._record.messages, []
+        taken, self._messages = self._messages, []
         return taken
 
     def events(self) -> list[dict[str, Any]]:
@@ -229,17 +255,23 @@ class Desk:
         self.types = types
         self.cell = cell
         self.endpoint = Endpoint(services)
+        self._people: list[Person] = []
 
     @property
     def session(self) -> Session:
         return self.services.session
 
     async def person(self, name: str = "") -> Person:
-        person = Person(self, name)
+        person = Person(self)
+        self._people.append(person)
         if name:
             await person.ask("RegisterUser", user_name=name)
         person.take()
         return person
+
+    async def close(self) -> None:
+        await asyncio.gather(*(person.leave() for person in self._people))
+        await self.endpoint.close()
 
 
 @contextlib.asynccontextmanager
@@ -273,7 +305,9 @@ async def open_desk(directory: Path, **settings: Any) -> AsyncIterator[Desk]:
     try:
         await services.session.open()
         try:
-            yield Desk(services, types, cell)
+            desk = Desk(services, types, cell)
+            yield desk
+            await desk.close()
         finally:
             await services.session.close()
     finally:
