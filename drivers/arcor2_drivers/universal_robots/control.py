@@ -2,7 +2,7 @@
 
 The guard kicks the controller's watchdog, through that process, as long as this process lives and the observed stream
 is fresh. It ends the session as soon as something is so that nothing may go on by itself: the process is killed, and
-the controller's program is stopped on a connection of its own. An ended session never comes back; control is taken anew.
+the program is stopped on a connection of its own. An ended session never comes back; control is taken anew.
 """
 
 import contextlib

@@ -109,9 +109,9 @@ class Dashboard:
             self._lock.release()
 
     def _opened(self, deadline: float) -> socket.socket:
-        if self._socket is not None:
+        if self._socket is not None and self._quiet(self._socket):
             return self._socket
-        self._buffer = b""
+        self._shut()
         try:
             self._socket = socket.create_connection(self._where, max(deadline - time.monotonic(), 0.001))
             self._line(deadline)  # the greeting
@@ -122,6 +122,17 @@ class Dashboard:
             self._shut()
             raise NotConnected(f"no dashboard server at {self.address}", str(e)) from e
         return self._socket
+
+    def _quiet(self, opened: socket.socket) -> bool:
+        """Tell whether the connection is open with nothing unasked in it: one that broke while idle is replaced."""
+        try:
+            opened.settimeout(0.0)
+            opened.recv(1, socket.MSG_PEEK)
+        except BlockingIOError:
+            return not self._buffer
+        except OSError:
+            return False
+        return False
 
     def _line(self, deadline: float) -> str:
         assert self._socket is not None

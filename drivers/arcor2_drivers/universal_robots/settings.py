@@ -46,7 +46,7 @@ class UrSettings(Settings):
     def __post_init__(self) -> None:
         if not self.host.strip():
             raise OutOfRange("host must be the address of the controller")
-        if self.payload_mass >= 0.0:
+        if not self.payload_mass < 0.0:
             within("payload_mass", self.payload_mass, 0.0, 40.0)
         for axis in "xyz":
             within(f"payload_cog_{axis}", getattr(self, f"payload_cog_{axis}"), -1.0, 1.0)

@@ -183,13 +183,14 @@ class UrArm(UrObserved):
         Raises KinematicsException, OutOfRange, Refused, NotInControl, SafetyStop, Cancelled, DeviceTimeout.
         """
         self._check_end_effector(end_effector_id)
-        self._move_pose(target_pose, linear, speed, 1.0)
+        self._move_pose(target_pose, linear, speed, 1.0, self._stops)
 
     def move_to_joints(self, target_joints: list[Joint], speed: float, safe: bool = True) -> None:
         """Move to joint values, all joints arriving together."""
-        self._move_joints(self._checked_joints(target_joints), speed, 1.0)
+        self._move_joints(self._checked_joints(target_joints), speed, 1.0, self._stops)
 
-    def _move_pose(self, target: Pose, linear: bool, speed: float, acceleration: float) -> MoveResult:
+    def _move_pose(self, target: Pose, linear: bool, speed: float, acceleration: float, stops: int) -> MoveResult:
+        """Move; `stops` is the count of stops when the caller was called: one more since then, and nothing starts."""
         within("speed", speed, 0.001, 1.0)
         within("acceleration", acceleration, 0.01, 1.0)
         vector = self._controller_vector(target)
@@ -198,7 +199,7 @@ class UrArm(UrObserved):
             start = self._observer.sample()
             q = self._solve(session, vector, list(start.q))
             if not linear:
-                return self._run_joints(session, start, q, speed, acceleration)
+                return self._run_joints(session, start, q, speed, acceleration, stops)
             tcp_speed = min(speed * self._ur.max_tcp_speed, self._tcp_speed_cap())
             ramp = acceleration * self._ur.tcp_acceleration
             here, there = from_vector(start.tcp), from_vector(vector)
@@ -219,17 +220,18 @@ class UrArm(UrObserved):
                 budget,
                 reached,
                 tcp_speed / self._ur.max_tcp_speed,
+                stops,
             )
 
-    def _move_joints(self, q: list[float], speed: float, acceleration: float) -> MoveResult:
+    def _move_joints(self, q: list[float], speed: float, acceleration: float, stops: int) -> MoveResult:
         within("speed", speed, 0.001, 1.0)
         within("acceleration", acceleration, 0.01, 1.0)
         with self._moving():
             session = self._controlled()
-            return self._run_joints(session, self._observer.sample(), q, speed, acceleration)
+            return self._run_joints(session, self._observer.sample(), q, speed, acceleration, stops)
 
     def _run_joints(
-        self, session: ControlSession, start: Sample, q: list[float], speed: float, acceleration: float
+        self, session: ControlSession, start: Sample, q: list[float], speed: float, acceleration: float, stops: int
     ) -> MoveResult:
         joint_speed = min(speed * self._ur.max_joint_speed, self._joint_speed_cap())
         ramp = acceleration * self._ur.joint_acceleration
@@ -240,6 +242,7 @@ class UrArm(UrObserved):
             joint_budget(start.q, q, joint_speed, ramp),
             lambda sample: max(abs(a - b) for a, b in zip(sample.q, q, strict=True)) < JOINTS_REACHED,
             joint_speed / self._ur.max_joint_speed,
+            stops,
         )
 
     def _tcp_speed_cap(self) -> float:
@@ -270,9 +273,10 @@ class UrArm(UrObserved):
         budget: float,
         reached: Callable[[Sample], bool],
         speed: float,
+        stops: int,
     ) -> MoveResult:
         """Start an asynchronous motion and wait for its end by what is observed."""
-        stops, began = self._stops, time.monotonic()
+        began = time.monotonic()
         number, _ = self._observer.sample().operation(session.upper)
         try:
             session.do(what, *command, valid=lambda: self._stops == stops)

@@ -62,7 +62,7 @@ class UrTasks(UrServiced):
         """
         assert 0.01 <= speed <= 1.0
         assert 0.01 <= acceleration <= 1.0
-        self._move_pose(pose, move_type is MoveType.LINEAR, speed, acceleration)
+        self._move_pose(pose, move_type is MoveType.LINEAR, speed, acceleration, self._stops)
 
     @action
     def move_to(
@@ -76,7 +76,7 @@ class UrTasks(UrServiced):
         """
         assert 0.01 <= speed <= 1.0
         assert 0.01 <= acceleration <= 1.0
-        self._move_joints(self._checked_joints(joints.joints), speed, acceleration)
+        self._move_joints(self._checked_joints(joints.joints), speed, acceleration, self._stops)
 
     @action
     def pick(
@@ -92,13 +92,13 @@ class UrTasks(UrServiced):
         assert 0.0 <= approach <= 0.5
         assert 0.01 <= speed <= 1.0
         assert 0.01 <= slow_speed <= 1.0
-        output = self._gripper_output()
+        output, stops = self._gripper_output(), self._stops
         above = behind(pose, approach)
-        self._move_pose(above, False, speed, 0.5)
-        self._move_pose(pose, True, slow_speed, 0.5)
+        self._move_pose(above, False, speed, 0.5, stops)
+        self._move_pose(pose, True, slow_speed, 0.5, stops)
         self._switch(output, True)
-        held = self._part_comes(True)
-        self._move_pose(above, True, slow_speed, 0.5)
+        held = self._part_comes(True, stops)
+        self._move_pose(above, True, slow_speed, 0.5, stops)
         if not held:
             self._switch(output, False)
             raise DeviceFault(f"{self.name} picked nothing", f"input {self._ur.part_sensor_input}", NOTHING_HELD)
@@ -119,15 +119,15 @@ class UrTasks(UrServiced):
         assert 0.0 <= approach <= 0.5
         assert 0.01 <= speed <= 1.0
         assert 0.01 <= slow_speed <= 1.0
-        output = self._gripper_output()
+        output, stops = self._gripper_output(), self._stops
         above = behind(pose, approach)
-        self._move_pose(above, False, speed, 0.5)
+        self._move_pose(above, False, speed, 0.5, stops)
         if self._senses_part() and not self.get_digital_input(self._ur.part_sensor_input):
             raise DeviceFault(f"{self.name} lost the part on the way", fault_code=PART_LOST)
-        self._move_pose(pose, True, slow_speed, 0.5)
+        self._move_pose(pose, True, slow_speed, 0.5, stops)
         self._switch(output, False)
-        gone = self._part_comes(False)
-        self._move_pose(above, True, slow_speed, 0.5)
+        gone = self._part_comes(False, stops)
+        self._move_pose(above, True, slow_speed, 0.5, stops)
         if not gone:
             raise DeviceFault(f"the part sticks to the gripper of {self.name}", fault_code=PART_STICKS)
 
@@ -179,13 +179,17 @@ class UrTasks(UrServiced):
     def _senses_part(self) -> bool:
         return self._ur.part_sensor_input >= 0
 
-    def _part_comes(self, held: bool) -> bool:
+    def _part_comes(self, held: bool, stops: int) -> bool:
         """Wait for the gripper: for the sensor's word if there is one, else for the time it takes."""
-        if not self._senses_part():
-            time.sleep(self._ur.gripper_time)
-            return True
         number = self._ur.part_sensor_input
-        return self._within(max(self._ur.gripper_time, 0.1), lambda: self.get_digital_input(number) is held)
+        seconds = self._ur.gripper_time
+
+        def seen() -> bool:
+            if self._stops != stops:
+                raise Cancelled(f"the gripper's work on {self.name} was stopped")
+            return self._senses_part() and self.get_digital_input(number) is held
+
+        return self._within(seconds, seen) or not self._senses_part()
 
     def _switch(self, output: int, value: bool) -> None:
         if not 0 <= output <= 17:

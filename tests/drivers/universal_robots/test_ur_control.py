@@ -1,0 +1,552 @@
+"""Controlling a UR: moves arrive, stops stop, nothing resumes, the controller's watchdog catches our death."""
+
+import math
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import psutil
+import pytest
+
+from arcor2_drivers.universal_robots.ur5e import UR5e
+from arcor2_drivers.universal_robots.ur_tasks import MoveType
+from arcor2_hw.data.device import LossKind
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.robot import Joint, MoveEnd, ProgramState
+from arcor2_hw.exceptions import (
+    Cancelled,
+    ConnectionLost,
+    DeviceError,
+    DeviceFault,
+    InvalidData,
+    NotInControl,
+    OutOfRange,
+    Refused,
+    SafetyStop,
+    Stale,
+)
+
+from .conftest import Doing, FakeUr, make, moving, wait
+
+
+def turned(robot: UR5e, by: float, joint: int = 0) -> list[Joint]:
+    joints = robot.robot_joints()
+    joints[joint].value += by
+    return joints
+
+
+def far_move(robot: UR5e, fake: FakeUr, speed: float = 0.5) -> Doing:
+    """A long joint move that is under way."""
+    doing = Doing(robot.move_to_joints, turned(robot, 3.0), speed)
+    moving(fake)
+    return doing
+
+
+def at_rest(fake: FakeUr, within: float) -> float:
+    """Give the seconds until the arm stands."""
+    began = time.monotonic()
+    fake.control.wait_until(lambda t: not t["moving"], within)
+    return time.monotonic() - began
+
+
+def stays(fake: FakeUr, seconds: float = 0.6) -> None:
+    q = fake.truth()["q"]
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        assert fake.truth()["q"] == q
+        time.sleep(0.02)
+
+
+# ------------------------------------------------------------------------------------------------ taking control
+def test_control_is_taken_and_given_back(robot: UR5e, fake: FakeUr) -> None:
+    with pytest.raises(NotInControl, match="not taken"):
+        robot.move_to_joints(robot.robot_joints(), 0.5)
+    assert robot.control_owner() is None
+    robot.take_control()
+    robot.take_control()
+    truth = fake.truth()
+    assert robot.control_owner() == "us"
+    assert robot.state().program is ProgramState.PLAYING
+    assert truth["watchdog"]
+    assert truth["payload"] == pytest.approx(1.0)
+    assert truth["tcp_offset"] == pytest.approx([0, 0, 0.1, 0, 0, 0])
+    robot.release_control()
+    robot.release_control()
+    fake.control.wait_until(lambda t: t["program"] is None)
+    assert fake.truth()["watchdog_trips"] == truth["watchdog_trips"], "the program was ended in order"
+
+
+def test_what_forbids_control_is_named(robot: UR5e, fake: FakeUr) -> None:
+    fake.do("remote_control", on=False)
+    with pytest.raises(NotInControl, match="local control"):
+        robot.take_control()
+    fake.do("remote_control", on=True)
+    fake.do("safeguard_stop")
+    wait(lambda: robot.state().safety.value == "safeguard_stop")
+    with pytest.raises(SafetyStop, match="safeguard stop") as stop:
+        robot.take_control()
+    assert stop.value.kind == "safeguard_stop"
+    assert fake.truth()["program"] is None
+
+
+def test_an_unstated_payload_refuses_control(fake: FakeUr) -> None:
+    robot = make(fake.host, payload_mass=-1.0)
+    robot.connect(3.0)
+    try:
+        with pytest.raises(Refused, match="payload_mass"):
+            robot.take_control()
+        with pytest.raises(Refused, match="payload_mass"):
+            robot.set_hand_teaching_mode(True)
+    finally:
+        robot.disconnect()
+
+
+def test_registers_in_use_are_named(fake: FakeUr) -> None:
+    fake.do("fieldbus", on=True)
+    robot = make(fake.host)  # this controller's version leaves ur_rtde only the lower registers
+    robot.connect(3.0)
+    try:
+        with pytest.raises(NotInControl, match="0 to 23"):
+            robot.take_control()
+    finally:
+        robot.disconnect()
+
+
+def test_the_upper_registers_leave_the_fieldbus_alone(start_fake: Callable[..., FakeUr]) -> None:
+    fake = start_fake("--controller-version", "5.12")
+    fake.do("fieldbus", on=True)
+    robot = make(fake.host)
+    robot.connect(3.0)
+    try:
+        robot.take_control()
+        assert fake.truth()["register_offset"] == 24
+        robot.move_to_joints(turned(robot, 0.2), 0.5)
+        assert fake.truth()["q"][0] == pytest.approx(0.2, abs=1e-3)
+    finally:
+        robot.disconnect()
+
+
+def test_power_and_brakes_are_acts_of_their_own(start_fake: Callable[..., FakeUr]) -> None:
+    fake = start_fake("--powered-off", "--time-scale", "0.1")
+    robot = make(fake.host)
+    robot.connect(3.0)
+    try:
+        with pytest.raises(Refused, match="not switched on"):
+            robot.take_control()
+        with pytest.raises(Refused, match="no power"):
+            robot.release_brakes()
+        robot.power_on()
+        assert fake.truth()["robot_mode"] == "IDLE"
+        robot.release_brakes()
+        assert fake.truth()["robot_mode"] == "RUNNING"
+        robot.take_control()
+    finally:
+        robot.disconnect()
+
+
+# ------------------------------------------------------------------------------------------------ moving
+def test_joint_moves_arrive(ready: UR5e, fake: FakeUr) -> None:
+    target = turned(ready, 0.4)
+    ready.move_to_joints(list(reversed(target)), 0.8)
+    assert fake.truth()["q"] == pytest.approx([joint.value for joint in target], abs=1e-3)
+    assert ready.last_move is not None
+    assert (ready.last_move.end, ready.last_move.speed) == (MoveEnd.DONE, pytest.approx(0.8))
+    assert ready.last_move.pose.position.distance_to(ready.get_end_effector_pose("tcp").position) < 1e-6
+
+
+def test_a_linear_move_is_linear_at_the_speed_asked_for(ready: UR5e, fake: FakeUr) -> None:
+    start = ready.get_end_effector_pose("tcp")
+    target = Pose(start.position + Position(0.0, -0.3, -0.1), start.orientation)
+    doing = Doing(ready.move_to_pose, "tcp", target, 0.25)
+    seen = []
+    while fake.truth()["moving"] or not seen or len(seen) < 20:
+        seen.append(ready.get_end_effector_pose("tcp").position)
+        time.sleep(0.01)
+    doing.result()
+    away = start.position.distance_to(target.position)
+    for at in seen:
+        detour = start.position.distance_to(at) + at.distance_to(target.position) - away
+        assert detour < 1e-4
+    assert ready.get_end_effector_pose("tcp").position.distance_to(target.position) < 1e-3
+    assert ready.last_move is not None
+    assert ready.last_move.duration >= away / 0.25
+
+
+def test_point_motion_takes_the_controllers_own_kinematics(ready: UR5e) -> None:
+    start = ready.get_end_effector_pose("tcp")
+    target = Pose(start.position + Position(0.05, 0.2, 0.1), start.orientation)
+    ready.move(target, MoveType.JOINT, 0.8)
+    assert ready.get_end_effector_pose("tcp").position.distance_to(target.position) < 1e-3
+    joints = ready.inverse_kinematics("tcp", start)
+    assert ready.forward_kinematics("tcp", joints).position.distance_to(start.position) < 1e-6
+    with pytest.raises(UR5e.KinematicsException, match="cannot reach"):
+        ready.move_to_pose("tcp", Pose(Position(3.0, 0.0, 0.0)), 0.5)
+    ready.move_to_joints(turned(ready, 0.1), 0.8)  # an unreachable pose has not ended the control program
+
+
+def test_bad_input_is_refused_before_anything_moves(ready: UR5e, fake: FakeUr) -> None:
+    q = fake.truth()["q"]
+    with pytest.raises(OutOfRange, match="speed"):
+        ready.move_to_joints(ready.robot_joints(), 1.5)
+    with pytest.raises(OutOfRange, match="speed"):
+        ready.move_to_joints(ready.robot_joints(), math.nan)
+    with pytest.raises(InvalidData, match="elbow_joint"):
+        ready.move_to_joints(ready.robot_joints()[:5], 0.5)
+    with pytest.raises(OutOfRange, match="shoulder_pan_joint"):
+        ready.move_to_joints(turned(ready, 9.0), 0.5)
+    with pytest.raises(OutOfRange, match="finite"):
+        ready.move_to_pose("tcp", Pose(Position(math.nan, 0.0, 0.0)), 0.5)
+    assert fake.truth()["q"] == q
+
+
+def test_one_motion_at_a_time(ready: UR5e, fake: FakeUr) -> None:
+    doing = far_move(ready, fake)
+    with pytest.raises(Refused, match="moving already"):
+        ready.move_to_joints(ready.robot_joints(), 0.5)
+    assert ready.state().moving
+    ready.stop()
+    with pytest.raises(Cancelled):
+        doing.result()
+
+
+def test_manual_mode_caps_the_tcp(ready: UR5e, fake: FakeUr) -> None:
+    fake.do("operational_mode", mode="MANUAL")
+    time.sleep(0.55)  # the key is looked at twice a second
+    speeds = []
+    for move in (
+        lambda: ready.move_to_joints(turned(ready, 0.15), 1.0),
+        lambda: (
+            ready.move_to_pose("tcp", Pose(), 1.0)
+            if False
+            else ready.move_to_pose(
+                "tcp",
+                Pose(
+                    ready.get_end_effector_pose("tcp").position + Position(0.0, -0.2, 0.0),
+                    ready.get_end_effector_pose("tcp").orientation,
+                ),
+                1.0,
+            )
+        ),
+    ):
+        doing = Doing(move)
+        last, at = ready.get_end_effector_pose("tcp").position, time.monotonic()
+        while not doing.ended_at:
+            time.sleep(0.05)
+            now, position = time.monotonic(), ready.get_end_effector_pose("tcp").position
+            speeds.append(position.distance_to(last) / (now - at))
+            last, at = position, now
+        doing.result()
+    assert 0.15 < max(speeds) < 0.28
+    with pytest.raises(OutOfRange, match="twist"):
+        ready.jog((0.3, 0.0, 0.0, 0.0, 0.0, 0.0))
+
+
+def test_a_slow_slider_gives_a_move_more_time(ready: UR5e, fake: FakeUr) -> None:
+    fake.do("speed_slider", fraction=0.1)
+    ready.move_to_joints(turned(ready, 0.3), 0.5)
+    assert fake.truth()["q"][0] == pytest.approx(0.3, abs=1e-3)
+
+
+# ------------------------------------------------------------------------------------------------ stopping
+def test_stop_passes_the_move_and_says_what_was_sent(ready: UR5e, fake: FakeUr) -> None:
+    took = []
+    for _ in range(5):
+        doing = far_move(ready, fake)
+        sent = time.monotonic()
+        ready.stop()
+        stopped = time.monotonic()
+        with pytest.raises(Cancelled, match="stopped"):
+            doing.result(1.0)
+        assert not fake.truth()["moving"], "stop returns when the arm stands"
+        last = fake.do("stops")[-1]
+        assert last["code"] == 33
+        took.append(last["t"] - sent)
+        assert stopped - sent < 1.0
+        fake.do("place", q=[0.0, *fake.truth()["q"][1:]])
+        time.sleep(0.05)
+    assert max(took) < 0.1
+    assert ready.last_move is not None
+    assert ready.last_move.end is MoveEnd.STOPPED
+    assert ready.control_owner() == "us"
+    stays(fake, 0.3)
+    ready.move_to_joints(turned(ready, 0.1), 0.5)
+
+
+def test_the_dashboard_stops_when_the_control_process_hangs(ready: UR5e, fake: FakeUr) -> None:
+    doing = far_move(ready, fake)
+    children = [child for child in psutil.Process().children() if "control_process" in " ".join(child.cmdline())]
+    assert len(children) == 1
+    children[0].send_signal(signal.SIGSTOP)
+    began = time.monotonic()
+    ready.stop()
+    with pytest.raises(DeviceError):
+        doing.result(2.0)
+    assert at_rest(fake, 1.0) + time.monotonic() - began < 1.0
+    assert fake.do("stops")[-1]["via"] == "dashboard"
+    fake.control.wait_until(lambda t: t["program"] is None)
+    ready.move_to_joints(turned(ready, 0.1), 0.5)  # a stop of ours costs nobody control
+
+
+def test_a_motion_that_waits_is_dropped_by_a_stop(ready: UR5e, fake: FakeUr) -> None:
+    taken = len(fake.do("commands_taken"))
+    stops = ready._stops
+    with pytest.raises(Cancelled):
+        ready._session.call(  # type: ignore[union-attr]
+            "a move", "moveJ", [0.0] * 6, 0.5, 0.5, True, valid=lambda: ready._stops != stops
+        )
+    assert len(fake.do("commands_taken")) == taken
+
+
+# ------------------------------------------------------------------------------------------------ safety
+def test_after_a_safeguard_stop_nothing_moves_until_a_new_command(ready: UR5e, fake: FakeUr) -> None:
+    doing = far_move(ready, fake)
+    fake.do("safeguard_stop")
+    with pytest.raises(SafetyStop) as stop:
+        doing.result(1.0)
+    assert stop.value.kind == "safeguard_stop"
+    assert ready.last_move is not None
+    assert ready.last_move.end is MoveEnd.SAFETY
+    fake.control.wait_until(lambda t: not t["moving"] and t["program"] is None)
+    fake.do("safeguard_stop", on=False)
+    stays(fake)
+    with pytest.raises(NotInControl, match="safeguard stop"):
+        ready.move_to_joints(turned(ready, 0.1), 0.5)
+    ready.take_control()
+    ready.move_to_joints(turned(ready, 0.1), 0.5)
+
+
+def test_a_protective_stop_is_acknowledged_by_a_person_only(ready: UR5e, fake: FakeUr) -> None:
+    doing = far_move(ready, fake)
+    fake.do("protective_stop")
+    with pytest.raises(SafetyStop) as stop:
+        doing.result(1.0)
+    assert stop.value.kind == "protective_stop"
+    fake.control.wait_until(lambda t: not t["moving"])
+    with pytest.raises(SafetyStop):
+        ready.take_control()
+    with pytest.raises(InvalidData, match="confirmed_by"):
+        ready.acknowledge_protective_stop(" ")
+    with pytest.raises(Refused, match="5s"):
+        ready.acknowledge_protective_stop("Eva")  # too early: the controller's own words
+    with pytest.raises(Refused, match="acknowledge_protective_stop"):
+        ready.acknowledge("protective_stop")
+    assert fake.truth()["safety"] == "PROTECTIVE_STOP"
+
+    def acknowledged() -> bool:
+        try:
+            ready.acknowledge_protective_stop("Eva")
+        except Refused:
+            return False
+        return True
+
+    wait(acknowledged, 8.0)
+    assert fake.truth()["safety"] == "NORMAL"
+    stays(fake)
+    assert ready.control_owner() is None
+    ready.take_control()
+    ready.move_to_joints(turned(ready, 0.1), 0.5)
+
+
+def test_hand_teaching(ready: UR5e, fake: FakeUr) -> None:
+    ready.set_hand_teaching_mode(True)
+    assert ready.get_hand_teaching_mode()
+    assert fake.truth()["freedrive"]
+    with pytest.raises(Refused, match="hand teaching"):
+        ready.move_to_joints(ready.robot_joints(), 0.5)
+    ready.stop()
+    assert not ready.get_hand_teaching_mode()
+    assert not fake.truth()["freedrive"]
+
+
+def test_a_jog_runs_out_by_itself(ready: UR5e, fake: FakeUr) -> None:
+    start = ready.get_end_effector_pose("tcp").position
+    for _ in range(5):
+        ready.jog((0.0, -0.1, 0.0, 0.0, 0.0, 0.0), valid_for=0.2)
+        time.sleep(0.1)
+    assert fake.truth()["moving"]
+    at_rest(fake, 0.6)
+    way = ready.get_end_effector_pose("tcp").position - start
+    assert way.y < -0.03
+    assert abs(way.x) + abs(way.z) < 0.005
+    assert ready.control_owner() == "us"
+
+
+# ------------------------------------------------------------------------------------------------ losing each other
+@pytest.mark.parametrize("fault", ["silence", "reset", "half_frame"])
+def test_a_cable_cut_in_mid_move(ready: UR5e, fake: FakeUr, fault: str) -> None:
+    doing = far_move(ready, fake)
+    scripts = fake.truth()["scripts_taken"]
+    fake.do(fault)
+    cut = time.monotonic()
+    with pytest.raises((ConnectionLost, Stale)):
+        doing.result(2.0)
+    assert doing.ended_at - cut < 1.0
+    assert at_rest(fake, 0.5) < 0.5
+    time.sleep(0.2)
+    fake.do("heal")
+    wait(lambda: ready.connection.value == "back")
+    stays(fake)
+    truth = fake.truth()
+    assert truth["program"] is None, "nothing of ours plays on"
+    if fault != "reset":  # within the instant of a reset the library may send its program once more; it was stopped
+        assert truth["scripts_taken"] == scripts
+    with pytest.raises(NotInControl):
+        ready.move_to_joints(turned(ready, 0.1), 0.5)
+    ready.take_control()
+    ready.move_to_joints(turned(ready, 0.1), 0.5)
+
+
+def test_a_silence_as_long_as_the_library_cannot_bear(ready: UR5e, fake: FakeUr) -> None:
+    fake.do("silence")
+    time.sleep(3.5)
+    fake.do("heal")
+    wait(lambda: ready.connection.value == "back")
+    fake.do("foreign_program", on=True)
+    time.sleep(0.5)
+    assert fake.truth()["program"] is not None, "nothing of ours came back and killed it"
+
+
+@pytest.fixture
+def owner(fake: FakeUr) -> Iterator[Callable[[], Any]]:
+    """Gives ``owner()``: another process that has a long move of the arm under way."""
+    started: list[subprocess.Popen[bytes]] = []
+    code = textwrap.dedent(
+        f"""
+        from arcor2_drivers.universal_robots.settings import UrSettings
+        from arcor2_drivers.universal_robots.ur5e import UR5e
+        from arcor2_hw.data.geometry import Pose
+        robot = UR5e("obj_1", "ur", Pose(), UrSettings({fake.host!r}, payload_mass=1.0))
+        robot.connect(3.0)
+        robot.take_control()
+        joints = robot.robot_joints()
+        joints[0].value += 3.0
+        robot.move_to_joints(joints, 1.0)
+        """
+    )
+
+    def start() -> subprocess.Popen[bytes]:
+        started.append(subprocess.Popen([sys.executable, "-c", code]))
+        moving(fake)
+        return started[-1]
+
+    yield start
+    for process in started:
+        if process.poll() is None:
+            process.kill()
+        process.wait()
+
+
+def test_the_watchdog_stops_the_arm_of_a_killed_owner(owner: Callable[[], Any], fake: FakeUr) -> None:
+    assert UR5e.loss_reaction.kind is LossKind.STOPS_WITHIN
+    process = owner()
+    time.sleep(0.5)  # at full speed
+    children = psutil.Process(process.pid).children()
+    trips = fake.truth()["watchdog_trips"]
+    os.kill(process.pid, signal.SIGKILL)
+    assert at_rest(fake, 2.0) < UR5e.loss_reaction.within
+    assert fake.truth()["watchdog_trips"] == trips + 1
+    process.wait()
+    psutil.wait_procs(children, timeout=2.0)
+    assert not any(child.is_running() and child.status() != psutil.STATUS_ZOMBIE for child in children)
+    stays(fake)
+
+
+def test_a_stopped_owner_stops_the_arm(owner: Callable[[], Any], fake: FakeUr) -> None:
+    process = owner()
+    time.sleep(0.3)
+    os.kill(process.pid, signal.SIGSTOP)  # it lives, but no longer works
+    assert at_rest(fake, 2.0) < UR5e.loss_reaction.within
+
+
+def test_a_program_stopped_at_the_pendant_ends_control(ready: UR5e, fake: FakeUr) -> None:
+    doing = far_move(ready, fake)
+    other = make(fake.host)
+    other._dashboard.do("stop", "Stopped")
+    other._dashboard.close()
+    with pytest.raises(NotInControl, match="not by this driver"):
+        doing.result(1.0)
+
+
+# ------------------------------------------------------------------------------------------------ inputs and outputs
+def test_outputs_and_inputs(ready: UR5e, fake: FakeUr) -> None:
+    for number in (0, 7, 8, 15, 16, 17):
+        ready.set_digital_output(number, True)
+        assert fake.truth()["digital_outputs"] >> number & 1
+    ready.set_digital_output(8, False)
+    assert not fake.truth()["digital_outputs"] >> 8 & 1
+    for number in (0, 7, 8, 15, 16, 17):
+        ready.set_digital_output(number, False)
+    assert not ready.get_digital_input(4)
+    doing = Doing(ready.wait_for_input, 4, True, 5.0)
+    fake.do("set_input", bit=4, on=True)
+    doing.result(1.0)
+    fake.do("set_input", bit=4, on=False)
+    wait(lambda: not ready.get_digital_input(4))
+    waiting = Doing(ready.wait_for_input, 4, True, 5.0)
+    time.sleep(0.05)
+    ready.stop()
+    with pytest.raises(Cancelled):
+        waiting.result(1.0)
+
+
+def test_pick_and_place_by_the_sensors_word(fake: FakeUr) -> None:
+    robot = make(fake.host, gripper_output=0, part_sensor_input=1)
+    robot.connect(3.0)
+    try:
+        robot.take_control()
+        start = robot.get_end_effector_pose("tcp")
+        target = Pose(start.position + Position(0.0, 0.0, -0.1), start.orientation)
+        with pytest.raises(DeviceFault, match="picked nothing") as fault:
+            robot.pick(target, approach=0.05, slow_speed=0.5)
+        assert fault.value.fault_code == "nothing_held"
+        assert not fake.truth()["digital_outputs"] & 1
+        picking = Doing(robot.pick, target, approach=0.05, slow_speed=0.5)
+        fake.control.wait_until(lambda t: t["digital_outputs"] & 1)
+        at = robot.get_end_effector_pose("tcp").position
+        fake.do("set_input", bit=1, on=True)
+        picking.result()
+        assert at.distance_to(target.position) < 0.002, "it grips at the part"
+        up = target.position - Position(*Position(0.0, 0.0, 0.05).rotated(target.orientation))
+        assert robot.get_end_effector_pose("tcp").position.distance_to(up) < 0.002
+        placing = Doing(robot.place, target, approach=0.05, slow_speed=0.5)
+        fake.control.wait_until(lambda t: not t["digital_outputs"] & 1)
+        fake.do("set_input", bit=1, on=False)
+        placing.result()
+        with pytest.raises(AssertionError):
+            robot.pick(target, approach=0.9)
+    finally:
+        fake.do("set_input", bit=1, on=False)
+        robot.disconnect()
+
+
+def test_a_stop_ends_a_pick_as_a_whole_and_keeps_the_gripper(fake: FakeUr) -> None:
+    robot = make(fake.host, gripper_output=0, gripper_time=1.0)
+    robot.connect(3.0)
+    try:
+        robot.take_control()
+        start = robot.get_end_effector_pose("tcp")
+        picking = Doing(robot.pick, start, approach=0.0, slow_speed=0.5)
+        fake.control.wait_until(lambda t: t["digital_outputs"] & 1)
+        robot.stop()
+        with pytest.raises(Cancelled):
+            picking.result(1.0)
+        stays(fake, 0.3)
+        assert fake.truth()["digital_outputs"] & 1, "a stop does not open a gripper"
+    finally:
+        robot.disconnect()
+
+
+def test_the_tool_is_told(ready: UR5e, fake: FakeUr) -> None:
+    before = ready.get_end_effector_pose("tcp").position
+    ready.set_tool(Pose(Position(0.0, 0.0, 0.2), Orientation()), 2.0, (0.0, 0.0, 0.05))
+    truth = fake.truth()
+    assert truth["payload"] == pytest.approx(2.0)
+    assert truth["payload_cog"] == pytest.approx([0.0, 0.0, 0.05])
+    wait(lambda: abs(ready.get_end_effector_pose("tcp").position.distance_to(before) - 0.1) < 1e-6)
+    with pytest.raises(OutOfRange, match="mass"):
+        ready.set_tool(Pose(), 9.0, (0.0, 0.0, 0.0))
