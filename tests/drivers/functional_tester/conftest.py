@@ -1,0 +1,58 @@
+"""A fake tester in a process of its own, and the driver on its wire."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from arcor2_drivers.functional_tester.functional_tester import FunctionalTester
+from arcor2_drivers.functional_tester.settings import FunctionalTesterSettings
+from arcor2_hw.data.geometry import Pose
+from tests.fakes.conftest import FakeProcess, start_fake, wait_for
+
+__all__ = ["start_fake", "wait_for"]
+
+
+@pytest.fixture
+def fake(start_fake: Callable[..., FakeProcess]) -> FakeProcess:
+    return start_fake("functional_tester", "--seed", "1", "--test-time", "1.5", "--time-scale", "5")
+
+
+@pytest.fixture
+def make() -> Iterator[Callable[..., FunctionalTester]]:
+    """Gives ``make("127.0.0.1:4000", watchdog_ms=500)``: a driver, not connected; it is disconnected in the end."""
+    made: list[FunctionalTester] = []
+
+    def build(address: str, **settings: Any) -> FunctionalTester:
+        host, _, port = address.rpartition(":")
+        tester = FunctionalTester(
+            "tester_id", "tester", Pose(), None, settings=FunctionalTesterSettings(host, int(port), **settings)
+        )
+        made.append(tester)
+        return tester
+
+    yield build
+    for tester in made:
+        tester.disconnect()
+
+
+@pytest.fixture
+def observed(fake: FakeProcess, make: Callable[..., FunctionalTester]) -> FunctionalTester:
+    tester = make(fake.ready["modbus"])
+    tester.connect()
+    return tester
+
+
+@pytest.fixture
+def tester(observed: FunctionalTester) -> FunctionalTester:
+    observed.take_control()
+    return observed
+
+
+@pytest.fixture
+def loaded(fake: FakeProcess, tester: FunctionalTester) -> FunctionalTester:
+    """With a good board behind the closed door."""
+    tester.open_door()
+    fake.control.do("put_board", code="GOOD-1")
+    tester.close_door()
+    return tester

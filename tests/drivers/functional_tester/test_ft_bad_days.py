@@ -1,0 +1,313 @@
+"""The functional tester's driver when the wire fails, answers come late, or the driver's own process is killed."""
+
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+from pymodbus.client import ModbusTcpClient
+
+from arcor2_drivers.functional_tester.functional_tester import FunctionalTester
+from arcor2_drivers.functional_tester.settings import FunctionalTesterSettings
+from arcor2_hw.data.device import Connection
+from arcor2_hw.exceptions import (
+    ConnectionLost,
+    DeviceError,
+    DeviceFault,
+    DeviceTimeout,
+    NotConnected,
+    NotInControl,
+    OutOfRange,
+    Stale,
+)
+from arcor2_hw.objects import MachineCommand, MachineState
+from tests.drivers.functional_tester.relay import Relay
+from tests.fakes.conftest import FakeProcess
+
+READ_INPUT_REGISTERS, WRITE_REGISTERS = 4, 16
+QUICK: dict[str, Any] = {"request_timeout": 0.15, "watchdog_ms": 600}
+
+
+@pytest.fixture
+def quick(make: Callable[..., FunctionalTester], slow_fake: FakeProcess) -> FunctionalTester:
+    """A driver that gives up soon, in control of a tester with a board behind its door."""
+    slow_fake.control.do("push_door", opening=True)
+    slow_fake.control.do("put_board", code="B-1")
+    slow_fake.control.do("push_door", opening=False)
+    tester = make(slow_fake.ready["modbus"], **QUICK)
+    tester.connect()
+    tester.take_control()
+    return tester
+
+
+@pytest.fixture
+def relay(fake: FakeProcess) -> Iterator[Relay]:
+    with Relay(fake.ready["modbus"]) as relay:
+        yield relay
+
+
+@pytest.fixture
+def slow_fake(start_fake: Callable[..., FakeProcess]) -> FakeProcess:
+    """A test takes 4 s, all else is quick."""
+    return start_fake("functional_tester", "--seed", "1", "--test-time", "20", "--time-scale", "5")
+
+
+@contextmanager
+def running_test(fake: FakeProcess, tester: FunctionalTester) -> Iterator[list[Any]]:
+    """A test in a thread, seen to be in Execute; the list holds what it gave or raised, and when."""
+    outcome: list[Any] = []
+
+    def run() -> None:
+        try:
+            outcome.append(tester.test())
+        except Exception as error:
+            outcome.append(error)
+        outcome.append(time.monotonic())
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    tester.wait_for(MachineState.EXECUTE, 3.0)
+    try:
+        yield outcome
+    finally:
+        thread.join(10.0)
+
+
+# ------------------------------------------------------------------------------------------------ connecting
+def test_nobody_there(make: Callable[..., FunctionalTester]) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))  # not listening: refuses
+        address = "{}:{}".format(*taken.getsockname())
+        tester = make(address)
+        began = time.monotonic()
+        with pytest.raises(NotConnected, match=f"^tester at {address} "):
+            tester.connect(1.0)
+        assert time.monotonic() - began < 1.0
+        assert tester.connection is Connection.FAILED
+        with pytest.raises(NotConnected, match=address):
+            tester.machine_state()
+        with pytest.raises(NotConnected, match=address):
+            tester.test()
+
+
+@pytest.mark.parametrize("fault", ["silence", "half_frame", "garbage"])
+def test_connecting_to_one_that_does_not_answer_sensibly(
+    fake: FakeProcess, make: Callable[..., FunctionalTester], fault: str
+) -> None:
+    fake.control.do(fault)
+    tester = make(fake.ready["modbus"])
+    began = time.monotonic()
+    with pytest.raises(DeviceTimeout, match=f"^tester at {fake.ready['modbus']}"):
+        tester.connect(0.6)
+    assert time.monotonic() - began < 0.8
+    fake.control.do("heal")
+    tester.connect()
+    assert tester.machine_state() is MachineState.STOPPED
+
+
+def test_silent_peer_that_is_no_tester(make: Callable[..., FunctionalTester]) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = "{}:{}".format(*server.getsockname())
+        with pytest.raises(DeviceTimeout, match=f"{address}: no answer came within .* \\(reading the input registers"):
+            make(address).connect(0.5)
+
+
+# ------------------------------------------------------------------------------------------------ losses
+@pytest.mark.parametrize(
+    ("fault", "within"), [("reset", 0.3), ("silence", 1.0), ("half_frame", 1.0), ("garbage", 1.0), ("refuse", None)]
+)
+def test_loss_in_mid_test(
+    slow_fake: FakeProcess, quick: FunctionalTester, wait_for: Callable[..., Any], fault: str, within: float | None
+) -> None:
+    with running_test(slow_fake, quick) as outcome:
+        began = time.monotonic()
+        slow_fake.control.do(fault)
+        if fault == "refuse":  # only new connections are refused: the test goes on until this one breaks too
+            slow_fake.control.do("reset")
+    assert isinstance(outcome[0], ConnectionLost)
+    assert f"tester at {slow_fake.ready['modbus']}: the connection was lost" in str(outcome[0])
+    assert outcome[1] - began < (within or 0.3) + 0.3
+    # The station is left alone until it has ended the test by itself, and nothing begins again.
+    wait_for(slow_fake.truth, lambda truth: truth["fault"] == 105)
+    slow_fake.control.do("heal")
+    wait_for(lambda: quick.connection, lambda state: state is Connection.BACK, within=8.0)
+    assert quick.machine_state() is MachineState.ABORTED
+    assert quick.control_owner() is None
+    with pytest.raises(NotInControl):
+        quick.clear()
+    quick.take_control()
+    quick.clear()
+    assert quick.connection is Connection.ONLINE
+    truth = slow_fake.truth()
+    assert (truth["state"], truth["tested"], truth["watchdog_ms"]) == ("Stopped", 0, 600)
+
+
+def test_loss_while_the_door_moves(
+    slow_fake: FakeProcess, quick: FunctionalTester, wait_for: Callable[..., Any]
+) -> None:
+    slow_fake.control.do("silence")
+    began = time.monotonic()
+    with pytest.raises((ConnectionLost, DeviceTimeout), match=slow_fake.ready["modbus"]):
+        quick.open_door()
+    assert time.monotonic() - began < 1.5
+    slow_fake.control.do("heal")
+    wait_for(lambda: quick.connection, lambda state: state is Connection.BACK)
+    assert slow_fake.truth()["door"] == "closed"
+
+
+def test_a_late_answer_to_a_reading(relay: Relay, make: Callable[..., FunctionalTester]) -> None:
+    """The reading is repeated on a new connection; the late answer finds nobody; nothing counts as lost."""
+    tester = make(relay.address, request_timeout=0.2)
+    tester.connect()
+    tester.take_control()
+    relay.delay_next(READ_INPUT_REGISTERS, 0.4)
+    tester.open_door()
+    assert relay.connections == 2
+    assert tester.connection is Connection.ONLINE
+    assert tester.control_owner() == "us"
+    assert tester.machine_state() is MachineState.STOPPED
+
+
+def test_a_late_answer_to_a_write(
+    relay: Relay, make: Callable[..., FunctionalTester], fake: FakeProcess, wait_for: Callable[..., Any]
+) -> None:
+    """A write is sent once; what became of it is said to be unknown; its late answer answers nothing."""
+    tester = make(relay.address, request_timeout=0.2)
+    tester.connect()
+    tester.take_control()
+    relay.delay_next(WRITE_REGISTERS, 0.4)
+    before = relay.requests[WRITE_REGISTERS]
+    with pytest.raises(DeviceTimeout, match=f"^tester at {relay.address}: .* it may have been obeyed$"):
+        tester.open_door()
+    assert relay.requests[WRITE_REGISTERS] == before + 1
+    wait_for(lambda: fake.truth()["door"], lambda door: door == "open")  # it was
+    tester.close_door()
+    assert relay.connections == 2
+    assert fake.truth()["door"] == "closed"
+
+
+def test_an_answer_with_another_transactions_number_is_none(
+    relay: Relay, make: Callable[..., FunctionalTester]
+) -> None:
+    tester = make(relay.address, request_timeout=0.2)
+    tester.connect()
+    relay.renumber_next(READ_INPUT_REGISTERS)
+    assert tester.board_present() is False
+    assert relay.connections == 2
+
+
+def test_state_gets_stale_before_it_is_called_lost(
+    fake: FakeProcess, observed: FunctionalTester, wait_for: Callable[..., Any]
+) -> None:
+    assert observed.machine_state() is MachineState.STOPPED
+    fake.control.do("silence")
+    with pytest.raises(Stale, match=f"tester at {fake.ready['modbus']}: the newest state is 0.5. s old"):
+        wait_for(observed.machine_state, lambda state: state is not MachineState.STOPPED)
+    wait_for(lambda: observed.connection, lambda state: state is Connection.LOST)
+    with pytest.raises(ConnectionLost, match=fake.ready["modbus"]):
+        observed.machine_state()
+
+
+def test_observation_comes_back_by_itself_and_control_does_not(
+    fake: FakeProcess, tester: FunctionalTester, wait_for: Callable[..., Any]
+) -> None:
+    fake.control.do("reset")
+    wait_for(lambda: tester.connection, lambda state: state is Connection.BACK)
+    assert tester.machine_state() is MachineState.STOPPED
+    assert tester.control_owner() is None
+    with pytest.raises(NotInControl, match="open_door is refused in state Stopped: nobody has control"):
+        tester.open_door()
+    tester.take_control()
+    assert tester.connection is Connection.ONLINE
+    tester.open_door()
+
+
+def test_disconnect_is_quick_whatever_the_wire_does(fake: FakeProcess, tester: FunctionalTester) -> None:
+    fake.control.do("silence")
+    began = time.monotonic()
+    tester.disconnect()
+    assert time.monotonic() - began < 1.0
+    assert tester.connection is Connection.OFFLINE
+    tester.disconnect()
+    fake.control.do("heal")
+    tester.connect()
+    assert tester.machine_state() is MachineState.STOPPED
+
+
+HOST = """
+import sys
+from arcor2_drivers.functional_tester.functional_tester import FunctionalTester
+from arcor2_drivers.functional_tester.settings import FunctionalTesterSettings
+from arcor2_hw.data.geometry import Pose
+host, port = sys.argv[1].rsplit(":", 1)
+settings = FunctionalTesterSettings(host, int(port), watchdog_ms=500, request_timeout=0.15)
+tester = FunctionalTester("id", "tester", Pose(), None, settings=settings)
+tester.connect()
+tester.take_control()
+tester.test()
+"""
+
+
+def test_host_watchdog_trips_when_the_drivers_process_is_killed(
+    slow_fake: FakeProcess, wait_for: Callable[..., Any]
+) -> None:
+    slow_fake.control.do("push_door", opening=True)
+    slow_fake.control.do("put_board", code="B-1")
+    slow_fake.control.do("push_door", opening=False)
+    process = subprocess.Popen([sys.executable, "-c", HOST, slow_fake.ready["modbus"]])
+    try:
+        wait_for(slow_fake.truth, lambda truth: truth["state"] == "Execute", within=15.0)
+        time.sleep(1.0)  # twice the watchdog's time: the driver keeps it quiet
+        assert slow_fake.truth()["state"] == "Execute"
+        process.kill()
+        killed = time.monotonic()
+        truth = wait_for(slow_fake.truth, lambda truth: truth["state"] == "Aborted", within=2.0)
+        assert time.monotonic() - killed < FunctionalTester.loss_reaction.within
+    finally:
+        process.kill()
+        process.wait()
+    assert (truth["fault"], truth["tested"]) == (105, 0)
+
+
+# ------------------------------------------------------------------------------------------------ odd peers
+def test_sequence_numbers_go_on_where_another_host_left_them(fake: FakeProcess, tester: FunctionalTester) -> None:
+    host, _, port = fake.ready["modbus"].rpartition(":")
+    other = ModbusTcpClient(host, port=int(port))
+    try:
+        other.write_registers(0, [MachineCommand.RESET, 0xFFFF], device_id=1)
+        tester.wait_for(MachineState.IDLE, 2.0)
+        tester.command(MachineCommand.STOP)
+        tester.wait_for(MachineState.STOPPED, 2.0)
+        assert other.read_holding_registers(1, count=1, device_id=1).registers == [0]
+    finally:
+        other.close()
+
+
+def test_wrong_unit_is_refused_by_name(fake: FakeProcess, make: Callable[..., FunctionalTester]) -> None:
+    with pytest.raises((DeviceFault, DeviceTimeout), match=fake.ready["modbus"]):
+        make(fake.ready["modbus"], unit_id=7).connect(1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("host", " "),
+        ("port", 0),
+        ("port", 70000),
+        ("unit_id", 256),
+        ("watchdog_ms", 0),
+        ("watchdog_ms", 5000),
+        ("request_timeout", 1.0),
+        ("request_timeout", float("nan")),
+        ("test_timeout", 0.0),
+        ("door_timeout", float("inf")),
+    ],
+)
+def test_settings_out_of_range_name_the_parameter(name: str, value: Any) -> None:
+    with pytest.raises(OutOfRange, match=f"^{name} must be"):
+        FunctionalTesterSettings(**{"host": "127.0.0.1", name: value})
