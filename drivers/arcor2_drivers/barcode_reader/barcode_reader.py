@@ -45,8 +45,7 @@ class BarcodeReader(Reader):
     def disconnect(self) -> None:
         """Close; harmless when closed. A reading under way is ended first."""
         self._stops += 1
-        self._conversation.interrupt()
-        self._conversation.observing.stop()
+        self._conversation.close()
 
     @property
     def connection(self) -> Connection:
@@ -55,7 +54,7 @@ class BarcodeReader(Reader):
 
     @property
     def health(self) -> Health:
-        """Give the condition the reader told last; failure while it does not tell."""
+        """Give the condition the reader told last; failure when it does not tell any more."""
         return self._conversation.health
 
     def identify(self) -> Identity:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 from arcor2_hw.data.base import now
-from arcor2_hw.data.device import Alarm, Health, Severity
+from arcor2_hw.data.device import Alarm, Connection, Health, Severity
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotConnected, Refused
 from arcor2_hw.objects.observing import Observing
 
@@ -20,6 +20,9 @@ STATUS_PERIOD: Final = 1.0
 """s between questions how the reader is, while nothing is read."""
 INBOX: Final = 64
 """Lines kept for an asker; who is that far behind has nobody who asks."""
+
+LAST_WORD: Final = 0.2
+"""s for one who reads to end it before the line is closed."""
 
 _COMPLAINTS: Final = {
     "DIRTY": ("the window is dirty", "clean the window", Severity.WARNING),
@@ -49,8 +52,15 @@ class Conversation:
 
     @property
     def health(self) -> Health:
-        """Give the condition the reader told last; failure while it does not tell."""
-        return self._condition if self.observing.online else Health.FAILURE
+        """Give the condition the reader told last; failure when it does not tell any more."""
+        return Health.FAILURE if self.observing.state in (Connection.LOST, Connection.FAILED) else self._condition
+
+    def close(self) -> None:
+        """Stop listening; harmless when closed. Whoever reads has a moment to tell the reader that it may end."""
+        self.interrupt()
+        if self._busy.acquire(timeout=LAST_WORD):
+            self._busy.release()
+        self.observing.stop()
 
     # -------------------------------------------------------------------------------- asking
     @contextlib.contextmanager
@@ -140,7 +150,7 @@ class Conversation:
             line.write(lines.STATUS)
             until = min(deadline, time.monotonic() + max(self._settings.answer_timeout, 0.5 * timeout))
             while time.monotonic() < until:
-                if any([self._hear_status(text) for text in line.read()]):
+                if any(self._hear_status(text) for text in line.read()):
                     with self._came:
                         self._inbox.clear()
                         self._loss = None

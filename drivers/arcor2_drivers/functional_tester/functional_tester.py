@@ -81,10 +81,12 @@ class FunctionalTester(Machine, CollisionObject):
 
     @property
     def health(self) -> Health:
-        """Give the condition as the tester last told it; failure while it does not tell."""
+        """Give the condition as the tester last told it; failure when it does not tell any more."""
         inputs = self._observer.newest()
-        if inputs is None or not self._observer.observing.online:
+        if self.connection in (Connection.LOST, Connection.FAILED):
             return Health.FAILURE
+        if inputs is None:
+            return Health.NORMAL
         if inputs.fault_code:
             return fault_of(inputs.fault_code).health
         return Health.NORMAL if inputs.mode is UnitMode.PRODUCE else Health.CHECK_FUNCTION
@@ -263,7 +265,6 @@ class FunctionalTester(Machine, CollisionObject):
         expected = (before.result_number + 1) & 0xFFFF
         go_on()
         self._observer.link.write(Holding.TEST_PROGRAM, program)
-        self._handshake.give(MachineCommand.START, go_on)
 
         def finished(inputs: Inputs) -> bool:
             go_on()
@@ -274,9 +275,11 @@ class FunctionalTester(Machine, CollisionObject):
             return inputs.state in (S.COMPLETE, S.RESETTING, S.IDLE) and inputs.result_number == expected
 
         try:
+            self._handshake.give(MachineCommand.START, go_on)
             after = self._observer.wait(finished, self._test_timeout, what)
         except DeviceTimeout:
-            self.stop()  # late is as good as never: nothing may go on that nobody waits for
+            with contextlib.suppress(DeviceError):  # the tester's watchdog is left then
+                self.stop()  # nothing may go on that nobody waits for any more
             raise
         if after.result not in (1, 2):
             raise DeviceFault(f"{self._observer.who}: {what} ended with result {after.result}, neither pass nor fail")

@@ -17,7 +17,6 @@ from arcor2_drivers.functional_tester.settings import FunctionalTesterSettings
 from arcor2_hw.data.device import Connection
 from arcor2_hw.exceptions import (
     ConnectionLost,
-    DeviceError,
     DeviceFault,
     DeviceTimeout,
     NotConnected,
