@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Final
 
 from arcor2_hw.data.device import Connection
-from arcor2_hw.exceptions import ConnectionLost, DeviceError, NotConnected
+from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected
 
 ATTEMPT_TIMEOUT: Final = 2.0
 """Seconds an attempt to come back may take: a device on a local network answers in one."""
@@ -42,6 +42,7 @@ class Observing:
         self._life = threading.Lock()
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
+        self._ending: threading.Thread | None = None
         self._state = Connection.OFFLINE
         self._reason: DeviceError | None = None
 
@@ -74,9 +75,11 @@ class Observing:
             if self._thread is not None:
                 self.check()
                 return
+            deadline = time.monotonic() + timeout
+            self._await_former(timeout)
             self._state = Connection.CONNECTING
             try:
-                self._open(timeout)
+                self._open(max(deadline - time.monotonic(), 0.001))
             except BaseException as e:
                 self._close()
                 self._state = Connection.FAILED
@@ -97,7 +100,16 @@ class Observing:
             self._stopping.set()
             if thread is not None and thread is not threading.current_thread():
                 thread.join(STOP_WITHIN)
+                self._ending = thread if thread.is_alive() else None
             self._state = Connection.OFFLINE
+
+    def _await_former(self, timeout: float) -> None:
+        """Let a thread end that `stop` could not wait for: at its end it closes what is open."""
+        if self._ending is not None:
+            self._ending.join(timeout)
+            if self._ending.is_alive():
+                raise DeviceTimeout(f"the last connection to {self.what} is still being closed")
+            self._ending = None
 
     def _run(self, stopping: threading.Event) -> None:
         try:

@@ -19,7 +19,30 @@ def within(name: str, value: float, low: float, high: float) -> None:
 
 @dataclasses.dataclass
 class UrSettings(Settings):
-    """SI units. A negative payload mass means that nobody has stated it: control is refused until somebody does."""
+    """SI units. Poses of the TCP are in the flange; its orientation is a rotation vector.
+
+    :param host: address of the controller; its ports are fixed
+    :param payload_mass: mass at the flange, kg; negative: nobody has stated it, and control is refused
+    :param payload_cog_x: centre of gravity of the payload, m
+    :param payload_cog_y: centre of gravity of the payload, m
+    :param payload_cog_z: centre of gravity of the payload, m
+    :param tcp_x: tool centre point, m
+    :param tcp_y: tool centre point, m
+    :param tcp_z: tool centre point, m
+    :param tcp_rx: orientation at the tool centre point, rad
+    :param tcp_ry: orientation at the tool centre point, rad
+    :param tcp_rz: orientation at the tool centre point, rad
+    :param max_tcp_speed: what speed 1 means in a linear move, m/s
+    :param max_joint_speed: what speed 1 means in a joint move, rad/s
+    :param tcp_acceleration: acceleration of linear moves, m/s²
+    :param joint_acceleration: acceleration of joint moves, rad/s²
+    :param stop_deceleration: deceleration of a stop, m/s²
+    :param watchdog_frequency: the controller stops when it is not called that often, Hz
+    :param use_upper_range_registers: leave registers 0 to 23 to a fieldbus, where ur_rtde can
+    :param gripper_output: digital output of the gripper, 0 to 17; -1: there is none
+    :param part_sensor_input: digital input that tells of a held part, 0 to 17; -1: there is none
+    :param gripper_time: time the gripper takes to open or close, s
+    """
 
     host: str
     payload_mass: float = -1.0

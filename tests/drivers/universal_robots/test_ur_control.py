@@ -13,6 +13,7 @@ from typing import Any
 import psutil
 import pytest
 
+from arcor2_drivers.universal_robots import timing
 from arcor2_drivers.universal_robots.ur5e import UR5e
 from arcor2_drivers.universal_robots.ur_tasks import MoveType
 from arcor2_hw.data.device import LossKind
@@ -23,6 +24,7 @@ from arcor2_hw.exceptions import (
     ConnectionLost,
     DeviceError,
     DeviceFault,
+    DeviceTimeout,
     InvalidData,
     NotInControl,
     OutOfRange,
@@ -246,10 +248,25 @@ def test_manual_mode_caps_the_tcp(ready: UR5e, fake: FakeUr) -> None:
         ready.jog((0.3, 0.0, 0.0, 0.0, 0.0, 0.0))
 
 
-def test_a_slow_slider_gives_a_move_more_time(ready: UR5e, fake: FakeUr) -> None:
-    fake.do("speed_slider", fraction=0.1)
-    ready.move_to_joints(turned(ready, 0.3), 0.5)
-    assert fake.truth()["q"][0] == pytest.approx(0.3, abs=1e-3)
+def test_a_slow_slider_gives_a_move_more_time(ready: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(timing, "GRACE", 0.2)
+    fake.do("speed_slider", fraction=0.2)
+    ready.move_to_joints(
+        turned(ready, 0.15), 0.5
+    )  # five times as long as at full slider; half as much again is allowed
+    assert fake.truth()["q"][0] == pytest.approx(0.15, abs=1e-3)
+
+
+def test_a_move_that_does_not_end_in_its_time_is_stopped(
+    ready: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(timing, "GRACE", 0.1)
+    monkeypatch.setattr(timing, "SLACK", 0.1)
+    with pytest.raises(DeviceTimeout, match="time computed"):
+        ready.move_to_joints(turned(ready, 2.0), 0.5)
+    at_rest(fake, 0.5)
+    assert fake.truth()["q"][0] < 1.5
+    stays(fake, 0.3)
 
 
 # ------------------------------------------------------------------------------------------------ stopping
