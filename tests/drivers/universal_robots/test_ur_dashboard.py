@@ -1,0 +1,128 @@
+"""The dashboard connection: deadlines, late answers, idle connections that broke; and what the quality file claims."""
+
+import ast
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+import yaml
+
+from arcor2_drivers.universal_robots import ur5e
+from arcor2_drivers.universal_robots.dashboard import Dashboard
+from arcor2_hw.actions import metadata_of
+from arcor2_hw.exceptions import ConnectionLost, DeviceTimeout, NotConnected, Refused
+
+GREETING = b"Connected: Universal Robots Dashboard Server\n"
+Answer = Callable[[socket.socket, bytes], None]
+
+
+@pytest.fixture
+def server() -> Iterator[Callable[[Answer], Dashboard]]:
+    """Gives ``server(answer)``: a client of a dashboard server that treats each line so."""
+    made: list[tuple[socket.socket, Dashboard, threading.Thread]] = []
+
+    def serve(listening: socket.socket, answer: Answer) -> None:
+        while True:
+            try:
+                client, _ = listening.accept()
+            except OSError:
+                return
+            with client, client.makefile("rb") as lines:
+                try:
+                    client.sendall(GREETING)
+                    for line in lines:
+                        answer(client, line.strip())
+                except OSError:
+                    continue
+
+    def start(answer: Answer) -> Dashboard:
+        listening = socket.create_server(("127.0.0.1", 0))
+        thread = threading.Thread(target=serve, args=(listening, answer))
+        thread.start()
+        dashboard = Dashboard(*listening.getsockname())
+        made.append((listening, dashboard, thread))
+        return dashboard
+
+    yield start
+    for listening, dashboard, thread in made:
+        dashboard.close()
+        listening.shutdown(socket.SHUT_RDWR)
+        listening.close()
+        thread.join(5.0)
+
+
+def test_a_late_answer_answers_no_later_question(server: Callable[[Answer], Dashboard]) -> None:
+    def answer(client: socket.socket, line: bytes) -> None:
+        if line == b"slow":
+            time.sleep(0.3)
+        client.sendall(b"answer to " + line + b"\n")
+
+    dashboard = server(answer)
+    assert dashboard.ask("first") == "answer to first"
+    began = time.monotonic()
+    with pytest.raises(DeviceTimeout, match="slow"):
+        dashboard.ask("slow", 0.1)
+    assert time.monotonic() - began < 0.25
+    time.sleep(0.3)
+    assert dashboard.ask("next") == "answer to next"
+
+
+def test_what_comes_unasked_answers_nothing(server: Callable[[Answer], Dashboard]) -> None:
+    dashboard = server(lambda client, line: client.sendall(line + b"\nand one more\n"))
+    assert dashboard.ask("first") == "first"
+    time.sleep(0.05)
+    assert dashboard.ask("second") == "second"
+
+
+def test_an_idle_connection_that_was_closed_is_replaced(server: Callable[[Answer], Dashboard]) -> None:
+    def answer(client: socket.socket, line: bytes) -> None:
+        client.sendall(line + b"\n")
+        client.shutdown(socket.SHUT_RDWR)
+
+    dashboard = server(answer)
+    assert dashboard.ask("first") == "first"
+    time.sleep(0.05)
+    assert dashboard.ask("second") == "second"
+
+
+def test_what_goes_wrong_is_typed_and_names_the_address(server: Callable[[Answer], Dashboard]) -> None:
+    def answer(client: socket.socket, line: bytes) -> None:
+        if line == b"flood":
+            client.sendall(b"x" * 20000)
+        elif line == b"close":
+            client.shutdown(socket.SHUT_RDWR)
+        else:
+            client.sendall(b"No\n")
+
+    dashboard = server(answer)
+    for command in ("flood", "close"):
+        with pytest.raises(ConnectionLost, match=dashboard.address):
+            dashboard.ask(command)
+    with pytest.raises(Refused, match="'play': No"):
+        dashboard.do("play", "Starting program")
+    with pytest.raises(NotConnected, match=r"127\.0\.0\.1:1$"):
+        Dashboard("127.0.0.1", 1).ask("x")
+
+
+def test_what_the_quality_file_claims_is_there() -> None:
+    root = Path(__file__).parents[3]
+    claims = yaml.safe_load((root / "drivers/arcor2_drivers/universal_robots/quality.yaml").read_text())
+    assert len(claims["rules"]) == 8
+    for tests in claims["rules"].values():
+        for test in tests:
+            file, name = test.split("::")
+            tree = ast.parse((Path(__file__).parent / file).read_text())
+            assert name in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}, test
+    assert (root / claims["page"]).is_file()
+    for type_name in claims["types"]:
+        own = {
+            name
+            for base in getattr(ur5e, type_name).__mro__
+            if base.__module__.startswith("arcor2_drivers")
+            for name, value in vars(base).items()
+            if metadata_of(value)
+        }
+        assert own == set(claims["actions"])
