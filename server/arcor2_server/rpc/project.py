@@ -64,7 +64,6 @@ async def _save_scene_changes(context: Context) -> None:
     """Save an open scene that has changes: a project can only be stored on a stored scene."""
     if context.services.session.scene_changed:
         await save_open_scene(context)
-        context.emit("SceneSaved")
 
 
 @rpc("NewProject")
@@ -140,7 +139,10 @@ async def close_project(context: Context, args: CloseProjectArgs) -> None:
             raise RequestRefused(f"{project.name} has changes that are not saved: save it, or close it by force.")
         if context.dry_run:
             return
+        ids = [item.id for item in session.document.items()]
         await session.discard()
+        # Read locks keep nobody from closing; what they were on is gone.
+        context.services.locks.drop(ids)
     context.emit("ProjectClosed")
     context.emit("ShowMainScreen", ShowMainScreenData(MainScreen.PROJECTS_LIST, project.id))
 

@@ -90,13 +90,13 @@ async def save_scene(context: Context, args: None) -> None:  # noqa: ARG001
         if context.dry_run:
             return
         await save_open_scene(context)
-    context.emit("SceneSaved")
 
 
 async def save_open_scene(context: Context) -> None:
     """Save the open scene, with all that follows for its projects and for object types made for it."""
     services = context.services
     removed_types = await after_saving(services, services.session.save)
+    context.emit("SceneSaved")
     if removed_types:
         context.emit("ChangedObjectTypes", removed_types, ChangeType.REMOVE)
 

@@ -20,7 +20,7 @@ from arcor2_hw.data.rpc import (
     UpdateObjectPoseUsingRobotArgs,
 )
 from arcor2_hw.data.scene import SceneObject
-from arcor2_hw.exceptions import InvalidData
+from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_server.locks import ADDING_OBJECT, SCENE
 from arcor2_server.rpc.editing import commit, eef_pose, require_free, require_held, tell, unlock
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
@@ -218,7 +218,10 @@ async def update_object_model(context: Context, args: UpdateObjectModelArgs) -> 
     if _model_of(args.object_model).id != meta.type:
         raise InvalidData(f"The model of {meta.type} needs the id {meta.type}.")
     require_held(context, args.object_type_id)
-    stored = await services.storage.object_type(meta.type)
+    try:
+        stored = await services.storage.object_type(meta.type)
+    except NotFound:
+        raise RequestRefused(f"{meta.type} comes with an installed driver: its model cannot be changed.") from None
     if not context.dry_run:
         updated = await services.types.add(replace(stored, model=args.object_model))
         context.emit("ChangedObjectTypes", [updated], ChangeType.UPDATE)

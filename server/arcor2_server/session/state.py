@@ -279,11 +279,12 @@ class Session:
             at, scene = self._number, self.require_scene()
             saved_scene = await self._services.storage.put_scene(scene)
             self._scene_times = self._times_after(at, saved_scene, self._scene_times)
+            self._forget_snapshots()
         if self.project_changed:
             at, project = self._number, self.require_project()
             saved_project = await self._services.storage.put_project(project)
             self._project_times = self._times_after(at, saved_project, self._project_times)
-        self._forget_snapshots()
+            self._forget_snapshots()
         await self._rebase(forget=self._number - self._limit)
 
     def _times_after(self, at: int, saved: BareScene | BareProject, before: Times) -> Times:

@@ -1,0 +1,106 @@
+"""What each editing request is refused for first, in the server states that the spec recorded."""
+
+import json
+from typing import Any
+
+import msgspec
+import pytest
+
+from arcor2_hw.data.rpc import RPCS
+from arcor2_server.rpc import (
+    action_points,
+    actions,
+    copying,
+    joints,
+    logic,
+    orientations,
+    parameters,
+    project,
+    scene,
+    scene_objects,
+)
+from arcor2_server.rpc.registry import HANDLERS
+from tests.server.session.desk import SPEC, Desk, Person
+
+MODULES = {
+    module.__name__
+    for module in (
+        action_points,
+        actions,
+        copying,
+        joints,
+        logic,
+        orientations,
+        parameters,
+        project,
+        scene,
+        scene_objects,
+    )
+}
+OURS = sorted(name for name, handler in HANDLERS.items() if handler.__module__ in MODULES)
+MATRIX = json.loads((SPEC / "state_matrix.json").read_text())
+REASONS = {
+    "needs a registered user": "not logged in",
+    "needs an open scene": "is open: open one first",
+    "needs an open project": "is open: open one first",
+}
+
+
+def example(of: Any) -> Any:
+    """Give some value of a type as JSON has it, with required fields alone."""
+    info = msgspec.inspect.type_info(of) if not isinstance(of, msgspec.inspect.Type) else of
+    match info:
+        case msgspec.inspect.StructType():
+            return {f.encode_name: example(f.type) for f in info.fields if f.required or f.name in ("x", "w")}
+        case msgspec.inspect.EnumType():
+            return next(iter(info.cls)).value
+        case msgspec.inspect.UnionType():
+            return example(info.types[0])
+        case msgspec.inspect.ListType() | msgspec.inspect.SetType():
+            return []
+        case msgspec.inspect.FloatType():
+            return 1.0
+        case msgspec.inspect.BoolType():
+            return True
+        case msgspec.inspect.StrType():
+            return "x"
+    raise TypeError(info)
+
+
+def request(name: str) -> dict[str, Any]:
+    message = {"id": 1, "request": name, "dry_run": RPCS[name].dry_run}
+    if RPCS[name].args is None:
+        return message
+    args = example(RPCS[name].args)
+    if name in ("AddVirtualCollisionObjectToScene", "UpdateObjectModel"):
+        args["model" if "model" in args else "object_model"] = {
+            "type": "Sphere",
+            "sphere": {"id": "x", "radius": 1.0},
+        }
+    if name == "RenameScene":
+        args["new_name"] = "free"
+    return message | {"args": args}
+
+
+def test_these_are_all_of_them() -> None:
+    assert len(OURS) >= 55
+    assert set(OURS) <= MATRIX["no_scene"].keys()
+
+
+@pytest.mark.parametrize("state", ["unregistered_no_scene", "no_scene", "scene_offline"])
+async def test_first_reason(desk: Desk, alice: Person, stranger: Person, state: str) -> None:
+    if state == "scene_offline":
+        await alice.ask("NewScene", name="scene")
+    person = stranger if state.startswith("unregistered") else alice
+    wrong, compared = {}, 0
+    for name in OURS:
+        recorded = MATRIX[state][name].removeprefix("refused: ")
+        answer = await person.send(request(name))
+        said = "ok" if answer["result"] else answer["messages"][0]
+        assert "are wrong:" not in said, said
+        if recorded in REASONS:
+            compared += 1
+            if REASONS[recorded] not in said:
+                wrong[name] = f"{recorded}: {said}"
+    assert wrong == {}
+    assert compared == {"unregistered_no_scene": 55, "no_scene": 44, "scene_offline": 34}[state]
