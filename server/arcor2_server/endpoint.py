@@ -157,17 +157,28 @@ class Endpoint:
             if route is None:
                 self._refuse(client, request, f"There is no request {request.request!r}.")
                 continue
-            if route.at_once is not None and client.role >= route.rpc.role:
-                data = route.at_once(self._services)
-                if data is not None:
-                    client.put(encode(Response(request.id, request.request, True, UNSET, data)))
-                    continue
+            if route.at_once is not None and self._answer_at_once(client, request, route):
+                continue
             if len(mine) >= in_flight:
                 await asyncio.wait(mine, return_when=asyncio.FIRST_COMPLETED)
             task = create_task(self._handle(client, request, route))
             for held in (mine, self._tasks):
                 held.add(task)
                 task.add_done_callback(held.discard)
+
+    def _answer_at_once(self, client: Client, request: Request, route: Route) -> bool:
+        """Send a kept answer; tells whether there was one."""
+        if client.role < route.rpc.role or route.at_once is None:
+            return False
+        try:
+            data = route.at_once(self._services)
+        except Exception:
+            # The handler meets the same trouble, and answers it.
+            log.exception("no kept answer", request=request.request)
+            return False
+        if data is not None:
+            client.put(encode(Response(request.id, request.request, True, UNSET, data)))
+        return data is not None
 
     async def _handle(self, client: Client, request: Request, route: Route) -> None:
         try:

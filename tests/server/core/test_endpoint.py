@@ -1,0 +1,228 @@
+"""What the endpoint does with handlers: order of events and answer, partial success, errors nobody foresaw."""
+
+import asyncio
+import json
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+import structlog
+
+from arcor2_hw.exceptions import DeviceTimeout
+from arcor2_server.app import running_services
+from arcor2_server.endpoint import Endpoint
+from arcor2_server.rpc.registry import AT_ONCE, HANDLERS, Context, Handler, RequestRefused
+from arcor2_server.services import Services
+from arcor2_server.settings import ServerSettings
+from arcor2_server.wire import EXTENSION
+
+
+class Protocol:
+    """What the endpoint uses of WireProtocol."""
+
+    def __init__(self) -> None:
+        self.sent: list[dict[str, Any]] = []
+
+    def send_text_now(self, message: bytes) -> bool:
+        self.sent.append(json.loads(message))
+        return True
+
+    async def send_text(self, message: bytes) -> None:
+        self.send_text_now(message)
+
+    async def ping(self) -> None: ...
+
+    def abort(self) -> None: ...
+
+
+class Socket:
+    """What the endpoint uses of a websocket; messages come from a queue."""
+
+    def __init__(self) -> None:
+        self.protocol = Protocol()
+        self.scope = {"extensions": {EXTENSION: self.protocol}}
+        self.client = ("127.0.0.1", 1)
+        self.incoming: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
+
+    async def accept(self) -> None: ...
+
+    async def receive(self) -> dict[str, Any]:
+        return await self.incoming.get()
+
+    async def send(self, message: dict[str, Any]) -> None: ...
+
+    def say(self, **message: Any) -> None:
+        self.incoming.put_nowait({"type": "websocket.receive", "text": json.dumps(message)})
+
+    def hang_up(self) -> None:
+        self.incoming.put_nowait({"type": "websocket.disconnect"})
+
+    async def heard(self, count: int) -> list[dict[str, Any]]:
+        async with asyncio.timeout(5):
+            while len(self.protocol.sent) < count:
+                await asyncio.sleep(0.001)
+        return self.protocol.sent
+
+
+@pytest.fixture
+async def services(tmp_path: Path) -> AsyncIterator[Services]:
+    async with running_services(ServerSettings(data_dir=tmp_path, requests_in_flight=2)) as running:
+        yield running
+
+
+@asynccontextmanager
+async def connecting(services: Services) -> AsyncIterator[Callable[[], Socket]]:
+    """Connect to an endpoint that knows the handlers of this moment."""
+    tasks: list[asyncio.Task[None]] = []
+    sockets: list[Socket] = []
+    endpoint: list[Endpoint] = []
+
+    def make() -> Socket:
+        if not endpoint:
+            endpoint.append(Endpoint(services))
+        socket: Any = Socket()
+        sockets.append(socket)
+        tasks.append(asyncio.create_task(endpoint[0].serve(socket)))
+        return socket  # type: ignore[no-any-return]
+
+    yield make
+    for socket in sockets:
+        socket.hang_up()
+    await asyncio.gather(*tasks)
+    for each in endpoint:
+        await each.close()
+
+
+def handle(monkeypatch: pytest.MonkeyPatch, name: str, handler: Handler) -> None:
+    monkeypatch.setitem(HANDLERS, name, handler)
+
+
+async def test_events_before_answer_events_after(services: Services, monkeypatch: pytest.MonkeyPatch) -> None:
+    async with connecting(services) as connect:
+
+        async def handler(context: Context, args: None) -> set[str]:
+            context.emit("SceneSaved")
+            context.emit_first("ProjectSaved")
+            return {"x"}
+
+        handle(monkeypatch, "SaveScene", handler)
+        ann, bob = connect(), connect()
+        await bob.heard(1)
+        ann.say(id=1, request="SaveScene")
+        heard = await ann.heard(4)
+        assert [one.get("event") or one["response"] for one in heard[1:]] == ["ProjectSaved", "SaveScene", "SceneSaved"]
+        assert heard[2] == {"id": 1, "response": "SaveScene", "result": True, "data": ["x"]}
+        assert [one["event"] for one in (await bob.heard(3))[1:]] == ["ProjectSaved", "SceneSaved"]
+
+
+async def test_refusal_drops_events_unless_a_part_was_done(services: Services, monkeypatch: pytest.MonkeyPatch) -> None:
+    async with connecting(services) as connect:
+
+        async def refused(context: Context, args: None) -> None:
+            context.emit("SceneSaved")
+            raise RequestRefused("not now")
+
+        async def partly(context: Context, args: None) -> None:
+            context.emit_first("ProjectSaved")
+            raise RequestRefused("not all", ["a"])
+
+        handle(monkeypatch, "SaveScene", refused)
+        handle(monkeypatch, "SaveProject", partly)
+        ann = connect()
+        ann.say(id=1, request="SaveScene")
+        await ann.heard(2)
+        ann.say(id=2, request="SaveProject")
+        assert (await ann.heard(4))[1:] == [
+            {"id": 1, "response": "SaveScene", "result": False, "messages": ["not now"]},
+            {"event": "ProjectSaved"},
+            {"id": 2, "response": "SaveProject", "result": False, "messages": ["not all"], "data": ["a"]},
+        ]
+
+
+async def test_error_of_ours_is_the_message(services: Services, monkeypatch: pytest.MonkeyPatch) -> None:
+    async with connecting(services) as connect:
+
+        async def handler(context: Context, args: None) -> None:
+            raise DeviceTimeout("robot at 10.0.0.1 did not answer", detail="register 7")
+
+        handle(monkeypatch, "SaveScene", handler)
+        ann = connect()
+        ann.say(id=1, request="SaveScene")
+        assert (await ann.heard(2))[1]["messages"] == ["robot at 10.0.0.1 did not answer"]
+
+
+async def test_what_nobody_foresaw_is_answered_with_a_reference_to_the_log(
+    services: Services, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with connecting(services) as connect:
+
+        async def handler(context: Context, args: None) -> Any:
+            return 1 / 0
+
+        async def not_encodable(context: Context, args: None) -> Any:
+            return object()
+
+        def no_kept_answer(services: Services) -> Any:
+            raise ZeroDivisionError
+
+        handle(monkeypatch, "SaveScene", handler)
+        handle(monkeypatch, "SaveProject", not_encodable)
+        monkeypatch.setitem(AT_ONCE, "SystemInfo", no_kept_answer)
+        ann = connect()
+        with structlog.testing.capture_logs() as logged:
+            monkeypatch.setattr("arcor2_server.endpoint.log", structlog.get_logger())
+            for number, name in enumerate(("SaveScene", "SaveProject", "SystemInfo"), 1):
+                ann.say(id=number, request=name)
+            answers = {one["id"]: one for one in (await ann.heard(4))[1:]}
+        references = {entry["request"]: entry["reference"] for entry in logged if entry["event"] == "request failed"}
+        assert set(references) == {"SaveScene", "SaveProject"}
+        for number, name in ((1, "SaveScene"), (2, "SaveProject")):
+            assert answers[number]["result"] is False
+            assert references[name] in answers[number]["messages"][0]
+        assert answers[3]["result"] is True
+
+
+async def test_bounded_number_in_flight(services: Services, monkeypatch: pytest.MonkeyPatch) -> None:
+    async with connecting(services) as connect:
+        started: list[int] = []
+        go_on = asyncio.Event()
+
+        async def handler(context: Context, args: None) -> None:
+            started.append(1)
+            await go_on.wait()
+
+        handle(monkeypatch, "SaveScene", handler)
+        ann = connect()
+        for number in range(10):
+            ann.say(id=number, request="SaveScene")
+        await ann.heard(1)
+        await asyncio.sleep(0.02)
+        assert len(started) == 2
+        # Another client is not held up by it.
+        bob = connect()
+        bob.say(id=1, request="SystemInfo")
+        await bob.heard(2)
+        go_on.set()
+        assert len(await ann.heard(11)) == 11
+        assert len(started) == 10
+
+
+async def test_request_of_one_who_leaves_is_finished(services: Services, monkeypatch: pytest.MonkeyPatch) -> None:
+    async with connecting(services) as connect:
+        entered, go_on, done = asyncio.Event(), asyncio.Event(), asyncio.Event()
+
+        async def handler(context: Context, args: None) -> None:
+            entered.set()
+            await go_on.wait()
+            done.set()
+
+        handle(monkeypatch, "SaveScene", handler)
+        ann = connect()
+        ann.say(id=1, request="SaveScene")
+        await entered.wait()
+        ann.hang_up()
+        go_on.set()
+        async with asyncio.timeout(5):
+            await done.wait()
