@@ -89,8 +89,7 @@ class BarcodeReader(Reader):
             if code is not None and self._stops == stops:
                 talk.observing.settled()
                 return Code(code)
-            # A code that was decoded just now may be on its way: the answer to RST comes behind it.
-            talk.send(lines.STOP)
+            # RST ends the reading too, and its answer comes behind a code that was decoded just now.
             self._come_into_step()
         if self._stops != stops:
             raise Cancelled(f"{self._who}: reading was stopped")

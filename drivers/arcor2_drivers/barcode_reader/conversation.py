@@ -146,9 +146,8 @@ class Conversation:
         line = SerialLine(self._name, self._settings.port, self._settings.baud_rate, timeout)
         self._line = line
         # The first question may meet half a command that somebody else has left in the reader.
-        for _ in range(2):
+        for until in (min(deadline, time.monotonic() + self._settings.answer_timeout), deadline):
             line.write(lines.STATUS)
-            until = min(deadline, time.monotonic() + max(self._settings.answer_timeout, 0.5 * timeout))
             while time.monotonic() < until:
                 if any(self._hear_status(text) for text in line.read()):
                     with self._came:
