@@ -17,6 +17,8 @@ CONSTRUCTION_DEADLINE: Final = 10.0
 """Seconds beyond the connect timeout for a constructor that, by the older convention, opens the device itself."""
 STOP_DEADLINE: Final = 2.0
 """Seconds a `stop` may take before it is reported as failed."""
+OVERTAKES_WITHIN: Final = 0.1
+"""Seconds from the begin of a call within which its command to the device may still be on its way."""
 STOP_GRACE: Final = 2.0
 """Seconds a stopped call has to come back before its caller is told that it is cancelled."""
 CLOSE_DEADLINE: Final = 1.2
@@ -182,9 +184,16 @@ class Device:
         if stop is None:
             return None
         interrupted = self.lane.interrupt()
-        job = Job("stop", stop, notify=notify)
+        job = Job("stop", self._stop, (stop, time.monotonic()), notify=notify)
         self.stop_lane.submit(job)
         return job, interrupted
+
+    def _stop(self, stop: Callable[[], Any], moment: float) -> None:
+        """Stop; and again when a call that had only just begun is not over: its command may have overtaken the stop."""
+        stop()
+        job = self.lane.current
+        if job is not None and job.since > moment - OVERTAKES_WITHIN and not job.wait(OVERTAKES_WITHIN / 2):
+            stop()
 
     @property
     def moving(self) -> bool:

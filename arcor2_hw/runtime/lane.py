@@ -159,6 +159,11 @@ class Lane:
 
     # -------------------------------------------------------------------------------- state
     @property
+    def current(self) -> Job | None:
+        """Give the call that runs, None when none does."""
+        return self._current
+
+    @property
     def busy_with(self) -> str:
         """Name the method that runs, empty when none does."""
         current = self._current
@@ -206,12 +211,12 @@ class Lane:
     def _run(self) -> None:
         _on_lane.here = True
         while (job := self._queue.get()) is not None:
+            job.since = time.monotonic()
             self._current = job  # before looking whether it has ended, so that its deadline finds it here
             if job.ended or job.epoch != self._epoch:
                 self._current = None
                 job.finish(None, Cancelled(f"{self.device}: {job.method} was stopped before it began"))
                 continue
-            job.since = time.monotonic()
             value: Any = None
             error: BaseException | None = None
             try:

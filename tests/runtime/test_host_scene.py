@@ -134,6 +134,21 @@ def test_stop_passes_the_busy_device(host: HostProcess, tmp_path: Path) -> None:
     assert host.call("obj_a", "quick") == "quick"
 
 
+def test_a_command_that_overtakes_the_stop_is_stopped_too(host: HostProcess, tmp_path: Path) -> None:
+    # This device forgets a stop that comes before its motion, as one does whose frames cross on the wire.
+    source = DEVICE.replace('self.note("move")', 'self.note("move"); time.sleep(0.03); self.stopped.clear()')
+    host.send(open_scene([type_code("Device", source)], scene_object("a", "Device", file=str(tmp_path / "notes"))))
+    host.expect(m.SceneOpened)
+    move = host.begin("obj_a", "move")
+    while "move" not in (tmp_path / "notes").read_text():
+        time.sleep(0.001)
+    host.send(m.StopMotion(99))
+    began = time.monotonic()
+    assert host.answer(move).code == "cancelled"
+    assert time.monotonic() - began < 0.5
+    assert (tmp_path / "notes").read_text().count("stop") == 2
+
+
 def test_twenty_slow_devices_come_up_at_once(host: HostProcess) -> None:
     began = time.monotonic()
     _open(host, *(f"d{n}" for n in range(20)), connect_takes=0.5)

@@ -212,6 +212,20 @@ async def test_a_driver_that_ends_the_process(arm: Server) -> None:
     assert "status 9" in (await arm.client.state("stopped"))["message"]
 
 
+@serving()
+async def test_a_driver_that_ends_the_process_while_it_connects(server: Server) -> None:
+    server.types.add(
+        "Bomb", "class Bomb(Generic):\n    _ABSTRACT = False\n    def connect(self, timeout=5.0): os._exit(11)\n"
+    )
+    await server.open(Scene("scene", id="scn_1", objects=[scene_object("bomb", "Bomb")]))
+    for _ in range(2):
+        await server.ask("StartScene")
+        states = [await server.client.event("SceneState") for _ in range(3)]
+        assert [s["state"] for s in states] == ["starting", "stopping", "stopped"]
+        assert "status 11" in states[1]["message"]
+    assert server.services.locks.locked_roots() == []
+
+
 @serving(with_arm)
 async def test_silence_is_reported_and_forgiven(arm: Server) -> None:
     await arm.start()

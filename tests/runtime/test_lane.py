@@ -1,0 +1,161 @@
+"""A lane: order, deadlines, late answers, stops; each call ends exactly once, whatever races with it."""
+
+import random
+import threading
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from arcor2_hw.exceptions import Cancelled, DeviceFault, DeviceTimeout
+from arcor2_hw.runtime.lane import Job, Lane, on_any_lane
+
+
+@pytest.fixture
+def lane() -> Iterator[Lane]:
+    lane = Lane("arm")
+    yield lane
+    lane.close()
+    assert lane.join(5)
+
+
+def test_calls_run_in_order_on_one_thread(lane: Lane) -> None:
+    threads = set()
+
+    def number(n: int) -> int:
+        threads.add(threading.get_ident())
+        assert on_any_lane()
+        return lane.call("inner", lambda: n)  # on the lane itself a call does not wait for the lane
+
+    jobs = [Job("number", number, (n,)) for n in range(100)]
+    for job in jobs:
+        lane.submit(job)
+    assert [job.wait(5) and job.outcome() for job in jobs] == list(range(100))
+    assert len(threads) == 1
+    assert not on_any_lane()
+
+
+def test_errors_go_to_the_caller(lane: Lane) -> None:
+    def fail(error: BaseException) -> None:
+        raise error
+
+    for error in (DeviceFault("broken"), ValueError("odd"), SystemExit(3), KeyboardInterrupt()):
+        with pytest.raises(type(error)):
+            lane.call("fail", fail, (error,))
+    assert lane.call("after", lambda: 1) == 1
+
+
+def test_a_late_answer_is_dropped_and_the_lane_is_usable_again(lane: Lane) -> None:
+    gate = threading.Event()
+    with pytest.raises(DeviceTimeout, match=r"arm: slow did not finish within 0\.05 s"):
+        lane.call("slow", lambda: gate.wait(5), deadline=0.05)
+    assert lane.hung
+    began = time.monotonic()
+    with pytest.raises(DeviceTimeout, match="still busy with slow"):
+        lane.call("next", lambda: 1, deadline=5.0)
+    assert time.monotonic() - began < 0.05
+    gate.set()
+    deadline = time.monotonic() + 5
+    while lane.hung and time.monotonic() < deadline:
+        time.sleep(0.001)
+    assert lane.call("next", lambda: 2, deadline=5.0) == 2
+
+
+def test_a_call_that_did_not_get_its_turn_never_runs(lane: Lane) -> None:
+    gate = threading.Event()
+    ran: list[int] = []
+    first = Job("first", lambda: gate.wait(5))
+    lane.submit(first)
+    with pytest.raises(DeviceTimeout, match="busy with first"):
+        lane.call("second", lambda: ran.append(1), deadline=0.05)
+    gate.set()
+    assert lane.call("third", lambda: 3) == 3
+    assert ran == []
+
+
+def test_a_stop_cancels_what_waits_and_what_runs(lane: Lane) -> None:
+    gate, begun = threading.Event(), threading.Event()
+    ran: list[int] = []
+
+    def move() -> str:
+        begun.set()
+        gate.wait(5)
+        return "arrived"
+
+    moving, waiting = Job("move", move), Job("wait", lambda: ran.append(1))
+    for job in (moving, waiting):
+        lane.submit(job)
+    assert begun.wait(5)
+    assert lane.interrupt() is moving
+    assert waiting.wait(1)
+    gate.set()
+    assert moving.wait(5)
+    for job in (moving, waiting):
+        assert isinstance(job.error, Cancelled)
+    assert ran == []
+    assert lane.call("next", lambda: 1) == 1
+
+
+def test_what_the_device_says_of_its_stop_is_kept(lane: Lane) -> None:
+    begun, gate = threading.Event(), threading.Event()
+
+    def move() -> None:
+        begun.set()
+        gate.wait(5)
+        raise DeviceFault("drive 3")
+
+    job = Job("move", move)
+    lane.submit(job)
+    begun.wait(5)
+    lane.interrupt()
+    gate.set()
+    assert job.wait(5)
+    assert isinstance(job.error, DeviceFault)
+
+
+def test_a_stop_at_a_random_moment_lets_nothing_from_before_it_pass(lane: Lane) -> None:
+    """At most the one call that was just beginning runs, and it is told as cancelled."""
+    source = random.Random(7)
+    cut = 0
+    for _ in range(300):
+        began: dict[int, float] = {}
+
+        def move(n: int, began: dict[int, float] = began) -> None:
+            began[n] = time.perf_counter()
+
+        jobs = [Job("move", move, (n,)) for n in range(5)]
+        for job in jobs:
+            lane.submit(job)
+        spin = time.perf_counter() + source.random() * 2e-4
+        while time.perf_counter() < spin:
+            pass
+        lane.interrupt()
+        stopped = time.perf_counter()
+        assert all(job.wait(5) for job in jobs)
+        late = [n for n, moment in began.items() if moment > stopped]
+        assert len(late) <= 1
+        assert all(isinstance(jobs[n].error, Cancelled) for n in late)
+        assert all(isinstance(job.error, Cancelled) for n, job in enumerate(jobs) if n not in began)
+        cut += len(began) < len(jobs)
+    assert cut  # the moments did hit
+    assert lane.call("next", lambda: 1) == 1
+
+
+def test_a_call_ends_once() -> None:
+    ends: list[Job] = []
+    for _ in range(200):
+        job = Job("x", lambda: None, notify=ends.append)
+        start = threading.Barrier(3)
+        wins: list[bool] = []
+
+        def race(result: int, job: Job = job, start: threading.Barrier = start, wins: list[bool] = wins) -> None:
+            start.wait()
+            wins.append(job.finish(result) if result else job.give_up(DeviceTimeout("late")))
+
+        threads = [threading.Thread(target=race, args=(n,)) for n in range(3)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert sorted(wins) == [False, False, True]
+    assert len(ends) == 200
