@@ -5,12 +5,11 @@ GRACE seconds after the test's own fixtures are torn down.
 """
 
 import asyncio
-import functools
 import gc
 import inspect
 import threading
 import time
-from collections.abc import Generator
+from collections.abc import AsyncIterator, Generator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -107,27 +106,25 @@ def pytest_runtest_teardown(item: pytest.Item) -> Generator[None, None, None]:
         pytest.fail("left behind: " + "; ".join(leaked), pytrace=False)
 
 
-def _checked(function: Any) -> Any:
-    @functools.wraps(function)
-    async def run(*args: Any, **kwargs: Any) -> None:
-        before = asyncio.all_tasks()
-        await function(*args, **kwargs)
-        leaked = asyncio.all_tasks() - before
-        deadline = time.monotonic() + GRACE
-        while leaked and time.monotonic() < deadline:
-            await asyncio.sleep(0.01)
-            leaked = {task for task in asyncio.all_tasks() - before if not task.done()}
-        if leaked:
-            for task in leaked:
-                task.cancel()
-            await asyncio.wait(leaked, timeout=1)
-            pytest.fail("left behind: " + "; ".join(f"task {task.get_coro()}" for task in leaked), pytrace=False)
-
-    return run
+@pytest.fixture
+async def no_leaked_tasks() -> AsyncIterator[None]:
+    """Set up before and torn down after every other fixture of an asynchronous test."""
+    before = asyncio.all_tasks()
+    yield
+    mine = before | {asyncio.current_task()}
+    leaked = asyncio.all_tasks() - mine
+    deadline = time.monotonic() + GRACE
+    while leaked and time.monotonic() < deadline:
+        await asyncio.sleep(0.01)
+        leaked = asyncio.all_tasks() - mine
+    if leaked:
+        for task in leaked:
+            task.cancel()
+        await asyncio.wait(leaked, timeout=1)
+        pytest.fail("left behind: " + "; ".join(f"task {task.get_coro()}" for task in leaked), pytrace=False)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
-        function = getattr(item, "obj", None)
-        if inspect.iscoroutinefunction(function) and not hasattr(function, "hypothesis"):
-            item.obj = _checked(function)  # type: ignore[attr-defined]
+        if inspect.iscoroutinefunction(getattr(item, "obj", None)):
+            item.fixturenames.insert(0, "no_leaked_tasks")  # type: ignore[attr-defined]

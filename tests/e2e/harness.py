@@ -64,11 +64,10 @@ class Cell:
         await self.start_fake("robot", "arcor2_fakes.ur", "--host", self.robot_host)
 
     async def start_devices(self) -> None:
-        await asyncio.gather(
-            self.start_robot(),
-            self.start_fake("tester", "arcor2_fakes.functional_tester"),
-            self.start_fake("reader", "arcor2_fakes.barcode_reader"),
-        )
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self.start_robot())
+            tasks.create_task(self.start_fake("tester", "arcor2_fakes.functional_tester"))
+            tasks.create_task(self.start_fake("reader", "arcor2_fakes.barcode_reader"))
 
     async def start_world(self, boards: int, seed: int) -> None:
         await self.start_fake(
@@ -106,7 +105,8 @@ class Cell:
 
     async def stop(self) -> None:
         await self._exit.aclose()
-        for name in reversed(self.children):
+        # The server first, which holds the devices; the world before the fakes that it follows.
+        for name in sorted(self.children, key=lambda name: {"server": 0, "world": 1}.get(name, 2)):
             await self.children[name].stop()
 
     # ------------------------------------------------------------------------------------------------ hands
@@ -176,7 +176,9 @@ async def running_cell(directory: Path, *, boards: int = 0, seed: int = 0) -> As
     """All fakes and the server; with boards also the small world."""
     cell = Cell(directory)
     try:
-        await asyncio.gather(cell.start_devices(), cell.start_server())
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(cell.start_devices())
+            tasks.create_task(cell.start_server())
         if boards:
             await cell.start_world(boards, seed)
         yield cell

@@ -59,6 +59,9 @@ class Child:
         except TimeoutError:
             await self.stop()
             raise ChildFailed(f"{self.name} was not ready within {READY_TIMEOUT:g} s.", self._last_words()) from None
+        except asyncio.CancelledError:
+            await self.stop()
+            raise
         await self._process.wait()
         raise ChildFailed(f"{self.name} did not start: {self._last_words() or 'it said nothing'}")
 

@@ -71,6 +71,12 @@ def free_loopback_address(ports: tuple[int, ...] = (30004, 30003, 29999)) -> str
     raise ChildFailed("No loopback address has the ports of a UR controller free.")
 
 
+def first_of(group: BaseExceptionGroup[Any]) -> BaseException:
+    """Give the first error in a group: what a person wants to read is what began it."""
+    first: BaseException = group.exceptions[0]
+    return first_of(first) if isinstance(first, BaseExceptionGroup) else first
+
+
 async def ask(address: str, do: str) -> Any:
     """Ask a fake's control channel; raises ConnectionLost naming the address."""
     host, _, port = address.rpartition(":")
@@ -125,6 +131,8 @@ class Demo:
                 self._display.note("stopping")
                 job.cancel()
             return await job
+        except* Arcor2Error as group:
+            raise first_of(group) from None
         finally:
             stop.cancel()
             for number in (signal.SIGINT, signal.SIGTERM):
@@ -140,7 +148,9 @@ class Demo:
         reader = self._child("reader", python_module("arcor2_fakes.barcode_reader", "--control", "127.0.0.1:0"))
         self._display.note("starting the robot, the tester, the reader and the server")
         server_arguments = ("serve", "--host", self._host, "--port", str(self._port), "--data-dir", str(self._data_dir))
-        ur_at, tester_at, reader_at = await asyncio.gather(ur.start_json(), tester.start_json(), reader.start_json())
+        async with asyncio.TaskGroup() as starts:
+            found = [starts.create_task(child.start_json()) for child in (ur, tester, reader)]
+        ur_at, tester_at, reader_at = (task.result() for task in found)
         world = self._child(
             "world",
             python_module(
@@ -151,7 +161,9 @@ class Demo:
             ),
         )
         server = self._child("server", python_module("arcor2_server.cli.main", *server_arguments))
-        world_at, url = await asyncio.gather(world.start_json(), server.start())
+        async with asyncio.TaskGroup() as starts:
+            world_start, server_start = starts.create_task(world.start_json()), starts.create_task(server.start())
+        world_at, url = world_start.result(), server_start.result()
         self._display.addresses(url, {"robot": robot, "tester": tester_at["modbus"], "reader": reader_at["port"]})
         (self._data_dir / "demo.json").write_bytes(
             msgspec.json.format(
