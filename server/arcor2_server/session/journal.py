@@ -187,11 +187,14 @@ class Journal:
             return
         futures = [done for _, _, done in live]
         try:
-            # One transaction for all that waited: one wait for the disk.
-            with connection:
-                connection.execute("begin immediate")
-                for job, _, _ in live:
-                    _write(connection, job)
+            if len(live) == 1 and isinstance(live[0][0], Edit):
+                _write(connection, live[0][0])  # one statement is a transaction of its own
+            else:
+                # One transaction for all that waited: one wait for the disk.
+                with connection:
+                    connection.execute("begin immediate")
+                    for job, _, _ in live:
+                        _write(connection, job)
         except (sqlite3.Error, OSError) as error:
             self._failed_epoch = live[-1][1]
             self._failure = StorageError(f"The change could not be kept, {self._path} cannot be written: {error}.")
