@@ -15,7 +15,7 @@ from .settings import FunctionalTesterSettings
 
 QUIET_PERIOD: Final = 0.1
 """s between readings while nobody waits."""
-BUSY_PERIOD: Final = 0.01
+BUSY_PERIOD: Final = 0.02
 """s between readings while somebody waits for a change."""
 FRESH: Final = 0.5
 """s: how old a state may be that is told."""

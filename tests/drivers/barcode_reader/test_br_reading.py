@@ -3,12 +3,16 @@
 import itertools
 import os
 import socket
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from arcor2_drivers.barcode_reader.barcode_reader import BarcodeReader
 from arcor2_drivers.barcode_reader.settings import BarcodeReaderSettings
@@ -373,3 +377,42 @@ def test_half_a_command_of_somebody_else_in_the_reader(
 def test_settings_out_of_range_name_the_parameter(name: str, value: Any) -> None:
     with pytest.raises(OutOfRange, match=f"^{name} must be"):
         BarcodeReaderSettings(**{"port": "/dev/ttyUSB0", name: value})
+
+
+HOST = """
+import sys
+from arcor2_drivers.barcode_reader.barcode_reader import BarcodeReader
+from arcor2_drivers.barcode_reader.settings import BarcodeReaderSettings
+reader = BarcodeReader("id", "reader", settings=BarcodeReaderSettings(sys.argv[1]))
+reader.connect()
+reader.scan(60.0)
+"""
+
+
+def test_a_killed_owner_leaves_no_reading(
+    fake: FakeProcess, make: Callable[..., BarcodeReader], wait_for: Callable[..., Any]
+) -> None:
+    process = subprocess.Popen([sys.executable, "-c", HOST, fake.ready["port"]])
+    try:
+        wait_for(lambda: fake.truth()["received"].count("LON") >= 2, within=15.0)
+        wait_for(lambda: fake.truth()["reading"])
+    finally:
+        process.kill()
+        process.wait()
+    killed = time.monotonic()
+    wait_for(lambda: not fake.truth()["reading"], within=2.0)
+    assert time.monotonic() - killed < BarcodeReader.loss_reaction.within
+    fake.control.do("present", code="AFTER")
+    reader = make(fake.ready["port"])
+    reader.connect()
+    assert reader.scan() == "AFTER"
+
+
+def test_what_the_quality_file_claims_is_there() -> None:
+    root = Path(__file__).resolve().parents[3]
+    claims = yaml.safe_load((root / "drivers/arcor2_drivers/barcode_reader/quality.yaml").read_text())
+    named = [test for tests in claims["rules"].values() for test in tests]
+    for test in named:
+        file, _, function = test.partition("::")
+        assert f"def {function}(" in (Path(__file__).parent / file).read_text(), test
+    assert all(hasattr(getattr(BarcodeReader, name), "__action__") for name in claims["actions"])

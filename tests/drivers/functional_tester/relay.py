@@ -34,6 +34,8 @@ class Relay:
         self.requests: collections.Counter[int] = collections.Counter()
         self._delays: dict[int, float] = {}
         self._renumber: set[int] = set()
+        self._last: dict[int, bytes] = {}
+        self._repeated: dict[int, bytes] = {}
         self._threads: list[threading.Thread] = []
         self._sockets: list[socket.socket] = []
 
@@ -44,6 +46,10 @@ class Relay:
     def renumber_next(self, function: int) -> None:
         """Give the next answer of this function code the number of another transaction."""
         self._renumber.add(function)
+
+    def repeat_last(self, function: int) -> None:
+        """From now on answer each request of this function code with what was answered last."""
+        self._repeated[function] = self._last[function]
 
     def __enter__(self) -> Self:
         self._start(self._accept)
@@ -82,7 +88,9 @@ class Relay:
                 function = request[_HEADER]
                 self.requests[function] += 1
                 device.sendall(request)
-                answer = _read(device)
+                answer = self._last[function] = _read(device)
+                if function in self._repeated:
+                    answer = request[:2] + self._repeated[function][2:]
                 time.sleep(self._delays.pop(function, 0.0))
                 if function in self._renumber:
                     self._renumber.discard(function)

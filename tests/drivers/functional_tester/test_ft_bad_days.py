@@ -7,9 +7,11 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 from pymodbus.client import ModbusTcpClient
 
 from arcor2_drivers.functional_tester.functional_tester import FunctionalTester
@@ -212,6 +214,20 @@ def test_state_gets_stale_before_it_is_called_lost(
         observed.machine_state()
 
 
+def test_a_life_counter_that_stands_is_stale(relay: Relay, make: Callable[..., FunctionalTester]) -> None:
+    """A gateway that goes on answering for a tester that hangs behind it."""
+    tester = make(relay.address)
+    tester.connect()
+    assert tester.machine_state() is MachineState.STOPPED
+    relay.repeat_last(READ_INPUT_REGISTERS)
+    time.sleep(0.7)
+    assert tester.machine_state() is MachineState.STOPPED  # it counts ten times a second: not yet out of the ordinary
+    time.sleep(0.7)
+    with pytest.raises(Stale, match=r"answers, but its life counter has stood at \d+ for 1\.\d s"):
+        tester.machine_state()
+    assert tester.connection is Connection.ONLINE
+
+
 def test_observation_comes_back_by_itself_and_control_does_not(
     fake: FakeProcess, tester: FunctionalTester, wait_for: Callable[..., Any]
 ) -> None:
@@ -310,3 +326,13 @@ def test_wrong_unit_is_refused_by_name(fake: FakeProcess, make: Callable[..., Fu
 def test_settings_out_of_range_name_the_parameter(name: str, value: Any) -> None:
     with pytest.raises(OutOfRange, match=f"^{name} must be"):
         FunctionalTesterSettings(**{"host": "127.0.0.1", name: value})
+
+
+def test_what_the_quality_file_claims_is_there() -> None:
+    root = Path(__file__).resolve().parents[3]
+    claims = yaml.safe_load((root / "drivers/arcor2_drivers/functional_tester/quality.yaml").read_text())
+    named = [test for tests in claims["rules"].values() for test in tests]
+    for test in named:
+        file, _, function = test.partition("::")
+        assert f"def {function}(" in (Path(__file__).parent / file).read_text(), test
+    assert all(hasattr(getattr(FunctionalTester, name), "__action__") for name in claims["actions"])
