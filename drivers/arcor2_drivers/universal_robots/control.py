@@ -69,6 +69,7 @@ class ControlSession:
         self._observer = observer
         self._watchdog = watchdog_frequency
         self._stop_line = Dashboard(observer.host)
+        self._has_stop_line = True
         self._numbers = itertools.count(1)
         self._waiting: dict[int, Future[Any]] = {}
         self._order = threading.Lock()
@@ -82,6 +83,8 @@ class ControlSession:
         """Send the control program and arm its watchdog. Raises NotInControl, DeviceTimeout, DeviceFault."""
         if dashboard:
             self._stop_line.open(timeout)
+        else:
+            self._has_stop_line = False  # PolyScope X: without kicks the watchdog stops the program
         arguments = {
             "host": self.host,
             "frequency": STREAM_FREQUENCY,
@@ -216,7 +219,8 @@ class ControlSession:
         """The second path of a stop: stop the program, and with it the session."""
         reason = Cancelled(f"the control program of UR {self.host} was stopped by the dashboard")
         try:
-            self._stop_line.do("stop", "Stopped")
+            if self._has_stop_line:
+                self._stop_line.do("stop", "Stopped")
         except DeviceError as e:
             self.end(e)  # without kicks the watchdog stops it
             raise
@@ -337,7 +341,8 @@ class ControlSession:
     def _last_stop(self) -> None:
         """Leave no program of ours on the controller: a connection that broke may have brought it there once more."""
         newest = self._observer.newest()
-        if not self._released and (newest is None or program_plays(newest.runtime)):
+        left_behind = newest is None or program_plays(newest.runtime)
+        if self._has_stop_line and left_behind and not self._released:
             for _ in range(2):  # idempotent; the first attempt may meet a connection that was reset
                 try:
                     self._stop_line.do("stop", "Stopped", LAST_STOP)

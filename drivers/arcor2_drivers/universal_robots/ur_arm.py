@@ -39,7 +39,7 @@ POSITION_REACHED: Final = 0.002
 ANGLE_REACHED: Final = 0.02
 STANDING: Final = 0.5
 """Seconds an arm may stand, short of its target and with no motion running, before the move counts as failed."""
-LOWER_ONLY: Final = ((5, 23), (10, 9))
+LOWER_ONLY: Final = ((5, 23), (10, 0))
 """From these versions on, ur_rtde 1.6.5 told to use the upper registers sends a program that does, but does not."""
 
 log = logging.getLogger(__name__)

@@ -337,6 +337,33 @@ def test_after_a_safeguard_stop_nothing_moves_until_a_new_command(ready: UR5e, f
     ready.move_to_joints(turned(ready, 0.1), 0.5)
 
 
+def test_without_a_dashboard_the_watchdog_keeps_a_safeguard_stop(start_fake: Callable[..., FakeUr]) -> None:
+    fake = start_fake("--controller-version", "10.12")  # PolyScope X
+    robot = make(fake.host)
+    robot.connect(3.0)
+    try:
+        assert robot.identify().firmware.startswith("10.12")
+        robot.take_control()
+        robot.move_to_joints(turned(robot, 0.1), 0.5)
+        doing = far_move(robot, fake)
+        fake.do("safeguard_stop")
+        with pytest.raises(SafetyStop):
+            doing.result(1.0)
+        fake.control.wait_until(lambda t: not t["moving"] and t["program"] is None)
+        fake.do("safeguard_stop", on=False)
+        stays(fake)
+        with pytest.raises(Refused, match="pendant"):
+            robot._order("stop", "Stopped")
+        wait(lambda: robot.state().safety.value == "normal")
+        robot.take_control()
+        doing = far_move(robot, fake)
+        robot.stop()
+        with pytest.raises(Cancelled):
+            doing.result(1.0)
+    finally:
+        robot.disconnect()
+
+
 def test_a_protective_stop_is_acknowledged_by_a_person_only(ready: UR5e, fake: FakeUr) -> None:
     doing = far_move(ready, fake)
     fake.do("protective_stop")
