@@ -18,7 +18,7 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.project import Project, ProjectRobotJoints
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound, ProgramStopped
 from arcor2_hw.runtime.cell import Cell
-from arcor2_hw.runtime.device import STOP_DEADLINE, Device
+from arcor2_hw.runtime.device import STOP_DEADLINE, Device, describe
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.pacing import Gate
 from arcor2_hw.runtime.values import encode_shown, results
@@ -63,6 +63,7 @@ class Program:
         self.inside = False
         """The script's main thread is in our code, where an exception out of nowhere would do harm."""
         self.error: BaseException | None = None
+        self._blamed: tuple[BaseException, Device] | None = None
         self._main = threading.main_thread()
         self._stops: list[tuple[Device, Job]] = []
         self._stop_sent = threading.Event()
@@ -139,6 +140,10 @@ class Program:
         """Say that an action is over without a result. Raises ProgramStopped."""
         self.gate.after()
 
+    def blame(self, device: Device, error: BaseException) -> None:
+        """Note from which device an error came, so that whoever reads it learns which one."""
+        self._blamed = error, device
+
     # -------------------------------------------------------------------------------- ends
     def stop(self) -> None:
         """Stop all devices past whatever they do, then let nothing of the script go on."""
@@ -164,9 +169,10 @@ class Program:
         if self.error is error:
             return
         self.error = error
-        data = ProjectExceptionData(
-            str(error) or type(error).__name__, type(error).__name__, isinstance(error, Arcor2Error)
-        )
+        text = str(error) or type(error).__name__
+        if self._blamed is not None and self._blamed[0] is error:
+            text = str(describe(self._blamed[1], error))
+        data = ProjectExceptionData(text, type(error).__name__, isinstance(error, Arcor2Error))
         self.channel.event("ProjectException", _encode(Event("ProjectException", data=data)))
 
 

@@ -41,6 +41,9 @@ def _plain_call(device: Device, program: Program, name: str, bound: Callable[...
         program.inside = True
         try:
             return lane.call(name, bound, arguments, keywords, deadline)
+        except Exception as error:
+            program.blame(device, error)
+            raise
         finally:
             program.inside = False
 
@@ -66,6 +69,7 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
             program.action_failed()
             if program.stop_requested and isinstance(error, Exception):
                 raise ProgramStopped from error
+            program.blame(device, error)
             raise
         program.action_ended(action_id, value)
         return value
