@@ -4,7 +4,7 @@ import math
 import struct
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from arcor2_drivers.universal_robots import dashboard, timing
@@ -21,6 +21,7 @@ def packed(kind: int, payload: bytes) -> bytes:
     return struct.pack(">HB", 3 + len(payload), kind) + payload
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 255), st.binary(max_size=60)), max_size=6), st.data())
 def test_frames_come_out_whole_however_the_bytes_are_cut(sent: list[tuple[int, bytes]], data: st.DataObject) -> None:
     stream = b"".join(packed(kind, payload) for kind, payload in sent)
@@ -31,6 +32,7 @@ def test_frames_come_out_whole_however_the_bytes_are_cut(sent: list[tuple[int, b
     assert rest == b""
 
 
+@settings(deadline=None)
 @given(st.binary(max_size=200))
 def test_foreign_bytes_are_frames_or_a_value_error_and_never_kept_without_bound(data: bytes) -> None:
     try:
@@ -50,6 +52,7 @@ def test_a_recipe_gives_the_layout_and_names_what_is_missing() -> None:
             recipe(["timestamp", "actual_q"], nonsense)
 
 
+@settings(deadline=None)
 @given(st.text(max_size=80))
 def test_dashboard_answers_are_understood_or_a_device_fault(answer: str) -> None:
     for read in (dashboard.is_remote, dashboard.program):
@@ -75,6 +78,7 @@ def test_dashboard_answers_of_the_manual() -> None:
 numbers = st.floats(-1.0, 1.0)
 
 
+@settings(deadline=None)
 @given(numbers, numbers, numbers, numbers, numbers, numbers)
 def test_a_pose_goes_to_the_controller_and_back(x: float, y: float, z: float, a: float, b: float, c: float) -> None:
     pose = Pose(Position(x, y, z), Orientation.from_rotation_vector(a, b, c))
@@ -94,6 +98,7 @@ def test_numbers_nobody_knows_are_a_fault_and_no_power() -> None:
     assert (power_of(3), power_of(5), power_of(7)) == (Power.OFF, Power.IDLE_BRAKED, Power.OPERATIONAL)
 
 
+@settings(deadline=None)
 @given(st.floats(0, 10), st.floats(0.01, 3), st.floats(0.05, 20))
 def test_the_time_of_a_motion_is_the_least_that_speed_and_acceleration_allow(d: float, v: float, a: float) -> None:
     took = timing.trapezoid(d, v, a)
