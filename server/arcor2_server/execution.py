@@ -152,10 +152,10 @@ class Execution:
 
     async def _note_run(self, package_id: str) -> None:
         try:
-            directory = await asyncio.to_thread(self.packages.directory, package_id)
+            await asyncio.to_thread(self.packages.mark_executed, package_id)
+            directory = self.packages.checked(package_id)
             for difference in await asyncio.to_thread(check_versions, directory):
                 log.warning("package was built with another version", package=package_id, difference=difference)
-            await asyncio.to_thread(self.packages.mark_executed, package_id)
         except Arcor2Error as error:
             log.warning("run not noted", package=package_id, reason=str(error))
 

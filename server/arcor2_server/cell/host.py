@@ -54,8 +54,8 @@ class HostUser(Protocol):
 class _Wire(asyncio.Protocol):
     """Cuts the stream into messages."""
 
-    def __init__(self, host: "CellHost") -> None:
-        self._host = host
+    def __init__(self) -> None:
+        self.host: CellHost | None = None
         self._buffer = bytearray()
         self.transport: asyncio.Transport | None = None
 
@@ -63,37 +63,40 @@ class _Wire(asyncio.Protocol):
         self.transport = cast("asyncio.Transport", transport)
 
     def data_received(self, data: bytes) -> None:
-        buffer = self._buffer
+        host, buffer = self.host, self._buffer
         buffer += data
+        if host is None:
+            return  # `start` looks again
         start = 0
         try:
             while len(buffer) - start >= m.PREFIX_SIZE:
                 end = start + m.PREFIX_SIZE + m.body_length(bytes(buffer[start : start + m.PREFIX_SIZE]))
                 if len(buffer) < end:
                     break
-                self._host._heard(m.decode_server_bound(bytes(buffer[start + m.PREFIX_SIZE : end])))
+                host._heard(m.decode_server_bound(bytes(buffer[start + m.PREFIX_SIZE : end])))
                 start = end
         except (msgspec.MsgspecError, ValueError):
-            log.exception("the cell host sent what is no message", pid=self._host.pid)
-            self._host.kill()
+            log.exception("the cell host sent what is no message", pid=host.pid)
+            host.kill()
             return
         del buffer[:start]
 
     def connection_lost(self, error: Exception | None) -> None:  # noqa: ARG002 - the process tells why
-        self._host._disconnected()
+        if self.host is not None:
+            self.host._disconnected()
 
 
 class CellHost:
     """A running host. `user` is set by who takes it."""
 
-    def __init__(self, process: asyncio.subprocess.Process) -> None:
+    def __init__(self, process: asyncio.subprocess.Process, wire: _Wire) -> None:
         self.process = process
         self.user: HostUser | None = None
         self.ready: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self.ended: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self.reason = ""
         """Why the host is gone; empty while it is not."""
-        self._wire = _Wire(self)
+        self._wire = wire
         self._number = itertools.count(1)
         self._calls: dict[int, asyncio.Future[bytes]] = {}
         self._waiting: list[tuple[type[m.ToServer], asyncio.Future[Any]]] = []
@@ -106,7 +109,10 @@ class CellHost:
     async def start(cls, environment: Mapping[str, str] = os.environ) -> "CellHost":
         """Start the process; it is usable once `ready` is done."""
         ours, theirs = socket.socketpair()
+        wire = _Wire()
         try:
+            # First the wire, then the process: nothing is awaited between a process and the tasks that look after it.
+            await asyncio.get_running_loop().create_unix_connection(lambda: wire, sock=ours)
             process = await asyncio.create_subprocess_exec(
                 sys.executable, "-P", "-m", "arcor2_hw.runtime.host", "--fd", str(theirs.fileno()),
                 pass_fds=[theirs.fileno()],
@@ -118,17 +124,20 @@ class CellHost:
                 start_new_session=True,  # Ctrl-C is for the server, which ends the host in order
             )  # fmt: skip
         except BaseException:
+            if wire.transport is not None:
+                wire.transport.abort()
             ours.close()
             raise
         finally:
             theirs.close()
-        host = cls(process)
-        await asyncio.get_running_loop().create_unix_connection(lambda: host._wire, sock=ours)
+        host = cls(process, wire)
+        wire.host = host
         host._tasks = [
             asyncio.create_task(host._read_output(), name=f"output of cell host {process.pid}"),
             asyncio.create_task(host._watch_end(), name=f"end of cell host {process.pid}"),
             asyncio.create_task(host._watch_silence(), name=f"silence of cell host {process.pid}"),
         ]
+        wire.data_received(b"")
         return host
 
     @property

@@ -11,6 +11,8 @@ from arcor2_server.cell.host import CellHost, HostUser
 
 log = structlog.get_logger(__name__)
 
+CLOSE_WITHIN: Final = 1.5
+"""Seconds that the end of the server waits for a host that is just starting."""
 READY_WITHIN: Final = 20.0
 """Seconds for the start of Python and the common imports on a machine that is busy."""
 
@@ -51,6 +53,8 @@ class CellHosts:
         hosts = set(self._given)
         spare, self._spare = self._spare, None
         if spare is not None:
+            # One that is just starting is let finish, which is sooner over than a start cut off in the middle.
+            await asyncio.wait({spare}, timeout=CLOSE_WITHIN)
             spare.cancel()
             with contextlib.suppress(Arcor2Error, asyncio.CancelledError):
                 hosts.add(await spare)
