@@ -229,26 +229,18 @@ def test_disconnecting_ends_a_reading(fake: FakeProcess, reader: BarcodeReader, 
 
 
 # ------------------------------------------------------------------------------------------------ condition
-@pytest.mark.parametrize(
-    ("word", "health"),
-    [("DIRTY", Health.MAINTENANCE_REQUIRED), ("HOT", Health.OFF_SPEC), ("FAIL", Health.FAILURE)],
-)
-def test_health_is_followed(
-    start_fake: Callable[..., FakeProcess],
-    make: Callable[..., BarcodeReader],
-    wait_for: Callable[..., Any],
-    word: str,
-    health: Health,
-) -> None:
-    fake = start_fake("barcode_reader")
-    reader = make(fake.ready["port"])
-    reader.connect()
+def test_health_is_followed(fake: FakeProcess, reader: BarcodeReader, wait_for: Callable[..., Any]) -> None:
     assert reader.alarms() == []
-    fake.control.do("health", value=word)
-    wait_for(lambda: reader.health, lambda value: value is health)
-    [alarm] = reader.alarms()
-    assert alarm.code == word.lower()
-    assert alarm.remedy
+    for word, health in (
+        ("DIRTY", Health.MAINTENANCE_REQUIRED),
+        ("HOT", Health.OFF_SPEC),
+        ("FAIL", Health.FAILURE),
+    ):
+        fake.control.do("health", value=word)
+        wait_for(lambda: reader.health, lambda value, wanted=health: value is wanted)
+        [alarm] = reader.alarms()
+        assert alarm.code == word.lower()
+        assert alarm.remedy
     fake.control.do("health", value="OK")
     wait_for(lambda: reader.health, lambda value: value is Health.NORMAL)
     assert reader.alarms() == []

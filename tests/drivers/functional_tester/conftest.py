@@ -15,7 +15,7 @@ __all__ = ["start_fake", "wait_for"]
 
 @pytest.fixture
 def fake(start_fake: Callable[..., FakeProcess]) -> FakeProcess:
-    return start_fake("functional_tester", "--seed", "1", "--test-time", "1.5", "--time-scale", "5")
+    return start_fake("functional_tester", "--seed", "1", "--test-time", "6", "--time-scale", "20")
 
 
 @pytest.fixture
