@@ -19,6 +19,7 @@ from arcor2_server.execution import Execution
 from arcor2_server.hub import Hub
 from arcor2_server.locks import Locks
 from arcor2_server.object_types import ObjectTypes
+from arcor2_server.origin import own_pages_only
 from arcor2_server.rest import ROUTES
 from arcor2_server.rest.answers import ROLE
 
@@ -120,6 +121,7 @@ def create_app(services: Services) -> Litestar:
     endpoint = Endpoint(services)
     app = Litestar(
         route_handlers=[ready, arserver, *ROUTES],
+        guards=[own_pages_only],
         openapi_config=OpenAPIConfig(
             title="ARCOR2-HW",
             version=version("arcor2-hw"),

@@ -28,6 +28,8 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     streaming_period: float = 0.1
     history_limit: int = 1000
     """Steps of undo that the journal keeps."""
+    allowed_hosts: frozenset[str] = frozenset()
+    """Names, beside addresses and this machine's own name, under which browsers may reach the server."""
     default_role: Role = Role.PROGRAMMER
     """Role of a client that has not shown another one (nobody can show one before there are accounts)."""
     served_size: int = 16 * MIB
@@ -57,7 +59,7 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
 
     @classmethod
     def from_environment(cls, environment: Mapping[str, str] = os.environ, **given: Any) -> Self:
-        """Take what is not given from the environment (docs/protocol.md names the variables).
+        """Take what is not given from the environment (docs/reference/command-line.md names the variables).
 
         Raises InvalidData naming the variable whose value makes no sense.
         """
@@ -66,8 +68,9 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
         for variable, name in _VARIABLES.items():
             if (text := environment.get(variable)) is None or name in given:
                 continue
+            given_value = [part.strip() for part in text.split(",") if part.strip()] if name in _LISTS else text
             try:
-                values[name] = msgspec.convert(text, types[name], strict=False)
+                values[name] = msgspec.convert(given_value, types[name], strict=False)
             except msgspec.ValidationError as error:
                 raise InvalidData(f"{variable}={text!r}: {error}") from None
         values.update((name, value) for name, value in given.items() if value is not None)
@@ -86,12 +89,15 @@ _VARIABLES: Final = {
     "ARCOR2_STREAMING_PERIOD": "streaming_period",
     "ARCOR2_HW_HOST": "host",
     "ARCOR2_HW_DATABASE_URL": "database_url",
+    "ARCOR2_HW_ALLOWED_HOSTS": "allowed_hosts",
     "ARCOR2_HW_HISTORY_LIMIT": "history_limit",
     "ARCOR2_HW_DEFAULT_ROLE": "default_role",
     "ARCOR2_HW_OUTGOING_BYTES": "outgoing_bytes",
     "ARCOR2_HW_OUTGOING_AGE": "outgoing_age",
     "ARCOR2_HW_PING_INTERVAL": "ping_interval",
 }
+_LISTS: Final = frozenset({"allowed_hosts"})
+"""Settings that are names separated by commas."""
 
 
 def default_data_dir(environment: Mapping[str, str] = os.environ) -> Path:
