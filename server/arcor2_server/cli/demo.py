@@ -46,11 +46,11 @@ def demo(
     data_dir
         Where scenes, projects and packages are kept.
     picture
-        Write what the terminal showed last to this SVG file.
+        Write what the terminal showed when the last board was done to this SVG file.
     """
     directory = data_dir if data_dir is not None else default_data_dir() / "demo"
     drawn = seed if seed is not None else random.randrange(1_000_000)
-    console = Console(highlight=False, record=picture is not None)
+    console = Console(highlight=False)
     with Display(console, boards) as display:
         display.note(f"{boards} boards, seed {drawn}")
         job = Demo(host=host, port=port, data_dir=directory, boards=boards, seed=drawn, once=once, display=display)
@@ -67,5 +67,5 @@ def demo(
             sys.stderr.write(f"arcor2-hw demo: {directory}: {error.strerror or error}\n")
             return ExitStatus.DATA_UNUSABLE
     if picture is not None:
-        console.save_svg(str(picture), title="make run")
+        display.save_picture(picture)
     return ExitStatus.OK if outcome.right else ExitStatus.PROGRAM_FAILED

@@ -1,12 +1,15 @@
 """What the demo shows in the terminal: devices, the current action, boards done."""
 
 import asyncio
+import io
+import re
 import time
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import httpx
-from rich.console import Console, Group
+from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
@@ -14,6 +17,8 @@ from rich.text import Text
 
 _CONNECTION = {"online": "green", "back": "yellow", "connecting": "yellow", "lost": "red", "failed": "red"}
 _HISTORY = 6
+PICTURE_WIDTH = 84
+"""Characters in a line of the picture."""
 
 
 class Display:
@@ -34,6 +39,7 @@ class Display:
         self._task = self._progress.add_task("boards", total=boards, result="")
         self._passed = 0
         self._failed = 0
+        self._pictured: list[RenderableType] = []
 
     def __enter__(self) -> "Display":
         if self._console.is_terminal:
@@ -74,17 +80,28 @@ class Display:
         self._progress.update(self._task, completed=number, result=f"{self._passed} passed, {self._failed} failed")
         verdict = Text("passed", "green") if passed else Text("failed", "red")
         self._line(Text.assemble(f"board {number} of {of}: ", verdict))
+        if number == of:
+            self._pictured = [self._view()]
 
     def finish(self, summary: str, misplaced: list[str]) -> None:
         """Say how the cycle ended."""
         self._now = ""
-        for line in misplaced:
-            self._out(Text(line, "red"))
-        self._out(Text(summary, "bold"))
+        self.close()
+        lines = [*(Text(line, "red") for line in misplaced), Text(summary, "bold")]
+        for line in lines:
+            self._out(line)
+        self._pictured += lines
 
     def serving(self, url: str) -> None:
         """Say that the server goes on."""
         self._out(Text(f"serving at {url} until Ctrl-C"))
+
+    def save_picture(self, file: Path) -> None:
+        """Write what stood in the terminal when the last board was done, and how it ended, to an SVG file."""
+        console = Console(record=True, file=io.StringIO(), width=PICTURE_WIDTH, force_terminal=True)
+        console.print(Group(*self._pictured))
+        # Without rich's fonts from the network: whoever opens the picture need not fetch anything.
+        file.write_text(re.sub(r"@font-face \{.*?\}", "", console.export_svg(title="make run"), flags=re.DOTALL))
 
     async def follow_devices(self, url: str, period: float) -> None:
         """Ask the server for its devices again and again, until cancelled."""
@@ -106,10 +123,9 @@ class Display:
 
     def _line(self, text: Text) -> None:
         stamped = Text.assemble((f"{time.monotonic() - self._begin:6.1f} s  ", "dim"), text)
+        self._history = [*self._history, stamped][-_HISTORY:]
         if self._live is None:
             self._out(stamped)
-            return
-        self._history = [*self._history, stamped][-_HISTORY:]
         self._refresh()
 
     def _refresh(self) -> None:
@@ -121,7 +137,7 @@ class Display:
         for heading in ("device", "type", "address", "connection", "health", "says"):
             devices.add_column(heading, header_style="dim")
         known = {device["name"]: device for device in self._devices}
-        for name in {**self._where, **known}:
+        for name in self._where:
             device = known.get(name)
             if device is None:
                 devices.add_row(name, "", self._where.get(name, ""), Text("offline", "dim"), "", "")
