@@ -7,6 +7,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
 FAMILIES := --extra ur --extra modbus --extra serial
+# Drivers beyond the demo are tested too.
+TESTED := $(FAMILIES) --extra can --extra dynamixel
 
 run: .make/run
 	$(BIN)/arcor2-hw demo $(ARGS)
@@ -51,7 +53,7 @@ layers: .make/dev
 COMPILE := pip-compile --quiet --upgrade --generate-hashes --allow-unsafe --strip-extras \
 	--no-emit-index-url --no-emit-find-links --no-emit-trusted-host --no-header
 lock:
-	$(COMPILE) $(FAMILIES) --extra build --extra dev --output-file requirements/dev.txt pyproject.toml
+	$(COMPILE) $(TESTED) --extra build --extra dev --output-file requirements/dev.txt pyproject.toml
 	$(COMPILE) $(FAMILIES) --extra build --constraint requirements/dev.txt --output-file requirements/run.txt pyproject.toml
 
 clean:
