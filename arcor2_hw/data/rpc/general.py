@@ -1,0 +1,55 @@
+"""Arguments and answers that belong to no one subject, or to the server itself."""
+
+from msgspec import field
+
+from arcor2_hw.data.base import Data
+from arcor2_hw.data.camera import CameraParameters
+
+
+class IdArgs(Data, frozen=True):
+    """Arguments of every RPC that takes one id."""
+
+    id: str
+
+
+class TypeArgs(Data, frozen=True):
+    """Arguments of GetActions."""
+
+    type: str
+
+
+class GetCameraPoseArgs(Data, frozen=True):
+    """Arguments of GetCameraPose."""
+
+    camera_parameters: CameraParameters
+    image: str
+    inverse: bool = False
+
+
+class MarkersCornersArgs(Data, frozen=True):
+    """Arguments of MarkersCorners."""
+
+    camera_parameters: CameraParameters
+    image: str
+
+
+class RegisterUserArgs(Data, frozen=True):
+    """Arguments of RegisterUser."""
+
+    user_name: str
+
+
+class RenameArgs(Data, frozen=True):
+    """Arguments of RenameScene and RenameObject."""
+
+    id: str
+    new_name: str
+
+
+class SystemInfoData(Data, frozen=True):
+    """What SystemInfo answers."""
+
+    version: str
+    api_version: str
+    supported_parameter_types: set[str] = field(default_factory=set)
+    supported_rpc_requests: set[str] = field(default_factory=set)

@@ -1,0 +1,125 @@
+"""Arguments and answers about projects, actions and logic."""
+
+from msgspec import field
+
+from arcor2_hw.data.base import UNSET, Data, Unset
+from arcor2_hw.data.project import ActionParameter, BareProject, Flow, ProjectLogicIf
+
+
+class AddActionArgs(Data, frozen=True):
+    """Arguments of AddAction."""
+
+    action_point_id: str
+    name: str
+    type: str
+    parameters: list[ActionParameter] = field(default_factory=list)
+    flows: list[Flow] = field(default_factory=list)
+
+
+class AddLogicItemArgs(Data, frozen=True):
+    """Arguments of AddLogicItem."""
+
+    start: str
+    end: str
+    condition: ProjectLogicIf | Unset = UNSET
+
+
+class AddProjectParameterArgs(Data, frozen=True):
+    """Arguments of AddProjectParameter."""
+
+    name: str
+    type: str
+    value: str
+
+
+class CloseProjectArgs(Data, frozen=True):
+    """Arguments of CloseProject."""
+
+    force: bool = False
+
+
+class CopyProjectArgs(Data, frozen=True):
+    """Arguments of CopyProject."""
+
+    source_id: str
+    target_name: str
+
+
+class ListProjectsData(BareProject, frozen=True):
+    """What ListProjects answers."""
+
+    problems: list[str] | Unset = UNSET
+
+
+class NewProjectArgs(Data, frozen=True):
+    """Arguments of NewProject."""
+
+    scene_id: str
+    name: str
+    description: str = ""
+    has_logic: bool = True
+
+
+class RemoveLogicItemArgs(Data, frozen=True):
+    """Arguments of RemoveLogicItem."""
+
+    logic_item_id: str
+
+
+class RemoveProjectParameterArgs(Data, frozen=True):
+    """Arguments of RemoveProjectParameter."""
+
+    id: str
+
+
+class RenameActionArgs(Data, frozen=True):
+    """Arguments of RenameAction."""
+
+    action_id: str
+    new_name: str
+
+
+class RenameProjectArgs(Data, frozen=True):
+    """Arguments of RenameProject."""
+
+    project_id: str
+    new_name: str
+
+
+class UpdateActionArgs(Data, frozen=True):
+    """Arguments of UpdateAction."""
+
+    action_id: str
+    parameters: list[ActionParameter] | Unset = UNSET
+    flows: list[Flow] | Unset = UNSET
+
+
+class UpdateLogicItemArgs(Data, frozen=True):
+    """Arguments of UpdateLogicItem."""
+
+    logic_item_id: str
+    start: str
+    end: str
+    condition: ProjectLogicIf | Unset = UNSET
+
+
+class UpdateProjectDescriptionArgs(Data, frozen=True):
+    """Arguments of UpdateProjectDescription."""
+
+    project_id: str
+    new_description: str
+
+
+class UpdateProjectHasLogicArgs(Data, frozen=True):
+    """Arguments of UpdateProjectHasLogic."""
+
+    project_id: str
+    new_has_logic: bool
+
+
+class UpdateProjectParameterArgs(Data, frozen=True):
+    """Arguments of UpdateProjectParameter."""
+
+    id: str
+    name: str | Unset = UNSET
+    value: str | Unset = UNSET
