@@ -8,10 +8,10 @@ from typing import Annotated, Any
 
 from cyclopts import App, Parameter, validators
 
-from arcor2_fakes.barcode_reader.line import Line, PtyLine, TcpLine
 from arcor2_fakes.barcode_reader.reader import HEALTH, Framing, Health, Reader
 from arcor2_fakes.control import ControlServer, parse_address
 from arcor2_fakes.process import announce, run, until_told_to_end
+from arcor2_fakes.serial_line import Line, PtyLine, TcpLine
 from arcor2_fakes.wire import register_faults
 
 app = App(name="arcor2_fakes.barcode_reader", help="Fake barcode reader on a pty or TCP.", version_flags=[])

@@ -16,7 +16,7 @@ _CHUNK = 4096
 
 
 class Line(Protocol):
-    """What the reader is wired to."""
+    """What a device is wired to."""
 
     @property
     def port(self) -> str:

@@ -1,0 +1,164 @@
+"""The printer itself: status asked, formats queued, labels printed in time. Knows neither pty nor socket."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Final
+
+import msgspec
+
+from arcor2_fakes.label_printer.zpl import Format, Stream
+
+BUFFER: Final = 8
+"""Formats kept; more are thrown away, as by a printer whose host does not look at the buffer full flag."""
+
+
+class Label(msgspec.Struct, frozen=True):
+    """A label that has come out."""
+
+    number: int
+    zpl: str
+    fields: list[dict[str, Any]]
+
+
+class LabelPrinter:
+    """A thermal transfer printer.
+
+    Args:
+        send: puts bytes on the line.
+        printed: called when a label has come out.
+        duration: how long a label takes, s.
+        mute: whether the printer answers nothing while it has no media or its head is open.
+    """
+
+    identity = ("ZT411-203dpi", "V92.21.39Z", 8, 65536)
+    unique_id = "99J204200001"
+
+    def __init__(
+        self, send: Callable[[bytes], None], printed: Callable[[], None], *, duration: float, mute: bool, labels: int
+    ) -> None:
+        self._send, self._printed = send, printed
+        self._duration = duration
+        self._loop = asyncio.get_running_loop()
+        self._stream = Stream()
+        self._queue: deque[Format] = deque()
+        self._left = 0  # labels of the format being printed that are still to come
+        self._timer: asyncio.TimerHandle | None = None
+        self.mute = mute
+        self.media = labels
+        self.counter = 0
+        self.paused = self.head_open = self.ribbon_out = self.hot = False
+        self.forgetful = False
+        self.labels: deque[Label] = deque(maxlen=1000)
+        self.received: deque[str] = deque(maxlen=200)
+
+    @property
+    def partial(self) -> bool:
+        """Tell whether half a format is in the printer."""
+        return self._stream.partial
+
+    @property
+    def waiting(self) -> int:
+        """Count the formats that are not printed."""
+        return len(self._queue)
+
+    # ------------------------------------------------------------------------------------------------ the line's side
+    def feed(self, data: bytes) -> None:
+        """Take bytes from the line."""
+        for item in self._stream.feed(data):
+            if isinstance(item, Format):
+                self.received.append("format")
+                if self.forgetful:
+                    continue
+                if len(self._queue) < BUFFER:
+                    self._queue.append(item)
+                    self.go_on()
+            else:
+                self.received.append(item)
+                self._obey(item)
+
+    def drop_input(self) -> None:
+        """Forget half a format."""
+        self._stream.clear()
+
+    def _obey(self, command: str) -> None:
+        if self.mute and (self.media <= 0 or self.head_open):
+            return
+        if command == "~HS":
+            self._send(self._host_status())
+        elif command == "~HI":
+            model, firmware, dots, memory = self.identity
+            self._send(_framed(f"{model},{firmware},{dots},{memory}KB"))
+        elif command == "~PS":
+            self.pause(False)
+        elif command == "~PP":
+            self.pause(True)
+        elif command.startswith("getvar "):
+            values = {"odometer.total_label_count": str(self.counter), "device.unique_id": self.unique_id}
+            self._send(f'"{values.get(command.removeprefix("getvar "), "?")}"'.encode("ascii"))
+
+    def _host_status(self) -> bytes:
+        waiting = len(self._queue)
+        one = (
+            f"030,{self.media <= 0:d},{self.paused:d},1245,{waiting:03d},{waiting >= BUFFER:d},0,{self.partial:d},"
+            f"000,0,0,{self.hot:d}"
+        )
+        two = f"000,0,{self.head_open:d},{self.ribbon_out:d},1,2,6,0,{self._left:08d},1,000"
+        return _framed(one) + _framed(two) + _framed("1234,0")
+
+    # ------------------------------------------------------------------------------------------------ printing
+    @property
+    def _able(self) -> bool:
+        return self.media > 0 and not (self.paused or self.head_open or self.ribbon_out or self.hot)
+
+    def go_on(self) -> None:
+        """Print what waits, if nothing stands against it."""
+        if self._timer is None and self._queue and self._able:
+            if self._left == 0:
+                self._left = self._queue[0].quantity
+            self._timer = self._loop.call_later(self._duration, self._finish_label)
+
+    def hold(self) -> None:
+        """Stop printing; a label that is not finished is printed again from its start."""
+        if self._timer is not None and not self._able:
+            self._timer.cancel()
+            self._timer = None
+
+    def _finish_label(self) -> None:
+        self._timer = None
+        format_ = self._queue[0]
+        self.counter += 1
+        self.media -= 1
+        self._left -= 1
+        self.labels.append(Label(self.counter, format_.zpl, [msgspec.to_builtins(f) for f in format_.fields]))
+        if self._left == 0:
+            self._queue.popleft()
+        self._printed()
+        self.go_on()
+
+    # ------------------------------------------------------------------------------------------------ the world's side
+    def pause(self, on: bool) -> None:
+        """Press the pause key."""
+        self.paused = on
+        self.hold()
+        self.go_on()
+
+    def power_cycle(self) -> None:
+        """Switch off and on: what waits is gone, the odometer stays."""
+        self.close()
+        self._queue.clear()
+        self._left = 0
+        self._stream.clear()
+        self.paused = False
+
+    def close(self) -> None:
+        """Cancel what is under way."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+
+def _framed(text: str) -> bytes:
+    return b"\x02" + text.encode("ascii") + b"\x03\r\n"
