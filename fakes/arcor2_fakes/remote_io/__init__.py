@@ -1,0 +1,8 @@
+"""Fake remote I/O block on Modbus TCP or RTU, as docs/devices/remote-io.md says, in real time.
+
+`python -m arcor2_fakes.remote_io --help`. Inputs are set by the control channel; outputs, pulses and the four watchdogs
+are the block's own.
+
+Not modelled: filters and delays of real inputs, noise and settling of analogue values, loads on the outputs, rejection
+of a second TCP client, RTU timing (silent intervals), broadcast writes, and Modbus over TLS.
+"""

@@ -1,0 +1,142 @@
+"""The block itself: inputs, outputs, timed pulses and four watchdogs. Knows nothing of Modbus."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+DIGITAL = 16
+ANALOG_IN = 4
+ANALOG_OUT = 2
+WATCHDOGS = 4
+ACKNOWLEDGE, RELEASE = 1, 2
+BROKEN_WIRE = -32768
+_HISTORY = 200
+
+
+class WatchdogState(IntEnum):
+    """What a watchdog is doing."""
+
+    OFF = 0
+    RUNNING = 1
+    EXPIRED = 2
+
+
+@dataclass
+class Watchdog:
+    """One of the block's watchdogs: the outputs it guards, and what they do when its host is silent."""
+
+    time_ms: int = 0
+    number: int = 0
+    do_guarded: int = 0
+    do_switched: int = 0
+    do_safe: int = 0
+    ao_guarded: int = 0
+    ao_switched: int = 0
+    ao_safe: list[int] = field(default_factory=lambda: [0] * ANALOG_OUT)
+    state: WatchdogState = WatchdogState.OFF
+    expires: float = 0.0
+
+
+class Locked(ValueError):
+    """An expired watchdog holds this output in its safe state."""
+
+
+class Block:
+    """Time is worked off lazily: `advance` applies what fell due; every other method begins with it."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self.inputs = [False] * DIGITAL
+        self.analog_inputs = [0] * ANALOG_IN
+        self.supply_missing = False
+        self.overload = False
+        self.writes = 0
+        self.history: deque[tuple[float, int, bool]] = deque(maxlen=_HISTORY)
+        self.power_on()
+
+    def power_on(self) -> None:
+        """Come up: outputs off, watchdogs off."""
+        self.outputs = [False] * DIGITAL
+        self.analog_outputs = [0] * ANALOG_OUT
+        self.watchdogs = [Watchdog() for _ in range(WATCHDOGS)]
+        self._pulses: dict[int, float] = {}
+
+    def advance(self) -> None:
+        """Apply in order what fell due: ends of pulses, watchdogs that expire."""
+        now = self._clock()
+        due: list[tuple[float, int, int]] = [(end, 0, number) for number, end in self._pulses.items() if end <= now]
+        due += [
+            (dog.expires, 1, number)
+            for number, dog in enumerate(self.watchdogs)
+            if dog.state is WatchdogState.RUNNING and dog.expires <= now
+        ]
+        for at, kind, number in sorted(due):
+            if kind == 1:
+                self.watchdogs[number].state = WatchdogState.EXPIRED
+                self._to_safe_state(self.watchdogs[number], at)
+            elif self._pulses.pop(number, None) is not None:
+                self._switch(number, on=False, at=at)
+
+    # -------------------------------------------------------------------------------- outputs
+    def write_digital(self, number: int, *, on: bool) -> None:
+        """Switch an output; ends a pulse on it."""
+        self._pulses.pop(number, None)
+        self._switch(number, on=on, at=self._clock())
+
+    def write_analog(self, number: int, raw: int) -> None:
+        """Set an analogue output."""
+        self.analog_outputs[number] = raw
+
+    def pulse(self, number: int, duration_ms: int) -> None:
+        """Switch an output on for so long; 0 ends a pulse at once."""
+        if duration_ms:
+            self._pulses[number] = self._clock() + duration_ms / 1000.0
+            self._switch(number, on=True, at=self._clock())
+        elif self._pulses.pop(number, None) is not None:
+            self._switch(number, on=False, at=self._clock())
+
+    def check_unlocked(self, digital: int = 0, analog: int = 0) -> None:
+        """Raise Locked when an expired watchdog guards one of these (bit masks)."""
+        for dog in self.watchdogs:
+            if dog.state is WatchdogState.EXPIRED and (dog.do_guarded & digital or dog.ao_guarded & analog):
+                raise Locked
+
+    def _switch(self, number: int, *, on: bool, at: float) -> None:
+        if self.outputs[number] != on:
+            self.outputs[number] = on
+            self.history.append((at, number, on))
+
+    # -------------------------------------------------------------------------------- watchdogs
+    def trigger(self, dog: Watchdog, number: int) -> None:
+        """Start a watchdog, or keep it quiet, in the name of the host with this number."""
+        dog.number = number
+        if dog.state is WatchdogState.EXPIRED:
+            return
+        dog.state = WatchdogState.RUNNING if dog.time_ms else WatchdogState.OFF
+        dog.expires = self._clock() + dog.time_ms / 1000.0
+
+    def command(self, dog: Watchdog, command: int) -> None:
+        """Acknowledge an expired watchdog, or release: safe state at once, then off."""
+        if command == RELEASE and dog.state is WatchdogState.RUNNING:
+            self._to_safe_state(dog, self._clock())
+        if command in (ACKNOWLEDGE, RELEASE) and not (
+            command == ACKNOWLEDGE and dog.state is not WatchdogState.EXPIRED
+        ):
+            dog.state, dog.number = WatchdogState.OFF, 0
+
+    def _to_safe_state(self, dog: Watchdog, at: float) -> None:
+        for number in range(DIGITAL):
+            if dog.do_guarded & dog.do_switched & (1 << number):
+                self._pulses.pop(number, None)
+                self._switch(number, on=bool(dog.do_safe & (1 << number)), at=at)
+        for number in range(ANALOG_OUT):
+            if dog.ao_guarded & dog.ao_switched & (1 << number):
+                self.analog_outputs[number] = dog.ao_safe[number]
+
+    def diagnosis(self) -> int:
+        """Give the diagnosis bits."""
+        return int(self.supply_missing) | int(self.overload) << 1

@@ -1,0 +1,52 @@
+"""A fake block in a process of its own, and the drivers on its wire."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from arcor2_drivers.remote_io.remote_io import RemoteIO
+from arcor2_drivers.remote_io.settings import RemoteIOSettings
+from tests.fakes.conftest import FakeProcess, start_fake, wait_for
+
+__all__ = ["start_fake", "wait_for"]
+
+POINTS = (
+    "part=DI0; door=DI1 debounce=0.1; lamp=DO4; valve=DO5 on_loss=hold; lock=DO6 on_loss=on; "
+    "level=AI0 scale=0.001 unit=m; speed=AO0 scale=0.01 unit=m/s; pressure=AO1 on_loss=hold"
+)
+
+
+@pytest.fixture
+def fake(start_fake: Callable[..., FakeProcess]) -> FakeProcess:
+    return start_fake("remote_io")
+
+
+@pytest.fixture
+def make() -> Iterator[Callable[..., RemoteIO]]:
+    """Gives ``make("127.0.0.1:4000", watchdog_ms=500)``: a driver, not connected; it is disconnected in the end."""
+    made: list[RemoteIO] = []
+
+    def build(address: str, **settings: Any) -> RemoteIO:
+        host, _, port = address.rpartition(":")
+        where: dict[str, Any] = {"host": host, "port": int(port)} if host else {"serial_port": address}
+        block = RemoteIO("block_id", "block", RemoteIOSettings(**{**where, "points": POINTS, **settings}))
+        made.append(block)
+        return block
+
+    yield build
+    for block in made:
+        block.disconnect()
+
+
+@pytest.fixture
+def observed(fake: FakeProcess, make: Callable[..., RemoteIO]) -> RemoteIO:
+    block = make(fake.ready["modbus"])
+    block.connect()
+    return block
+
+
+@pytest.fixture
+def block(observed: RemoteIO) -> RemoteIO:
+    observed.take_control()
+    return observed
