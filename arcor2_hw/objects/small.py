@@ -2,7 +2,7 @@
 
 import abc
 import enum
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, NamedTuple
 
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.device import LossReaction, Reading
@@ -21,7 +21,7 @@ class GripperState(enum.StrEnum):
     LOST = "lost"
 
 
-class GripResult(Data, frozen=True):
+class GripResult(NamedTuple):
     """What a grip came to: whether something is held, and the width between the fingers, m."""
 
     held: bool
@@ -40,8 +40,8 @@ class Gripper(Generic):
         """Make it ready; it may open and close once."""
 
     @abc.abstractmethod
-    def grip(self, width: float, force: float, speed: float) -> GripResult:
-        """Close to `width` m with `force` N at `speed` m/s; return when it holds or has arrived."""
+    def grip(self, width: float, force: float, speed: float) -> tuple[bool, float]:
+        """Close to `width` m with `force` N at `speed` m/s; return when it holds or has arrived: a GripResult."""
 
     @abc.abstractmethod
     def release(self) -> None:

@@ -1,0 +1,50 @@
+"""A fake gripper in a process of its own, and the driver on its wire."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from arcor2_drivers.robotiq_2f.robotiq_2f import Robotiq2F
+from arcor2_drivers.robotiq_2f.settings import Robotiq2FSettings
+from tests.fakes.conftest import FakeProcess, start_fake, wait_for
+
+__all__ = ["start_fake", "wait_for"]
+
+SPEED_UP = 4.0
+
+
+@pytest.fixture
+def fake(start_fake: Callable[..., FakeProcess]) -> FakeProcess:
+    return start_fake("robotiq_2f", "--time-scale", str(SPEED_UP))
+
+
+@pytest.fixture
+def make() -> Iterator[Callable[..., Robotiq2F]]:
+    """Gives ``make("127.0.0.1:4000", request_timeout=0.2)``: a driver, not connected; disconnected in the end."""
+    made: list[Robotiq2F] = []
+
+    def build(address: str, **settings: Any) -> Robotiq2F:
+        host, _, port = address.rpartition(":")
+        gripper = Robotiq2F("gripper_id", "gripper", Robotiq2FSettings(host=host, port=int(port), **settings))
+        made.append(gripper)
+        return gripper
+
+    yield build
+    for gripper in made:
+        gripper.disconnect()
+
+
+@pytest.fixture
+def observed(fake: FakeProcess, make: Callable[..., Robotiq2F]) -> Robotiq2F:
+    gripper = make(fake.ready["ascii"])
+    gripper.connect()
+    return gripper
+
+
+@pytest.fixture
+def gripper(observed: Robotiq2F) -> Robotiq2F:
+    """In control and activated."""
+    observed.take_control()
+    observed.activate()
+    return observed

@@ -1,0 +1,105 @@
+"""The gripper's driver on a bad wire: absent, silent, reset, half a frame, garbage, slow; lost and back."""
+
+import socket
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from arcor2_drivers.robotiq_2f.robotiq_2f import Robotiq2F
+from arcor2_hw.data.device import Connection, Health
+from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected, NotInControl
+from arcor2_hw.objects.small import GripperState
+from tests.drivers.robotiq_2f.test_2f_gripping import in_background
+from tests.fakes.conftest import FakeProcess
+
+
+def test_nobody_there(make: Callable[..., Robotiq2F]) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{taken.getsockname()[1]}"
+        gripper = make(address)
+        with pytest.raises(NotConnected, match=f"gripper at {address} cannot be reached"):
+            gripper.connect(1.0)
+        assert gripper.connection is Connection.FAILED
+        with pytest.raises(NotConnected):
+            gripper.state()
+
+
+def test_somebody_who_says_nothing(fake: FakeProcess, make: Callable[..., Robotiq2F]) -> None:
+    fake.control.do("silence")
+    gripper = make(fake.ready["ascii"], request_timeout=0.2)
+    began = time.monotonic()
+    with pytest.raises(DeviceTimeout, match=r"gripper at 127\.0\.0\.1:\d+ did not answer GET ACT within 0\.2 s"):
+        gripper.connect(1.0)
+    assert time.monotonic() - began < 1.0
+    fake.control.do("heal")
+    gripper.connect(1.0)
+
+
+@pytest.mark.parametrize("fault", ["silence", "reset", "half_frame", "garbage", "slow"])
+def test_bad_wire_in_mid_grip_and_back(
+    fake: FakeProcess, make: Callable[..., Robotiq2F], wait_for: Callable[..., Any], fault: str
+) -> None:
+    gripper = make(fake.ready["ascii"], request_timeout=0.15)
+    gripper.connect()
+    gripper.take_control()
+    gripper.activate()
+    fake.control.do("put_part", width=0.03)
+    thread, outcome = in_background(lambda: gripper.grip(0.0, speed=0.03))
+    wait_for(gripper.state, lambda state: state is GripperState.MOVING)
+    fake.control.do(fault, seconds=0.4)
+    thread.join(3.0)
+    assert isinstance(outcome[0], ConnectionLost)
+    assert "gripper at 127.0.0.1" in str(outcome[0])
+    if fault != "reset":
+        wait_for(lambda: gripper.connection is Connection.LOST)
+        assert gripper.health is Health.FAILURE
+        with pytest.raises(ConnectionLost):
+            gripper.state()
+    fake.control.do("heal")
+    wait_for(lambda: gripper.connection is Connection.BACK)
+
+    wait_for(lambda: fake.truth()["registers"]["OBJ"] == 2)  # what it had been told it does, and holds
+    sets = fake.truth()["sets"]
+    wait_for(gripper.state, lambda state: state is GripperState.HOLDING)
+    with pytest.raises(NotInControl):
+        gripper.release()
+    assert fake.truth()["sets"] == sets
+    gripper.take_control()
+    gripper.release()
+    assert gripper.connection is Connection.ONLINE
+
+
+def test_senseless_answers_are_typed(make: Callable[..., Robotiq2F]) -> None:
+    """A listener that answers each question with the next of a row of wrong answers."""
+    for answer in (b"POS 3\n", b"ACT 999\n", b"?\n", b"\xff\xff\xff\n", b"A" * 200, b"ACT x\n", b"ACT"):
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            server.settimeout(5.0)
+
+            def serve(server: socket.socket = server, answer: bytes = answer) -> None:
+                client, _ = server.accept()
+                with client:
+                    client.settimeout(5.0)
+                    client.recv(100)
+                    client.sendall(answer)
+                    client.recv(100)  # until it is closed
+
+            thread, _ = in_background(serve)
+            gripper = make(f"127.0.0.1:{server.getsockname()[1]}", request_timeout=0.1)
+            with pytest.raises(DeviceError, match=r"gripper at 127\.0\.0\.1"):
+                gripper.connect(1.0)
+            gripper.disconnect()
+            thread.join(5.0)
+
+
+def test_disconnecting_ends_who_waits(fake: FakeProcess, gripper: Robotiq2F, wait_for: Callable[..., Any]) -> None:
+    thread, outcome = in_background(lambda: gripper.grip(0.0, speed=0.02))
+    wait_for(gripper.state, lambda state: state is GripperState.MOVING)
+    began = time.monotonic()
+    gripper.disconnect()
+    assert time.monotonic() - began < 1.0
+    thread.join(3.0)
+    assert isinstance(outcome[0], DeviceError)
+    wait_for(lambda: fake.truth()["registers"]["OBJ"] == 3)  # it finishes, and holds

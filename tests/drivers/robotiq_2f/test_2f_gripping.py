@@ -1,0 +1,296 @@
+"""The gripper's driver on a fake: activation, gripping, losing a part, stopping, control, scaling, settings."""
+
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from arcor2_drivers.robotiq_2f import scaling
+from arcor2_drivers.robotiq_2f.robotiq_2f import Robotiq2F
+from arcor2_drivers.robotiq_2f.settings import Robotiq2FSettings
+from arcor2_drivers.robotiq_2f.status import FAULTS
+from arcor2_hw.data.device import Connection, Health
+from arcor2_hw.exceptions import (
+    Arcor2Error,
+    Cancelled,
+    DeviceFault,
+    DeviceTimeout,
+    NotFound,
+    NotInControl,
+    OutOfRange,
+    Refused,
+)
+from arcor2_hw.objects.small import GripperState
+from tests.fakes.conftest import FakeProcess
+
+
+def in_background(call: Callable[[], Any]) -> tuple[threading.Thread, list[Any]]:
+    """Run a call in a thread; the list holds what it gave or raised."""
+    outcome: list[Any] = []
+
+    def run() -> None:
+        try:
+            outcome.append(call())
+        except Exception as error:
+            outcome.append(error)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    return thread, outcome
+
+
+def test_connecting_and_taking_control_write_nothing(fake: FakeProcess, observed: Robotiq2F) -> None:
+    observed.connect()  # harmless when connected
+    assert observed.connection is Connection.ONLINE
+    assert observed.state() is GripperState.INACTIVE
+    assert observed.control_owner() is None
+    with pytest.raises(NotInControl, match="grip to 0 m is refused: nobody has control"):
+        observed.grip()
+    with pytest.raises(NotInControl, match="activate is refused"):
+        observed.activate()
+    observed.stop()
+    observed.take_control()
+    with pytest.raises(Refused, match="release is refused in state inactive: activate it first"):
+        observed.release()
+    assert fake.truth()["sets"] == []
+    assert fake.truth()["registers"]["STA"] == 0
+    observed.disconnect()
+    observed.disconnect()
+    assert fake.truth()["sets"] == []
+
+
+def test_whole_cycle(fake: FakeProcess, gripper: Robotiq2F) -> None:
+    assert gripper.state() is GripperState.AT_POSITION
+    sets = len(fake.truth()["sets"])
+    gripper.activate()  # harmless when activated
+    assert len(fake.truth()["sets"]) == sets
+
+    fake.control.do("put_part", width=0.04)
+    held, width = gripper.grip(0.01, force=127.5, speed=0.15)
+    assert held
+    assert width == pytest.approx(0.04, abs=0.0002)
+    requested = fake.truth()["registers"]
+    assert (requested["PRE"], requested["FOR"], requested["SPE"]) == (203, 128, 255)
+    assert fake.truth()["gripped"]
+    assert gripper.state() is GripperState.HOLDING
+    assert gripper.part_held()
+
+    gripper.release()
+    assert not gripper.part_held()
+    assert gripper.width() == pytest.approx(0.085)
+    fake.control.do("remove_part")
+    assert gripper.grip(0.03, speed=0.15) == (False, pytest.approx(0.03, abs=0.0002))
+    assert gripper.state() is GripperState.AT_POSITION
+
+
+def test_the_same_grip_again_tells_what_is_so_now(fake: FakeProcess, gripper: Robotiq2F) -> None:
+    fake.control.do("put_part", width=0.05)
+    assert gripper.grip(0.0, speed=0.15)[0]
+    assert gripper.grip(0.0, speed=0.15)[0]
+    fake.control.do("remove_part")
+    assert gripper.grip(0.0, speed=0.15) == (False, 0.0)
+
+
+def test_lost_part_is_noticed(fake: FakeProcess, gripper: Robotiq2F, wait_for: Callable[..., Any]) -> None:
+    fake.control.do("put_part", width=0.04)
+    assert gripper.grip(0.0, speed=0.15)[0]
+    fake.control.do("remove_part")
+    wait_for(gripper.state, lambda state: state is GripperState.LOST)
+    wait_for(lambda: fake.truth()["registers"]["OBJ"], lambda found: found == 3)
+    assert not gripper.part_held()
+    assert gripper.state() is GripperState.LOST  # until the next command
+    gripper.release()
+    assert gripper.state() is GripperState.AT_POSITION
+
+
+def test_blocked_release_fails(fake: FakeProcess, gripper: Robotiq2F) -> None:
+    gripper.grip(0.0, speed=0.15)
+    fake.control.do("block")
+    with pytest.raises(DeviceFault, match=r"release ended at 0\.0000 m: the fingers are blocked"):
+        gripper.release()
+    fake.control.do("block", on=False)
+    gripper.release()
+
+
+def test_stop_ends_a_grip_and_holds_what_is_held(
+    fake: FakeProcess, gripper: Robotiq2F, wait_for: Callable[..., Any]
+) -> None:
+    thread, outcome = in_background(lambda: gripper.grip(0.0, speed=0.02))
+    wait_for(gripper.state, lambda state: state is GripperState.MOVING)
+    with pytest.raises(Refused, match="release is refused in state moving"):
+        gripper.release()
+    gripper.stop()
+    position = fake.truth()["position"]
+    thread.join(5.0)
+    assert isinstance(outcome[0], Cancelled)
+    assert 3 < position < 230
+    assert fake.truth()["position"] == position
+    assert gripper.state() is GripperState.AT_POSITION
+    gripper.release()
+
+    fake.control.do("put_part", width=0.06)
+    assert gripper.grip(0.0, speed=0.15)[0]
+    sets = fake.truth()["sets"]
+    gripper.stop()
+    assert fake.truth()["sets"] == sets
+    assert gripper.part_held()
+
+
+def test_stop_ends_an_activation(fake: FakeProcess, observed: Robotiq2F, wait_for: Callable[..., Any]) -> None:
+    observed.take_control()
+    thread, outcome = in_background(observed.activate)
+    wait_for(lambda: fake.truth()["registers"]["STA"] == 1)
+    observed.stop()
+    thread.join(5.0)
+    assert isinstance(outcome[0], Cancelled)
+    assert fake.truth()["registers"]["STA"] == 0
+    observed.activate()
+    assert observed.state() is GripperState.AT_POSITION
+
+
+def test_major_fault_ends_a_grip_and_is_acknowledged(
+    fake: FakeProcess, gripper: Robotiq2F, wait_for: Callable[..., Any]
+) -> None:
+    code = 0x0E
+    thread, outcome = in_background(lambda: gripper.grip(0.0, speed=0.02))
+    wait_for(gripper.state, lambda state: state is GripperState.MOVING)
+    fake.control.do("fault", code=code)
+    thread.join(5.0)
+    error = outcome[0]
+    assert isinstance(error, DeviceFault)
+    assert error.fault_code == code
+    assert "gripper at 127.0.0.1" in str(error)
+    assert "overcurrent" in str(error)
+    assert error.detail == FAULTS[code].remedy
+    (alarm,) = gripper.alarms()
+    assert (alarm.code, alarm.text) == ("14", "overcurrent")
+    assert gripper.health is Health.FAILURE
+    with pytest.raises(DeviceFault):
+        gripper.release()
+    with pytest.raises(NotFound):
+        gripper.acknowledge("5")
+    gripper.acknowledge(str(code))
+    assert gripper.alarms() == []
+    assert gripper.state() is GripperState.INACTIVE
+    gripper.activate()
+
+
+def test_minor_fault_is_told_and_ends_with_its_cause(
+    fake: FakeProcess, gripper: Robotiq2F, wait_for: Callable[..., Any]
+) -> None:
+    fake.control.do("fault", code=8)
+    wait_for(gripper.alarms)
+    assert gripper.health is Health.OFF_SPEC
+    with pytest.raises(Refused, match="let the gripper cool down"):
+        gripper.acknowledge("8")
+    fake.control.do("fault", code=0)
+    wait_for(lambda: gripper.health is Health.NORMAL)
+
+
+def test_interference_fails_the_activation(fake: FakeProcess, observed: Robotiq2F) -> None:
+    observed.take_control()
+    fake.control.do("put_part", width=0.05)
+    with pytest.raises(DeviceFault, match="activate ended by fault 13"):
+        observed.activate()
+
+
+def test_power_cycle_in_mid_grip(fake: FakeProcess, gripper: Robotiq2F, wait_for: Callable[..., Any]) -> None:
+    thread, outcome = in_background(lambda: gripper.grip(0.0, speed=0.02))
+    wait_for(gripper.state, lambda state: state is GripperState.MOVING)
+    fake.control.do("power_cycle")
+    thread.join(5.0)
+    assert isinstance(outcome[0], DeviceFault)
+    assert gripper.state() is GripperState.INACTIVE
+    sets = len(fake.truth()["sets"])
+    with pytest.raises(Refused, match="activate it first"):
+        gripper.grip()
+    assert len(fake.truth()["sets"]) == sets
+
+
+def test_another_client_is_noticed_and_named(
+    fake: FakeProcess, gripper: Robotiq2F, make: Callable[..., Robotiq2F], wait_for: Callable[..., Any]
+) -> None:
+    gripper.grip(0.02, speed=0.15)
+    other = make(fake.ready["ascii"])
+    other.connect()
+    other.take_control()
+    thread, _ = in_background(lambda: other.grip(0.08, speed=0.02))
+    wait_for(lambda: gripper.control_owner() != "us")
+    with pytest.raises(NotInControl, match="another client of the gripper, which asks for position 16"):
+        gripper.release()
+    with pytest.raises(NotInControl, match="somebody else moves the gripper"):
+        gripper.take_control()
+    other.stop()
+    thread.join(5.0)
+    gripper.take_control()
+    gripper.release()
+
+
+def test_values_out_of_range_send_nothing(fake: FakeProcess, gripper: Robotiq2F) -> None:
+    sets = fake.truth()["sets"]
+    for name, value in (("width", 0.2), ("width", -0.01), ("force", 5.0), ("force", 300.0), ("speed", float("nan"))):
+        with pytest.raises(OutOfRange, match=f"{name} must be"):
+            gripper.grip(**{name: value})
+    assert fake.truth()["sets"] == sets
+
+
+def test_a_grip_that_takes_too_long_is_stopped(
+    fake: FakeProcess, gripper: Robotiq2F, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("arcor2_drivers.robotiq_2f.robotiq_2f.MARGIN", -4.9)
+    with pytest.raises(DeviceTimeout, match=r"gripper at .*: grip to 0 m took longer than 0\.35 s"):
+        gripper.grip(0.0, speed=0.02)
+    gripper._await_rest()
+    assert 3 < fake.truth()["position"] < 230
+
+
+@given(st.floats(0.0, 0.085))
+def test_width_survives_scaling(width: float) -> None:
+    settings = Robotiq2FSettings(host="h")
+    position = scaling.position(settings, width)
+    assert settings.open_position <= position <= settings.closed_position
+    assert abs(scaling.width(settings, position) - width) <= 0.085 / 227 / 2 + 1e-9
+
+
+def test_scaling_by_the_limits_of_the_model() -> None:
+    settings = Robotiq2FSettings(host="h", stroke=0.14, min_force=10.0, max_force=125.0, max_speed=0.25, min_speed=0.03)
+    assert (scaling.position(settings, 0.14), scaling.position(settings, 0.0)) == (3, 230)
+    assert (scaling.force(settings, 10.0), scaling.force(settings, 125.0)) == (0, 255)
+    assert (scaling.speed(settings, 0.03), scaling.speed(settings, 0.25)) == (0, 255)
+    assert (scaling.width(settings, 0), scaling.width(settings, 255)) == (0.14, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "named"),
+    [
+        ({"host": " "}, "host"),
+        ({"port": 0}, "port"),
+        ({"request_timeout": 0.0}, "request_timeout"),
+        ({"activation_timeout": float("inf")}, "activation_timeout"),
+        ({"stroke": 1.0}, "stroke"),
+        ({"open_position": -1}, "open_position"),
+        ({"closed_position": 3}, "closed_position"),
+        ({"max_force": 20.0}, "max_force"),
+        ({"min_speed": 0.0}, "min_speed"),
+        ({"max_speed": 0.01}, "max_speed"),
+    ],
+)
+def test_settings_name_the_parameter(wrong: dict[str, Any], named: str) -> None:
+    with pytest.raises(OutOfRange, match=f"^{named} must be") as caught:
+        Robotiq2FSettings(**{"host": "gripper.local", **wrong})
+    assert isinstance(caught.value, Arcor2Error)
+
+
+def test_what_the_quality_file_claims_is_there() -> None:
+    root = Path(__file__).resolve().parents[3]
+    claims = yaml.safe_load((root / "drivers/arcor2_drivers/robotiq_2f/quality.yaml").read_text())
+    named = [test for tests in claims["rules"].values() for test in tests]
+    for test in named:
+        file, _, function = test.partition("::")
+        assert f"def {function}(" in (Path(__file__).parent / file).read_text(), test
+    assert all(hasattr(getattr(Robotiq2F, name), "__action__") for name in claims["actions"])
