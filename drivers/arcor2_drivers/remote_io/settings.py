@@ -7,7 +7,8 @@ from typing import Final
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
 
-from .points import parse_points
+from .patterns import parse_patterns
+from .points import Point, parse_address, parse_points
 from .registers import WATCHDOGS
 
 LONGEST_WATCHDOG: Final = 5000
@@ -74,3 +75,64 @@ class RemoteIOSettings(BlockSettings):
     def __post_init__(self) -> None:
         super().__post_init__()
         parse_points(self.points)
+
+
+COLORS: Final = ("red", "amber", "green", "blue", "white")
+
+
+@dataclasses.dataclass
+class TowerLightSettings(BlockSettings):
+    """A block, the outputs that a tower light's lamps are at, and what they show.
+
+    :param red: output of the red lamp, as DO0; empty when there is none
+    :param amber: output of the amber lamp
+    :param green: output of the green lamp
+    :param blue: output of the blue lamp
+    :param white: output of the white lamp
+    :param buzzer: output of the buzzer
+    :param on_loss: colour that is lit when the block loses us; empty for none
+    :param blink_period: seconds from one flash to the next
+    :param patterns: what show_state shows: "execute=green; aborted=red+amber blinking; idle=off"; empty for the usual
+    """
+
+    red: str = ""
+    amber: str = ""
+    green: str = ""
+    blue: str = ""
+    white: str = ""
+    buzzer: str = ""
+    on_loss: str = ""
+    blink_period: float = 1.0
+    patterns: str = ""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        within("blink_period", self.blink_period, 0.2, 10.0)
+        fitted = self.lamps()
+        if not fitted:
+            raise OutOfRange(f"one of {', '.join(COLORS)} must be the output of a lamp")
+        if self.on_loss and self.on_loss not in fitted:
+            raise OutOfRange(f"on_loss must be one of {', '.join(fitted)} or empty, not {self.on_loss!r}")
+        parse_patterns(self.patterns, fitted)
+        self.points()
+
+    def lamps(self) -> list[str]:
+        """Give the colours that are there."""
+        return [color for color in COLORS if getattr(self, color)]
+
+    def points(self) -> dict[str, Point]:
+        """Give lamps and buzzer as points. Raises OutOfRange naming the parameter."""
+        used: dict[str, str] = {}
+        for name in (*COLORS, "buzzer"):
+            terminal = getattr(self, name)
+            if not terminal:
+                continue
+            if parse_address(terminal, name)[0] != "DO":
+                raise OutOfRange(f"{name} must be a digital output such as DO0, not {terminal}")
+            if terminal in used.values():
+                raise OutOfRange(f"{name} must be an output of its own: {terminal} is another lamp's")
+            used[name] = terminal
+        on = self.on_loss
+        return parse_points(
+            "; ".join(f"{name}={terminal} on_loss={'on' if name == on else 'off'}" for name, terminal in used.items())
+        )

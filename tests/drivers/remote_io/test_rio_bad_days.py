@@ -1,0 +1,271 @@
+"""The remote I/O block's driver when the wire fails, answers come late, or the driver's own process is killed."""
+
+import itertools
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from pymodbus.client import ModbusTcpClient
+
+from arcor2_drivers.remote_io.remote_io import RemoteIO
+from arcor2_drivers.remote_io.tower_light import TowerLight
+from arcor2_hw.data.device import Connection
+from arcor2_hw.exceptions import (
+    ConnectionLost,
+    DeviceError,
+    DeviceFault,
+    DeviceTimeout,
+    NotConnected,
+    NotInControl,
+)
+from tests.drivers.functional_tester.relay import Relay
+from tests.drivers.remote_io.conftest import POINTS
+from tests.drivers.remote_io.test_rio_points import in_thread
+from tests.fakes.conftest import FakeProcess
+
+READ_IMAGE, WRITE_COIL = 4, 5
+QUICK: dict[str, Any] = {"request_timeout": 0.1, "watchdog_ms": 400}
+
+
+@pytest.fixture
+def quick(fake: FakeProcess, make: Callable[..., RemoteIO]) -> RemoteIO:
+    """A driver that gives up soon, in control, with all three kinds of outputs other than on loss."""
+    block = make(fake.ready["modbus"], **QUICK)
+    block.connect()
+    block.take_control()
+    block.write_digital("lamp", True)
+    block.write_digital("valve", True)
+    return block
+
+
+@pytest.fixture
+def relay(fake: FakeProcess) -> Iterator[Relay]:
+    with Relay(fake.ready["modbus"]) as relay:
+        yield relay
+
+
+def expired(truth: dict[str, Any]) -> bool:
+    return bool(truth["watchdogs"][0]["state"] == "expired")
+
+
+# ------------------------------------------------------------------------------------------------ connecting
+def test_nobody_there(make: Callable[..., RemoteIO]) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))  # not listening: refuses
+        address = "{}:{}".format(*taken.getsockname())
+        block = make(address)
+        with pytest.raises(NotConnected, match=f"^block at {address} cannot be reached"):
+            block.connect(1.0)
+        assert block.connection is Connection.FAILED
+        for call in (lambda: block.read("part"), lambda: block.write("lamp", True), block.take_control, block.identify):
+            with pytest.raises(NotConnected, match=address):
+                call()
+
+
+@pytest.mark.parametrize("fault", ["silence", "half_frame", "garbage"])
+def test_connecting_to_one_that_does_not_answer_sensibly(
+    fake: FakeProcess, make: Callable[..., RemoteIO], fault: str
+) -> None:
+    fake.control.do(fault)
+    block = make(fake.ready["modbus"])
+    began = time.monotonic()
+    with pytest.raises(DeviceError, match=f"^block at {fake.ready['modbus']}"):
+        block.connect(0.6)
+    assert time.monotonic() - began < 0.9
+    fake.control.do("heal")
+    block.connect()
+    assert block.read_digital("part") is False
+
+
+def test_wrong_unit_is_refused_by_name(fake: FakeProcess, make: Callable[..., RemoteIO]) -> None:
+    with pytest.raises((DeviceFault, DeviceTimeout), match=fake.ready["modbus"]):
+        make(fake.ready["modbus"], unit_id=7).connect(1.0)
+
+
+# ------------------------------------------------------------------------------------------------ losses
+@pytest.mark.parametrize("fault", ["reset", "silence", "half_frame", "garbage"])
+def test_loss_and_coming_back(fake: FakeProcess, quick: RemoteIO, wait_for: Callable[..., Any], fault: str) -> None:
+    edges: list[Any] = []
+    quick.subscribe("part", edges.append)
+    thread, outcome = in_thread(lambda: quick.wait_for("part", True, 20.0))
+    began = time.monotonic()
+    fake.control.do(fault)
+    if fault == "reset":
+        fake.control.do("refuse")  # what comes back at once is the next test's
+    thread.join(5.0)
+    assert isinstance(outcome[0], ConnectionLost)
+    assert fake.ready["modbus"] in str(outcome[0])
+    assert outcome[1] - began < 1.5
+    with pytest.raises(ConnectionLost):
+        quick.write_digital("lamp", False)
+    # The block itself puts the outputs into their safe state, and nothing brings them back.
+    truth = wait_for(fake.truth, expired)
+    assert truth["outputs"][4:7] == [False, True, True]
+    fake.control.do("heal")
+    wait_for(lambda: quick.connection, lambda state: state is Connection.BACK)
+    with pytest.raises(NotInControl, match="writing lamp is refused: control ended when the connection was lost"):
+        quick.write_digital("lamp", True)
+    assert fake.truth()["outputs"][4:7] == [False, True, True]
+    quick.take_control()
+    assert quick.connection is Connection.ONLINE
+    assert fake.truth()["outputs"][4:7] == [False, True, True]
+    quick.write_digital("lamp", True)
+    fake.control.do("set_input", number=0, on=True)
+    wait_for(lambda: len(edges), lambda count: count == 1)  # subscriptions outlive a loss
+
+
+def test_control_does_not_come_back_after_a_short_loss(
+    fake: FakeProcess, quick: RemoteIO, wait_for: Callable[..., Any]
+) -> None:
+    fake.control.do("reset")
+    wait_for(lambda: quick.connection, lambda state: state is Connection.BACK)
+    with pytest.raises(NotInControl):
+        quick.write_digital("lamp", False)
+    quick.take_control()  # at once: the number on the running watchdog is our own
+    quick.write_digital("lamp", False)
+
+
+def test_a_block_that_was_switched_off_and_on_ends_control(
+    start_fake: Callable[..., FakeProcess], make: Callable[..., RemoteIO], wait_for: Callable[..., Any]
+) -> None:
+    """On a serial line nothing breaks; the watchdog that is off tells it."""
+    fake = start_fake("remote_io", "--serial")
+    block = make(fake.ready["modbus"], baudrate=115200)
+    block.connect()
+    block.take_control()
+    block.write_digital("lamp", True)
+    fake.control.do("power_cycle")
+    wait_for(block.control_owner, lambda owner: owner is None)
+    with pytest.raises(NotInControl, match="writing lamp is refused: the block's watchdog is off"):
+        block.write_digital("lamp", True)
+    assert block.connection is Connection.ONLINE
+    assert fake.truth()["outputs"][4] is False
+
+
+def test_a_pulse_ends_though_the_connection_is_lost(
+    fake: FakeProcess, make: Callable[..., RemoteIO], wait_for: Callable[..., Any]
+) -> None:
+    block = make(fake.ready["modbus"], watchdog_ms=5000)  # the pulse is over long before
+    block.connect()
+    block.take_control()
+    thread, outcome = in_thread(lambda: block.pulse("valve", 0.3))
+    wait_for(lambda: fake.truth()["outputs"][5])
+    fake.control.do("reset")
+    thread.join(5.0)
+    assert isinstance(outcome[0], ConnectionLost)
+    history = wait_for(lambda: fake.truth()["history"], lambda history: len(history) == 2)
+    assert history[1]["time"] - history[0]["time"] == pytest.approx(0.3, abs=0.001)
+
+
+def test_a_late_answer_to_a_reading(relay: Relay, make: Callable[..., RemoteIO]) -> None:
+    """The reading is repeated on a new connection; the late answer finds nobody; nothing counts as lost."""
+    block = make(relay.address, request_timeout=0.2)
+    block.connect()
+    block.take_control()
+    relay.delay_next(READ_IMAGE, 0.4)
+    assert block.read_digital("part") is False
+    block.read_digital("part")
+    assert relay.connections == 2
+    assert block.connection is Connection.ONLINE
+    assert block.control_owner() == "us"
+
+
+def test_a_late_answer_to_a_write(relay: Relay, make: Callable[..., RemoteIO], fake: FakeProcess) -> None:
+    """A write is sent once; what became of it is said to be unknown; its late answer answers nothing."""
+    block = make(relay.address, request_timeout=0.2)
+    block.connect()
+    block.take_control()
+    relay.delay_next(WRITE_COIL, 0.4)
+    with pytest.raises(DeviceTimeout, match=f"^block at {relay.address}: .*switching DO4.* it may have been obeyed$"):
+        block.write_digital("lamp", True)
+    assert relay.requests[WRITE_COIL] == 1
+    assert fake.truth()["outputs"][4] is True  # it was
+    block.write_digital("lamp", False)
+    assert fake.truth()["outputs"][4] is False
+    assert block.control_owner() == "us"
+
+
+def test_another_host_that_takes_the_watchdog_ends_control(
+    fake: FakeProcess, quick: RemoteIO, wait_for: Callable[..., Any]
+) -> None:
+    host, _, port = fake.ready["modbus"].rpartition(":")
+    client = ModbusTcpClient(host, port=int(port))
+    try:
+        for number in itertools.count(1):  # as often as it takes to come between two triggers of ours
+            client.write_register(65, number, device_id=1)
+            if quick.control_owner() != "us":
+                break
+            assert number < 2000
+    finally:
+        client.close()
+    with pytest.raises(NotInControl, match=r"another host \(number \d+ on watchdog 0\) has control"):
+        quick.write_digital("lamp", False)
+
+
+def test_disconnect_is_quick_whatever_the_wire_does(fake: FakeProcess, quick: RemoteIO) -> None:
+    fake.control.do("silence")
+    began = time.monotonic()
+    quick.disconnect()
+    assert time.monotonic() - began < 1.0
+    assert quick.connection is Connection.OFFLINE
+    quick.disconnect()
+    fake.control.do("heal")
+    quick.connect()
+    assert quick.read_digital("part") is False
+
+
+HOST = """
+import sys, time
+from arcor2_drivers.remote_io.remote_io import RemoteIO
+from arcor2_drivers.remote_io.settings import RemoteIOSettings
+host, port = sys.argv[1].rsplit(":", 1)
+settings = RemoteIOSettings(host, int(port), watchdog_ms=400, request_timeout=0.1, points=sys.argv[2])
+block = RemoteIO("id", "block", settings)
+block.connect()
+block.take_control()
+block.write_digital("lamp", True)
+block.write_digital("valve", True)
+block.write_analog("speed", 1.0)
+time.sleep(60)
+"""
+
+
+def test_outputs_go_to_their_safe_state_when_the_drivers_process_is_killed(
+    fake: FakeProcess, make: Callable[..., RemoteIO], wait_for: Callable[..., Any]
+) -> None:
+    watcher = make(fake.ready["modbus"])  # somebody else's reading must not keep the watchdog quiet
+    watcher.connect()
+    process = subprocess.Popen([sys.executable, "-c", HOST, fake.ready["modbus"], POINTS])
+    try:
+        wait_for(fake.truth, lambda truth: truth["analog_outputs"][0] == 100, within=15.0)
+        time.sleep(1.0)  # more than twice the watchdog's time: the driver keeps it quiet
+        assert fake.truth()["outputs"][4:7] == [True, True, False]
+        process.kill()
+        killed = time.monotonic()
+        truth = wait_for(fake.truth, expired, within=2.0)
+        off = truth["history"][-2:]  # the lamp off, the lock on; on the clock all processes share
+        assert all(change["time"] - killed <= 0.4 for change in off)
+    finally:
+        process.kill()
+        process.wait()
+    assert truth["outputs"][4:7] == [False, True, True]
+    assert truth["analog_outputs"][0] == 0
+    assert watcher.connection is Connection.ONLINE
+
+
+def test_what_the_quality_file_claims_is_there() -> None:
+    root = Path(__file__).resolve().parents[3]
+    claims = yaml.safe_load((root / "drivers/arcor2_drivers/remote_io/quality.yaml").read_text())
+    for test in itertools.chain.from_iterable(claims["rules"].values()):
+        file, _, function = test.partition("::")
+        assert f"def {function}(" in (Path(__file__).parent / file).read_text(), test
+    types = {each.__name__: each for each in (RemoteIO, TowerLight)}
+    assert set(claims["types"]) == set(types)
+    for type_name, names in claims["actions"].items():
+        assert all(hasattr(getattr(types[type_name], name), "__action__") for name in names)
