@@ -1,0 +1,78 @@
+"""A motion in time: a path of parts, each run with a trapezoid of speed."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+
+from arcor2_fakes.dobot_magician.geometry import Four
+
+
+def between(a: Four, b: Four, share: float) -> Four:
+    """Give the point at a share of the way from `a` to `b`."""
+    return (
+        a[0] + (b[0] - a[0]) * share,
+        a[1] + (b[1] - a[1]) * share,
+        a[2] + (b[2] - a[2]) * share,
+        a[3] + (b[3] - a[3]) * share,
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class Trapezoid:
+    """A distance run with a highest speed and an acceleration."""
+
+    distance: float
+    speed: float
+    acceleration: float
+
+    @property
+    def _ramp(self) -> float:
+        """Give the time of one ramp, s; without a plateau when the distance is short."""
+        return min(self.speed / self.acceleration, math.sqrt(self.distance / self.acceleration))
+
+    @property
+    def duration(self) -> float:
+        """Give the time it takes, s."""
+        ramp = self._ramp
+        if ramp <= 0.0:
+            return 0.0
+        return ramp + self.distance / (self.acceleration * ramp)
+
+    def share(self, time: float) -> float:
+        """Give how much of the distance is done after `time` s, 0 to 1."""
+        whole, ramp = self.duration, self._ramp
+        if time >= whole:
+            return 1.0
+        if time < ramp:
+            done = 0.5 * self.acceleration * time * time
+        elif time > whole - ramp:
+            done = self.distance - 0.5 * self.acceleration * (whole - time) ** 2
+        else:
+            done = self.acceleration * ramp * (time - 0.5 * ramp)
+        return done / self.distance
+
+
+@dataclasses.dataclass(frozen=True)
+class Part:
+    """A stretch of a motion: its timing, and the joints at a share of it (None: the links do not reach)."""
+
+    timing: Trapezoid
+    joints_at: Callable[[float], Four | None]
+
+
+class Motion:
+    """Parts run one after the other."""
+
+    def __init__(self, parts: list[Part]) -> None:
+        self._parts = parts
+        self._time = 0.0
+
+    def advance(self, seconds: float) -> tuple[Four | None, bool]:
+        """Go on; give the joints now (None: not reached) and whether it is at its end."""
+        self._time += seconds
+        while len(self._parts) > 1 and self._time >= self._parts[0].timing.duration:
+            self._time -= self._parts.pop(0).timing.duration
+        timing = self._parts[0].timing
+        return self._parts[0].joints_at(timing.share(self._time)), self._time >= timing.duration

@@ -1,0 +1,256 @@
+"""The Magician's driver on its fake: the wire fails, the owner dies, somebody else moves it."""
+
+import os
+import struct
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import serial
+
+from arcor2_drivers.dobot_magician.dobot_magician import DobotMagician
+from arcor2_drivers.dobot_magician.frames import encode
+from arcor2_hw.data.device import Connection, Health
+from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected, NotInControl, Refused
+from tests.drivers.dobot_magician.test_dm_working import in_background, joints
+from tests.fakes.conftest import FakeProcess
+
+
+def ptp(x: float, mode: int = 4) -> bytes:
+    return encode(84, 3, struct.pack("<B4f", mode, x, 45.0, 45.0, 0.0))
+
+
+def write(port: str, *frames: bytes) -> None:
+    """Send as a foreign program would, and leave."""
+    with serial.Serial(port, 115200, timeout=1.0) as line:
+        for frame in frames:
+            line.write(frame)
+            assert line.read(6)
+
+
+def test_a_port_that_is_not_there_or_in_use(fake: FakeProcess, make: Callable[..., DobotMagician]) -> None:
+    absent = make("/dev/no-such-port")
+    with pytest.raises(NotConnected, match=r"^arm at /dev/no-such-port: the port cannot be opened$"):
+        absent.connect()
+    assert absent.connection is Connection.FAILED
+    with serial.Serial(fake.ready["port"], exclusive=True):
+        other = make(fake.ready["port"])
+        with pytest.raises(NotConnected, match=r"is used by another program$"):
+            other.connect()
+    other.connect()
+
+
+@pytest.mark.parametrize("fault", ["silence", "garbage", "half_frame"])
+def test_a_device_that_does_not_answer_sensibly(
+    fake: FakeProcess, make: Callable[..., DobotMagician], fault: str
+) -> None:
+    fake.control.do(fault)
+    arm = make(fake.ready["port"])
+    began = time.monotonic()
+    with pytest.raises(DeviceTimeout, match=r"^arm at .*ttyDOBOT did not answer within 0.3 s$"):
+        arm.connect(2.0)
+    assert time.monotonic() - began < 1.5
+    fake.control.do("heal")
+    arm.connect()
+
+
+@pytest.mark.parametrize("fault", ["silence", "garbage", "half_frame", "wrong_checksum"])
+def test_a_wire_that_fails_is_named_and_comes_back(
+    fake: FakeProcess, arm: DobotMagician, wait_for: Callable[..., Any], fault: str
+) -> None:
+    fake.control.do(fault)
+    wait_for(lambda: arm.connection, lambda state: state in (Connection.LOST, Connection.BACK))
+    if fault != "wrong_checksum":
+        with pytest.raises(ConnectionLost, match=r"the connection to arm at .*ttyDOBOT is lost"):
+            arm.get_end_effector_pose("tcp")
+        with pytest.raises(ConnectionLost):
+            arm.move_to_joints(joints(0, 45, 45, 0), 1.0)
+        assert arm.health is Health.FAILURE
+    fake.control.do("heal")
+    wait_for(lambda: arm.connection, lambda state: state is Connection.BACK)
+    wait_for(lambda: arm.health, lambda health: health is Health.NORMAL)
+    with pytest.raises(NotInControl):  # only observation comes back
+        arm.move_to_joints(joints(0, 45, 45, 0), 1.0)
+    arm.take_control()
+    assert arm.connection is Connection.ONLINE
+    arm.move_to_joints(joints(20, 45, 45, 0), 1.0)
+    assert fake.truth()["motions"] == 1
+
+
+def test_answers_that_lag_behind_answer_nothing(
+    fake: FakeProcess, arm: DobotMagician, wait_for: Callable[..., Any]
+) -> None:
+    fake.control.do("slow", seconds=0.5)
+    wait_for(lambda: arm.connection, lambda state: state is Connection.LOST)
+    deadline = time.monotonic() + 1.5  # meanwhile answers to earlier questions keep coming
+    while time.monotonic() < deadline:
+        assert arm.connection is Connection.LOST
+        time.sleep(0.01)
+    fake.control.do("heal")
+    wait_for(lambda: arm.connection, lambda state: state is Connection.BACK, 8.0)
+    assert arm.identify().serial == "DT1022049091"
+
+
+def test_unplugged_in_mid_move_and_plugged_again(
+    fake: FakeProcess, arm: DobotMagician, wait_for: Callable[..., Any]
+) -> None:
+    thread, outcome = in_background(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.1))
+    fake.control.wait_until(lambda truth: truth["moving"])
+    fake.control.do("unplug")
+    thread.join(5.0)
+    assert isinstance(outcome[0], ConnectionLost), outcome
+    assert "a joint move" in str(outcome[0])
+    assert "arm at" in str(outcome[0])
+    with pytest.raises(ConnectionLost):
+        arm.stop()  # it cannot be sent, and says so
+    fake.control.do("plug")
+    wait_for(lambda: arm.connection, lambda state: state is Connection.BACK)
+    fake.control.wait_until(lambda truth: not truth["moving"], 10.0)
+    truth = fake.truth()
+    assert truth["joints"][0] == pytest.approx(60.0, abs=0.01)  # it continues, as declared
+    assert truth["motions"] == 1
+    with pytest.raises(NotInControl):
+        arm.home()
+
+
+def test_what_a_loss_left_running_is_stopped_when_it_is_back(
+    fake: FakeProcess, arm: DobotMagician, wait_for: Callable[..., Any]
+) -> None:
+    arm.conveyor(0.05)
+    thread, outcome = in_background(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.03))
+    fake.control.wait_until(lambda truth: truth["moving"])
+    fake.control.do("reset")
+    thread.join(5.0)
+    assert isinstance(outcome[0], ConnectionLost), outcome
+    wait_for(lambda: arm.connection, lambda state: state is Connection.BACK)
+    assert fake.truth()["moving"] is True
+    arm.stop()
+    truth = fake.truth()
+    assert (truth["moving"], truth["steppers"]["0"]) == (False, [False, 0])
+    assert arm.control_owner() is None
+
+
+def test_control_is_refused_while_it_moves_for_somebody_else(
+    fake: FakeProcess, make: Callable[..., DobotMagician]
+) -> None:
+    ratio = encode(83, 1, struct.pack("<2f", 5.0, 50.0))
+    write(fake.ready["port"], ratio, ptp(30.0), encode(240, 1))
+    fake.control.wait_until(lambda truth: truth["moving"])
+    arm = make(fake.ready["port"])
+    arm.connect()
+    with pytest.raises(NotInControl, match="moves, and not for us"):
+        arm.take_control()
+    assert arm.control_owner() == "somebody else"
+    with pytest.raises(NotInControl):
+        arm.stop()
+    arm.disconnect()
+    assert fake.truth()["moving"] is True
+    arm.connect()
+    fake.control.wait_until(lambda truth: not truth["moving"], 10.0)
+    assert fake.truth()["joints"][0] == pytest.approx(30.0, abs=0.01)
+    arm.take_control()
+    assert arm.control_owner() == "us"
+
+
+def test_what_waits_in_a_standing_queue_never_runs(fake: FakeProcess, make: Callable[..., DobotMagician]) -> None:
+    write(fake.ready["port"], ptp(30.0), ptp(-30.0))
+    assert fake.truth()["queued"] == 2
+    arm = make(fake.ready["port"])
+    arm.connect()
+    assert fake.truth()["queued"] == 2
+    arm.take_control()
+    arm.move_to_joints(joints(10, 45, 45, 0), 1.0)
+    truth = fake.truth()
+    assert truth["motions"] == 1
+    assert truth["joints"][0] == pytest.approx(10.0, abs=0.01)
+
+
+def test_switched_off_and_on(fake: FakeProcess, arm: DobotMagician, wait_for: Callable[..., Any]) -> None:
+    thread, outcome = in_background(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.1))
+    fake.control.wait_until(lambda truth: truth["moving"])
+    fake.control.do("power_cycle")
+    thread.join(5.0)
+    assert isinstance(outcome[0], DeviceError), outcome
+    wait_for(lambda: arm.connection, lambda state: state is Connection.BACK)
+    assert [alarm.code for alarm in arm.alarms()] == ["00h"]
+    with pytest.raises(NotInControl):
+        arm.move_to_joints(joints(0, 45, 45, 0), 1.0)
+    assert fake.truth()["moving"] is False
+    arm.acknowledge("00h")
+    arm.take_control()
+    arm.home()
+    assert fake.truth()["homed"] is True
+
+
+def test_a_motion_whose_answer_is_lost_never_runs(
+    fake: FakeProcess, arm: DobotMagician, wait_for: Callable[..., Any]
+) -> None:
+    fake.control.do("mute", number=84)
+    with pytest.raises(DeviceTimeout, match=r"^arm at .* did not answer within 0.3 s$") as raised:
+        arm.move_to_joints(joints(40, 45, 45, 0), 1.0)
+    assert "id 84" in raised.value.detail
+    wait_for(lambda: arm.connection, lambda state: state is Connection.BACK)
+    fake.control.do("mute", number=84, on=False)
+    arm.take_control()  # the motion whose answer was lost waits in the queue, and is dropped
+    arm.move_to_joints(joints(10, 45, 45, 0), 1.0)
+    truth = fake.truth()
+    assert truth["motions"] == 1
+    assert truth["joints"][0] == pytest.approx(10.0, abs=0.01)
+
+
+OWNER = """
+import sys
+from arcor2_drivers.dobot_magician.dobot_magician import DobotMagician
+from arcor2_drivers.dobot_magician.settings import DobotMagicianSettings
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.robot import Joint
+import math
+arm = DobotMagician("a", "arm", Pose(), DobotMagicianSettings(sys.argv[1]))
+arm.connect()
+arm.take_control()
+for angle in (60, -60, 60):
+    arm.move_to_joints([Joint(f"joint_{i + 1}", math.radians(v)) for i, v in enumerate((angle, 45, 45, 0))], 0.1)
+"""
+
+
+def test_a_killed_owner_leaves_one_motion_and_no_more(fake: FakeProcess, tmp_path: Path) -> None:
+    script = tmp_path / "owner.py"
+    script.write_text(OWNER)
+    owner = subprocess.Popen([sys.executable, str(script), fake.ready["port"]], env=dict(os.environ))
+    try:
+        fake.control.wait_until(lambda truth: truth["moving"], 20.0)
+    finally:
+        owner.kill()
+        owner.wait()
+    fake.control.wait_until(lambda truth: not truth["moving"], 10.0)
+    truth = fake.truth()
+    assert truth["joints"][0] == pytest.approx(60.0, abs=0.01)
+    assert (truth["motions"], truth["queued"], truth["longest_queue"]) == (1, 0, 1)
+
+
+def test_closing_stops_what_we_move(fake: FakeProcess, arm: DobotMagician) -> None:
+    thread, outcome = in_background(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.1))
+    fake.control.wait_until(lambda truth: truth["moving"])
+    began = time.monotonic()
+    arm.disconnect()
+    assert time.monotonic() - began < 1.0
+    thread.join(5.0)
+    assert isinstance(outcome[0], DeviceError)
+    truth = fake.truth()
+    assert truth["moving"] is False
+    assert truth["joints"][0] < 60.0
+
+
+def test_a_stop_between_two_motions_of_a_pick_drops_the_rest(fake: FakeProcess, arm: DobotMagician) -> None:
+    for _ in range(3):
+        arm.stop()
+    arm.move_to_joints(joints(0, 45, 45, 0), 1.0)
+    before = arm._stops
+    arm.stop()
+    with pytest.raises((DeviceError, Refused), match="was stopped"):
+        arm._move_joints((0.1, 0.7, 0.7, 0.0), 1.0, before)
+    assert fake.truth()["queued"] == 0
