@@ -111,9 +111,13 @@ class BarcodeReader(Reader):
         return None
 
     def stop(self) -> None:
-        """End a reading under way; called past everything else. What it would still have read is thrown away."""
+        """End a reading under way; called past everything else. What it would still have read is thrown away.
+
+        Returns when the reader has ended it. Raises DeviceTimeout.
+        """
         self._stops += 1
         self._conversation.interrupt()
+        self._conversation.rest()
 
     # -------------------------------------------------------------------------------- actions
     @action(deadline=LONGEST_SCAN + MARGIN)

@@ -77,6 +77,15 @@ class Conversation:
             self._reading = False
             self._busy.release()
 
+    def rest(self) -> None:
+        """Return when nobody reads any more. Raises DeviceTimeout."""
+        if not self._reading:
+            return
+        within = 3.0 * self._settings.answer_timeout
+        if not self._busy.acquire(timeout=within):
+            raise DeviceTimeout(f"{self.who} did not end its reading within {within:g} s")
+        self._busy.release()
+
     def send(self, command: str) -> None:
         """Send a command that has no answer of its own. Raises ConnectionLost."""
         line = self._line

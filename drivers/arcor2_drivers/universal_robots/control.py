@@ -64,6 +64,7 @@ class ControlSession:
 
     def __init__(self, observer: Observer, upper: bool, watchdog_frequency: float) -> None:
         self.host = observer.host
+        self.who = observer.who
         self.upper = upper
         self.ended: DeviceError | None = None
         self._observer = observer
@@ -103,7 +104,7 @@ class ControlSession:
         try:
             opened.result(timeout)
         except FutureTimeout:
-            error = DeviceTimeout(f"UR controller {self.host} did not start the control program in {timeout:g} s")
+            error = DeviceTimeout(f"{self.who} did not start the control program in {timeout:g} s")
             self.end(error)
             self._stop_line.close()
             raise error from None
@@ -125,7 +126,7 @@ class ControlSession:
                 process.kill()
             self._ending.set()
         if not self._released:
-            log.warning("control of UR %s ends: %s", self.host, reason)
+            log.warning("control of %s ends: %s", self.who, reason)
 
     def release(self, reason: DeviceError, wait: float) -> None:
         """End the control program in order, and the session."""
@@ -139,12 +140,12 @@ class ControlSession:
         if "in use" in lower or "in_use" in lower:
             block = "24 to 47" if self.upper else "0 to 23"
             return NotInControl(
-                f"the input registers {block} of UR controller {self.host} are used by a fieldbus or another client",
+                f"the input registers {block} of {self.who} are used by a fieldbus or another client",
                 text,
             )
         if "remote control" in lower:
-            return NotInControl(f"UR controller {self.host} is in local control", text)
-        return DeviceFault(f"UR controller {self.host} does not start the control program", text)
+            return NotInControl(f"{self.who} is in local control", text)
+        return DeviceFault(f"{self.who} does not start the control program", text)
 
     # -------------------------------------------------------------------------------- commands, from any thread
     def call(
@@ -164,7 +165,7 @@ class ControlSession:
         try:
             return future.result(timeout)
         except FutureTimeout:
-            error = DeviceTimeout(f"UR controller {self.host} did not take {what} within {timeout:g} s")
+            error = DeviceTimeout(f"{self.who} did not take {what} within {timeout:g} s")
             self.end(error)
             raise error from None
 
@@ -173,7 +174,7 @@ class ControlSession:
         if not self.call(what, command, *arguments, **options):
             if self._ending.wait(2.0 * PROGRAM_GONE) and self.ended is not None:
                 raise self.ended  # the guard was about to see why
-            raise DeviceFault(f"UR controller {self.host} did not accept {what}")
+            raise DeviceFault(f"{self.who} did not accept {what}")
 
     def speed(
         self, command: str, velocities: list[float], acceleration: float, valid_for: float, valid: Callable[[], bool]
@@ -213,11 +214,11 @@ class ControlSession:
         except (FutureTimeout, DeviceFault):
             self.stop_by_dashboard()
         except DeviceError as e:
-            log.debug("UR %s: control ended while stopping: %s", self.host, e)
+            log.debug("%s: control ended while stopping: %s", self.who, e)
 
     def stop_by_dashboard(self) -> None:
         """The second path of a stop: stop the program, and with it the session."""
-        reason = Cancelled(f"the control program of UR {self.host} was stopped by the dashboard")
+        reason = Cancelled(f"the control program of {self.who} was stopped by the dashboard")
         try:
             if self._has_stop_line:
                 self._stop_line.do("stop", "Stopped")
@@ -268,7 +269,7 @@ class ControlSession:
                     for line in lines:
                         self._answered(line) if pipe is process.stdout else self._said(line)
         status = process.wait()
-        self.end(ConnectionLost(f"the control process of UR {self.host} ended with status {status}"))
+        self.end(ConnectionLost(f"the control process of {self.who} ended with status {status}"))
         assert process.stdin is not None
         process.stdin.close()
         process.stdout.close()
@@ -285,16 +286,16 @@ class ControlSession:
         if future is None:
             return
         if "error" in answer:
-            future.set_exception(DeviceFault(f"the control interface of UR {self.host} failed", answer["error"]))
+            future.set_exception(DeviceFault(f"the control interface of {self.who} failed", answer["error"]))
         else:
             future.set_result(answer["data"])
 
     def _said(self, line: bytes) -> None:
         text = line.decode("utf-8", "replace").strip()
         if any(word in line.lower() for word in _BROKEN):
-            self.end(ConnectionLost(f"the control connection to UR {self.host} broke", text))
+            self.end(ConnectionLost(f"the control connection to {self.who} broke", text))
         elif text:
-            log.info("UR %s: %s", self.host, text)
+            log.info("%s: %s", self.who, text)
 
     # -------------------------------------------------------------------------------- the guard
     def _watch(self) -> None:
@@ -305,7 +306,7 @@ class ControlSession:
             now = time.monotonic()
             newest = self._observer.newest()
             if newest is None or newest.age > UNHEALTHY or not self._observer.observing.online:
-                self.end(ConnectionLost(f"nothing is heard of UR controller {self.host}"))
+                self.end(ConnectionLost(f"nothing is heard of {self.who}"))
             elif (safety := safety_of(newest.safety_mode)) not in MAY_MOVE:
                 self._stopped_by_safety(safety)
             elif program_plays(newest.runtime):
@@ -313,9 +314,7 @@ class ControlSession:
             elif gone_since == 0.0:
                 gone_since = now
             elif now - gone_since > PROGRAM_GONE:
-                self.end(
-                    NotInControl(f"the control program was stopped at UR controller {self.host}, not by this driver")
-                )
+                self.end(NotInControl(f"the control program was stopped at {self.who}, not by this driver"))
             if self._ending.is_set():
                 break
             if self._speed_until is not None and now >= self._speed_until:
@@ -332,9 +331,7 @@ class ControlSession:
 
     def _stopped_by_safety(self, safety: Safety) -> None:
         """End, and stop the program first: after a safeguard stop it would go on as soon as the guard closes."""
-        reason = SafetyStop(
-            f"{safety.value.replace('_', ' ')} of UR {self.host}", REMEDIES.get(safety, ""), safety.value
-        )
+        reason = SafetyStop(f"{safety.value.replace('_', ' ')} of {self.who}", REMEDIES.get(safety, ""), safety.value)
         self._last_stop()
         self.end(reason)
 
@@ -348,6 +345,6 @@ class ControlSession:
                     self._stop_line.do("stop", "Stopped", LAST_STOP)
                     break
                 except DeviceError as e:
-                    log.warning("UR %s: the program could not be stopped by the dashboard: %s", self.host, e)
+                    log.warning("%s: the program could not be stopped by the dashboard: %s", self.who, e)
         if self._ending.is_set():
             self._stop_line.close()

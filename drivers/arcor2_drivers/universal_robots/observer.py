@@ -79,8 +79,10 @@ class Observer:
     """The observed controller. It never writes."""
 
     def __init__(self, name: str, host: str) -> None:
+        self.name = name
         self.host = host
         self.address = f"{host}:{PORT}"
+        self.who = f"{name} (UR controller {self.address})"
         self.version: Version = (0, 0, 0, 0)
         self.period = 0.002
         self.samples_received = 0
@@ -108,20 +110,23 @@ class Observer:
             return newest
         self.observing.check()
         if newest is None:
-            raise NotConnected(f"UR controller {self.address} has sent no sample yet")
-        raise Stale(f"the newest sample of {self.address} is {newest.age:.2f} s old, {max_age:g} s asked for")
+            raise NotConnected(f"{self.who} has sent no sample yet")
+        raise Stale(f"the newest sample of {self.who} is {newest.age:.2f} s old, {max_age:g} s asked for")
 
     # -------------------------------------------------------------------------------- on the observing thread
     def _open(self, timeout: float) -> None:
         deadline = time.monotonic() + timeout
-        self._stream = stream = RtdeStream.open(self.host, FIELDS, timeout)
+        try:
+            self._stream = stream = RtdeStream.open(self.host, FIELDS, timeout)
+        except DeviceError as e:
+            raise type(e)(f"{self.name}: {e}", e.detail) from e
         self.version = stream.version
         self.period = 0.002 if self.version[0] >= 5 else 0.008
         self.ring.clear()
         while not self.ring:
             left = deadline - time.monotonic()
             if left <= 0.0:
-                raise DeviceTimeout(f"UR controller {self.address} sends no samples")
+                raise DeviceTimeout(f"{self.who} sends no samples")
             self._take(stream, left)
 
     def _close(self) -> None:
@@ -134,7 +139,7 @@ class Observer:
         assert stream is not None
         while not stopping.is_set():
             if not self._take(stream, _LOOK) and self.ring[-1].age > STALLED:
-                raise ConnectionLost(f"UR controller {self.address} has sent nothing for {STALLED:g} s")
+                raise ConnectionLost(f"{self.who} has sent nothing for {STALLED:g} s")
 
     def _take(self, stream: RtdeStream, wait: float) -> bool:
         """Put what has come into the ring; false when nothing has."""

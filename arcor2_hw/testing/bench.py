@@ -1,0 +1,172 @@
+"""Bench: how the suite gets at one driver and at the device, real or fake, behind it."""
+
+import abc
+import contextlib
+import inspect
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any, ClassVar, Final
+
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.objects import Generic
+from arcor2_hw.testing import quality
+
+
+def missing(name: str) -> NotImplementedError:
+    """Give the error of a hook that a bench does not have; the suite asks `Bench.has` before."""
+    return NotImplementedError(f"this bench has no hook {name}")
+
+
+class Bench(abc.ABC):
+    """One driver on one device. A hook that is overridden is there; a case whose hooks are not all there is not run,
+    which quality.yaml has to give the reason of.
+
+    object_type: the driver's class. real: it stands in front of a real device, and is run only when named by
+    `--real-device`. connect_timeout: s given to connect. call_within: s after which a call on a silent device has
+    failed. stale_after: s from the cut on after which no old value is given. lost_within, back_within: s until the
+    connection tells so. stops_within: s from `stop` to standstill.
+    """
+
+    object_type: ClassVar[type[Generic]]
+    real: ClassVar[bool] = False
+    connect_timeout: ClassVar[float] = 2.0
+    call_within: ClassVar[float] = 2.0
+    stale_after: ClassVar[float] = 1.0
+    lost_within: ClassVar[float] = 3.0
+    back_within: ClassVar[float] = 8.0
+    stops_within: ClassVar[float] = 1.0
+
+    def __init__(self) -> None:
+        self._made: list[Generic] = []
+
+    # -------------------------------------------------------------------------------- every bench
+    @property
+    @abc.abstractmethod
+    def address(self) -> str:
+        """Give what an error has to contain to say which device is meant: a host, a port."""
+
+    @abc.abstractmethod
+    def make(self) -> Generic:
+        """Give a new object for the device, not connected."""
+
+    def start(self) -> None:  # noqa: B027
+        """Start the fake, or reserve the device; once, before all cases."""
+
+    def end(self) -> None:  # noqa: B027
+        """End what `start` started."""
+
+    def reset(self) -> None:  # noqa: B027
+        """Bring the device to rest, whole and free; before each case, and harmless at any time."""
+
+    # -------------------------------------------------------------------------------- optional hooks
+    def absent(self) -> tuple[Generic, str]:
+        """Give an object for a device that is not there, and its address."""
+        raise missing("absent")
+
+    def writes(self) -> Any:
+        """Give all that was ever written, switched or moved at the device; equal when nothing was in between."""
+        raise missing("writes")
+
+    def cut(self) -> None:
+        """Make the device silent, as when the cable is drawn."""
+        raise missing("cut")
+
+    def heal(self) -> None:
+        """Undo `cut`."""
+        raise missing("heal")
+
+    def observe(self, device: Generic) -> object:
+        """Take a reading of the device by the driver, one that goes stale."""
+        raise missing("observe")
+
+    def command(self, device: Generic) -> object:
+        """Give a command that acts on the device and needs control."""
+        raise missing("command")
+
+    def ask(self, device: Generic) -> object:
+        """Call something that speaks with the device, and therefore fails on a silent one."""
+        raise missing("ask")
+
+    def run_long(self, device: Generic) -> object:
+        """Run a motion, or another act of some seconds, to its end; the device is connected and controlled."""
+        raise missing("run_long")
+
+    def running(self) -> bool:
+        """Tell, from the device and past the driver, whether the act of `run_long` is under way."""
+        raise missing("running")
+
+    def foreign(self) -> AbstractContextManager[None]:
+        """Have somebody else control the device."""
+        raise missing("foreign")
+
+    def orphan(self) -> list[str]:
+        """Give the command line of a process that connects, takes control and does `run_long`; it will be killed."""
+        raise missing("orphan")
+
+    # -------------------------------------------------------------------------------- for the suite
+    @classmethod
+    def has(cls, hook: str) -> bool:
+        """Tell whether the bench has a hook."""
+        return getattr(cls, hook) is not getattr(Bench, hook)
+
+    @classmethod
+    def type_name(cls) -> str:
+        """Give the name of the object type."""
+        return cls.object_type.__name__
+
+    @classmethod
+    def quality_file(cls) -> Path:
+        """Give where the driver's quality.yaml has to be: beside the module of the object type."""
+        return Path(inspect.getfile(cls.object_type)).parent / quality.FILE
+
+    def new(self) -> Generic:
+        """Give an object that is disconnected after the case."""
+        return self.keep(self.make())
+
+    def keep(self, device: Generic) -> Generic:
+        """Have an object disconnected after the case."""
+        self._made.append(device)
+        return device
+
+    def connected(self) -> Generic:
+        """Give a connected object."""
+        device = self.new()
+        device.connect(self.connect_timeout)
+        return device
+
+    def controlled(self) -> Generic:
+        """Give an object that is connected and in control, where the type knows control."""
+        device = self.connected()
+        if knows_control(type(device)):
+            device.take_control()
+        return device
+
+    def release(self) -> None:
+        """Disconnect all objects that were given out; what a broken driver raises there is of another case."""
+        while self._made:
+            with contextlib.suppress(Arcor2Error):
+                self._made.pop().disconnect()
+
+
+HOOKS: Final = frozenset(
+    name for name, member in vars(Bench).items() if callable(member) and "missing(" in inspect.getsource(member)
+)
+"""The names of the optional hooks."""
+
+
+def knows_control(kind: type[Generic]) -> bool:
+    """Tell whether control of the type is taken by an act of its own."""
+    return kind.take_control is not Generic.take_control
+
+
+def needs(*hooks: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Mark a case of the suite with the hooks that it uses."""
+    if unknown := set(hooks) - HOOKS:
+        raise ValueError(f"a bench has no hook {', '.join(sorted(unknown))}")
+
+    def mark(case: Callable[..., None]) -> Callable[..., None]:
+        case.__dict__["needs"] = hooks
+        return case
+
+    return mark

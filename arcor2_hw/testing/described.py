@@ -1,0 +1,96 @@
+"""What the source of a driver has to say, found by analysis: nothing is imported, no device is needed."""
+
+import ast
+import inspect
+from pathlib import Path
+from typing import Final
+
+from arcor2_hw.analysis import InstalledType, Library, SourceFile, TypeAnalysis, installed_types
+from arcor2_hw.analysis.library import NO_DESCRIPTION
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.object_type import ObjectAction
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.testing import quality
+
+STOCK: Final = "arcor2_hw.objects."
+"""Where the types lie that are no drivers."""
+MOTION: Final = ("move_to_pose", "move_to_joints", "move_path", "move_until_contact", "jog")
+
+
+def drivers() -> list[InstalledType]:
+    """Give the installed object types that are drivers, by name; nothing is imported."""
+    return [each for each in installed_types() if not each.entry_point.startswith(STOCK)]
+
+
+def source_of(kind: type) -> SourceFile:
+    """Give the source of an imported type."""
+    path = Path(inspect.getfile(kind))
+    return SourceFile(kind.__name__, kind.__module__, path.read_bytes(), str(path), path.stem == "__init__")
+
+
+def faults(file: SourceFile) -> list[str]:
+    """Give, one sentence each, what the source or the quality.yaml of a driver lacks; empty when all is well."""
+    library = Library([file])
+    found = library.analyse(file.name)
+    if found.problem is not None:
+        return [f"{file.name}: {found.problem.text}"]
+    if not found.is_object_type:
+        return [f"{file.name} does not derive from Generic"]
+    wrong = _of_the_type(file, found)
+    try:
+        claims = quality.read(Path(file.path).parent / quality.FILE)
+    except Arcor2Error as error:
+        return [*wrong, str(error)]
+    if file.name not in claims.types:
+        wrong.append(f"quality.yaml: types does not name {file.name}")
+    offered = {action.name for action in found.actions}
+    if unknown := set(claims.actions_of(file.name)) - offered:
+        wrong.append(f"quality.yaml: {file.name} has no action {', '.join(sorted(unknown))}")
+    own = {action.name for action in found.actions if isinstance(action.origins, Unset) or not _is_base(action.origins)}
+    if unnamed := own - set(claims.actions_of(file.name)):
+        wrong.append(f"quality.yaml: actions does not name {', '.join(sorted(unnamed))} of {file.name}")
+    return wrong
+
+
+def _is_base(origin: str) -> bool:
+    return origin in ("Generic", "GenericWithPose", "CollisionObject", "Robot", "MultiArmRobot", "Camera")
+
+
+def _of_the_type(file: SourceFile, found: TypeAnalysis) -> list[str]:
+    name = file.name
+    wrong = []
+    if found.meta.abstract:
+        wrong.append(f"{name} may not be placed in a scene: _ABSTRACT, or a mandatory method is missing")
+    if found.meta.disabled:
+        wrong.append(f"{name} is disabled: {found.meta.problem}")
+    if found.meta.description in ("", NO_DESCRIPTION):
+        wrong.append(f"{name} has no docstring")
+    wrong += [f"{name}: setting {each.name} is not described" for each in found.meta.settings if not each.description]
+    for action in found.actions:
+        wrong += [f"{name}.{action.name} {lack}" for lack in _of_an_action(action)]
+    if set(MOTION) & found.implemented and "stop" not in found.implemented:
+        wrong.append(f"{name} moves and has no stop()")
+    if found.robot is not None and "state" not in found.implemented:
+        wrong.append(f"{name} is a robot and has no state()")
+    if not any(_declares_reaction(each.source) for each in (file, *found.modules)):
+        wrong.append(f"{name} does not declare loss_reaction")
+    return wrong
+
+
+def _of_an_action(action: ObjectAction) -> list[str]:
+    if action.disabled:
+        return [f"is disabled: {action.problem}"]
+    lacks = [] if action.description else ["has no docstring"]
+    return lacks + [
+        f"does not describe its parameter {each.name}" for each in action.parameters if not each.description
+    ]
+
+
+def _declares_reaction(source: str | bytes) -> bool:
+    classes = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ClassDef))
+    return any(
+        isinstance(target, ast.Name) and target.id == "loss_reaction"
+        for each in classes
+        for line in each.body
+        for target in ([line.target] if isinstance(line, ast.AnnAssign) else getattr(line, "targets", []))
+    )

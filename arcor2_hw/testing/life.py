@@ -1,0 +1,115 @@
+"""Measures of the suite: what a process holds, how long a call takes, what it raises, a call beside others."""
+
+import gc
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+from arcor2_hw.exceptions import DeviceError
+
+POLL: Final = 0.01
+SLACK: Final = 0.5
+"""Seconds that a busy machine may add to any time limit."""
+GRACE: Final = 2.0
+"""Seconds in which threads and sockets end after they were told to."""
+
+
+def held() -> set[str]:
+    """Give the threads and open sockets and serial ports of this process."""
+    found = {f"thread {thread.name} ({thread.ident})" for thread in threading.enumerate()}
+    for descriptor in Path("/proc/self/fd").glob("*"):
+        try:
+            target = str(descriptor.readlink())
+        except OSError:
+            continue
+        if target.startswith(("socket:", "/dev/pts/", "/dev/tty")):
+            found.add(f"{target} (descriptor {descriptor.name})")
+    return found
+
+
+def left_behind(before: set[str]) -> set[str]:
+    """Give what this process holds that it did not before, after a moment to end."""
+    until = time.monotonic() + GRACE
+    while (left := held() - before) and time.monotonic() < until:
+        gc.collect()
+        time.sleep(POLL)
+    return left
+
+
+def wait_until(holds: Callable[[], bool], within: float, what: str) -> float:
+    """Wait until something holds; give the seconds it took. Fails after `within` s, saying what was waited for."""
+    began = time.monotonic()
+    while not holds():
+        assert time.monotonic() - began < within, f"{what}: not within {within:g} s"
+        time.sleep(POLL)
+    return time.monotonic() - began
+
+
+def stays(holds: Callable[[], bool], seconds: float, what: str) -> None:
+    """Fail when something ceases to hold within some seconds."""
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        assert holds(), what
+        time.sleep(POLL)
+
+
+def timed(call: Callable[[], Any], within: float, what: str) -> Any:
+    """Call; give the result. Fails when it took longer than `within` s and the slack."""
+    began = time.monotonic()
+    try:
+        return call()
+    finally:
+        took = time.monotonic() - began
+        assert took <= within + SLACK, f"{what} took {took:.2f} s, not {within:g} s at most"
+
+
+def raised(call: Callable[[], Any], *kinds: type[DeviceError], within: float, what: str) -> DeviceError:
+    """Call, and give the typed error it has to raise within some seconds. Fails when it returns, or raises another."""
+    given: object = None
+    error: Exception | None = None
+    try:
+        given = timed(call, within, what)
+    except AssertionError:
+        raise
+    except Exception as e:  # noqa: BLE001 - judged below
+        error = e
+    allowed = " or ".join(kind.__name__ for kind in kinds)
+    assert error is not None, f"{what} returned {given!r} and did not raise {allowed}"
+    assert isinstance(error, kinds), f"{what} raised {type(error).__name__} ({error}), not {allowed}"
+    return error
+
+
+def named(error: DeviceError, name: str, address: str, what: str) -> None:
+    """Fail unless an error says which device is meant, and where."""
+    text = f"{error} {error.detail}"
+    assert name in text, f"the error of {what} does not name {name!r}: {text}"
+    assert address in text, f"the error of {what} does not name the address {address}: {text}"
+
+
+class Beside:
+    """A call on a thread of its own."""
+
+    def __init__(self, call: Callable[[], Any]) -> None:
+        self.error: BaseException | None = None
+        self.result: Any = None
+        self._thread = threading.Thread(target=self._run, args=(call,), name="beside", daemon=True)
+        self._thread.start()
+
+    def _run(self, call: Callable[[], Any]) -> None:
+        try:
+            self.result = call()
+        except BaseException as error:  # noqa: BLE001 - told to who waits
+            self.error = error
+
+    @property
+    def over(self) -> bool:
+        """Tell whether the call has ended."""
+        return not self._thread.is_alive()
+
+    def outcome(self, within: float, what: str) -> BaseException | None:
+        """Wait for the end; give what was raised. Fails when it does not end in time."""
+        self._thread.join(within + SLACK)
+        assert self.over, f"{what} has not ended within {within:g} s"
+        return self.error

@@ -1,0 +1,46 @@
+"""Every installed driver: described as it has to be, and through the whole suite when its quality.yaml says so."""
+
+import importlib
+import pkgutil
+from pathlib import Path
+
+import pytest
+
+from arcor2_hw.analysis import InstalledType
+from arcor2_hw.testing import described, quality
+from arcor2_hw.testing.bench import Bench
+from arcor2_hw.testing.conformance import Conformance
+from arcor2_hw.testing.plugin import PENDING
+from tests.drivers import benches
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def found_benches() -> list[type[Bench]]:
+    """Give the benches of all modules of the package benches."""
+    return [
+        each
+        for module in pkgutil.iter_modules(benches.__path__, f"{benches.__name__}.")
+        for each in vars(importlib.import_module(module.name)).values()
+        if isinstance(each, type) and issubclass(each, Bench) and each.__module__ == module.name
+    ]
+
+
+class TestConformance(Conformance):
+    benches = found_benches()
+
+
+@pytest.mark.parametrize("driver", described.drivers(), ids=lambda driver: driver.name)
+def test_every_installed_driver_is_covered(driver: InstalledType, pytestconfig: pytest.Config) -> None:
+    assert driver.file is not None, driver.problem and driver.problem.text
+    file = Path(driver.folder) / quality.FILE
+    wrong = described.faults(driver.file)
+    if not quality.is_bench(file):
+        pending = pytestconfig.stash.setdefault(PENDING, [])
+        pending.append(f"{driver.name}: " + ("; ".join(wrong) or "quality.yaml does not say `conformance: bench` yet"))
+        return
+    assert not wrong, "; ".join(wrong)
+    claims = quality.read(file)
+    assert (ROOT / claims.page).is_file(), f"quality.yaml names the page {claims.page}, which is not there"
+    have = {bench.type_name() for bench in TestConformance.benches}
+    assert driver.name in have or driver.name in claims.not_run, f"{driver.name} has neither a bench nor a reason"
