@@ -1,0 +1,151 @@
+"""CiA 301 and 402 as far as used: indices, states, control words, and the texts of error codes."""
+
+import enum
+from typing import Final, NamedTuple
+
+from arcor2_hw.data.device import Severity
+
+
+class Entry(NamedTuple):
+    """An entry of the object dictionary with the struct format of its value and its name."""
+
+    at: int
+    subindex: int
+    form: str
+    title: str
+
+
+DEVICE_TYPE: Final = Entry(0x1000, 0, "<I", "device type")
+CONSUMER_HEARTBEAT: Final = Entry(0x1016, 1, "<I", "consumer heartbeat")
+VENDOR: Final = Entry(0x1018, 1, "<I", "vendor")
+PRODUCT: Final = Entry(0x1018, 2, "<I", "product")
+REVISION: Final = Entry(0x1018, 3, "<I", "revision")
+SERIAL: Final = Entry(0x1018, 4, "<I", "serial number")
+ABORT_OPTION: Final = Entry(0x6007, 0, "<h", "abort connection option")
+ERROR_CODE: Final = Entry(0x603F, 0, "<H", "error code")
+CONTROLWORD: Final = Entry(0x6040, 0, "<H", "control word")
+STATUSWORD: Final = Entry(0x6041, 0, "<H", "status word")
+QUICK_STOP_OPTION: Final = Entry(0x605A, 0, "<h", "quick stop option")
+MODE: Final = Entry(0x6060, 0, "<b", "mode of operation")
+MODE_DISPLAY: Final = Entry(0x6061, 0, "<b", "mode of operation display")
+POSITION: Final = Entry(0x6064, 0, "<i", "position actual value")
+VELOCITY: Final = Entry(0x606C, 0, "<i", "velocity actual value")
+TARGET_POSITION: Final = Entry(0x607A, 0, "<i", "target position")
+PROFILE_VELOCITY: Final = Entry(0x6081, 0, "<I", "profile velocity")
+ACCELERATION: Final = Entry(0x6083, 0, "<I", "profile acceleration")
+DECELERATION: Final = Entry(0x6084, 0, "<I", "profile deceleration")
+QUICK_STOP_DECELERATION: Final = Entry(0x6085, 0, "<I", "quick stop deceleration")
+HOMING_METHOD: Final = Entry(0x6098, 0, "<b", "homing method")
+HOMING_SPEED_SEARCH: Final = Entry(0x6099, 1, "<I", "homing speed, search for switch")
+HOMING_SPEED_ZERO: Final = Entry(0x6099, 2, "<I", "homing speed, search for zero")
+HOMING_ACCELERATION: Final = Entry(0x609A, 0, "<I", "homing acceleration")
+TARGET_VELOCITY: Final = Entry(0x60FF, 0, "<i", "target velocity")
+
+PROFILE: Final = 402
+QUICK_STOP_ON_LOSS: Final = 3
+"""6007h: on a lost connection do a quick stop."""
+SLOW_DOWN_AND_DISABLE: Final = 2
+"""605Ah: slow down on the quick stop ramp, then Switch on disabled."""
+
+
+class Mode(enum.IntEnum):
+    """Modes of operation."""
+
+    PROFILE_POSITION = 1
+    PROFILE_VELOCITY = 3
+    HOMING = 6
+
+
+class Power(enum.StrEnum):
+    """States of the drive, as CiA 402 names them."""
+
+    NOT_READY = "Not ready to switch on"
+    SWITCH_ON_DISABLED = "Switch on disabled"
+    READY = "Ready to switch on"
+    SWITCHED_ON = "Switched on"
+    ENABLED = "Operation enabled"
+    QUICK_STOP = "Quick stop active"
+    FAULT_REACTION = "Fault reaction active"
+    FAULT = "Fault"
+
+
+_STATES: Final = (
+    (0x4F, 0x00, Power.NOT_READY),
+    (0x4F, 0x40, Power.SWITCH_ON_DISABLED),
+    (0x6F, 0x21, Power.READY),
+    (0x6F, 0x23, Power.SWITCHED_ON),
+    (0x6F, 0x27, Power.ENABLED),
+    (0x6F, 0x07, Power.QUICK_STOP),
+    (0x4F, 0x0F, Power.FAULT_REACTION),
+    (0x4F, 0x08, Power.FAULT),
+)
+FAULTY: Final = frozenset({Power.FAULT, Power.FAULT_REACTION})
+
+TARGET_REACHED: Final = 1 << 10
+SETPOINT_ACKNOWLEDGE: Final = 1 << 12
+HOMING_ATTAINED: Final = 1 << 12
+HOMING_ERROR: Final = 1 << 13
+
+CW_DISABLE_VOLTAGE: Final = 0x0000
+CW_QUICK_STOP: Final = 0x0002
+CW_SHUTDOWN: Final = 0x0006
+CW_SWITCH_ON: Final = 0x0007
+CW_ENABLE: Final = 0x000F
+CW_START: Final = 0x0010
+CW_AT_ONCE: Final = 0x0020
+CW_RELATIVE: Final = 0x0040
+CW_FAULT_RESET: Final = 0x0080
+CW_HALT: Final = 0x0100
+
+
+def power(statusword: int) -> Power:
+    """Give the state a status word tells. Raises ValueError for a pattern that CiA 402 does not know."""
+    for mask, value, state in _STATES:
+        if statusword & mask == value:
+            return state
+    raise ValueError(f"status word {statusword:04X}h is no state of CiA 402")
+
+
+class Fault(NamedTuple):
+    """What an error code means and what a person should do."""
+
+    text: str
+    remedy: str
+    severity: Severity = Severity.ERROR
+
+
+_RESET: Final = "then reset the fault"
+_FAULTS: Final = {
+    0x2310: Fault("continuous overcurrent", f"see that the belt runs freely, {_RESET}"),
+    0x2320: Fault("short circuit or earth leakage", f"have the motor cable checked, {_RESET}", Severity.CRITICAL),
+    0x3210: Fault("overvoltage of the DC link", f"check the braking resistor and the supply, {_RESET}"),
+    0x3220: Fault("undervoltage of the DC link", f"check the supply, {_RESET}"),
+    0x4210: Fault("the drive is too hot", f"let it cool, see that air gets to it, {_RESET}"),
+    0x4310: Fault("the motor is too hot", f"let it cool, {_RESET}"),
+    0x5441: Fault("contactor or emergency stop input", f"release the emergency stop, {_RESET}", Severity.CRITICAL),
+    0x7121: Fault("the motor is blocked", f"free the belt, {_RESET}"),
+    0x7305: Fault("encoder 1 fails", f"check the encoder's cable, {_RESET} and home"),
+    0x8110: Fault("CAN overrun", f"check the load of the bus, {_RESET}"),
+    0x8130: Fault("our heartbeat did not come", "check the CAN bus and this computer, then take control again"),
+    0x8611: Fault("following error", f"see that the belt runs freely, {_RESET}"),
+    0x8612: Fault("reference limit", f"move off the limit, {_RESET}"),
+}
+_CLASSES: Final = {
+    0x1: "generic error",
+    0x2: "current",
+    0x3: "voltage",
+    0x4: "temperature",
+    0x5: "device hardware",
+    0x6: "device software",
+    0x7: "additional modules",
+    0x8: "monitoring",
+    0x9: "external error",
+    0xF: "specific to the device",
+}
+
+
+def fault_of(code: int) -> Fault:
+    """Give what an error code means; by its class when it is not known itself (CiA 301, table of EMCY codes)."""
+    return _FAULTS.get(code) or Fault(
+        _CLASSES.get(code >> 12, "unknown error"), f"look the code up in the drive's manual, {_RESET}"
+    )

@@ -1,0 +1,300 @@
+"""The conveyor as an object type: an Axis on a CiA 402 drive, positions and speeds of the belt in m and m/s."""
+
+import contextlib
+from typing import ClassVar, Final
+
+from arcor2_hw.actions import action
+from arcor2_hw.data.device import Alarm, Connection, Health, Identity, LossReaction, Reading
+from arcor2_hw.exceptions import ConnectionLost, DeviceError, NotFound, NotInControl, OutOfRange, Refused
+from arcor2_hw.objects import Axis
+from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
+
+from . import cia402
+from .cia402 import FAULTY, Power
+from .motion import GoOn, Motion
+from .observer import Observer, Snapshot
+from .settings import LONGEST_HEARTBEAT, LONGEST_MOVE, LONGEST_RAMP, ConveyorSettings
+
+MARGIN: Final = 30.0
+"""s a move may take beyond LONGEST_MOVE: enabling, the handshake and the stop, each with its longest time-out."""
+NOTICES: Final = 0.1
+"""s from the heartbeat's time-out until the drive slows down."""
+
+
+class Conveyor(Axis):
+    """A belt conveyor with a servo drive (CANopen, CiA 402)."""
+
+    _ABSTRACT = False
+    loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(
+        LONGEST_HEARTBEAT / 1000.0 + NOTICES + LONGEST_RAMP
+    )
+    CANCEL_MAPPING: ClassVar[dict[str, str]] = {"home": "halt", "move_to": "halt", "move_by": "halt", "run": "halt"}
+
+    def __init__(self, obj_id: str, name: str, settings: ConveyorSettings) -> None:
+        super().__init__(obj_id, name, settings)
+        self._units = settings
+        self._observer = Observer(name, settings, self._drop_control)
+        self._motion = Motion(self._observer, settings)
+        self._who = self._observer.who
+        self._in_control = self._homed = False
+
+    # -------------------------------------------------------------------------------- connection
+    def connect(self, timeout: float = DEFAULT_CONNECT_TIMEOUT) -> None:
+        """Begin to observe within `timeout` s; nothing is written. Raises NotConnected, DeviceTimeout, DeviceFault."""
+        self._observer.connect(timeout)
+
+    def disconnect(self) -> None:
+        """Give control back and stop observing. A belt that moves is stopped; failing that, the drive does it."""
+        self._motion.stop_waiting()
+        if self._in_control and self._observer.observing.online:
+            newest = self._observer.newest()
+            with contextlib.suppress(DeviceError):  # it is gone; the drive listens for our heartbeat
+                if newest is not None and self._motion.stands(newest):
+                    self._disarm()
+                else:
+                    self._observer.link.write(cia402.CONTROLWORD, cia402.CW_QUICK_STOP)
+        self._drop_control()
+        self._observer.disconnect()
+
+    @property
+    def connection(self) -> Connection:
+        """Tell how the connection is."""
+        return self._observer.observing.state
+
+    @property
+    def health(self) -> Health:
+        """Give the condition as the drive last told it; failure when it does not tell any more."""
+        if self.connection in (Connection.LOST, Connection.FAILED):
+            return Health.FAILURE
+        newest = self._observer.newest()
+        return Health.FAILURE if newest is not None and newest.power in FAULTY else Health.NORMAL
+
+    def identify(self) -> Identity:
+        """Ask the drive who it is (1018h); its numbers as they stand there."""
+        self._observer.observing.check()
+        entries = (cia402.VENDOR, cia402.PRODUCT, cia402.SERIAL, cia402.REVISION)
+        vendor, product, serial, revision = (self._observer.link.read(entry) for entry in entries)
+        return Identity(f"CANopen vendor {vendor:X}h", f"product {product:X}h", str(serial), f"{revision:X}h")
+
+    def alarms(self) -> list[Alarm]:
+        """Give the fault that stands, or the emergency that was not taken back."""
+        now = self._observer.current()
+        code = now.error_code if now.power in FAULTY else self._observer.emergency
+        if not code:
+            return []
+        fault = cia402.fault_of(code)
+        return [Alarm(f"{code:04X}h", fault.severity, fault.text, fault.remedy, self._observer.emergency_since)]
+
+    def acknowledge(self, code: str) -> None:
+        """Reset the fault `code`. Raises NotFound when it does not stand, Refused while its cause stands."""
+        now = self._observer.fresh()
+        if now.power not in FAULTY or f"{now.error_code:04X}h" != code:
+            raise NotFound(f"{self._who} has no alarm {code} to acknowledge")
+        self.fault_reset()
+
+    # -------------------------------------------------------------------------------- control
+    def take_control(self) -> None:
+        """Arm what the drive does when it loses us; from then on it is commanded. Raises NotInControl, Refused."""
+        now = self._observer.fresh()
+        if self._in_control:
+            return
+        losses, link = self._observer.losses, self._observer.link
+        if (owner := self._other_owner(now, link.read(cia402.CONSUMER_HEARTBEAT))) is not None:
+            raise NotInControl(f"{self._who}: control is refused in state {now.power}: {owner}")
+        s = self._units
+        armed = (
+            (cia402.CONSUMER_HEARTBEAT, s.master_id << 16 | s.heartbeat_ms),
+            (cia402.ABORT_OPTION, cia402.QUICK_STOP_ON_LOSS),
+        )
+        link.write(cia402.CONSUMER_HEARTBEAT, 0)  # no heartbeat of before counts
+        for entry, value in armed:
+            link.write(entry, value)
+        link.write(cia402.QUICK_STOP_OPTION, cia402.SLOW_DOWN_AND_DISABLE)
+        link.write(cia402.QUICK_STOP_DECELERATION, s.rate(s.quick_stop_deceleration))
+        link.write(cia402.ACCELERATION, s.rate(s.acceleration))
+        link.write(cia402.DECELERATION, s.rate(s.acceleration))
+        for entry, value in armed:
+            if (kept := link.read(entry)) != value:
+                raise Refused(f"{self._who}: {entry.title} is {kept} after {value} was written")
+        link.start_node()
+        link.heartbeat()
+        self._in_control = self._observer.guarded = True
+        try:
+            self._observer.check_unbroken(losses)
+        except DeviceError:
+            self._drop_control()
+            raise
+        self._observer.observing.settled()
+
+    def release_control(self) -> None:
+        """Switch the torque off and the drive's guard over us. Raises Refused while the belt moves."""
+        if not self._in_control:
+            return
+        if not self._motion.stands(self._observer.fresh()):
+            raise Refused(f"{self._who}: release_control is refused while the belt moves: halt it")
+        self._disarm()
+        self._drop_control()
+
+    def control_owner(self) -> str | None:
+        """Tell who has control."""
+        if self._in_control:
+            return "us"
+        newest = self._observer.newest()
+        return "somebody who enabled the drive" if newest is not None and newest.power is Power.ENABLED else None
+
+    def _other_owner(self, now: Snapshot, consumer: int) -> str | None:
+        master, limit = consumer >> 16 & 0x7F, consumer & 0xFFFF
+        if limit and self._observer.heard(master, limit / 1000.0):
+            return f"node {master} has it, the drive listens for its heartbeat"
+        if self._observer.heard(self._units.master_id, LONGEST_HEARTBEAT / 1000.0):
+            return f"another host sends heartbeats as node {self._units.master_id}"
+        return "somebody has enabled the drive" if now.power is Power.ENABLED else None
+
+    def _disarm(self) -> None:
+        link = self._observer.link
+        link.write(cia402.CONTROLWORD, cia402.CW_DISABLE_VOLTAGE)
+        link.write(cia402.CONSUMER_HEARTBEAT, 0)
+
+    def _drop_control(self) -> None:
+        """Forget control; after a loss the drive may have been off, so that its zero is unknown too."""
+        self._observer.guarded = self._in_control = False
+        self._homed = self._homed and self._observer.observing.online
+
+    def _begin(self, what: str, resting: bool = True) -> tuple[Snapshot, GoOn]:
+        go_on = self._motion.begin(what)
+        now = self._observer.fresh()
+        if not self._in_control:
+            refused = f"{self._who}: {what} is refused in state {now.power}"
+            raise NotInControl(f"{refused}: {self.control_owner() or 'nobody'} has control")
+        if resting and not self._motion.stands(now):
+            raise Refused(f"{self._who}: {what} is refused while the belt moves: halt it first")
+        return now, go_on
+
+    # -------------------------------------------------------------------------------- values
+    def position(self) -> Reading[float]:
+        """Give the belt's position, m. Raises Stale when the newest is too old, NotConnected, ConnectionLost."""
+        now = self._observer.current()
+        return Reading(self._units.metres(now.position), now.stamp, now.asked)
+
+    def velocity(self) -> Reading[float]:
+        """Give the belt's velocity, m/s. Raises like `position`."""
+        now = self._observer.current()
+        return Reading(self._units.metres(now.velocity), now.stamp, now.asked)
+
+    @property
+    def homed(self) -> bool:
+        """Tell whether the drive was homed since we have been observing it without a break."""
+        return self._homed
+
+    # -------------------------------------------------------------------------------- the base's methods
+    def move_absolute(self, position: float, velocity: float) -> None:
+        """Move to `position`, m, with `velocity`, m/s; return when it is there. Refused before homing."""
+        what = f"move_to {position:g} m"
+        self._check(position, velocity, what)
+        now, go_on = self._begin(what)
+        if not self._homed:
+            raise Refused(f"{self._who}: {what} is refused in state {now.power}: it is not homed")
+        target = self._units.counts(position)
+        self._motion.move(target, False, self._units.rate(velocity), target, what, go_on)
+
+    def move_relative(self, distance: float, velocity: float) -> None:
+        """Move by `distance`, m, with `velocity`, m/s; return when it is there."""
+        what = f"move_by {distance:g} m"
+        now, go_on = self._begin(what)
+        end = self._units.metres(now.position) + distance
+        self._check(end, velocity, what)
+        by = self._units.counts(distance)
+        self._motion.move(by, True, self._units.rate(velocity), now.position + by, what, go_on)
+
+    def move_velocity(self, velocity: float) -> None:
+        """Run with `velocity`, m/s, until halted; return when it is reached."""
+        what = f"run with {velocity:g} m/s"
+        if not abs(velocity) <= self._units.max_speed:
+            raise OutOfRange(f"{self._who}: {what}: velocity must be at most {self._units.max_speed:g} m/s")
+        _, go_on = self._begin(what, resting=False)
+        self._motion.run(self._units.counts(velocity), what, go_on)
+
+    def _check(self, position: float, speed: float, what: str) -> None:
+        s = self._units
+        if not s.min_position <= position <= s.max_position:
+            limits = f"{s.min_position:g} to {s.max_position:g} m"
+            raise OutOfRange(f"{self._who}: {what}: position must be {limits}, not {position:g} m")
+        if not 0.0 < speed <= s.max_speed:
+            raise OutOfRange(f"{self._who}: {what}: speed must be above 0 and at most {s.max_speed:g} m/s")
+        longest = LONGEST_MOVE * speed
+        if abs(position - s.metres(self._observer.current().position)) > longest:
+            raise OutOfRange(f"{self._who}: {what} would take longer than {LONGEST_MOVE:g} s at {speed:g} m/s")
+
+    # -------------------------------------------------------------------------------- actions
+    @action(deadline=LONGEST_MOVE + MARGIN)
+    def home(self, *, an: str | None = None) -> None:
+        """Find the zero of the belt; return when it is found."""
+        _, go_on = self._begin("home")
+        self._homed = False
+        losses = self._observer.losses
+        self._motion.home("home", go_on)
+        self._homed = True
+        if self._observer.losses != losses:
+            self._homed = False
+            raise ConnectionLost(f"{self._who}: the connection was lost while homing ended")
+
+    @action(deadline=LONGEST_MOVE + MARGIN)
+    def move_to(self, position: float, speed: float = 0.1, *, an: str | None = None) -> None:
+        """Move the belt to a position; it has to be homed.
+
+        :param position: m from its zero
+        :param speed: m/s
+        """
+        assert 0.001 <= speed <= 10.0
+
+        self.move_absolute(position, speed)
+
+    @action(deadline=LONGEST_MOVE + MARGIN)
+    def move_by(self, distance: float, speed: float = 0.1, *, an: str | None = None) -> None:
+        """Move the belt by a distance.
+
+        :param distance: m, negative for backwards
+        :param speed: m/s
+        """
+        assert 0.001 <= speed <= 10.0
+
+        self.move_relative(distance, speed)
+
+    @action
+    def run(self, velocity: float = 0.1, *, an: str | None = None) -> None:
+        """Let the belt run until it is halted; return when it has its velocity.
+
+        :param velocity: m/s, negative for backwards
+        """
+        assert -10.0 <= velocity <= 10.0
+
+        self.move_velocity(velocity)
+
+    @action
+    def halt(self, *, an: str | None = None) -> None:
+        """Slow the belt down; return when it stands. A move under way ends with Cancelled."""
+        self._motion.stop_waiting()
+        if self._in_control:
+            self._motion.halt()
+
+    def stop(self) -> None:
+        """Halt; called past everything else."""
+        self.halt()
+
+    @action
+    def quick_stop(self, *, an: str | None = None) -> None:
+        """Stop the belt as quickly as its settings allow; return when it stands, without torque."""
+        self._motion.stop_waiting()
+        if self._in_control:
+            self._motion.quick_stop()
+
+    @action
+    def fault_reset(self, *, an: str | None = None) -> None:
+        """Reset a fault after its cause was dealt with; the belt does not move by that."""
+        _, go_on = self._begin("fault_reset", resting=False)
+        self._motion.fault_reset(go_on)
+
+    @action
+    def belt_position(self, *, an: str | None = None) -> float:
+        """Give the belt's position, m."""
+        return self._units.metres(self._observer.fresh().position)

@@ -1,0 +1,249 @@
+"""The CAN bus to one drive: SDO requests one at a time, each with its time limit; a late answer answers nothing."""
+
+import contextlib
+import logging
+import socket
+import struct
+import threading
+import time
+import urllib.parse
+from collections.abc import Callable
+from typing import Any, Final
+
+import can
+import canopen
+from can.interfaces.slcan import slcanBus
+from canopen.sdo.client import SdoClient
+from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
+
+from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotConnected
+
+from .cia402 import Entry
+from .settings import CanInterface, ConveyorSettings
+
+LOOK: Final = 0.05
+"""s the receiver waits for a frame before it looks whether it should end."""
+WRITE_TIMEOUT: Final = 0.1
+"""s the adapter has to take a frame."""
+NMT_START: Final = 1
+HEARTBEAT: Final = 0x700
+EMCY: Final = 0x80
+OPERATIONAL: Final = b"\x05"
+
+# canopen logs every failure as an error. Each reaches the caller typed; a drive that is off would fill the log.
+logging.getLogger("canopen").setLevel(logging.CRITICAL)
+
+Hear = Callable[[int, bytes], None]
+
+
+class _Network(canopen.Network):
+    """canopen's network without its receiving thread, and with a time limit for sending."""
+
+    def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
+        bus = self.bus
+        if bus is None:
+            raise can.CanOperationError("the bus is closed")
+        message = can.Message(arbitration_id=can_id, data=data, is_extended_id=False, is_remote_frame=remote)
+        with self.send_lock:
+            bus.send(message, timeout=WRITE_TIMEOUT)
+
+
+class _Sdo(SdoClient):
+    """An SDO client that hears only the answer to what was asked for, by index and subindex."""
+
+    _expected = b""
+
+    def send_request(self, request: Any) -> None:
+        self._expected = bytes(request[1:4])
+        super().send_request(request)  # type: ignore[no-untyped-call]
+
+    def on_response(self, can_id: int, data: Any, timestamp: float) -> None:
+        if len(data) == 8 and bytes(data[1:4]) == self._expected:
+            super().on_response(can_id, data, timestamp)  # type: ignore[no-untyped-call]
+
+
+class CanLink:
+    """The way to one drive. Requests come from several threads and go out one after the other.
+
+    When an answer does not come in time the link is lost until `open`: what comes late must not answer a request for
+    the same index. An SDO server answers in order, so that the several requests of `open` drain what is late.
+    """
+
+    def __init__(self, name: str, settings: ConveyorSettings, hear: Hear) -> None:
+        self.who = f"{name} at {settings.channel} node {settings.node_id}"
+        self._settings, self._hear = settings, hear
+        self._one_request = threading.Lock()
+        self._network: _Network | None = None
+        self._bus: can.BusABC | None = None
+        self._sdo: _Sdo | None = None
+        self._receiver: threading.Thread | None = None
+        self._closing = threading.Event()
+        self.loss: DeviceError | None = None
+
+    # -------------------------------------------------------------------------------- life
+    def open(self, timeout: float) -> None:
+        """Open the bus within `timeout` s; the drive is not asked anything. Raises NotConnected, DeviceTimeout."""
+        self.close()
+        settings = self._settings
+        if settings.channel.startswith("socket://"):
+            self._reach(timeout)
+        options: dict[str, Any] = {}
+        if settings.interface is CanInterface.SLCAN:
+            options = {"bitrate": settings.bitrate, "sleep_after_open": 0.0, "timeout": LOOK}
+        try:
+            bus = can.Bus(channel=settings.channel, interface=settings.interface.value, **options)
+        except (can.CanError, OSError, ValueError) as error:
+            raise NotConnected(f"{self.who}: the CAN bus cannot be opened", str(error)) from error
+        self._bus, self.loss = bus, None
+        network = _Network(bus)
+        self._network = network
+        node, od = settings.node_id, canopen.ObjectDictionary()  # type: ignore[no-untyped-call]
+        sdo = _Sdo(0x600 + node, 0x580 + node, od)  # type: ignore[no-untyped-call]
+        sdo.network, sdo.RESPONSE_TIMEOUT = network, settings.sdo_timeout
+        network.subscribe(0x580 + node, sdo.on_response)
+        self._sdo, self._closing = sdo, threading.Event()
+        self._receiver = threading.Thread(
+            target=self._receive, args=(bus, network, self._closing), name=f"CAN to {self.who}", daemon=True
+        )
+        self._receiver.start()
+
+    def _reach(self, timeout: float) -> None:
+        """See that somebody listens: pyserial itself waits five seconds for that, whatever it is told."""
+        where = urllib.parse.urlsplit(self._settings.channel)
+        try:
+            socket.create_connection((where.hostname or "", where.port or 0), timeout).close()
+        except TimeoutError:
+            raise DeviceTimeout(f"{self.who}: the CAN adapter cannot be reached within {timeout:.1f} s") from None
+        except OSError as error:
+            raise NotConnected(f"{self.who}: the CAN adapter cannot be reached", str(error)) from error
+
+    def close(self) -> None:
+        """Close; harmless when closed."""
+        self._closing.set()
+        self.loss = self.loss or NotConnected(f"{self.who} is not connected")
+        receiver, self._receiver = self._receiver, None
+        if receiver is not None and receiver is not threading.current_thread():
+            receiver.join(4.0 * LOOK)
+        bus, self._bus, network = self._bus, None, self._network
+        if network is not None:
+            network.bus = None
+        if bus is None:
+            return
+        port = getattr(bus, "serialPortOrig", None)
+        raw = getattr(port, "_socket", None)
+        with contextlib.suppress(can.CanError, OSError):
+            if isinstance(bus, slcanBus) and raw is not None:
+                bus.close()  # the adapter's channel
+                raw.shutdown(socket.SHUT_RDWR)
+        if raw is not None and port is not None:
+            # Closed here: pyserial sleeps 0.3 s in closing, and forgets a socket that its peer has reset.
+            raw.close()
+            port.is_open = False
+            can.BusABC.shutdown(bus)
+        else:
+            with contextlib.suppress(can.CanError, OSError):
+                bus.shutdown()
+
+    def _receive(self, bus: can.BusABC, network: _Network, closing: threading.Event) -> None:
+        while not closing.is_set():
+            try:
+                message = bus.recv(LOOK)
+            except (ValueError, IndexError):  # no frame: an adapter that sends foreign bytes
+                flush = getattr(bus, "flush", None)
+                if flush is not None:
+                    with contextlib.suppress(can.CanError):
+                        flush()
+                continue
+            except (can.CanError, OSError, TypeError) as error:
+                if not closing.is_set():
+                    self._lose(ConnectionLost(f"{self.who}: the connection to the CAN bus was lost", str(error)))
+                return
+            if message is None or message.is_error_frame or message.is_remote_frame or message.is_extended_id:
+                continue
+            network.notify(message.arbitration_id, message.data, message.timestamp)
+            self._hear(message.arbitration_id, bytes(message.data))
+
+    def _lose(self, error: DeviceError) -> DeviceError:
+        self.loss = self.loss or error
+        return self.loss
+
+    def lose(self, error: DeviceError) -> None:
+        """Give the link up for `error` until it is opened again."""
+        self._lose(error)
+
+    # -------------------------------------------------------------------------------- requests
+    def read(self, entry: Entry) -> int:
+        """Read a value. Raises DeviceTimeout, ConnectionLost, DeviceFault when the drive refuses."""
+        what = f"reading {entry.title} ({entry.at:04X}h:{entry.subindex:02X})"
+        data = self._request(lambda sdo: sdo.upload(entry.at, entry.subindex), what)
+        size = struct.calcsize(entry.form)
+        if len(data) < size:
+            raise DeviceFault(f"{self.who}: {what} gave {len(data)} bytes instead of {size}")
+        return int(struct.unpack(entry.form, data[:size])[0])
+
+    def read_first(self, entry: Entry, timeout: float, enough: Callable[[], bool]) -> int:
+        """Read a value that never changes, over and over until the drive answers: it may be booting.
+
+        Raises DeviceTimeout when there is no answer within `timeout` s, or before it is `enough`.
+        """
+        deadline = time.monotonic() + timeout
+        while True:
+            try:
+                return self.read(entry)
+            except DeviceTimeout as error:
+                if enough() or time.monotonic() + self._settings.sdo_timeout > deadline:
+                    raise DeviceTimeout(f"{self.who} does not answer within {timeout:.1f} s", str(error)) from error
+                self.loss = None
+
+    def write(self, entry: Entry, value: int) -> None:
+        """Write a value; never sent a second time. Raises DeviceTimeout, ConnectionLost, DeviceFault."""
+        what = f"writing {value} to {entry.title} ({entry.at:04X}h:{entry.subindex:02X})"
+        data = struct.pack(entry.form, value)
+        self._request(lambda sdo: sdo.download(entry.at, entry.subindex, data), what)
+
+    def _request(self, send: Callable[[Any], Any], what: str) -> bytes:
+        limit = self._settings.sdo_timeout
+        if not self._one_request.acquire(timeout=4.0 * limit):
+            raise DeviceTimeout(f"{self.who}: {what} found the drive busy with other requests")
+        try:
+            sdo = self._sdo
+            if self.loss is not None or sdo is None:
+                raise _again(self.loss or NotConnected(f"{self.who} is not connected"))
+            try:
+                return bytes(send(sdo) or b"")
+            except SdoAbortedError as error:
+                text = SdoAbortedError.CODES.get(error.code, "unknown reason")
+                raise DeviceFault(
+                    f"{self.who} refuses {what}: {text} (abort {error.code:08X}h)", fault_code=f"{error.code:08X}h"
+                ) from error
+            except SdoCommunicationError as error:
+                late = DeviceTimeout(f"{self.who} did not answer {what} within {limit:g} s", str(error))
+                raise _again(self._lose(late)) from error
+            except (can.CanError, OSError) as error:
+                lost = ConnectionLost(f"{self.who}: the connection to the CAN bus was lost", str(error))
+                raise _again(self._lose(lost)) from error
+        finally:
+            self._one_request.release()
+
+    def heartbeat(self) -> None:
+        """Send our heartbeat. Raises ConnectionLost."""
+        self._send(HEARTBEAT + self._settings.master_id, OPERATIONAL)
+
+    def start_node(self) -> None:
+        """Have the node be Operational (NMT)."""
+        self._send(0x000, bytes([NMT_START, self._settings.node_id]))
+
+    def _send(self, identifier: int, data: bytes) -> None:
+        network = self._network
+        if self.loss is not None or network is None:
+            raise _again(self.loss or NotConnected(f"{self.who} is not connected"))
+        try:
+            network.send_message(identifier, data)
+        except (can.CanError, OSError) as error:
+            lost = ConnectionLost(f"{self.who}: the connection to the CAN bus was lost", str(error))
+            raise _again(self._lose(lost)) from error
+
+
+def _again(error: DeviceError) -> DeviceError:
+    """Give a new error of the same kind: one object raised in several threads mixes their tracebacks."""
+    return type(error)(str(error), error.detail)

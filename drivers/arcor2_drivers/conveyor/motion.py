@@ -1,0 +1,225 @@
+"""How the drive is enabled, moved and brought to a stand, step by step of CiA 402, and how a wait learns to give up."""
+
+import contextlib
+import threading
+from collections.abc import Callable
+from typing import Final
+
+from arcor2_hw.exceptions import Cancelled, DeviceError, DeviceFault, DeviceTimeout, Refused
+
+from . import cia402
+from .cia402 import FAULTY, Mode, Power
+from .observer import Observer, Snapshot
+from .settings import ConveyorSettings
+
+STEP: Final = 1.0
+"""s the drive has for one step of its state machine."""
+MARGIN: Final = 2.0
+"""s a motion may take beyond what its speed and ramps say."""
+STANDS: Final = 0.001
+"""m/s: slower than that it stands; a velocity that is measured never is quite zero."""
+
+GoOn = Callable[[], None]
+"""Returns while one may go on; raises Cancelled or ConnectionLost when not."""
+
+
+class Motion:
+    """Moves the belt, one motion at a time."""
+
+    def __init__(self, observer: Observer, settings: ConveyorSettings) -> None:
+        self._observer, self._link, self._settings = observer, observer.link, settings
+        self._who = observer.who
+        self._one_step = threading.Lock()
+        self._stops = 0
+        self._stands = max(settings.rate(STANDS), 1)
+
+    # -------------------------------------------------------------------------------- giving up
+    def begin(self, what: str) -> GoOn:
+        """Give the check for what begins now: it raises after a stop, and after a loss that is over already."""
+        stops, losses = self._stops, self._observer.losses
+
+        def check() -> None:
+            if self._stops != stops:
+                raise Cancelled(f"{self._who}: {what} was stopped")
+            self._observer.check_unbroken(losses)
+
+        return check
+
+    def stop_waiting(self) -> None:
+        """End with Cancelled what was begun before."""
+        self._stops += 1
+        self._observer.wake()
+
+    def control(self, word: int, go_on: GoOn) -> None:
+        """Write the control word, unless a stop has come: from then on nothing overtakes it."""
+        with self._one_step:
+            go_on()
+            self._link.write(cia402.CONTROLWORD, word)
+
+    def stands(self, now: Snapshot) -> bool:
+        """Tell whether the belt stands."""
+        return abs(now.velocity) <= self._stands
+
+    def fault(self, now: Snapshot, what: str) -> DeviceFault:
+        """Give the error for a drive in fault."""
+        code = now.error_code or self._observer.emergency
+        fault = cia402.fault_of(code)
+        return DeviceFault(
+            f"{self._who}: {what}: fault {code:04X}h, {fault.text}; {fault.remedy}", fault_code=f"{code:04X}h"
+        )
+
+    def _enabled(self, now: Snapshot, what: str) -> None:
+        if now.power in FAULTY:
+            raise self.fault(now, f"{what} ended")
+        if now.power is not Power.ENABLED:
+            emergency = self._observer.emergency
+            why = f": {cia402.fault_of(emergency).text} ({emergency:04X}h)" if emergency else ""
+            raise DeviceFault(f"{self._who}: {what} ended: the drive went to {now.power}{why}")
+
+    # -------------------------------------------------------------------------------- enabling
+    def enable(self, mode: Mode, what: str, go_on: GoOn) -> None:
+        """Bring the drive to Operation enabled in a mode, standing. Raises DeviceFault, DeviceTimeout, Cancelled."""
+        now = self._observer.fresh()
+        if now.power in FAULTY:
+            raise self.fault(now, f"{what} is refused in state {now.power}")
+        if now.power is Power.QUICK_STOP:
+            now = self._observer.wait(lambda s: s.power is not Power.QUICK_STOP, STEP, f"{what}: leaving quick stop")
+        if now.power is Power.ENABLED and now.mode == mode:
+            return
+        self._link.write(cia402.TARGET_VELOCITY, 0)
+        self._link.write(cia402.MODE, mode)
+        self._step(lambda s: s.mode == mode, f"{what}: changing to {mode.name.lower()}", go_on)
+        if now.power is Power.ENABLED:
+            return
+        if now.power is not Power.SWITCHED_ON:
+            self.control(cia402.CW_SHUTDOWN, go_on)
+            self._step(lambda s: s.power is Power.READY, f"{what}: getting ready to switch on", go_on)
+            self.control(cia402.CW_SWITCH_ON, go_on)
+            self._step(lambda s: s.power is Power.SWITCHED_ON, f"{what}: switching on", go_on)
+        self.control(cia402.CW_ENABLE, go_on)
+        self._step(lambda s: s.power is Power.ENABLED, f"{what}: enabling", go_on)
+
+    def _step(self, arrived: Callable[[Snapshot], bool], what: str, go_on: GoOn) -> Snapshot:
+        def holds(now: Snapshot) -> bool:
+            go_on()
+            if now.power in FAULTY:
+                raise self.fault(now, f"{what} ended")
+            return arrived(now)
+
+        return self._observer.wait(holds, STEP, what)
+
+    def _reach(self, arrived: Callable[[Snapshot], bool], timeout: float, what: str, go_on: GoOn) -> Snapshot:
+        """Wait while enabled; when that fails the belt is halted, for nobody waits for it any more."""
+
+        def holds(now: Snapshot) -> bool:
+            go_on()
+            self._enabled(now, what)
+            return arrived(now)
+
+        try:
+            return self._observer.wait(holds, timeout, what)
+        except DeviceTimeout:
+            with contextlib.suppress(DeviceError):  # the drive listens for our heartbeat
+                self.halt()
+            raise
+
+    # -------------------------------------------------------------------------------- motions
+    def home(self, what: str, go_on: GoOn) -> None:
+        """Home as the settings say. Raises DeviceFault when the drive cannot."""
+        s, write = self._settings, self._link.write
+        write(cia402.HOMING_METHOD, s.homing_method)
+        write(cia402.HOMING_SPEED_SEARCH, s.rate(s.homing_speed))
+        write(cia402.HOMING_SPEED_ZERO, s.rate(s.homing_speed))
+        write(cia402.HOMING_ACCELERATION, s.rate(s.acceleration))
+        self.enable(Mode.HOMING, what, go_on)
+        self.control(cia402.CW_ENABLE, go_on)
+        self.control(cia402.CW_ENABLE | cia402.CW_START, go_on)
+
+        def homed(now: Snapshot) -> bool:
+            if now.statusword & cia402.HOMING_ERROR:
+                raise DeviceFault(f"{self._who}: {what} ended with a homing error (method {s.homing_method})")
+            wanted = cia402.HOMING_ATTAINED | cia402.TARGET_REACHED
+            return now.statusword & wanted == wanted and self.stands(now)
+
+        self._reach(homed, s.homing_timeout, what, go_on)
+        self.control(cia402.CW_ENABLE, go_on)
+
+    def move(self, target: int, relative: bool, speed: int, expected: int, what: str, go_on: GoOn) -> None:
+        """Move to `target`, or by it, in counts; `expected` is where it has to end."""
+        s, write = self._settings, self._link.write
+        self.enable(Mode.PROFILE_POSITION, what, go_on)
+        before = self._observer.fresh()
+        self.control(cia402.CW_ENABLE, go_on)
+        write(cia402.PROFILE_VELOCITY, speed)
+        write(cia402.TARGET_POSITION, target)
+        self._step(lambda now: not now.statusword & cia402.SETPOINT_ACKNOWLEDGE, f"{what}: being free", go_on)
+        start = cia402.CW_ENABLE | cia402.CW_START | cia402.CW_AT_ONCE | (cia402.CW_RELATIVE if relative else 0)
+        self.control(start, go_on)
+        acknowledged = cia402.SETPOINT_ACKNOWLEDGE
+        self._reach(lambda now: bool(now.statusword & acknowledged), STEP, f"{what}: taking the set-point", go_on)
+        self.control(cia402.CW_ENABLE, go_on)
+        self._reach(lambda now: not now.statusword & acknowledged, STEP, f"{what}: ending the handshake", go_on)
+        takes = abs(expected - before.position) / speed + 2.0 * speed / s.rate(s.acceleration)
+        after = self._reach(
+            lambda now: bool(now.statusword & cia402.TARGET_REACHED) and self.stands(now), takes + MARGIN, what, go_on
+        )
+        if abs(after.position - expected) > s.rate(s.tolerance):
+            told, wanted = s.metres(after.position), s.metres(expected)
+            raise DeviceFault(f"{self._who}: {what} ended at {told:.4f} m instead of {wanted:.4f} m")
+
+    def run(self, speed: int, what: str, go_on: GoOn) -> None:
+        """Run with a velocity; return when it is reached."""
+        s = self._settings
+        self.enable(Mode.PROFILE_VELOCITY, what, go_on)
+        self.control(cia402.CW_ENABLE, go_on)
+        with self._one_step:
+            go_on()
+            self._link.write(cia402.TARGET_VELOCITY, speed)
+        near = max(self._stands, abs(speed) // 20)
+        ramp = 2.0 * s.max_speed / s.acceleration
+        self._reach(
+            lambda now: bool(now.statusword & cia402.TARGET_REACHED) and abs(now.velocity - speed) <= near,
+            ramp + MARGIN,
+            what,
+            go_on,
+        )
+
+    # -------------------------------------------------------------------------------- stands
+    def halt(self) -> None:
+        """Slow down, return when the belt stands. What it was doing is forgotten, by the drive too."""
+        s = self._settings
+        with self._one_step:
+            power = cia402.power(self._link.read(cia402.STATUSWORD))
+            if power is Power.ENABLED:
+                self._link.write(cia402.CONTROLWORD, cia402.CW_ENABLE | cia402.CW_HALT)
+                self._link.write(cia402.TARGET_VELOCITY, 0)
+        self._observer.wait(self.stands, s.max_speed / s.acceleration + MARGIN, "halting")
+        if power is not Power.ENABLED:
+            return
+        with self._one_step:
+            if cia402.power(self._link.read(cia402.STATUSWORD)) is Power.ENABLED:
+                # Clearing the halt bit alone would let the drive go on with its set-point.
+                self._link.write(cia402.CONTROLWORD, cia402.CW_SWITCH_ON)
+
+    def quick_stop(self) -> None:
+        """Stop on the quick stop ramp; return when the belt stands. The torque is off then."""
+        with self._one_step:
+            if cia402.power(self._link.read(cia402.STATUSWORD)) is Power.ENABLED:
+                self._link.write(cia402.CONTROLWORD, cia402.CW_QUICK_STOP)
+        self._observer.wait(
+            lambda now: now.power not in (Power.ENABLED, Power.QUICK_STOP) and self.stands(now), MARGIN, "quick stop"
+        )
+
+    def fault_reset(self, go_on: GoOn) -> None:
+        """Reset a fault. Raises Refused while its cause stands."""
+        now = self._observer.wait(lambda s: s.power is not Power.FAULT_REACTION, MARGIN, "the reaction to the fault")
+        if now.power is not Power.FAULT:
+            return
+        self.control(cia402.CW_DISABLE_VOLTAGE, go_on)
+        self.control(cia402.CW_FAULT_RESET, go_on)
+        try:
+            self._observer.wait(lambda s: s.power is not Power.FAULT, STEP, "resetting the fault")
+        except DeviceTimeout as error:
+            text = str(self.fault(now, "its cause stands"))
+            raise Refused(f"{self._who}: fault_reset is refused in state Fault", text) from error
+        self.control(cia402.CW_DISABLE_VOLTAGE, go_on)

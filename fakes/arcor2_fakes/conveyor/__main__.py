@@ -1,0 +1,98 @@
+"""Starts the fake conveyor: `python -m arcor2_fakes.conveyor`."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import sys
+from typing import Annotated
+
+from cyclopts import App, Parameter, validators
+
+from arcor2_fakes.control import ControlServer, parse_address
+from arcor2_fakes.conveyor.hub import Hub
+from arcor2_fakes.conveyor.node import Node
+from arcor2_fakes.process import announce, run, until_told_to_end
+from arcor2_fakes.wire import register_faults
+
+app = App(name="arcor2_fakes.conveyor", help="Fake conveyor: CiA 402 drive on CAN by slcan over TCP.", version_flags=[])
+
+
+def register_commands(control: ControlServer, node: Node) -> None:
+    """Make what the world and a test can do to the drive known to the control channel."""
+
+    def emergency(code: int, stands: bool = False) -> None:
+        if not isinstance(code, int) or not 1 <= code <= 0xFFFF:
+            raise ValueError("code is 1 to 65535")
+        node.drive.fault(code, stands=bool(stands))
+
+    def mute(on: bool = True) -> None:
+        node.silent = bool(on)
+
+    def jam(on: bool = True) -> None:
+        node.drive.jammed = bool(on)
+
+    def cause_gone() -> None:
+        node.drive.cause_stands = False
+
+    def homing_fails(on: bool = True) -> None:
+        node.drive.homing_fails = bool(on)
+
+    def handshake_stuck(on: bool = True) -> None:
+        node.drive.handshake_stuck = bool(on)
+
+    control.command("emergency", emergency)
+    control.command("mute", mute)
+    control.command("follow_error", jam)
+    control.command("cause_gone", cause_gone)
+    control.command("homing_fails", homing_fails)
+    control.command("handshake_stuck", handshake_stuck)
+    control.command("power_cycle", node.power_cycle)
+
+
+@app.default
+def main(
+    *,
+    host: str = "127.0.0.1",
+    port: int = 0,
+    control: str = "127.0.0.1:0",
+    node: Annotated[int, Parameter(validator=validators.Number(gte=1, lte=126))] = 5,
+) -> int:
+    """Start the fake; it prints one line `ready {json}` with its addresses and ends on SIGTERM.
+
+    Args:
+        host: address the CAN adapters are served on.
+        port: port they are served on; 0 takes a free one.
+        control: HOST:PORT of the control channel; port 0 takes a free one.
+        node: CANopen node id of the drive.
+    """
+    try:
+        control_host, control_port = parse_address(control)
+    except ValueError as e:
+        sys.stderr.write(f"conveyor: {e}\n")
+        return 2
+
+    async def body() -> None:
+        hub = Hub(host, port)
+        drive = Node(hub, node)
+        channel = ControlServer(control_host, control_port)
+        register_commands(channel, drive)
+        register_faults(channel, {"can": hub.wire})
+        channel.source("truth", drive.truth)
+        await hub.wire.listen()
+        life = asyncio.create_task(drive.run())
+        try:
+            announce(name="conveyor", can=hub.wire.address, node=node, control=await channel.start())
+            await until_told_to_end()
+        finally:
+            life.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await asyncio.gather(life)
+            hub.wire.close()
+            await channel.close()
+
+    return run(body, "conveyor")
+
+
+if __name__ == "__main__":
+    sys.exit(app())

@@ -1,0 +1,109 @@
+"""The object dictionary of the drive: what each index reads and writes, and the SDO aborts for what it does not."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from arcor2_fakes.conveyor.drive import Drive, Mode
+
+NO_OBJECT, NO_SUBINDEX = 0x06020000, 0x06090011
+READ_ONLY, TOO_LONG, TOO_SHORT, BAD_VALUE = 0x06010002, 0x06070012, 0x06070013, 0x06090030
+WRONG_STATE = 0x08000022
+
+
+class Abort(Exception):
+    """An SDO abort with its code."""
+
+    def __init__(self, code: int) -> None:
+        super().__init__(f"{code:08X}")
+        self.code = code
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One subindex: a struct format (or "s" for a text), how to read it, how to write it (None: read only)."""
+
+    form: str
+    read: Callable[[], int | str]
+    write: Callable[[int], None] | None = None
+
+
+class Dictionary:
+    """The entries by (index, subindex)."""
+
+    def __init__(self) -> None:
+        self.entries: dict[tuple[int, int], Entry] = {}
+
+    def read(self, index: int, subindex: int) -> bytes:
+        """Give the value's bytes. Raises Abort."""
+        entry = self._entry(index, subindex)
+        value = entry.read()
+        return value.encode() if isinstance(value, str) else struct.pack("<" + entry.form, value)
+
+    def write(self, index: int, subindex: int, data: bytes) -> None:
+        """Take a value. Raises Abort."""
+        entry = self._entry(index, subindex)
+        if entry.write is None:
+            raise Abort(READ_ONLY)
+        size = struct.calcsize("<" + entry.form)
+        if len(data) != size:
+            raise Abort(TOO_LONG if len(data) > size else TOO_SHORT)
+        try:
+            entry.write(struct.unpack("<" + entry.form, data)[0])
+        except ValueError:
+            raise Abort(BAD_VALUE) from None
+
+    def _entry(self, index: int, subindex: int) -> Entry:
+        entry = self.entries.get((index, subindex))
+        if entry is None:
+            raise Abort(NO_SUBINDEX if any(known == index for known, _ in self.entries) else NO_OBJECT)
+        return entry
+
+
+_PARAMETERS = {
+    0x6007: ("h", "abort_option", -32768),
+    0x605A: ("h", "quick_stop_option", -32768),
+    0x607A: ("i", "target_position", -(1 << 31)),
+    0x607C: ("i", "home_offset", -(1 << 31)),
+    0x6081: ("I", "profile_velocity", 1),
+    0x6083: ("I", "acceleration", 1),
+    0x6084: ("I", "deceleration", 1),
+    0x6085: ("I", "quick_stop_deceleration", 1),
+    0x6098: ("b", "homing_method", -128),
+    0x609A: ("I", "homing_acceleration", 1),
+    0x60FF: ("i", "target_velocity", -(1 << 31)),
+}
+_MODES_HAD = 1 << 0 | 1 << 2 | 1 << 5  # 6502h: bits of pp, pv, hm
+
+
+def add_drive(dictionary: Dictionary, drive: Drive) -> None:
+    """Enter what CiA 402 defines."""
+    entries = dictionary.entries
+    for index, (form, name, lowest) in _PARAMETERS.items():
+
+        def write(value: int, name: str = name, lowest: int = lowest) -> None:
+            if value < lowest:
+                raise ValueError
+            setattr(drive.parameters, name, value)
+
+        entries[index, 0] = Entry(form, lambda name=name: getattr(drive.parameters, name), write)  # type: ignore[misc]
+
+    def homing_speed(value: int) -> None:
+        if value < 1:
+            raise ValueError
+        drive.parameters.homing_speed = value
+
+    entries[0x603F, 0] = Entry("H", lambda: drive.error_code)
+    entries[0x6040, 0] = Entry("H", lambda: drive.controlword, drive.control)
+    entries[0x6041, 0] = Entry("H", lambda: drive.statusword)
+    entries[0x6060, 0] = Entry("b", lambda: drive.mode, drive.set_mode)
+    entries[0x6061, 0] = Entry("b", lambda: drive.mode)
+    entries[0x6064, 0] = Entry("i", lambda: drive.position)
+    entries[0x606C, 0] = Entry("i", lambda: round(drive.velocity))
+    entries[0x6099, 0] = Entry("B", lambda: 2)
+    for subindex in (1, 2):
+        entries[0x6099, subindex] = Entry("I", lambda: drive.parameters.homing_speed, homing_speed)
+    entries[0x6502, 0] = Entry("I", lambda: _MODES_HAD)
+    assert all(mode in (0, 1, 3, 6) for mode in Mode)

@@ -1,0 +1,202 @@
+"""The CANopen node (CiA 301) around the drive: NMT, SDO server, heartbeat both ways, EMCY, boot-up."""
+
+from __future__ import annotations
+
+import asyncio
+import struct
+from collections import deque
+from typing import Any
+
+from arcor2_fakes.conveyor.dictionary import BAD_VALUE, Abort, Dictionary, Entry, add_drive
+from arcor2_fakes.conveyor.drive import HEARTBEAT_ERROR, Drive
+from arcor2_fakes.conveyor.hub import Hub
+
+TICK = 0.005
+BOOT_TIME = 0.1
+_OPERATIONAL, _STOPPED, _PRE_OPERATIONAL = 5, 4, 127
+_UNKNOWN_COMMAND, _TOGGLE = 0x05040001, 0x05030000
+_REGISTER = {0x2: 1 << 1, 0x3: 1 << 2, 0x4: 1 << 3, 0x81: 1 << 4}  # 1001h: current, voltage, temperature, communication
+
+
+class Node:
+    """The node, booted when it is made. `run` is its life; it must run in the event loop that the hub runs in."""
+
+    def __init__(self, hub: Hub, number: int) -> None:
+        self.number = number
+        self.silent = False
+        self._hub = hub
+        self._nmt = _PRE_OPERATIONAL
+        self._booted_at = 0.0
+        self.writes: deque[dict[str, Any]] = deque(maxlen=400)
+        self.drive = Drive(self._emergency)
+        self._reset_communication()
+        hub.listen(self._received)
+
+    def _reset_communication(self) -> None:
+        self._heartbeat_ms = 200
+        self._consumer = 0
+        self._heard: float | None = None
+        self._master_lost = False
+        self._next_heartbeat = 0.0
+        self._upload: tuple[bytes, int] | None = None
+        self.dictionary = dictionary = Dictionary()
+        number, entries = self.number, dictionary.entries
+        entries[0x1000, 0] = Entry("I", lambda: 0x00020192)  # servo drive, profile 402
+        entries[0x1001, 0] = Entry("B", self._error_register)
+        entries[0x1008, 0] = Entry("s", lambda: "SD-48 belt servo")
+        entries[0x100A, 0] = Entry("s", lambda: "3.07")
+        entries[0x1016, 0] = Entry("B", lambda: 1)
+        entries[0x1016, 1] = Entry("I", lambda: self._consumer, self._set_consumer)
+        entries[0x1017, 0] = Entry("H", lambda: self._heartbeat_ms, self._set_heartbeat)
+        for subindex, value in enumerate((4, 0x3E7, 0x48, 0x307, 1000 + number)):
+            entries[0x1018, subindex] = Entry("I" if subindex else "B", lambda value=value: value)  # type: ignore[misc]
+        add_drive(dictionary, self.drive)
+
+    def _set_consumer(self, value: int) -> None:
+        if value >> 24 or (value & 0xFFFF and not 1 <= value >> 16 <= 127):
+            raise Abort(BAD_VALUE)
+        self._consumer, self._heard = value, None  # monitoring begins with the first heartbeat
+
+    def _set_heartbeat(self, value: int) -> None:
+        self._heartbeat_ms, self._next_heartbeat = value, 0.0
+
+    def _error_register(self) -> int:
+        code = self.drive.error_code
+        return 0 if not code else 1 | _REGISTER.get(code >> 8, _REGISTER.get(code >> 12, 0))
+
+    # -------------------------------------------------------------------------------- life
+    async def run(self) -> None:
+        """Boot, then move and watch until cancelled."""
+        loop = asyncio.get_running_loop()
+        before = loop.time()
+        while True:
+            await asyncio.sleep(TICK)
+            now = loop.time()
+            self.drive.advance(min(now - before, 0.05))
+            before = now
+            if self._booted_at and now >= self._booted_at:
+                self._booted_at, self._nmt = 0.0, _PRE_OPERATIONAL
+                self._send(0x700, b"\x00")
+            if self._booted_at:
+                continue
+            if self._heartbeat_ms and now >= self._next_heartbeat:
+                self._next_heartbeat = now + self._heartbeat_ms / 1000.0
+                self._send(0x700, bytes([self._nmt]))
+            self._watch_master(now)
+
+    def _watch_master(self, now: float) -> None:
+        limit = self._consumer & 0xFFFF
+        if self._heard is None or not limit or now - self._heard <= limit / 1000.0:
+            return
+        self._heard, self._master_lost = None, True
+        if self._nmt == _OPERATIONAL:
+            self._nmt = _PRE_OPERATIONAL  # 1029h:01 = 0
+        self._emergency(HEARTBEAT_ERROR)
+        self.drive.connection_aborted()
+
+    def power_cycle(self, belt: float | None = None) -> None:
+        """Be switched off and on: what is volatile is gone; the belt stands, or was pushed to `belt` counts."""
+        belt = self.drive.belt if belt is None else float(belt)
+        self.drive = Drive(self._emergency, belt)
+        self.writes.clear()
+        self._hub.frames.clear()
+        self._boot()
+
+    def _boot(self) -> None:
+        self._reset_communication()
+        self._booted_at = asyncio.get_running_loop().time() + BOOT_TIME
+
+    # -------------------------------------------------------------------------------- frames
+    def _send(self, service: int, data: bytes) -> None:
+        if not self.silent and not self._booted_at:
+            self._hub.transmit(service + self.number, data)
+
+    def _emergency(self, code: int) -> None:
+        self._send(0x80, struct.pack("<HB5x", code, self._error_register() if code else 0))
+
+    def _received(self, identifier: int, data: bytes) -> None:
+        if self.silent or self._booted_at:
+            return
+        if identifier == 0 and len(data) == 2 and data[1] in (0, self.number):
+            self._nmt_command(data[0])
+        elif identifier == 0x600 + self.number and len(data) == 8 and self._nmt != _STOPPED:
+            self._sdo(data)
+        elif identifier == 0x700 + (self._consumer >> 16 & 0x7F) and self._consumer & 0xFFFF:
+            self._heard = asyncio.get_running_loop().time()
+            if self._master_lost:
+                self._master_lost = False
+                self._emergency(self.drive.error_code)
+
+    def _nmt_command(self, command: int) -> None:
+        if command in (129, 130):  # reset node, reset communication
+            if command == 129:
+                self.power_cycle()
+            else:
+                self.drive.connection_aborted()
+                self._boot()
+            return
+        states = {1: _OPERATIONAL, 2: _STOPPED, 128: _PRE_OPERATIONAL}
+        if command in states:
+            left, self._nmt = self._nmt == _OPERATIONAL, states[command]
+            if left and self._nmt != _OPERATIONAL:
+                self.drive.connection_aborted()
+
+    # -------------------------------------------------------------------------------- SDO server
+    def _sdo(self, data: bytes) -> None:
+        specifier, index, subindex = struct.unpack_from("<BHB", data)
+        try:
+            answer = self._sdo_answer(specifier, index, subindex, data)
+        except Abort as abort:
+            self._upload = None
+            answer = struct.pack("<BHBI", 0x80, index, subindex, abort.code)
+        if answer:
+            self._send(0x580, answer)
+
+    def _sdo_answer(self, specifier: int, index: int, subindex: int, data: bytes) -> bytes:
+        if specifier == 0x80:
+            self._upload = None
+            return b""
+        if specifier == 0x40:
+            value = self.dictionary.read(index, subindex)
+            if len(value) <= 4:
+                return struct.pack("<BHB4s", 0x43 | (4 - len(value)) << 2, index, subindex, value)
+            self._upload = value, 0
+            return struct.pack("<BHBI", 0x41, index, subindex, len(value))
+        if specifier & 0xEF == 0x60 and self._upload is not None:
+            return self._segment(specifier & 0x10)
+        if specifier & 0xE2 == 0x22:  # expedited download
+            size = 4 - (specifier >> 2 & 3) if specifier & 1 else 4
+            self.writes.append({"index": index, "subindex": subindex, "data": data[4 : 4 + size].hex()})
+            self.dictionary.write(index, subindex, data[4 : 4 + size])
+            return struct.pack("<BHB4x", 0x60, index, subindex)
+        raise Abort(_UNKNOWN_COMMAND)
+
+    def _segment(self, toggle: int) -> bytes:
+        assert self._upload is not None
+        value, expected = self._upload
+        if toggle != expected:
+            raise Abort(_TOGGLE)
+        part, rest = value[:7], value[7:]
+        self._upload = (rest, expected ^ 0x10) if rest else None
+        return bytes([toggle | (7 - len(part)) << 1 | (not rest)]) + part.ljust(7, b"\0")
+
+    # -------------------------------------------------------------------------------- truth
+    def truth(self) -> dict[str, Any]:
+        """Give what is really so, whatever the wire says."""
+        drive = self.drive
+        return {
+            "state": drive.state.name.lower(),
+            "mode": int(drive.mode),
+            "nmt": self._nmt,
+            "booted": not self._booted_at,
+            "belt": drive.belt,
+            "position": drive.position,
+            "velocity": drive.velocity,
+            "homed": drive.homed,
+            "error_code": drive.error_code,
+            "consumer": self._consumer,
+            "abort_option": drive.parameters.abort_option,
+            "parameters": dict(vars(drive.parameters)),
+            "writes": list(self.writes),
+            "frames": list(self._hub.frames),
+        }

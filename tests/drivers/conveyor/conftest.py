@@ -1,0 +1,59 @@
+"""A fake conveyor in a process of its own, and the driver on its bus."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from arcor2_drivers.conveyor.conveyor import Conveyor
+from arcor2_drivers.conveyor.settings import ConveyorSettings
+from tests.fakes.conftest import FakeProcess, wait_for
+
+__all__ = ["wait_for"]
+
+
+@pytest.fixture(scope="module")
+def one_fake() -> Iterator[FakeProcess]:
+    fake = FakeProcess("conveyor")
+    fake.control  # noqa: B018 - opened here, so that it may live as long as the module
+    yield fake
+    fake.end()
+
+
+@pytest.fixture
+def fake(one_fake: FakeProcess) -> FakeProcess:
+    """Healthy and just switched on."""
+    one_fake.control.do("heal")
+    one_fake.control.do("mute", on=False)
+    one_fake.control.do("power_cycle", belt=0)
+    one_fake.control.wait_until(lambda truth: truth["booted"])
+    return one_fake
+
+
+@pytest.fixture
+def make() -> Iterator[Callable[..., Conveyor]]:
+    """Gives ``make("127.0.0.1:4000", homing_method=19)``: a driver, not connected; it is disconnected in the end."""
+    made: list[Conveyor] = []
+
+    def build(address: str, **settings: Any) -> Conveyor:
+        values = {"heartbeat_ms": 1000, "sdo_timeout": 0.4} | settings
+        conveyor = Conveyor("belt_id", "belt", ConveyorSettings(f"socket://{address}", **values))
+        made.append(conveyor)
+        return conveyor
+
+    yield build
+    for conveyor in made:
+        conveyor.disconnect()
+
+
+@pytest.fixture
+def observed(fake: FakeProcess, make: Callable[..., Conveyor]) -> Conveyor:
+    conveyor = make(fake.ready["can"])
+    conveyor.connect()
+    return conveyor
+
+
+@pytest.fixture
+def belt(observed: Conveyor) -> Conveyor:
+    observed.take_control()
+    return observed

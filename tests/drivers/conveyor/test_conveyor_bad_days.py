@@ -1,0 +1,202 @@
+"""The conveyor's driver when the bus fails, answers come late, the drive is reset, or its process is killed."""
+
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+import arcor2_drivers.conveyor as package
+from arcor2_drivers.conveyor.conveyor import Conveyor
+from arcor2_hw.data.device import Connection, Health
+from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected, NotInControl
+from tests.fakes.conftest import FakeProcess
+
+QUICK: dict[str, Any] = {"sdo_timeout": 0.15, "heartbeat_ms": 600}
+
+
+def test_nobody_there(make: Callable[..., Conveyor]) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))  # not listening: refuses
+        address = "{}:{}".format(*taken.getsockname())
+        belt = make(address)
+        with pytest.raises(NotConnected, match=f"^belt at socket://{address} node 5: the CAN adapter"):
+            belt.connect(1.0)
+        assert belt.connection is Connection.FAILED
+        with pytest.raises(NotConnected, match=address):
+            belt.position()
+        with pytest.raises(NotConnected, match=address):
+            belt.home()
+
+
+def test_no_drive_at_the_address(fake: FakeProcess, make: Callable[..., Conveyor]) -> None:
+    belt = make(fake.ready["can"], node_id=6, **QUICK)
+    began = time.monotonic()
+    with pytest.raises(DeviceTimeout, match=r"node 6 does not answer within 0.5 s"):
+        belt.connect(0.5)
+    assert time.monotonic() - began < 1.0
+
+
+@pytest.mark.parametrize("fault", ["silence", "half_frame", "garbage"])
+def test_connecting_to_one_that_does_not_answer_sensibly(
+    fake: FakeProcess, make: Callable[..., Conveyor], fault: str
+) -> None:
+    fake.control.do(fault)
+    belt = make(fake.ready["can"], **QUICK)
+    with pytest.raises(DeviceError, match=f"^belt at socket://{fake.ready['can']} node 5"):
+        belt.connect(0.5)
+    fake.control.do("heal")
+    belt.connect()
+    belt.connect()  # harmless
+    assert belt.position().value == 0.0
+    belt.disconnect()
+    belt.disconnect()
+    assert belt.connection is Connection.OFFLINE
+
+
+@pytest.mark.parametrize("fault", ["mute", "reset", "half_frame", "garbage"])
+def test_loss_in_mid_run_stops_the_belt_and_only_observation_comes_back(
+    fake: FakeProcess, make: Callable[..., Conveyor], wait_for: Callable[..., Any], fault: str
+) -> None:
+    belt = make(fake.ready["can"], **QUICK)
+    belt.connect()
+    belt.take_control()
+    belt.home()
+    outcome: list[Any] = []
+
+    def move() -> None:
+        try:
+            belt.move_to(20.0, 0.4)
+        except Exception as error:
+            outcome.append(error)
+
+    thread = threading.Thread(target=move)
+    thread.start()
+    fake.control.wait_until(lambda t: t["velocity"] > 100)
+    fake.control.do(fault)
+    thread.join(5.0)
+    assert isinstance(outcome[0], ConnectionLost), outcome
+    assert str(outcome[0]).startswith(f"belt at socket://{fake.ready['can']} node 5")
+    truth = fake.control.wait_until(lambda t: t["velocity"] == 0.0)
+    assert truth["state"] == "switch_on_disabled"
+    fake.control.do("heal")
+    fake.control.do("mute", on=False)
+    wait_for(lambda: belt.connection, lambda state: state is Connection.BACK, within=8.0)
+    assert not belt.homed
+    with pytest.raises(NotInControl, match="nobody has control"):
+        belt.run(0.1)
+    assert fake.truth()["velocity"] == 0.0
+    belt.take_control()
+    assert belt.connection is Connection.ONLINE
+    belt.move_by(0.01)
+
+
+def test_a_drive_that_was_off_and_on_is_not_homed(
+    fake: FakeProcess, belt: Conveyor, wait_for: Callable[..., Any]
+) -> None:
+    belt.home()
+    fake.control.do("power_cycle")
+    wait_for(lambda: belt.connection, lambda state: state is Connection.BACK)
+    assert not belt.homed
+    assert belt.control_owner() is None
+    assert fake.truth()["consumer"] == 0
+    belt.take_control()
+    assert fake.truth()["consumer"] == 127 << 16 | 1000  # armed again
+
+
+def test_late_answers_answer_nothing(
+    fake: FakeProcess, make: Callable[..., Conveyor], wait_for: Callable[..., Any]
+) -> None:
+    belt = make(fake.ready["can"], **QUICK)
+    belt.connect()
+    fake.control.do("slow", seconds=0.4)
+    wait_for(lambda: belt.connection, lambda state: state is Connection.LOST)
+    assert belt.health is Health.FAILURE
+    with pytest.raises(ConnectionLost, match="lost"):
+        belt.position()
+    fake.control.do("heal")
+    wait_for(lambda: belt.connection, lambda state: state is Connection.BACK, within=8.0)
+    assert belt.belt_position() == 0.0
+
+
+def test_stop_is_quick_while_the_belt_runs(fake: FakeProcess, belt: Conveyor) -> None:
+    belt.run(0.3)
+    began = time.monotonic()
+    belt.stop()
+    took = time.monotonic() - began
+    halts = [f for f in fake.truth()["frames"] if f["from_host"] and f["data"].startswith("2b4060000f01")]
+    assert halts
+    assert halts[0]["time"] - began < 0.1  # CLOCK_MONOTONIC is one clock for all processes
+    assert took < 1.5  # 0.3 s of ramp
+
+
+OWNER = """
+import sys, time
+from arcor2_drivers.conveyor.conveyor import Conveyor
+from arcor2_drivers.conveyor.settings import ConveyorSettings
+belt = Conveyor("id", "belt", ConveyorSettings(sys.argv[1], heartbeat_ms=600))
+belt.connect()
+belt.take_control()
+belt.run(0.3)
+print("runs", flush=True)
+time.sleep(60)
+"""
+
+
+def test_the_drive_stops_when_the_drivers_process_is_killed(fake: FakeProcess) -> None:
+    owner = subprocess.Popen(
+        [sys.executable, "-c", OWNER, f"socket://{fake.ready['can']}"], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert owner.stdout is not None
+        assert owner.stdout.readline() == "runs\n"
+        began = time.monotonic()
+        while time.monotonic() - began < 0.8:  # longer than the heartbeat's limit: it does run on while we live
+            assert fake.truth()["velocity"] == pytest.approx(3000)
+            time.sleep(0.05)
+        owner.kill()
+        killed = time.monotonic()
+        truth = fake.control.wait_until(lambda t: t["velocity"] == 0.0)
+        assert time.monotonic() - killed < Conveyor.loss_reaction.within
+        assert truth["state"] == "switch_on_disabled"
+        emergencies = [f["data"] for f in truth["frames"] if f["id"] == 0x85]
+        assert emergencies
+        assert emergencies[-1].startswith("3081")
+    finally:
+        owner.kill()
+        owner.wait(5.0)
+        assert owner.stdout is not None
+        owner.stdout.close()
+
+
+def test_the_heartbeat_ceases_when_the_drive_is_not_heard(fake: FakeProcess, belt: Conveyor) -> None:
+    belt.run(0.1)
+    fake.control.do("mute")
+    fake.control.wait_until(lambda t: t["velocity"] == 0.0)
+    silent_since = time.monotonic()
+    beats = [f["time"] for f in fake.truth()["frames"] if f["id"] == 0x77F]
+    assert silent_since - max(beats) > 0.5
+
+
+def test_disconnecting_stops_a_belt_that_runs(fake: FakeProcess, belt: Conveyor) -> None:
+    belt.run(0.2)
+    began = time.monotonic()
+    belt.disconnect()
+    assert time.monotonic() - began < 1.0
+    fake.control.wait_until(lambda t: t["velocity"] == 0.0 and t["state"] == "switch_on_disabled")
+
+
+def test_every_claim_names_a_test_that_exists() -> None:
+    claims = yaml.safe_load((Path(package.__file__).parent / "quality.yaml").read_text())
+    here = Path(__file__).parent
+    for tests in claims["rules"].values():
+        for test in tests:
+            file, _, function = test.partition("::")
+            assert f"def {function}(" in (here / file).read_text(), test
+    assert all(hasattr(Conveyor, name) for name in claims["actions"])
