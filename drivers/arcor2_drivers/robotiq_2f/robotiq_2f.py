@@ -16,7 +16,8 @@ from arcor2_hw.objects.small import GripperState
 from . import scaling
 from .ascii_link import AsciiLink
 from .observer import Observer
-from .settings import Robotiq2FSettings
+from .rtu_link import RtuLink
+from .settings import Robotiq2FSettings, Wire
 from .status import FIRST_MAJOR, HELD, Activation, Command, Link, Object, Status, fault_of
 
 MARGIN: Final = 2.0
@@ -30,6 +31,8 @@ LONGEST_ACTION: Final = 300.0
 
 def link_of(name: str, settings: Robotiq2FSettings) -> Link:
     """Give the wire that the settings choose, closed."""
+    if settings.wire is Wire.MODBUS_RTU:
+        return RtuLink(name, settings.serial_port, settings.baud_rate, settings.unit_id, settings.request_timeout)
     return AsciiLink(name, settings.host, settings.port, settings.request_timeout)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import sys
+from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import App, Parameter, validators
@@ -12,6 +13,7 @@ from arcor2_fakes.control import ControlServer, parse_address
 from arcor2_fakes.process import announce, run, until_told_to_end
 from arcor2_fakes.robotiq_2f.ascii_port import AsciiPort
 from arcor2_fakes.robotiq_2f.gripper import Gripper, Mechanics
+from arcor2_fakes.robotiq_2f.rtu_port import RtuPort
 from arcor2_fakes.wire import register_faults
 
 app = App(name="arcor2_fakes.robotiq_2f", help="Fake Robotiq 2F gripper.", version_flags=[])
@@ -30,6 +32,7 @@ def register_commands(control: ControlServer, gripper: Gripper) -> None:
 def main(
     *,
     ascii_port: Annotated[str, Parameter(name="--ascii")] = "127.0.0.1:0",
+    link: Path | None = None,
     control: str = "127.0.0.1:0",
     stroke: Annotated[float, Parameter(validator=validators.Number(gt=0))] = 0.085,
     latency: Annotated[float, Parameter(validator=validators.Number(gte=0))] = 0.015,
@@ -39,6 +42,7 @@ def main(
 
     Args:
         ascii_port: HOST:PORT of the URCap's ASCII port; port 0 takes a free one.
+        link: symbolic link to keep on the pty of Modbus RTU, whose own path changes when it is unplugged and plugged.
         control: HOST:PORT of the control channel; port 0 takes a free one.
         stroke: width between the fingers when open, m.
         latency: seconds of the gripper's own between a request and its effect.
@@ -54,19 +58,28 @@ def main(
         loop = asyncio.get_running_loop()
         gripper = Gripper(lambda: loop.time() * time_scale, Mechanics(stroke=stroke, latency=latency))
         port = AsciiPort(*ascii_address, gripper)
+        serial = RtuPort(gripper, link)
         channel = ControlServer(*control_address)
         register_commands(channel, gripper)
-        register_faults(channel, {"ascii": port.wire})
+        register_faults(channel, {"ascii": port.wire, "rtu": serial.line})
 
         def truth() -> dict[str, Any]:
-            return {**gripper.truth(), "sets": list(port.sets), "received": list(port.received)}
+            return {
+                **gripper.truth(),
+                "sets": list(port.sets),
+                "received": list(port.received),
+                "writes": list(serial.writes),
+            }
 
         channel.source("truth", truth)
+        await serial.line.plug()
         try:
-            announce(name="robotiq_2f", ascii=await port.wire.listen(), control=await channel.start())
+            addresses = {"ascii": await port.wire.listen(), "rtu": serial.line.port}
+            announce(name="robotiq_2f", **addresses, control=await channel.start())
             await until_told_to_end()
         finally:
             port.wire.close()
+            await serial.line.unplug()
             await channel.close()
 
     return run(body, "robotiq_2f")

@@ -58,11 +58,14 @@ class Gripper:
         self._part: float | None = None
         self._blocked = False
         self.commands: deque[dict[str, int]] = deque(maxlen=50)
+        self.count = 0
+        """Commands since the start."""
 
     # ------------------------------------------------------------------------------------------- from the wire
     def request(self, changes: dict[str, int]) -> None:
         """Take requests; they are obeyed after the gripper's latency."""
         self.commands.append(dict(changes))
+        self.count += 1
         self._pending.append((self._clock() + self.mechanics.latency, dict(changes)))
 
     def registers(self) -> dict[str, int]:
@@ -129,6 +132,7 @@ class Gripper:
             "part": self._part,
             "gripped": gripped,
             "blocked": self._blocked,
+            "count": self.count,
             "commands": list(self.commands),
         }
 

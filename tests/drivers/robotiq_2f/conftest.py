@@ -7,16 +7,27 @@ import pytest
 
 from arcor2_drivers.robotiq_2f.robotiq_2f import Robotiq2F
 from arcor2_drivers.robotiq_2f.settings import Robotiq2FSettings
-from tests.fakes.conftest import FakeProcess, start_fake, wait_for
+from tests.fakes.conftest import FakeProcess, wait_for
 
-__all__ = ["start_fake", "wait_for"]
+__all__ = ["wait_for"]
 
-SPEED_UP = 4.0
+
+@pytest.fixture(scope="module")
+def running() -> Iterator[FakeProcess]:
+    fake = FakeProcess("robotiq_2f", "--time-scale", "6")
+    fake.truth()  # opens the control channel
+    yield fake
+    fake.end()
 
 
 @pytest.fixture
-def fake(start_fake: Callable[..., FakeProcess]) -> FakeProcess:
-    return start_fake("robotiq_2f", "--time-scale", str(SPEED_UP))
+def fake(running: FakeProcess) -> FakeProcess:
+    """As if it had just been switched on."""
+    running.control.do("heal")
+    running.control.do("remove_part")
+    running.control.do("block", on=False)
+    running.control.do("power_cycle")
+    return running
 
 
 @pytest.fixture

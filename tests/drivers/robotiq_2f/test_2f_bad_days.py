@@ -47,7 +47,7 @@ def test_bad_wire_in_mid_grip_and_back(
     gripper.take_control()
     gripper.activate()
     fake.control.do("put_part", width=0.03)
-    thread, outcome = in_background(lambda: gripper.grip(0.0, speed=0.03))
+    thread, outcome = in_background(lambda: gripper.grip(0.0, speed=0.02))
     wait_for(gripper.state, lambda state: state is GripperState.MOVING)
     fake.control.do(fault, seconds=0.4)
     thread.join(3.0)
@@ -62,11 +62,11 @@ def test_bad_wire_in_mid_grip_and_back(
     wait_for(lambda: gripper.connection is Connection.BACK)
 
     wait_for(lambda: fake.truth()["registers"]["OBJ"] == 2)  # what it had been told it does, and holds
-    sets = fake.truth()["sets"]
+    commands = fake.truth()["count"]
     wait_for(gripper.state, lambda state: state is GripperState.HOLDING)
     with pytest.raises(NotInControl):
         gripper.release()
-    assert fake.truth()["sets"] == sets
+    assert fake.truth()["count"] == commands
     gripper.take_control()
     gripper.release()
     assert gripper.connection is Connection.ONLINE
