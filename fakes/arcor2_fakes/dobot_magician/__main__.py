@@ -37,6 +37,11 @@ def register_commands(control: ControlServer, arm: Arm, commands: Commands) -> N
     def mute(number: int, on: bool = True) -> None:
         (commands.mute.add if on else commands.mute.discard)(number)
 
+    def renew() -> None:
+        arm.as_delivered()
+        commands.renew()
+
+    control.command("renew", renew)
     control.command("alarm", alarm)
     control.command("wrong_checksum", wrong_checksum)
     control.command("mute", mute)

@@ -41,6 +41,10 @@ class Arm:
 
     def __init__(self, pace: float = 1.0) -> None:
         self.pace = pace
+        self.as_delivered()
+
+    def as_delivered(self) -> None:
+        """Be as new: folded, not homed, nothing set."""
         self.homed = False
         self.joints: Four = FOLDED
         self.alarms: set[int] = set()

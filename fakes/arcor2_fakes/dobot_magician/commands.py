@@ -29,6 +29,13 @@ class Commands:
         """Forget the part of a frame that has come."""
         self._cutter.drop()
 
+    def renew(self) -> None:
+        """Forget all that has come, and every fault."""
+        self.drop_input()
+        self.received.clear()
+        self.mute.clear()
+        self.spoiled = 0
+
     def feed(self, data: bytes) -> None:
         """Take bytes from the line."""
         for command, control, parameters in self._cutter.cut(data):

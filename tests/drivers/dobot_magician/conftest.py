@@ -1,7 +1,6 @@
 """A fake arm in a process of its own, and the driver on its line."""
 
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -31,9 +30,23 @@ def make() -> Iterator[Callable[..., DobotMagician]]:
         arm.disconnect()
 
 
+@pytest.fixture(scope="module")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FakeProcess]:
+    """One fake for a file's tests: starting one takes longer than most of them."""
+    fake = FakeProcess("dobot_magician", "--link", str(tmp_path_factory.mktemp("dev") / "ttyDOBOT"), "--pace", "6")
+    assert fake.control.do("commands")  # the channel is open before the first test
+    yield fake
+    fake.end()
+
+
 @pytest.fixture
-def fake(start_fake: Callable[..., FakeProcess], tmp_path: Path) -> FakeProcess:
-    return start_fake("dobot_magician", "--link", str(tmp_path / "ttyDOBOT"), "--pace", "6")
+def fake(running: FakeProcess) -> FakeProcess:
+    """As delivered, plugged, without faults."""
+    running.control.do("unplug")
+    running.control.do("heal")
+    running.control.do("plug")
+    running.control.do("renew")
+    return running
 
 
 @pytest.fixture

@@ -29,7 +29,7 @@ def write(port: str, *frames: bytes) -> None:
     with serial.Serial(port, 115200, timeout=1.0) as line:
         for frame in frames:
             line.write(frame)
-            assert line.read(6)
+            assert line.read(14 if frame[4] == 3 else 6)
 
 
 def test_a_port_that_is_not_there_or_in_use(fake: FakeProcess, make: Callable[..., DobotMagician]) -> None:
@@ -82,11 +82,14 @@ def test_a_wire_that_fails_is_named_and_comes_back(
 
 
 def test_answers_that_lag_behind_answer_nothing(
-    fake: FakeProcess, arm: DobotMagician, wait_for: Callable[..., Any]
+    start_fake: Callable[..., FakeProcess], make: Callable[..., DobotMagician], wait_for: Callable[..., Any]
 ) -> None:
-    fake.control.do("slow", seconds=0.5)
+    fake = start_fake("dobot_magician")
+    arm = make(fake.ready["port"], answer_timeout=0.15)
+    arm.connect()
+    fake.control.do("slow", seconds=0.25)
     wait_for(lambda: arm.connection, lambda state: state is Connection.LOST)
-    deadline = time.monotonic() + 1.5  # meanwhile answers to earlier questions keep coming
+    deadline = time.monotonic() + 0.9  # meanwhile answers to earlier questions keep coming
     while time.monotonic() < deadline:
         assert arm.connection is Connection.LOST
         time.sleep(0.01)
@@ -158,7 +161,7 @@ def test_control_is_refused_while_it_moves_for_somebody_else(
 
 def test_what_waits_in_a_standing_queue_never_runs(fake: FakeProcess, make: Callable[..., DobotMagician]) -> None:
     write(fake.ready["port"], ptp(30.0), ptp(-30.0))
-    assert fake.truth()["queued"] == 2
+    fake.control.wait_until(lambda truth: truth["queued"] == 2)
     arm = make(fake.ready["port"])
     arm.connect()
     assert fake.truth()["queued"] == 2
@@ -169,7 +172,7 @@ def test_what_waits_in_a_standing_queue_never_runs(fake: FakeProcess, make: Call
     assert truth["joints"][0] == pytest.approx(10.0, abs=0.01)
 
 
-def test_switched_off_and_on(fake: FakeProcess, arm: DobotMagician, wait_for: Callable[..., Any]) -> None:
+def test_switched_off_and_on_and_homed(fake: FakeProcess, arm: DobotMagician, wait_for: Callable[..., Any]) -> None:
     thread, outcome = in_background(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.1))
     fake.control.wait_until(lambda truth: truth["moving"])
     fake.control.do("power_cycle")
@@ -182,8 +185,12 @@ def test_switched_off_and_on(fake: FakeProcess, arm: DobotMagician, wait_for: Ca
     assert fake.truth()["moving"] is False
     arm.acknowledge("00h")
     arm.take_control()
+    began = time.monotonic()
     arm.home()
-    assert fake.truth()["homed"] is True
+    assert time.monotonic() - began > 1.2
+    truth = fake.truth()
+    assert truth["homed"] is True
+    assert truth["tool"][:2] == pytest.approx([259.1, 0.0], abs=0.1)
 
 
 def test_a_motion_whose_answer_is_lost_never_runs(

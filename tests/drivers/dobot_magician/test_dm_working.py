@@ -127,14 +127,6 @@ def test_kinematics_agrees_with_the_arm_and_names_what_is_out_of_reach(fake: Fak
     assert fake.truth()["motions"] == motions
 
 
-def test_homing_takes_its_time(fake: FakeProcess, arm: DobotMagician) -> None:
-    began = time.monotonic()
-    arm.home()
-    assert time.monotonic() - began > 1.2
-    assert fake.truth()["homed"] is True
-    assert fake.truth()["tool"][:2] == pytest.approx([259.1, 0.0], abs=0.1)
-
-
 def test_stop_passes_a_motion_and_nothing_follows(
     fake: FakeProcess, arm: DobotMagician, wait_for: Callable[..., Any]
 ) -> None:
