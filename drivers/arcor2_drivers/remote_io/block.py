@@ -238,9 +238,14 @@ class Block:
         newest = self._newest
         return None if newest is None else newest.image
 
+    def ask(self) -> Snapshot:
+        """Read an image now, on the caller's thread: quicker than `fresh`, and unknown to points that are debounced."""
+        self.observing.check()
+        asked, stamp = time.monotonic(), now()
+        return Snapshot(self.link.read_image(), asked, stamp)
+
     def fresh(self) -> Snapshot:
         """Give an image that was asked for after this call. Raises DeviceTimeout, NotConnected, ConnectionLost."""
-        self._hurry.set()
         return self.wait(lambda _: True, self._patience, "telling its state")
 
     def wait(self, holds: Callable[[Image], bool], timeout: float, what: str, stops: int | None = None) -> Snapshot:
@@ -250,6 +255,7 @@ class Block:
         `timeout` s, ConnectionLost as soon as the connection is lost, Cancelled.
         """
         began, losses = time.monotonic(), self._losses
+        self._hurry.set()
         with self._news:
             while True:
                 if stops not in (None, self._stops):

@@ -108,9 +108,12 @@ class RemoteIO(IOBlock):
         Raises OutOfRange for an unknown name, NotConnected, ConnectionLost, DeviceTimeout.
         """
         point = self._block.point(name)
-        image, asked, stamp = self._block.fresh()
-        if point.kind in ("DI", "DO"):
+        if point.io.debounce:
+            _, asked, stamp = self._block.fresh()
             return Reading[bool | float](self._block.digital(name), stamp, asked)
+        image, asked, stamp = self._block.ask()
+        if point.kind in ("DI", "DO"):
+            return Reading[bool | float](image.digital(point.kind, point.channel), stamp, asked)
         raw = image.analog(point.kind, point.channel)
         quality = Quality.BAD if point.kind == "AI" and raw == BROKEN_WIRE else Quality.GOOD
         return Reading[bool | float](point.physical(raw), stamp, asked, quality)
@@ -123,7 +126,7 @@ class RemoteIO(IOBlock):
             self._block.write_analog(name, float(value))
 
     def subscribe(self, name: str, listener: Callable[[Edge], None]) -> Callable[[], None]:
-        """Call `listener` with each edge of a digital point, on a thread of its own kind: be quick there.
+        """Call `listener` with each edge of a digital point, on the thread that observes: be quick there.
 
         What is given back ends the subscription. It outlives a loss; what changed meanwhile is told by no edge.
         """

@@ -51,6 +51,13 @@ def register_commands(control: ControlServer, block: Block, port: TcpPort | Seri
         block.power_on()
         port.reset()
 
+    async def renew() -> None:
+        """Be as it is when the process starts: for tests that share one."""
+        block.as_delivered()
+        await port.fault("heal")
+        port.reset()
+
+    control.command("renew", renew)
     control.command("set_input", set_input)
     control.command("set_analog", set_analog)
     control.command("diagnosis", diagnosis)

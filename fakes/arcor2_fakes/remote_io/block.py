@@ -50,6 +50,10 @@ class Block:
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
+        self.as_delivered()
+
+    def as_delivered(self) -> None:
+        """Be without any past: inputs off, nothing written, no fault."""
         self.inputs = [False] * DIGITAL
         self.analog_inputs = [0] * ANALOG_IN
         self.supply_missing = False

@@ -17,9 +17,19 @@ POINTS = (
 )
 
 
+@pytest.fixture(scope="module")
+def one_fake() -> Iterator[FakeProcess]:
+    fake = FakeProcess("remote_io")
+    fake.truth()  # opens the control channel, which lives as long
+    yield fake
+    fake.end()
+
+
 @pytest.fixture
-def fake(start_fake: Callable[..., FakeProcess]) -> FakeProcess:
-    return start_fake("remote_io")
+def fake(one_fake: FakeProcess) -> FakeProcess:
+    """A block as delivered; one process serves the tests of a file."""
+    one_fake.control.do("renew")
+    return one_fake
 
 
 @pytest.fixture
