@@ -1,0 +1,43 @@
+"""Kinematics of a planar arm with two links: positions in the plane of the base, m, and angles, rad."""
+
+import math
+from typing import Final
+
+OUT_OF_REACH: Final = 1e-9
+"""m by which rounding may put a point beyond the stretched arm."""
+
+
+def forward(links: tuple[float, float], q: tuple[float, float]) -> tuple[float, float, float]:
+    """Give x, y of the tool centre point and its heading."""
+    heading = q[0] + q[1]
+    x = links[0] * math.cos(q[0]) + links[1] * math.cos(heading)
+    y = links[0] * math.sin(q[0]) + links[1] * math.sin(heading)
+    return x, y, heading
+
+
+def _turned(angle: float) -> float:
+    """Give the angle within -pi and pi."""
+    return math.remainder(angle, math.tau)
+
+
+def inverse(links: tuple[float, float], x: float, y: float) -> list[tuple[float, float]]:
+    """Give the solutions, elbow on the left and on the right: two, one of the stretched arm, none out of reach."""
+    first, second = links
+    distance = math.hypot(x, y)
+    if distance > first + second + OUT_OF_REACH or distance < abs(first - second) - OUT_OF_REACH:
+        return []
+    cosine = (distance**2 - first**2 - second**2) / (2.0 * first * second)
+    elbow = math.acos(max(-1.0, min(1.0, cosine)))
+    found = []
+    for q2 in (elbow, -elbow) if elbow else (elbow,):
+        q1 = math.atan2(y, x) - math.atan2(second * math.sin(q2), first + second * math.cos(q2))
+        found.append((_turned(q1), q2))
+    return found
+
+
+def nearest(
+    solutions: list[tuple[float, float]], seed: tuple[float, float], limits: tuple[tuple[float, float], ...]
+) -> tuple[float, float] | None:
+    """Give the solution within the limits whose farthest joint has the shortest way from the seed; None if none is."""
+    allowed = [q for q in solutions if all(low <= a <= high for a, (low, high) in zip(q, limits, strict=True))]
+    return min(allowed, key=lambda q: max(abs(q[0] - seed[0]), abs(q[1] - seed[1])), default=None)

@@ -1,0 +1,120 @@
+"""Starts the fake two-axis robot: `python -m arcor2_fakes.two_axis_robot`."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+from cyclopts import App
+
+from arcor2_fakes.control import ControlServer, parse_address
+from arcor2_fakes.process import announce, run, until_told_to_end
+from arcor2_fakes.serial_line import PtyLine
+from arcor2_fakes.two_axis_robot.bus import Bus
+from arcor2_fakes.two_axis_robot.servo import TICKS, VELOCITY_UNIT, Servo
+from arcor2_fakes.wire import register_faults
+
+app = App(name="arcor2_fakes.two_axis_robot", help="Fake servos on a pty, Dynamixel protocol 2.0.", version_flags=[])
+
+
+def truth(bus: Bus, line: PtyLine) -> dict[str, Any]:
+    """Give what is really so, whatever the line says; angles in rad from the middle."""
+    found = {}
+    for number, servo in bus.servos.items():
+        servo.advance()
+        found[str(number)] = {
+            "angle": (servo.position - TICKS / 2) * math.tau / TICKS,
+            "speed": servo.speed * math.tau / TICKS,
+            "ticks": servo.position,
+            "velocity": servo.speed / VELOCITY_UNIT,
+            **{name: servo[name] for name in ("torque", "goal", "watchdog", "hardware_error", "homing_offset")},
+            **{name: servo[name] for name in ("profile_velocity", "profile_acceleration", "current_limit")},
+            "writes": servo.writes[-200:],
+        }
+    return {"servos": found, "packets": bus.packets, "plugged": line.plugged, "port": line.port}
+
+
+def register_commands(control: ControlServer, bus: Bus) -> None:
+    """Make what the world and a test can do to the servos known to the control channel."""
+
+    def at(number: int) -> Servo:
+        if number not in bus.servos:
+            raise ValueError(f"no servo {number}; there are {', '.join(map(str, bus.servos))}")
+        return bus.servos[number]
+
+    def byte(name: str, value: int) -> int:
+        if not 0 <= value <= 255:
+            raise ValueError(f"{name} is 0 to 255")
+        return value
+
+    def wrong_crc(count: int = 1) -> None:
+        bus.wrong_crcs = count
+
+    def absent(servo: int, on: bool = True) -> None:
+        at(servo).absent = on
+
+    def power_cycle() -> None:
+        for one in bus.servos.values():
+            one.reboot()
+
+    control.command("hardware_error", lambda servo, bits=0x20: at(servo).fail(byte("bits", bits)))
+    control.command("temperature", lambda servo, celsius: at(servo).warm(byte("celsius", celsius)))
+    control.command("place", lambda servo, ticks: at(servo).place(ticks))
+    control.command("status_error", lambda servo, error=1: bus.refuse_next(at(servo).number, byte("error", error)))
+    control.command("wrong_crc", wrong_crc)
+    control.command("absent", absent)
+    control.command("power_cycle", power_cycle)
+
+
+@app.default
+def main(*, link: Path | None = None, control: str = "127.0.0.1:0", ids: tuple[int, ...] = (1, 2)) -> int:
+    """Start the fake; it prints one line `ready {json}` with its port and ends on SIGTERM.
+
+    Args:
+        link: symbolic link to keep on the pty, whose own path changes when it is unplugged and plugged.
+        control: HOST:PORT of the control channel; port 0 takes a free one.
+        ids: ids of the servos on the bus.
+    """
+    try:
+        control_address = parse_address(control)
+        if len(set(ids)) != len(ids) or not all(0 <= number <= 252 for number in ids):
+            raise ValueError("ids are 0 to 252, each once")
+    except ValueError as e:
+        sys.stderr.write(f"two_axis_robot: {e}\n")
+        return 2
+
+    async def body() -> None:
+        clock = asyncio.get_running_loop().time
+        bus = Bus([Servo(number, clock) for number in ids], lambda frame: line.send(frame))
+        line = PtyLine(bus.feed, link)
+
+        async def plug() -> str:
+            await line.plug()
+            return line.port
+
+        async def unplug() -> None:
+            await line.unplug()
+            bus.clear()
+
+        channel = ControlServer(*control_address)
+        register_commands(channel, bus)
+        register_faults(channel, {"serial": line})
+        channel.command("plug", plug)
+        channel.command("unplug", unplug)
+        channel.source("truth", lambda: truth(bus, line))
+        await line.plug()
+        try:
+            announce(name="two_axis_robot", port=line.port, control=await channel.start())
+            await until_told_to_end()
+        finally:
+            await line.unplug()
+            await channel.close()
+
+    return run(body, "two_axis_robot")
+
+
+if __name__ == "__main__":
+    sys.exit(app())

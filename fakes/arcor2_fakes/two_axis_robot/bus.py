@@ -1,0 +1,115 @@
+"""The bus: takes instruction packets to the servos and puts their status packets on the line."""
+
+from collections.abc import Callable
+from typing import Final
+
+from arcor2_fakes.two_axis_robot.packet import BROADCAST, BadCrc, Instruction, Receiver, status
+from arcor2_fakes.two_axis_robot.servo import BAD_CRC, BAD_INSTRUCTION, BAD_LENGTH, OK, Servo
+
+PING: Final = 0x01
+READ: Final = 0x02
+WRITE: Final = 0x03
+REBOOT: Final = 0x08
+SYNC_READ: Final = 0x82
+SYNC_WRITE: Final = 0x83
+
+
+class Bus:
+    """Servos side by side; `send` puts one status packet on the line."""
+
+    def __init__(self, servos: list[Servo], send: Callable[[bytes], None]) -> None:
+        self.servos = {servo.number: servo for servo in servos}
+        self._send = send
+        self._receiver = Receiver()
+        self.packets = 0
+        self.wrong_crcs = 0
+        self._refusals: dict[int, int] = {}
+
+    def refuse_next(self, servo: int, error: int) -> None:
+        """Have the next instruction to that servo alone answered by an error and not done."""
+        self._refusals[servo] = error
+
+    def clear(self) -> None:
+        """Forget half a packet."""
+        self._receiver.clear()
+
+    def feed(self, data: bytes) -> None:
+        """Take bytes from the line."""
+        for found in self._receiver.feed(data):
+            if isinstance(found, BadCrc):
+                if (servo := self._awake(found.servo)) is not None:
+                    self._answer(servo, BAD_CRC)
+            else:
+                self.packets += 1
+                self._obey(found)
+
+    def _awake(self, number: int) -> Servo | None:
+        servo = self.servos.get(number)
+        return servo if servo is not None and servo.answers else None
+
+    def _answer(self, servo: Servo, error: int, data: bytes = b"") -> None:
+        frame = status(servo.number, error | servo.alert, data)
+        if self.wrong_crcs:
+            self.wrong_crcs -= 1
+            frame = frame[:-1] + bytes([frame[-1] ^ 0x01])
+        self._send(frame)
+
+    def _obey(self, given: Instruction) -> None:
+        parameters = given.parameters
+        if given.code == SYNC_READ and given.servo == BROADCAST and len(parameters) > 4:
+            for servo in self._named(parameters[4:]):
+                self._read(servo, parameters[:4])
+        elif given.code == SYNC_WRITE and given.servo == BROADCAST and len(parameters) > 4:
+            self._sync_write(parameters)
+        elif given.code == PING and given.servo == BROADCAST:
+            for servo in self._named(bytes(sorted(self.servos))):
+                self._ping(servo)
+        elif (one := self._awake(given.servo)) is not None:
+            one.hear()
+            if (error := self._refusals.pop(one.number, OK)) != OK:
+                self._answer(one, error)
+            else:
+                self._alone(one, given.code, parameters)
+
+    def _named(self, numbers: bytes) -> list[Servo]:
+        found = [servo for number in numbers if (servo := self._awake(number)) is not None]
+        for servo in found:
+            servo.hear()
+        return found
+
+    def _alone(self, servo: Servo, code: int, parameters: bytes) -> None:
+        if code == PING:
+            self._ping(servo)
+        elif code == READ:
+            self._read(servo, parameters)
+        elif code == WRITE:
+            short = len(parameters) < 3
+            address = int.from_bytes(parameters[:2], "little")
+            self._answer(servo, BAD_LENGTH if short else servo.write(address, parameters[2:]))
+        elif code == REBOOT:
+            self._answer(servo, OK)
+            servo.reboot()
+        else:
+            self._answer(servo, BAD_INSTRUCTION)
+
+    def _ping(self, servo: Servo) -> None:
+        self._answer(servo, OK, servo["model"].to_bytes(2, "little") + bytes([servo["firmware"]]))
+
+    def _read(self, servo: Servo, parameters: bytes) -> None:
+        if len(parameters) != 4:
+            self._answer(servo, BAD_LENGTH)
+            return
+        found = servo.read(int.from_bytes(parameters[:2], "little"), int.from_bytes(parameters[2:], "little"))
+        if isinstance(found, int):
+            self._answer(servo, found)
+        else:
+            self._answer(servo, OK, found)
+
+    def _sync_write(self, parameters: bytes) -> None:
+        address, size = int.from_bytes(parameters[:2], "little"), int.from_bytes(parameters[2:4], "little")
+        rest = parameters[4:]
+        if len(rest) % (size + 1):
+            return  # nobody answers a broadcast, not even to refuse it
+        for start in range(0, len(rest), size + 1):
+            for servo in self._named(rest[start : start + 1]):
+                servo.write(address, rest[start + 1 : start + 1 + size])

@@ -1,0 +1,84 @@
+"""Fake servos in a process of their own, and the driver on their line."""
+
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from arcor2_drivers.two_axis_robot.settings import TwoAxisRobotSettings
+from arcor2_drivers.two_axis_robot.two_axis_robot import TwoAxisRobot
+from arcor2_hw.data.geometry import Pose
+from tests.fakes.conftest import FakeProcess, start_fake, wait_for
+
+__all__ = ["start_fake", "wait_for"]
+
+
+class Doing:
+    """A call on a thread of its own; `result` gives its result or raises its error."""
+
+    def __init__(self, call: Callable[..., Any], *arguments: Any, **options: Any) -> None:
+        self._value: Any = None
+        self._error: BaseException | None = None
+
+        def run() -> None:
+            try:
+                self._value = call(*arguments, **options)
+            except BaseException as e:
+                self._error = e
+
+        self._thread = threading.Thread(target=run, daemon=True)
+        self._thread.start()
+
+    def result(self, within: float = 10.0) -> Any:
+        self._thread.join(within)
+        assert not self._thread.is_alive(), f"still busy after {within} s"
+        if self._error is not None:
+            raise self._error
+        return self._value
+
+
+def moving(fake: FakeProcess) -> None:
+    """Return when both joints really move."""
+    fake.control.wait_until(lambda t: all(abs(servo["speed"]) > 0.1 for servo in t["servos"].values()))
+
+
+def standing(truth: Any) -> bool:
+    return all(abs(servo["velocity"]) <= 0.5 for servo in truth["servos"].values())  # as a servo tells 0
+
+
+@pytest.fixture
+def make() -> Iterator[Callable[..., TwoAxisRobot]]:
+    made: list[TwoAxisRobot] = []
+
+    def build(port: str, pose: Pose | None = None, **settings: Any) -> TwoAxisRobot:
+        # The longest watchdog: the machine that runs the tests may be busy.
+        wanted = TwoAxisRobotSettings(port, **{"watchdog": 0.4, **settings})
+        robot = TwoAxisRobot("arm_id", "arm", pose or Pose(), wanted)
+        made.append(robot)
+        return robot
+
+    yield build
+    for robot in made:
+        robot.disconnect()
+
+
+@pytest.fixture
+def fake(start_fake: Callable[..., FakeProcess], tmp_path: Path) -> FakeProcess:
+    return start_fake("two_axis_robot", "--link", str(tmp_path / "ttyDXL"))
+
+
+@pytest.fixture
+def robot(fake: FakeProcess, make: Callable[..., TwoAxisRobot]) -> TwoAxisRobot:
+    """Connected, control not taken."""
+    robot = make(fake.ready["port"])
+    robot.connect()
+    return robot
+
+
+@pytest.fixture
+def ready(robot: TwoAxisRobot) -> TwoAxisRobot:
+    """Connected and controlled."""
+    robot.take_control()
+    return robot

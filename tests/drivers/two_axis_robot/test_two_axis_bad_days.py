@@ -1,0 +1,217 @@
+"""The two-axis robot on bad days: absent, silent, garbled, unplugged, killed, with hardware errors."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from arcor2_drivers.two_axis_robot.bus import Bus
+from arcor2_drivers.two_axis_robot.registers import HOMING_OFFSET, STATE, TORQUE
+from arcor2_drivers.two_axis_robot.two_axis_robot import TwoAxisRobot
+from arcor2_hw.data.device import Connection, Health
+from arcor2_hw.data.robot import Joint, Safety
+from arcor2_hw.exceptions import (
+    ConnectionLost,
+    DeviceError,
+    DeviceFault,
+    DeviceTimeout,
+    InvalidData,
+    NotConnected,
+    NotFound,
+    NotInControl,
+    Refused,
+    Stale,
+)
+from tests.fakes.conftest import FakeProcess
+
+from .conftest import Doing, moving, standing
+
+FAR = [Joint("joint_1", 2.0), Joint("joint_2", -2.0)]
+HOME = [Joint("joint_1", 0.0), Joint("joint_2", 0.0)]
+Make = Callable[..., TwoAxisRobot]
+WaitFor = Callable[..., object]
+
+
+def test_a_port_that_is_not_there_or_taken_is_named(fake: FakeProcess, make: Make, robot: TwoAxisRobot) -> None:
+    absent = make("/dev/ttyNOBODY")
+    with pytest.raises(NotConnected, match=r"arm: port /dev/ttyNOBODY"):
+        absent.connect()
+    assert absent.connection is Connection.FAILED
+    with pytest.raises(NotConnected, match=fake.ready["port"]):
+        make(fake.ready["port"]).connect()
+
+
+def test_an_absent_servo_is_named(fake: FakeProcess, make: Make) -> None:
+    fake.control.do("absent", servo=2)
+    robot = make(fake.ready["port"])
+    began = time.monotonic()
+    with pytest.raises(DeviceTimeout, match=rf"servo 2 of arm at {fake.ready['port']}"):
+        robot.connect(2.0)
+    assert time.monotonic() - began < 1.0
+    fake.control.do("absent", servo=2, on=False)
+    robot.connect()
+    assert robot.connection is Connection.ONLINE
+
+
+def test_garbage_and_noise_do_not_hang(fake: FakeProcess, make: Make) -> None:
+    fake.control.do("garbage")
+    robot = make(fake.ready["port"])
+    began = time.monotonic()
+    with pytest.raises(DeviceTimeout, match="servo 1 of arm at"):
+        robot.connect(2.0)
+    assert time.monotonic() - began < 2.0
+
+
+def test_one_damaged_answer_costs_nothing(fake: FakeProcess, ready: TwoAxisRobot) -> None:
+    fake.control.do("wrong_crc")
+    ready.move_to_joints(HOME, 0.5)
+    assert ready.connection is Connection.ONLINE
+    assert ready.control_owner() == "us"
+
+
+@pytest.mark.parametrize("fault", ["half_frame", "garbage", "unplug"])
+def test_a_loss_in_mid_move(fake: FakeProcess, ready: TwoAxisRobot, wait_for: WaitFor, fault: str) -> None:
+    doing = Doing(ready.move_to_joints, FAR, 0.5)
+    moving(fake)
+    fake.control.do(fault)
+    with pytest.raises((ConnectionLost, NotInControl, DeviceTimeout), match="arm"):
+        doing.result(5.0)
+    stood = fake.control.wait_until(standing)["servos"]["1"]
+    assert stood["watchdog"] == 0xFF  # the servo itself stopped
+    assert 0.0 < stood["angle"] < 2.0
+    wait_for(lambda: ready.connection is Connection.LOST)
+    assert ready.health is Health.FAILURE
+    with pytest.raises((ConnectionLost, Stale)):
+        ready.robot_joints()
+    fake.control.do("heal")
+    fake.control.do("plug")
+    wait_for(lambda: ready.connection is Connection.BACK, within=6.0)
+    with pytest.raises(NotInControl, match="lost"):  # only observation comes back by itself
+        ready.move_to_joints(HOME, 0.5)
+    assert fake.truth()["servos"]["1"]["angle"] == stood["angle"]
+    ready.take_control()
+    assert fake.truth()["servos"]["1"]["angle"] == pytest.approx(stood["angle"], abs=0.002)
+    ready.move_to_joints(HOME, 1.0)
+
+
+KILLED = """
+import sys
+from arcor2_drivers.two_axis_robot.settings import TwoAxisRobotSettings
+from arcor2_drivers.two_axis_robot.two_axis_robot import TwoAxisRobot
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.robot import Joint
+robot = TwoAxisRobot("id", "arm", Pose(), TwoAxisRobotSettings(sys.argv[1], watchdog=0.4))
+robot.connect()
+robot.take_control()
+robot.move_to_joints([Joint("joint_1", 2.0), Joint("joint_2", -2.0)], 0.3)
+"""
+
+
+def test_the_servos_stop_when_the_drivers_process_is_killed(fake: FakeProcess, make: Make) -> None:
+    process = subprocess.Popen([sys.executable, "-c", KILLED, fake.ready["port"]], cwd=Path(__file__).parents[3])
+    try:
+        fake.control.wait_until(lambda t: t["servos"]["1"]["speed"] > 0.5, within=15.0)
+        os.kill(process.pid, signal.SIGKILL)
+        killed = time.monotonic()
+    finally:
+        process.kill()
+        process.wait()
+    servo = fake.control.wait_until(standing)["servos"]["1"]
+    assert time.monotonic() - killed < TwoAxisRobot.loss_reaction.within + 0.3  # what a busy machine adds
+    assert servo["watchdog"] == 0xFF
+    assert servo["angle"] < 1.9
+    robot = make(fake.ready["port"])
+    robot.connect()
+    assert robot.control_owner() is None
+    robot.take_control()
+    assert fake.truth()["servos"]["1"]["angle"] == pytest.approx(servo["angle"], abs=0.002)
+
+
+def test_a_hardware_error_is_named_and_rebooted_on_a_persons_word(fake: FakeProcess, ready: TwoAxisRobot) -> None:
+    doing = Doing(ready.move_to_joints, FAR, 0.5)
+    moving(fake)
+    fake.control.do("hardware_error", servo=2, bits=0x20)
+    with pytest.raises(DeviceFault, match=r"servo 2: overload") as caught:
+        doing.result()
+    assert caught.value.fault_code == "2:5"
+    assert ready.state().safety is Safety.FAULT
+    assert ready.health is Health.FAILURE
+    assert ready.control_owner() is None
+    assert [alarm.code for alarm in ready.alarms()] == ["2:5"]
+    assert fake.control.wait_until(standing)["servos"]["1"]["angle"] < 1.9  # the other one does not go on alone
+    with pytest.raises(DeviceFault, match="overload"):
+        ready.take_control()
+    with pytest.raises(Refused, match="restart_safety"):
+        ready.acknowledge("2:5")
+    with pytest.raises(NotFound):
+        ready.acknowledge("1:5")
+    with pytest.raises(InvalidData):
+        ready.restart_safety(" ")
+    ready.restart_safety("the one at the cell")
+    assert ready.alarms() == []
+    assert ready.connection is Connection.ONLINE
+    servo = fake.truth()["servos"]["2"]
+    assert servo["torque"] == 0
+    with pytest.raises(NotInControl):
+        ready.move_to_joints(HOME, 0.5)
+    with pytest.raises(Refused, match="no hardware error"):
+        ready.restart_safety("the one at the cell")
+    ready.take_control()
+    ready.move_to_joints(HOME, 1.0)
+
+
+def test_a_refusal_names_servo_and_register_and_costs_no_connection(fake: FakeProcess, robot: TwoAxisRobot) -> None:
+    fake.control.do("status_error", servo=1, error=6)
+    with pytest.raises(Refused, match=r"servo 1 of arm at .* refuses .* register 38: the value is beyond"):
+        robot.take_control()
+    assert robot.control_owner() is None
+    assert robot.connection is Connection.ONLINE
+    robot.take_control()
+
+
+def test_a_supply_that_was_gone_takes_control_away(fake: FakeProcess, ready: TwoAxisRobot, wait_for: WaitFor) -> None:
+    fake.control.do("power_cycle")
+
+    def refused() -> bool:
+        try:
+            ready.move_to_joints(HOME, 0.5)
+        except DeviceError as e:
+            return isinstance(e, NotInControl)
+        return False
+
+    wait_for(refused)
+    assert all(servo["torque"] == 0 for servo in fake.truth()["servos"].values())
+
+
+@pytest.mark.parametrize("request_", ["read", "write"])
+def test_a_late_answer_answers_nothing_else(fake: FakeProcess, request_: str) -> None:
+    bus = Bus("arm", fake.ready["port"], 1_000_000)
+    bus.open()
+    try:
+        fake.control.do("slow", seconds=0.06)
+        with pytest.raises(DeviceTimeout, match="servo 1"):
+            bus.ping(1)
+        fake.control.do("absent", servo=1)
+        # Whatever comes now is the late answer to the ping.
+        with pytest.raises(DeviceTimeout, match="servo 1"):
+            bus.read(1, HOMING_OFFSET) if request_ == "read" else bus.write(1, TORQUE, 0)
+    finally:
+        bus.close()
+
+
+def test_a_servo_that_is_not_there_takes_no_longer_than_its_deadline(fake: FakeProcess) -> None:
+    bus = Bus("arm", fake.ready["port"], 1_000_000)
+    bus.open()
+    try:
+        assert len(bus.sync_read((1, 2), STATE)) == 2
+        began = time.monotonic()
+        with pytest.raises(DeviceTimeout, match="servo 7 of arm"):
+            bus.read(7, HOMING_OFFSET)
+        assert time.monotonic() - began < 0.3
+    finally:
+        bus.close()
