@@ -221,7 +221,9 @@ class Drive:
             return
         self._reached = False
         wanted = math.copysign(allowed, left)
-        self._ramp(wanted, max(self.parameters.acceleration, 2.0 * slow), dt)
+        # Twice as much for slowing down lets the ramp be followed in steps.
+        faster = abs(wanted) > abs(self.velocity)
+        self._ramp(wanted, self.parameters.acceleration if faster else 2.0 * slow, dt)
 
     def _home(self, dt: float) -> None:
         if self.homing_fails:

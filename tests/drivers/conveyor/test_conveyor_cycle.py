@@ -65,7 +65,7 @@ def test_the_guard_is_armed_before_anything_is_enabled(fake: FakeProcess, belt: 
 
 
 def test_home_move_run_halt(fake: FakeProcess, make: Callable[..., Conveyor]) -> None:
-    belt = make(fake.ready["can"], homing_method=19, homing_speed=0.4)
+    belt = make(fake.ready["can"], homing_method=19, homing_speed=1.0, max_speed=2.0, acceleration=10.0)
     belt.connect()
     belt.take_control()
     with pytest.raises(Refused, match=r"move_to 0.1 m is refused .*not homed"):
@@ -73,9 +73,9 @@ def test_home_move_run_halt(fake: FakeProcess, make: Callable[..., Conveyor]) ->
     belt.home()
     assert belt.homed
     assert fake.truth()["belt"] == pytest.approx(4000, abs=1)  # where its switch is
-    belt.move_to(0.05, 0.3)
+    belt.move_to(0.05, 1.0)
     assert fake.truth()["position"] == 500
-    belt.move_by(-0.08, 0.3)
+    belt.move_by(-0.08, 1.0)
     assert fake.truth()["position"] == -300
     assert belt.belt_position() == pytest.approx(-0.03)
     belt.run(0.2)

@@ -1,0 +1,224 @@
+"""The fake conveyor on its wire: Lawicel commands byte by byte, and CiA 402 with the canopen library."""
+
+import socket
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import can
+import pytest
+
+from tests.fakes.conftest import FakeProcess
+
+
+class Adapter:
+    """A raw Lawicel client."""
+
+    def __init__(self, address: str) -> None:
+        host, _, port = address.rpartition(":")
+        self.socket = socket.create_connection((host, int(port)), 2.0)
+        self.buffer = b""
+        self.frames: list[str] = []
+
+    def send(self, *commands: str) -> None:
+        for command in commands:
+            self.socket.sendall(command.encode() + b"\r")
+
+    def token(self) -> bytes:
+        """The next thing up to CR, or a BEL."""
+        while True:
+            for end in range(len(self.buffer)):
+                if self.buffer[end : end + 1] in (b"\r", b"\a"):
+                    found, self.buffer = self.buffer[: end + 1], self.buffer[end + 1 :]
+                    return found
+            received = self.socket.recv(4096)
+            assert received, "closed"
+            self.buffer += received
+
+    def answer(self) -> bytes:
+        """The next token that is no frame."""
+        while (token := self.token()).startswith(b"t"):
+            self.frames.append(token[:-1].decode())
+        return token
+
+    def frame(self, prefix: str) -> str:
+        """The next frame that begins so."""
+        while True:
+            for frame in self.frames:
+                if frame.startswith(prefix):
+                    self.frames.remove(frame)
+                    return frame
+            token = self.token()
+            if token.startswith(b"t"):
+                self.frames.append(token[:-1].decode())
+
+    def sdo(self, request: str) -> str:
+        self.frames = [frame for frame in self.frames if not frame.startswith("t585")]
+        self.send("t6058" + request)
+        return self.frame("t585")[5:]
+
+
+@pytest.fixture(scope="module")
+def fake() -> Iterator[FakeProcess]:
+    fake = FakeProcess("conveyor")
+    fake.control.wait_until(lambda truth: truth["booted"])
+    yield fake
+    fake.end()
+
+
+@pytest.fixture
+def adapter(fake: FakeProcess) -> Iterator[Adapter]:
+    fake.control.do("heal")
+    fake.control.do("power_cycle", belt=0)
+    fake.control.wait_until(lambda truth: truth["booted"])
+    adapter = Adapter(fake.ready["can"])
+    adapter.send("S6", "O")
+    assert (adapter.answer(), adapter.answer()) == (b"\r", b"\r")
+    yield adapter
+    adapter.socket.close()
+
+
+def test_lawicel_commands(fake: FakeProcess) -> None:
+    adapter = Adapter(fake.ready["can"])
+    try:
+        for command, answer in [
+            ("t0002", b"\a"),  # not open
+            ("V", b"V1013\r"),
+            ("C", b"\a"),
+            ("S6", b"\r"),
+            ("O", b"\r"),
+            ("S6", b"\a"),  # not while open
+            ("t12", b"\a"),
+            ("t1232AA", b"\a"),  # one byte short
+            ("t1232AABB", b"z\r"),
+            ("what", b"\a"),
+            ("C", b"\r"),
+        ]:
+            adapter.send(command)
+            assert adapter.answer() == answer, command
+    finally:
+        adapter.socket.close()
+
+
+def test_adapters_hear_each_other_in_order_and_not_themselves(fake: FakeProcess, adapter: Adapter) -> None:
+    other = Adapter(fake.ready["can"])
+    try:
+        other.send("O")
+        other.answer()
+        sent = [f"t1232{number:04X}" for number in range(500)]
+        adapter.send(*sent)
+        assert [other.frame("t123") for _ in sent] == sent
+        assert not [frame for frame in adapter.frames if frame.startswith("t123")]
+    finally:
+        other.socket.close()
+
+
+def test_sdo_frames(adapter: Adapter) -> None:
+    assert adapter.sdo("4000100000000000") == "4300100092010200"  # 1000h: servo drive, profile 402
+    assert adapter.sdo("4041600000000000")[:8] == "4B416000"  # two bytes
+    assert adapter.sdo("4000200000000000") == "8000200000000206"  # no such object
+    assert adapter.sdo("4018100900000000") == "8018100911000906"  # no such subindex
+    assert adapter.sdo("2341600000000000") == "8041600002000106"  # read only
+    assert adapter.sdo("23406000FF000000") == "8040600012000706"  # too long
+    assert adapter.sdo("2F60600002000000") == "8060600030000906"  # a mode it has not
+    assert adapter.sdo("2F60600003000000") == "6060600000000000"
+    assert adapter.sdo("4008100000000000") == "4108100010000000"  # 16 bytes, in segments
+    text = b""
+    for request, head in (("60", "00"), ("70", "10"), ("60", "0B")):
+        answer = adapter.sdo(request + "00" * 7)
+        assert answer[:2] == head
+        text += bytes.fromhex(answer[2:])
+    assert text.rstrip(b"\0") == b"SD-48 belt servo"
+
+
+def test_nmt_and_boot_up(fake: FakeProcess, adapter: Adapter) -> None:
+    assert adapter.frame("t705") == "t70517F"  # heartbeat: pre-operational
+    adapter.send("t00020105")
+    fake.control.wait_until(lambda truth: truth["nmt"] == 5)
+    adapter.send("t00020205")  # stopped: SDO is not served
+    fake.control.wait_until(lambda truth: truth["nmt"] == 4)
+    adapter.send("t00028105")  # reset node
+    while adapter.frame("t705") != "t705100":
+        pass
+
+
+def enable(adapter: Adapter, mode: str) -> None:
+    adapter.sdo(f"2F606000{mode}000000")
+    for word in ("06", "07", "0F"):
+        adapter.sdo(f"2B406000{word}000000")
+    assert adapter.sdo("4041600000000000")[8:10] == "37"  # Operation enabled
+
+
+def test_the_states_follow_the_control_word(fake: FakeProcess, adapter: Adapter) -> None:
+    adapter.sdo("2B4060000F000000")  # not from Switch on disabled
+    assert fake.truth()["state"] == "switch_on_disabled"
+    enable(adapter, "03")
+    adapter.sdo("2B40600007000000")
+    assert fake.truth()["state"] == "switched_on"
+    adapter.sdo("2B40600006000000")
+    assert fake.truth()["state"] == "ready_to_switch_on"
+    fake.control.do("emergency", code=0x3210)
+    assert adapter.frame("t085") == "t08581032050000000000"
+    adapter.sdo("2B40600080000000")
+    assert fake.truth()["state"] == "switch_on_disabled"
+    assert adapter.frame("t085") == "t08580000000000000000"
+
+
+def test_the_set_point_handshake(fake: FakeProcess, adapter: Adapter) -> None:
+    enable(adapter, "01")
+    adapter.sdo("237A6000E8030000")  # 1000 counts
+    status = "4041600000000000"
+
+    def bit12() -> bool:
+        return bool(bytes.fromhex(adapter.sdo(status)[10:12])[0] & 0x10)
+
+    assert not bit12()
+    began = time.monotonic()
+    adapter.sdo("2B4060001F000000")
+    assert bit12()
+    adapter.sdo("2B4060000F000000")
+    assert not bit12()
+    assert fake.truth()["position"] < 1000  # it takes time
+    fake.control.wait_until(lambda truth: truth["position"] == 1000 and truth["velocity"] == 0.0)
+    # 5000 counts/s at most, 20000 counts/s²: up and down in 2 * sqrt(1000 / 20000)
+    assert time.monotonic() - began > 0.4
+
+
+@pytest.mark.parametrize(
+    ("option", "state"), [(0, "operation_enabled"), (1, "fault"), (2, "switch_on_disabled"), (3, "switch_on_disabled")]
+)
+def test_heartbeat_loss_does_what_6007h_says(fake: FakeProcess, adapter: Adapter, option: int, state: str) -> None:
+    adapter.sdo("2316100196007F00")  # 150 ms of node 127
+    adapter.sdo(f"2B076000{option:02X}000000")
+    adapter.send("t00020105")
+    enable(adapter, "03")
+    adapter.sdo("23FF6000E8030000")
+    time.sleep(0.2)  # not watched before the first heartbeat
+    assert fake.truth()["state"] == "operation_enabled"
+    adapter.send("t77F105")
+    assert adapter.frame("t085").startswith("t08583081")
+    truth = fake.control.wait_until(lambda truth: truth["state"] == state and truth["nmt"] == 127)
+    if option:
+        fake.control.wait_until(lambda truth: truth["velocity"] == 0.0)
+    else:
+        assert truth["velocity"] > 0.0
+
+
+def test_python_can_reads_and_writes(fake: FakeProcess, adapter: Adapter) -> None:
+    with can.Bus(
+        interface="slcan", channel=f"socket://{fake.ready['can']}", bitrate=500000, sleep_after_open=0.0
+    ) as bus:
+        bus.send(can.Message(arbitration_id=0x605, data=bytes.fromhex("4000100000000000"), is_extended_id=False))
+        deadline = time.monotonic() + 2.0
+        while time.monotonic() < deadline:
+            message = bus.recv(0.5)
+            if message is not None and message.arbitration_id == 0x585:
+                assert bytes(message.data).hex() == "4300100092010200"
+                return
+    pytest.fail("no answer")
+
+
+def test_wrong_arguments_and_unknown_commands(fake: FakeProcess, start_fake: Callable[..., Any]) -> None:
+    for command, arguments in (("emergency", {"code": 0}), ("nothing", {})):
+        with pytest.raises(Exception, match=command if command == "nothing" else "1 to 65535"):
+            fake.control.do(command, **arguments)
