@@ -12,7 +12,7 @@ from cyclopts import App, Parameter, validators
 from arcor2_fakes.control import ControlServer, parse_address
 from arcor2_fakes.process import announce, run, until_told_to_end
 from arcor2_fakes.robotiq_2f.ascii_port import AsciiPort
-from arcor2_fakes.robotiq_2f.gripper import Gripper, Mechanics
+from arcor2_fakes.robotiq_2f.gripper import Gripper, Mechanics, Pace
 from arcor2_fakes.robotiq_2f.rtu_port import RtuPort
 from arcor2_fakes.wire import register_faults
 
@@ -56,11 +56,13 @@ def main(
 
     async def body() -> None:
         loop = asyncio.get_running_loop()
-        gripper = Gripper(lambda: loop.time() * time_scale, Mechanics(stroke=stroke, latency=latency))
+        pace = Pace(loop.time, time_scale)
+        gripper = Gripper(pace, Mechanics(stroke=stroke, latency=latency))
         port = AsciiPort(*ascii_address, gripper)
         serial = RtuPort(gripper, link)
         channel = ControlServer(*control_address)
         register_commands(channel, gripper)
+        channel.command("pace", pace.set)
         register_faults(channel, {"ascii": port.wire, "rtu": serial.line})
 
         def truth() -> dict[str, Any]:

@@ -41,6 +41,24 @@ class Mechanics:
         return speed * (self.closed_count - self.open_count) / self.stroke
 
 
+class Pace:
+    """A clock that may run faster than the real one, and change its pace."""
+
+    def __init__(self, clock: Callable[[], float], factor: float) -> None:
+        self._clock, self._factor = clock, factor
+        self._since, self._now = clock(), 0.0
+
+    def __call__(self) -> float:
+        """Give the seconds passed at this clock."""
+        return self._now + (self._clock() - self._since) * self._factor
+
+    def set(self, factor: float) -> None:
+        """Let it run `factor` times as fast as the real one. Raises `ValueError`."""
+        if not 0.01 <= factor <= 1000.0:
+            raise ValueError("factor is 0.01 to 1000")
+        self._now, self._since, self._factor = self(), self._clock(), factor
+
+
 class Gripper:
     """Fingers and registers. `clock` gives seconds; all is brought up to date whenever somebody looks."""
 

@@ -11,10 +11,12 @@ from tests.fakes.conftest import FakeProcess, wait_for
 
 __all__ = ["wait_for"]
 
+PACE = 6.0
+
 
 @pytest.fixture(scope="module")
 def running() -> Iterator[FakeProcess]:
-    fake = FakeProcess("robotiq_2f", "--time-scale", "6")
+    fake = FakeProcess("robotiq_2f", "--time-scale", str(PACE))
     fake.truth()  # opens the control channel
     yield fake
     fake.end()
@@ -27,6 +29,7 @@ def fake(running: FakeProcess) -> FakeProcess:
     running.control.do("remove_part")
     running.control.do("block", on=False)
     running.control.do("power_cycle")
+    running.control.do("pace", factor=PACE)
     return running
 
 
@@ -54,8 +57,15 @@ def observed(fake: FakeProcess, make: Callable[..., Robotiq2F]) -> Robotiq2F:
 
 
 @pytest.fixture
-def gripper(observed: Robotiq2F) -> Robotiq2F:
+def gripper(fake: FakeProcess, observed: Robotiq2F) -> Robotiq2F:
     """In control and activated."""
-    observed.take_control()
-    observed.activate()
+    make_ready(fake, observed)
     return observed
+
+
+def make_ready(fake: FakeProcess, gripper: Robotiq2F) -> None:
+    """Take control and activate, quicker than anything after it."""
+    fake.control.do("pace", factor=100.0)
+    gripper.take_control()
+    gripper.activate()
+    fake.control.do("pace", factor=PACE)

@@ -11,6 +11,7 @@ from arcor2_drivers.robotiq_2f.robotiq_2f import Robotiq2F
 from arcor2_hw.data.device import Connection, Health
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected, NotInControl
 from arcor2_hw.objects.small import GripperState
+from tests.drivers.robotiq_2f.conftest import make_ready
 from tests.drivers.robotiq_2f.test_2f_gripping import in_background
 from tests.fakes.conftest import FakeProcess
 
@@ -44,8 +45,7 @@ def test_bad_wire_in_mid_grip_and_back(
 ) -> None:
     gripper = make(fake.ready["ascii"], request_timeout=0.15)
     gripper.connect()
-    gripper.take_control()
-    gripper.activate()
+    make_ready(fake, gripper)
     fake.control.do("put_part", width=0.03)
     thread, outcome = in_background(lambda: gripper.grip(0.0, speed=0.02))
     wait_for(gripper.state, lambda state: state is GripperState.MOVING)
@@ -59,6 +59,7 @@ def test_bad_wire_in_mid_grip_and_back(
         with pytest.raises(ConnectionLost):
             gripper.state()
     fake.control.do("heal")
+    fake.control.do("pace", factor=50.0)
     wait_for(lambda: gripper.connection is Connection.BACK)
 
     wait_for(lambda: fake.truth()["registers"]["OBJ"] == 2)  # what it had been told it does, and holds
@@ -102,4 +103,5 @@ def test_disconnecting_ends_who_waits(fake: FakeProcess, gripper: Robotiq2F, wai
     assert time.monotonic() - began < 1.0
     thread.join(3.0)
     assert isinstance(outcome[0], DeviceError)
+    fake.control.do("pace", factor=50.0)
     wait_for(lambda: fake.truth()["registers"]["OBJ"] == 3)  # it finishes, and holds

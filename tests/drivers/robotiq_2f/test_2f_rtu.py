@@ -18,6 +18,7 @@ from arcor2_drivers.robotiq_2f.status import Activation, Command, Object, Status
 from arcor2_hw.data.device import Connection
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected, NotInControl
 from arcor2_hw.objects.small import GripperState
+from tests.drivers.robotiq_2f.conftest import make_ready
 from tests.drivers.robotiq_2f.test_2f_gripping import in_background
 from tests.fakes.conftest import FakeProcess
 
@@ -86,8 +87,7 @@ def test_whole_cycle(fake: FakeProcess, rtu: Robotiq2F) -> None:
 
 
 def test_stop(fake: FakeProcess, rtu: Robotiq2F, wait_for: Callable[..., Any]) -> None:
-    rtu.take_control()
-    rtu.activate()
+    make_ready(fake, rtu)
     thread, outcome = in_background(lambda: rtu.grip(0.0, speed=0.02))
     wait_for(rtu.state, lambda state: state is GripperState.MOVING)
     rtu.stop()
@@ -107,8 +107,7 @@ def test_absent_port_and_foreign_unit(fake: FakeProcess, make_rtu: Callable[...,
 def test_bad_line_in_mid_grip_and_back(
     fake: FakeProcess, rtu: Robotiq2F, wait_for: Callable[..., Any], fault: str
 ) -> None:
-    rtu.take_control()
-    rtu.activate()
+    make_ready(fake, rtu)
     fake.control.do("put_part", width=0.03)
     thread, outcome = in_background(lambda: rtu.grip(0.0, speed=0.02))
     wait_for(rtu.state, lambda state: state is GripperState.MOVING)
@@ -117,6 +116,7 @@ def test_bad_line_in_mid_grip_and_back(
     assert isinstance(outcome[0], ConnectionLost)
     assert "unit 9" in str(outcome[0])
     fake.control.do("heal")
+    fake.control.do("pace", factor=50.0)
     wait_for(lambda: rtu.connection is Connection.BACK)
     wait_for(lambda: fake.truth()["gripped"])
     wait_for(rtu.state, lambda state: state is GripperState.HOLDING)
