@@ -48,6 +48,8 @@ class DobotObserved(Robot):
         """Close; harmless when closed."""
         self._drop_control()
         self._observer.observing.stop()
+        with self._observer.came:
+            self._observer.came.notify_all()  # whoever still waits is told that it is closed
 
     @property
     def connection(self) -> Connection:

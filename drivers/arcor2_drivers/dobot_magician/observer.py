@@ -186,9 +186,10 @@ class Observer:
 
     def _look(self, port: Port) -> None:
         limit, began = self._settings.answer_timeout, time.monotonic()
+        # The index first: a motion that it tells to be done has its end in the pose.
+        index = self._unpack(Command.QUEUE_INDEX, port.ask(Command.QUEUE_INDEX, 0, b"", limit), "Q")[0]
         pose = self._unpack(Command.POSE, port.ask(Command.POSE, 0, b"", limit), "8f")
         alarms = codes(port.ask(Command.ALARMS, 0, b"", limit))
-        index = self._unpack(Command.QUEUE_INDEX, port.ask(Command.QUEUE_INDEX, 0, b"", limit), "Q")[0]
         if not all(map(math.isfinite, pose)):
             raise DeviceFault(f"{self.who} tells a pose that is none", repr(pose))
         x, y, z, r, *angles = pose

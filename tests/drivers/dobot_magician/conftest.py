@@ -33,7 +33,7 @@ def make() -> Iterator[Callable[..., DobotMagician]]:
 @pytest.fixture(scope="module")
 def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FakeProcess]:
     """One fake for a file's tests: starting one takes longer than most of them."""
-    fake = FakeProcess("dobot_magician", "--link", str(tmp_path_factory.mktemp("dev") / "ttyDOBOT"), "--pace", "6")
+    fake = FakeProcess("dobot_magician", "--link", str(tmp_path_factory.mktemp("dev") / "ttyDOBOT"), "--pace", "12")
     assert fake.control.do("commands")  # the channel is open before the first test
     yield fake
     fake.end()

@@ -44,7 +44,7 @@ def test_a_port_that_is_not_there_or_in_use(fake: FakeProcess, make: Callable[..
     other.connect()
 
 
-@pytest.mark.parametrize("fault", ["silence", "garbage", "half_frame"])
+@pytest.mark.parametrize("fault", ["silence", "garbage"])
 def test_a_device_that_does_not_answer_sensibly(
     fake: FakeProcess, make: Callable[..., DobotMagician], fault: str
 ) -> None:
@@ -89,7 +89,7 @@ def test_answers_that_lag_behind_answer_nothing(
     arm.connect()
     fake.control.do("slow", seconds=0.25)
     wait_for(lambda: arm.connection, lambda state: state is Connection.LOST)
-    deadline = time.monotonic() + 0.9  # meanwhile answers to earlier questions keep coming
+    deadline = time.monotonic() + 0.6  # meanwhile answers to earlier questions keep coming
     while time.monotonic() < deadline:
         assert arm.connection is Connection.LOST
         time.sleep(0.01)
@@ -101,7 +101,7 @@ def test_answers_that_lag_behind_answer_nothing(
 def test_unplugged_in_mid_move_and_plugged_again(
     fake: FakeProcess, arm: DobotMagician, wait_for: Callable[..., Any]
 ) -> None:
-    thread, outcome = in_background(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.1))
+    thread, outcome = in_background(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.06))
     fake.control.wait_until(lambda truth: truth["moving"])
     fake.control.do("unplug")
     thread.join(5.0)
@@ -124,7 +124,7 @@ def test_what_a_loss_left_running_is_stopped_when_it_is_back(
     fake: FakeProcess, arm: DobotMagician, wait_for: Callable[..., Any]
 ) -> None:
     arm.conveyor(0.05)
-    thread, outcome = in_background(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.03))
+    thread, outcome = in_background(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.02))
     fake.control.wait_until(lambda truth: truth["moving"])
     fake.control.do("reset")
     thread.join(5.0)
@@ -173,7 +173,7 @@ def test_what_waits_in_a_standing_queue_never_runs(fake: FakeProcess, make: Call
 
 
 def test_switched_off_and_on_and_homed(fake: FakeProcess, arm: DobotMagician, wait_for: Callable[..., Any]) -> None:
-    thread, outcome = in_background(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.1))
+    thread, outcome = in_background(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.06))
     fake.control.wait_until(lambda truth: truth["moving"])
     fake.control.do("power_cycle")
     thread.join(5.0)
@@ -187,7 +187,7 @@ def test_switched_off_and_on_and_homed(fake: FakeProcess, arm: DobotMagician, wa
     arm.take_control()
     began = time.monotonic()
     arm.home()
-    assert time.monotonic() - began > 1.2
+    assert time.monotonic() - began > 0.6
     truth = fake.truth()
     assert truth["homed"] is True
     assert truth["tool"][:2] == pytest.approx([259.1, 0.0], abs=0.1)
@@ -220,7 +220,7 @@ arm = DobotMagician("a", "arm", Pose(), DobotMagicianSettings(sys.argv[1]))
 arm.connect()
 arm.take_control()
 for angle in (60, -60, 60):
-    arm.move_to_joints([Joint(f"joint_{i + 1}", math.radians(v)) for i, v in enumerate((angle, 45, 45, 0))], 0.1)
+    arm.move_to_joints([Joint(f"joint_{i + 1}", math.radians(v)) for i, v in enumerate((angle, 45, 45, 0))], 0.06)
 """
 
 
@@ -240,7 +240,7 @@ def test_a_killed_owner_leaves_one_motion_and_no_more(fake: FakeProcess, tmp_pat
 
 
 def test_closing_stops_what_we_move(fake: FakeProcess, arm: DobotMagician) -> None:
-    thread, outcome = in_background(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.1))
+    thread, outcome = in_background(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.06))
     fake.control.wait_until(lambda truth: truth["moving"])
     began = time.monotonic()
     arm.disconnect()
