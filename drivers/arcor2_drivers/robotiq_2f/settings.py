@@ -1,14 +1,14 @@
 """Settings of a Robotiq 2F gripper, checked when they are given."""
 
 import dataclasses
-import enum
 import math
 
+from arcor2_hw.actions import StrEnum
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
 
 
-class Wire(enum.StrEnum):
+class Wire(StrEnum):
     """How the gripper is reached."""
 
     URCAP = "urcap"
