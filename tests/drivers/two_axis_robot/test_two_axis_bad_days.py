@@ -96,7 +96,7 @@ def test_a_loss_in_mid_move(fake: FakeProcess, ready: TwoAxisRobot, wait_for: Wa
     assert fake.truth()["servos"]["1"]["angle"] == stood["angle"]
     ready.take_control()
     assert fake.truth()["servos"]["1"]["angle"] == pytest.approx(stood["angle"], abs=0.002)
-    ready.move_to_joints(HOME, 1.0)
+    ready.check_if_ready_to_move()
 
 
 KILLED = """
