@@ -122,19 +122,20 @@ class CanLink:
         self._closing.set()
         self.loss = self.loss or NotConnected(f"{self.who} is not connected")
         receiver, self._receiver = self._receiver, None
+        bus, self._bus, network = self._bus, None, self._network
+        port = getattr(bus, "serialPortOrig", None)
+        raw = getattr(port, "_socket", None)
+        if isinstance(bus, slcanBus) and raw is not None:
+            with contextlib.suppress(can.CanError, OSError):
+                bus.close()  # the adapter's channel
+            with contextlib.suppress(OSError):
+                raw.shutdown(socket.SHUT_RDWR)  # wakes the receiver
         if receiver is not None and receiver is not threading.current_thread():
             receiver.join(4.0 * LOOK)
-        bus, self._bus, network = self._bus, None, self._network
         if network is not None:
             network.bus = None
         if bus is None:
             return
-        port = getattr(bus, "serialPortOrig", None)
-        raw = getattr(port, "_socket", None)
-        with contextlib.suppress(can.CanError, OSError):
-            if isinstance(bus, slcanBus) and raw is not None:
-                bus.close()  # the adapter's channel
-                raw.shutdown(socket.SHUT_RDWR)
         if raw is not None and port is not None:
             # Closed here: pyserial sleeps 0.3 s in closing, and forgets a socket that its peer has reset.
             raw.close()

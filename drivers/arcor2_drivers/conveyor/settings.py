@@ -1,11 +1,11 @@
 """Settings of a conveyor, checked when they are given."""
 
 import dataclasses
-import enum
 import math
 import urllib.parse
 from typing import Final
 
+from arcor2_hw.actions import StrEnum
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
 
@@ -17,7 +17,7 @@ LONGEST_MOVE: Final = 600.0
 _INT32: Final = (1 << 31) - 1
 
 
-class CanInterface(enum.StrEnum):
+class CanInterface(StrEnum):
     """How python-can reaches the bus."""
 
     SLCAN = "slcan"

@@ -12,7 +12,7 @@ from arcor2_fakes.conveyor.drive import HEARTBEAT_ERROR, Drive
 from arcor2_fakes.conveyor.hub import Hub
 
 TICK = 0.005
-BOOT_TIME = 0.1
+BOOT_TIME = 0.03
 _OPERATIONAL, _STOPPED, _PRE_OPERATIONAL = 5, 4, 127
 _UNKNOWN_COMMAND, _TOGGLE = 0x05040001, 0x05030000
 _REGISTER = {0x2: 1 << 1, 0x3: 1 << 2, 0x4: 1 << 3, 0x81: 1 << 4}  # 1001h: current, voltage, temperature, communication

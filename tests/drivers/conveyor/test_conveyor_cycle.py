@@ -19,7 +19,7 @@ COUNTS = 10000
 
 @contextmanager
 def under_way(fake: FakeProcess, act: Callable[[], None]) -> Iterator[list[Any]]:
-    """`act` in a thread, the belt seen to move; the list holds what it gave or raised."""
+    """`act` in a thread, the belt seen to move with 0.3 m/s; the list holds what it gave or raised."""
     outcome: list[Any] = []
 
     def run() -> None:
@@ -31,7 +31,7 @@ def under_way(fake: FakeProcess, act: Callable[[], None]) -> Iterator[list[Any]]
     thread = threading.Thread(target=run)
     thread.start()
     try:
-        fake.control.wait_until(lambda t: abs(t["velocity"]) > 100)
+        fake.control.wait_until(lambda t: abs(t["velocity"]) > 2900)
         yield outcome
     finally:
         thread.join(10.0)
