@@ -1,0 +1,144 @@
+"""ZPL as a host speaks it: labels put together and checked, answers taken apart. Pure.
+
+Source: ZPL II programming guide, ~HS (host status return), ~HI (host identification), ^FH, ^BC, and SGD getvar;
+docs/devices/label-printer.md says what is used.
+"""
+
+import dataclasses
+import re
+from typing import Final
+
+LONGEST_LABEL: Final = 32768
+LONGEST_FIELD: Final = 200
+HOST_STATUS: Final = b"~HS"
+IDENTIFY: Final = b"~HI"
+COUNTER: Final = "odometer.total_label_count"
+UNIQUE_ID: Final = "device.unique_id"
+FIELDS: Final = ("title", "text", "code")
+DEFAULT_TEMPLATE: Final = (
+    "^XA^CI28^PW400^LL240^FO20,20^A0N,40,40{title}^FO20,70^A0N,28,28{text}^FO20,110^BY2^BCN,80,Y,N,N{code}^XZ"
+)
+
+_FRAME: Final = re.compile(rb"\x02([\x20-\x7e]{1,120})\x03\r\n")
+_QUOTED: Final = re.compile(rb'"([\x20-\x21\x23-\x7e]{0,80})"')
+_PLAIN: Final = frozenset(b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789 .,:;-+/()#*=<>@!?%&'")
+_PLACE: Final = re.compile(r"\{([^{}]*)\}")
+_FORBIDDEN: Final = re.compile(r"\^(CC|CT|CD|DF|XF|JU|MP|XA|XZ|PQ(?!1(?![0-9])))", re.IGNORECASE)
+
+
+class BadLabel(ValueError):
+    """What was given is no label that is printed exactly once; the text says why."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Status:
+    """What ~HS tells."""
+
+    paper_out: bool
+    paused: bool
+    head_open: bool
+    ribbon_out: bool
+    too_cold: bool
+    too_hot: bool
+    buffer_full: bool
+    partial_format: bool
+    formats_waiting: int
+    labels_left: int
+
+    @property
+    def idle(self) -> bool:
+        """Tell whether nothing waits to be printed."""
+        return not (self.formats_waiting or self.labels_left or self.partial_format)
+
+
+def status(data: bytes) -> Status | None:
+    """Read the three strings of ~HS; None while they are not all there, or are none."""
+    strings = [frame.decode("ascii").split(",") for frame in _FRAME.findall(data)]
+    for one, two, three in zip(strings, strings[1:], strings[2:], strict=False):
+        if (len(one), len(two), len(three)) != (12, 11, 2):
+            continue
+        flags = (one[1], one[2], one[5], one[7], one[10], one[11], two[2], two[3])
+        if any(flag not in ("0", "1") for flag in flags) or not (one[4].isdigit() and two[8].isdigit()):
+            continue
+        out, pause, full, partial, cold, hot, head, ribbon = (flag == "1" for flag in flags)
+        return Status(out, pause, head, ribbon, cold, hot, full, partial, int(one[4]), int(two[8]))
+    return None
+
+
+def identity(data: bytes) -> tuple[str, str] | None:
+    """Read model and firmware from the answer to ~HI; None when it is none."""
+    for frame in _FRAME.findall(data):
+        parts = frame.decode("ascii").split(",")
+        if len(parts) >= 4 and parts[2].isdigit():
+            return parts[0], parts[1]
+    return None
+
+
+def getvar(name: str) -> bytes:
+    """Give the question for a variable of the printer."""
+    return f'! U1 getvar "{name}"\r\n'.encode("ascii")
+
+
+def variable(data: bytes) -> str | None:
+    """Read the answer to getvar: a text in quotes; None when it is none."""
+    match = _QUOTED.search(data)
+    return None if match is None else match[1].decode("ascii")
+
+
+def number(data: bytes) -> int | None:
+    """Read the answer to getvar when it is a count."""
+    text = variable(data)
+    return int(text) if text is not None and text.isdigit() else None
+
+
+def field(text: str, barcode: bool = False) -> str:
+    """Give ^FH^FD…^FS that prints exactly `text`: nothing in it is a command. Raises BadLabel."""
+    if len(text) > LONGEST_FIELD:
+        raise BadLabel(f"is longer than {LONGEST_FIELD} characters")
+    if not text.isprintable():
+        raise BadLabel("has characters that cannot be printed")
+    if barcode:
+        if not text.isascii():
+            raise BadLabel("has characters that Code 128 does not have")
+        text = text.replace(">", ">0")  # > begins an invocation code of ^BC
+    try:
+        raw = text.encode("utf-8")
+    except UnicodeEncodeError as e:
+        raise BadLabel("has characters that cannot be sent") from e
+    data = "".join(chr(byte) if byte in _PLAIN else f"_{byte:02X}" for byte in raw)
+    return f"^FH_^FD{data}^FS"
+
+
+def fill(template: str, fields: dict[str, str]) -> str:
+    """Put fields into a template's places {title}, {text} and {code}. Raises BadLabel naming the field."""
+
+    def place(match: re.Match[str]) -> str:
+        name = match[1]
+        try:
+            return field(fields[name], barcode=name == "code")
+        except BadLabel as e:
+            raise BadLabel(f"{name} {e}") from e
+
+    return _PLACE.sub(place, template)
+
+
+def check_template(template: str) -> None:
+    """Raise BadLabel when this cannot be filled to one label."""
+    for name in _PLACE.findall(template):
+        if name not in FIELDS:
+            raise BadLabel(f"has a place {{{name}}}; there are {', '.join(FIELDS)}")
+    check_label(fill(template, dict.fromkeys(FIELDS, "x")))
+
+
+def check_label(label: str) -> bytes:
+    """Give the bytes of a label that is one format, printed once. Raises BadLabel."""
+    text = label.strip()
+    if not (text.startswith("^XA") and text.endswith("^XZ") and len(text) > len("^XA^XZ")):
+        raise BadLabel("must begin with ^XA and end with ^XZ")
+    if len(text) > LONGEST_LABEL:
+        raise BadLabel(f"is longer than {LONGEST_LABEL} characters")
+    if "~" in text:
+        raise BadLabel("has a ~: control commands are no part of a label")
+    if found := _FORBIDDEN.search(text, 3, len(text) - 3):
+        raise BadLabel(f"has {found[0]}, which is not allowed in a single label")
+    return text.encode("utf-8")

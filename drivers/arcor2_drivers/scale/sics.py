@@ -1,0 +1,50 @@
+"""MT-SICS answers: bytes in, what they mean out. Pure; docs/devices/scale.md says what is used."""
+
+import dataclasses
+import re
+from decimal import Decimal
+from typing import Final
+
+KILOGRAMS: Final = {"kg": Decimal(1), "g": Decimal("1e-3"), "mg": Decimal("1e-6")}
+ERRORS: Final = {"ES": "does not know the command", "ET": "heard a damaged command", "EL": "refuses its parameter"}
+LONGEST_LINE: Final = 80
+_VALUE: Final = re.compile(r"-?\d{1,9}(\.\d{1,6})?")
+_TEXT: Final = re.compile(r'(I[0-4]) A "([^"]*)"')
+
+
+@dataclasses.dataclass(frozen=True)
+class Answer:
+    """What a line says: the command it answers (or ES, ET, EL), its mark, and a value in kg or a text if it has one.
+
+    mark: S stable, D dynamic, A done, I not executable now, + above and - below the range. unit: as sent.
+    """
+
+    command: str
+    mark: str = ""
+    value: float | None = None
+    unit: str = ""
+    text: str = ""
+
+
+def answers(data: bytes) -> list[Answer]:
+    """Give the sensible lines among those that are complete, in order."""
+    lines = (raw.decode("ascii", "replace") for raw in data.split(b"\r\n")[:-1] if len(raw) <= LONGEST_LINE)
+    return [found for line in lines if (found := answer(line)) is not None]
+
+
+def answer(line: str) -> Answer | None:
+    """Read one line without its CR LF; None when it is none. The value field may be padded as it likes."""
+    if line in ERRORS:
+        return Answer(line)
+    if match := _TEXT.fullmatch(line):
+        return Answer(match[1], "A", text=match[2])
+    parts = line.split()
+    if len(parts) == 2 and parts[0] in ("S", "T", "Z", "TA", "ZI", "TI") and parts[1] in ("A", "I", "+", "-", "L"):
+        return Answer(parts[0], parts[1])
+    if len(parts) == 4 and parts[0] in ("S", "T", "TI", "TA") and parts[1] in ("S", "D", "A"):
+        if not _VALUE.fullmatch(parts[2]) or not parts[3].isalpha():
+            return None
+        factor = KILOGRAMS.get(parts[3])
+        value = None if factor is None else float(Decimal(parts[2]) * factor)
+        return Answer(parts[0], parts[1], value, parts[3])
+    return None
