@@ -2,10 +2,10 @@
 
 import dataclasses
 
-from arcor2_drivers.asked_line import check_line
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
 
+from .asked_line import check_line
 from .zpl import DEFAULT_TEMPLATE, BadLabel, check_template
 
 

@@ -4,7 +4,6 @@ import dataclasses
 import time
 from typing import ClassVar, Final
 
-from arcor2_drivers.asked_line import AskedLine
 from arcor2_hw.actions import action
 from arcor2_hw.data.base import now
 from arcor2_hw.data.device import Alarm, Connection, Health, Identity, LossReaction, Severity
@@ -13,6 +12,7 @@ from arcor2_hw.objects import Printer
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 
 from . import zpl
+from .asked_line import AskedLine
 from .settings import ZplPrinterSettings
 from .zpl import BadLabel, Status
 

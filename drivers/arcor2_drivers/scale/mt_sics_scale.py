@@ -5,7 +5,6 @@ import math
 import time
 from typing import ClassVar, Final
 
-from arcor2_drivers.asked_line import AskedLine
 from arcor2_hw.actions import action
 from arcor2_hw.data.base import now
 from arcor2_hw.data.device import Alarm, Connection, Health, Identity, LossReaction, Reading, Severity
@@ -23,6 +22,7 @@ from arcor2_hw.objects import Scale
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 
 from . import sics
+from .asked_line import AskedLine
 from .settings import MtSicsScaleSettings
 from .sics import Answer
 
