@@ -2,7 +2,6 @@
 
 import sys
 import textwrap
-import time
 from pathlib import Path
 
 import pytest
@@ -125,18 +124,12 @@ def test_a_file_that_changed_is_read_again(distribution: Path) -> None:
     assert first.source != second.source == b"class Arm: ...\n"
 
 
-def test_all_that_is_installed_is_sound_and_quickly_read() -> None:
-    def once() -> float:
-        began = time.process_time()
-        found = installed_types()
-        library = Library(each.file for each in found if each.file is not None)
-        analyses = {each.name: library.analyse(each.name) for each in found}
-        duration = time.process_time() - began
-        for each in found:
-            assert each.problem is None, each.problem
-            assert analyses[each.name].problem is None, analyses[each.name].problem
-            assert not [a.problem for a in analyses[each.name].actions if a.disabled]
-        assert {"CounterActions", "FlowActions", "LogicActions", "RandomActions", "TimeActions"} <= set(analyses)
-        return duration
-
-    assert min(once() for _ in range(3)) < 0.15
+def test_all_that_is_installed_is_sound() -> None:
+    found = installed_types()
+    library = Library(each.file for each in found if each.file is not None)
+    assert {"CounterActions", "FlowActions", "LogicActions", "RandomActions", "TimeActions"} <= {e.name for e in found}
+    for each in found:
+        assert each.problem is None, each.problem
+        analysis = library.analyse(each.name)
+        assert analysis.problem is None, analysis.problem
+        assert not [(a.name, a.problem) for a in analysis.actions if a.disabled], each.name
