@@ -4,8 +4,8 @@ import dataclasses
 
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
+from arcor2_hw.objects.asked_line import check_line
 
-from .asked_line import check_line
 from .zpl import DEFAULT_TEMPLATE, BadLabel, check_template
 
 

@@ -9,10 +9,10 @@ from arcor2_hw.data.base import now
 from arcor2_hw.data.device import Alarm, Connection, Health, Identity, LossReaction, Severity
 from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, NotFound, OutOfRange, Refused
 from arcor2_hw.objects import Printer
+from arcor2_hw.objects.asked_line import AskedLine
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 
 from . import zpl
-from .asked_line import AskedLine
 from .settings import ZplPrinterSettings
 from .zpl import BadLabel, Status
 

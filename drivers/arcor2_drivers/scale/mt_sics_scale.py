@@ -19,10 +19,10 @@ from arcor2_hw.exceptions import (
     Stale,
 )
 from arcor2_hw.objects import Scale
+from arcor2_hw.objects.asked_line import AskedLine
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 
 from . import sics
-from .asked_line import AskedLine
 from .settings import MtSicsScaleSettings
 from .sics import Answer
 

@@ -4,8 +4,7 @@ import dataclasses
 
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
-
-from .asked_line import check_line
+from arcor2_hw.objects.asked_line import check_line
 
 
 @dataclasses.dataclass
