@@ -6,15 +6,17 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
-FAMILIES := --extra ur --extra modbus --extra serial
+FAMILIES := --extra ur --extra modbus --extra serial --extra can --extra dynamixel --extra depthai --extra vision
 # Drivers beyond the demo are tested too.
-TESTED := $(FAMILIES) --extra can --extra dynamixel
+TESTED := $(FAMILIES) --extra opcua
 
 run: .make/run
 	$(BIN)/arcor2-hw demo $(ARGS)
 
+# Tests wait for devices most of the time, so three at once suit two cores. A module, or one driver's conformance,
+# stays in one process and shares its fake.
 test: .make/dev
-	$(BIN)/python -m pytest $(ARGS)
+	$(BIN)/python -m pytest --numprocesses 3 --dist loadgroup $(ARGS)
 
 bench: .make/dev
 	$(BIN)/python -m benchmarks $(ARGS)
@@ -38,12 +40,23 @@ layers: .make/dev
 	@$(PYTHON) -m venv $(VENV) || { test "$$(id -u)" = 0 && apt-get update -qq && apt-get install -y -qq python3-venv && $(PYTHON) -m venv $(VENV); }
 	@touch $@
 
-.make/run: requirements/run.txt pyproject.toml | .make/venv
+# Open3D loads these; where they are missing and we may, they are installed, otherwise they are named.
+LIBRARIES := libEGL.so.1:libegl1 libGL.so.1:libgl1 libusb-1.0.so.0:libusb-1.0-0 libgomp.so.1:libgomp1
+.make/system:
+	@mkdir -p .make
+	@for each in $(LIBRARIES); do ldconfig -p | grep -q "$${each%%:*}" || missing="$$missing $${each##*:}"; done; \
+	if test -n "$$missing"; then \
+	  if test "$$(id -u)" = 0; then apt-get update -qq && apt-get install -y -qq --no-install-recommends $$missing >/dev/null; \
+	  else echo "please install:$$missing" >&2; exit 1; fi; \
+	fi
+	@touch $@
+
+.make/run: requirements/run.txt pyproject.toml .make/system | .make/venv
 	@test -e .make/dev && test .make/dev -nt requirements/dev.txt || $(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements/run.txt
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@touch $@
 
-.make/dev: requirements/dev.txt pyproject.toml | .make/venv
+.make/dev: requirements/dev.txt pyproject.toml .make/system | .make/venv
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements/dev.txt
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@touch $@

@@ -13,3 +13,12 @@ def spec() -> Path:
     path = Path(__file__).resolve().parents[2] / "shared" / "spec"
     assert path.is_dir(), f"the protocol is expected in {path}"
     return path
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Keep in one process what shares a fake: a module, or the suite's cases on one bench."""
+    for item in items:
+        callspec = getattr(item, "callspec", None)
+        bench = callspec.params.get("arcor2_running_bench") if callspec is not None else None
+        item.add_marker(pytest.mark.xdist_group(f"{item.location[0]}:{bench.type_name() if bench else ''}"))
