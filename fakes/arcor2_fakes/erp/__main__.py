@@ -1,0 +1,117 @@
+"""Starts the fake planning service: `python -m arcor2_fakes.erp`."""
+
+from __future__ import annotations
+
+import ssl
+import sys
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from cyclopts import App
+
+from arcor2_fakes.control import ControlServer, parse_address
+from arcor2_fakes.erp.planning import Planning
+from arcor2_fakes.erp.port import Port
+from arcor2_fakes.process import announce, run, until_told_to_end
+from arcor2_fakes.wire import register_faults
+
+app = App(name="arcor2_fakes.erp", help="Fake production planning service (ERP) on HTTP.", version_flags=[])
+
+
+def truth(planning: Planning, port: Port) -> dict[str, Any]:
+    """Give what the service really knows, whatever its answers say."""
+    return {
+        "orders": msgspec.to_builtins(list(planning.orders.values())),
+        "results": list(planning.results),
+        "repeated": planning.repeated,
+        "taken": len(planning.taken),
+        "requests": port.total,
+        "connections": len(port.wire.connections),
+    }
+
+
+def register_commands(control: ControlServer, planning: Planning, port: Port) -> None:
+    """Make what a planner and a test can do to the service known to the control channel."""
+
+    def add_order(order: str, product: str, quantity: int = 1) -> None:
+        planning.add_order(order, product, quantity)
+        control.publish("truth")
+
+    def forbid(order: str, on: bool = True) -> None:
+        (planning.forbidden.add if on else planning.forbidden.discard)(order)
+
+    def fail(status: int, count: int = 1, retry_after: float = 0.0, path: str = "", done: bool = False) -> None:
+        port.fail(status, count, retry_after, path, done)
+
+    control.command("add_order", add_order)
+    control.command("forbid", forbid)
+    control.command("forget", planning.forget)
+    control.command("lose_answers", port.lose_answers)
+    control.command("fail", fail)
+    control.command("work", port.heal)
+    control.command("received", lambda: list(port.received))
+    control.command("power_cycle", port.power_cycle)
+
+
+@app.default
+def main(
+    *,
+    listen: str = "127.0.0.1:0",
+    control: str = "127.0.0.1:0",
+    order: list[str] | None = None,
+    token: str = "",
+    store: Path | None = None,
+    certificate: Path | None = None,
+    key: Path | None = None,
+) -> int:
+    """Start the fake; it prints one line `ready {json}` with its URL and ends on SIGTERM.
+
+    Args:
+        listen: HOST:PORT of the service; port 0 takes a free one.
+        control: HOST:PORT of the control channel; port 0 takes a free one.
+        order: ID=PRODUCT:QUANTITY, an order that is planned from the start; repeatable.
+        token: bearer token that a client has to send; empty for none.
+        store: file that keeps orders and results beyond the process; not given, they are kept in memory.
+        certificate: PEM file; the service is on HTTPS then.
+        key: PEM file of the certificate's private key.
+    """
+    try:
+        address = parse_address(listen)
+        control_address = parse_address(control)
+        planning = Planning(store)
+        for text in order or ():
+            number, _, what = text.partition("=")
+            product, _, quantity = what.rpartition(":")
+            if number not in planning.orders:
+                planning.add_order(number, product, int(quantity))
+        context = None
+        if certificate is not None:
+            context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+            context.load_cert_chain(certificate, key)
+    except (ValueError, OSError, msgspec.MsgspecError) as e:
+        sys.stderr.write(f"erp: {e}\n")
+        return 2
+
+    async def body() -> None:
+        channel = ControlServer(*control_address)
+        port = Port(planning, *address, token, context)
+        port.changed = lambda: channel.publish("truth")
+        register_commands(channel, planning, port)
+        register_faults(channel, {"http": port.wire})
+        channel.source("truth", lambda: truth(planning, port))
+        where = await port.wire.listen()
+        try:
+            scheme = "http" if context is None else "https"
+            announce(name="erp", url=f"{scheme}://{where}", control=await channel.start())
+            await until_told_to_end()
+        finally:
+            port.wire.close()
+            await channel.close()
+            planning.close()
+
+    return run(body, "erp")
+
+
+if __name__ == "__main__":
+    sys.exit(app())

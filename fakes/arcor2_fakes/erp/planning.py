@@ -1,0 +1,190 @@
+"""What the service knows: orders, to whom they went, results, and the keys of what was taken. Knows no socket."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+
+from arcor2_fakes.erp.http import Request
+
+NAME: Final = "Fake planning"
+VERSION: Final = "1.4.0"
+LONGEST_KEY: Final = 200
+
+
+class Problem(Exception):
+    """The service does not do what was asked, and nothing has changed; `status` is the HTTP status."""
+
+    def __init__(self, status: int, text: str) -> None:
+        super().__init__(text)
+        self.status = status
+
+
+class Order(msgspec.Struct):
+    """So many pieces of a product; `station` has it, empty while nobody does."""
+
+    id: str
+    product: str
+    quantity: int
+    station: str = ""
+    closed: bool = False
+
+    def told(self) -> dict[str, Any]:
+        """Give it as the wire tells it."""
+        return {"id": self.id, "product": self.product, "quantity": self.quantity}
+
+
+class _OrderRequest(msgspec.Struct):
+    station: str
+
+
+class _Result(msgspec.Struct):
+    order: str
+    serial: str
+    passed: bool
+    note: str
+    finished: str
+    station: str
+
+
+class _Closing(msgspec.Struct):
+    order: str
+    reason: str
+    finished: str
+    station: str
+
+
+class _Event(msgspec.Struct, omit_defaults=True):
+    """One line of the store: an order that came, or a request that was taken."""
+
+    order: Order | None = None
+    key: str = ""
+    path: str = ""
+    body: str = ""
+
+
+class Planning:
+    """Orders and results. Everything that was taken is taken once per key.
+
+    store: file that keeps it beyond the process; None keeps it in memory.
+    """
+
+    def __init__(self, store: Path | None = None) -> None:
+        self.orders: dict[str, Order] = {}
+        self.results: list[dict[str, Any]] = []
+        self.taken: dict[str, tuple[str, str, dict[str, Any]]] = {}  # by key: path, body, answer
+        self.repeated = 0
+        self.forbidden: set[str] = set()
+        self._store = None
+        if store is not None:
+            for line in store.read_bytes().splitlines() if store.exists() else ():
+                self._replay(msgspec.json.decode(line, type=_Event))
+            self._store = store.open("ab")
+
+    def close(self) -> None:
+        """Close the store."""
+        if self._store is not None:
+            self._store.close()
+
+    def add_order(self, order: str, product: str, quantity: int) -> None:
+        """Plan an order. Raises ValueError."""
+        if not order or not product or order in self.orders or not 1 <= quantity <= 100_000:
+            raise ValueError("an order has an id of its own, a product, and a quantity of 1 to 100000")
+        self.orders[order] = Order(order, product, int(quantity))
+        self._keep(_Event(order=self.orders[order]))
+
+    def forget(self) -> None:
+        """Begin anew, with no order and no result."""
+        self.orders.clear()
+        self.results.clear()
+        self.taken.clear()
+        self.forbidden.clear()
+        self.repeated = 0
+        if self._store is not None:
+            self._store.truncate(0)
+
+    # -------------------------------------------------------------------------------- requests
+    def do(self, request: Request) -> tuple[int, dict[str, Any]]:
+        """Do what is asked; gives status and body. Raises Problem."""
+        if request.path == "/status":
+            self._method(request, "GET")
+            return 200, {"service": NAME, "version": VERSION}
+        if request.path not in ("/orders/next", "/results", "/orders/close"):
+            raise Problem(404, f"there is no {request.path}")
+        self._method(request, "POST")
+        key = request.headers.get("idempotency-key", "")
+        if not 0 < len(key) <= LONGEST_KEY:
+            raise Problem(400, "Idempotency-Key is missing")
+        try:
+            body = request.body.decode()
+        except UnicodeDecodeError as e:
+            raise Problem(400, "the body is not UTF-8") from e
+        if key in self.taken:
+            path, before, answer = self.taken[key]
+            if (path, before) != (request.path, body):
+                raise Problem(409, f"the key {key} was used for something else")
+            self.repeated += 1
+            return 200, {**answer, "repeated": True}
+        answer = self._take(key, request.path, body)
+        if answer.get("order", True) is None:
+            return 200, answer  # nothing has changed, so the key stays free
+        self._keep(_Event(key=key, path=request.path, body=body))
+        return 201, answer
+
+    @staticmethod
+    def _method(request: Request, method: str) -> None:
+        if request.method != method:
+            raise Problem(405, f"{request.path} takes {method}")
+
+    def _take(self, key: str, path: str, body: str) -> dict[str, Any]:
+        try:
+            answer = {"key": key, **self._DO[path](self, body)}
+        except msgspec.DecodeError as e:
+            raise Problem(422, str(e)) from e
+        if answer.get("order", True) is not None:
+            self.taken[key] = (path, body, answer)
+        return answer
+
+    def _next_order(self, body: str) -> dict[str, Any]:
+        station = msgspec.json.decode(body, type=_OrderRequest).station
+        for order in self.orders.values():
+            if not order.station and not order.closed:
+                order.station = station
+                return {"order": order.told()}
+        return {"order": None}
+
+    def _result(self, body: str) -> dict[str, Any]:
+        result = msgspec.json.decode(body, type=_Result)
+        self._known(result.order)
+        self.results.append(msgspec.structs.asdict(result))
+        return {"number": len(self.results)}
+
+    def _close_order(self, body: str) -> dict[str, Any]:
+        closing = msgspec.json.decode(body, type=_Closing)
+        self._known(closing.order).closed = True
+        return {}
+
+    _DO: Final = {"/orders/next": _next_order, "/results": _result, "/orders/close": _close_order}
+
+    def _known(self, order: str) -> Order:
+        if order not in self.orders:
+            raise Problem(404, f"there is no order {order}")
+        if order in self.forbidden:
+            raise Problem(422, f"the order {order} takes nothing")
+        return self.orders[order]
+
+    # -------------------------------------------------------------------------------- storage
+    def _keep(self, event: _Event) -> None:
+        if self._store is not None:
+            self._store.write(msgspec.json.encode(event) + b"\n")
+            self._store.flush()
+            os.fsync(self._store.fileno())
+
+    def _replay(self, event: _Event) -> None:
+        if event.order is not None:
+            self.orders[event.order.id] = event.order
+        else:
+            self._take(event.key, event.path, event.body)
