@@ -1,9 +1,10 @@
 """Observing: the life of a driver's connection, kept by a thread of its own: opened, watched, lost, back."""
 
+import contextlib
 import logging
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Final
 
 from arcor2_hw.data.device import Connection
@@ -15,10 +16,29 @@ FIRST_PAUSE: Final = 0.1
 """Seconds before the first attempt: a device that resets a connection takes the next at once."""
 LONGEST_PAUSE: Final = 2.0
 """Seconds between attempts in the end: a device that was switched on is seen before its operator has walked back."""
+STEADY: Final = 0.5
+"""Seconds after which a connection that came back counts as one; one that breaks sooner does not shorten the pauses."""
+BREATH: Final = 0.005
+"""Seconds between two calls of a watch that returns though nobody told it to."""
 STOP_WITHIN: Final = 0.9
 """Seconds `stop` waits for the thread; disconnect may take one."""
 
 log = logging.getLogger(__name__)
+_made_here = threading.local()
+
+
+@contextlib.contextmanager
+def listening(changed: Callable[[], None]) -> Iterator[None]:
+    """Have `changed` called at every change of state of the connections that are made on this thread meanwhile.
+
+    It is called on the thread that changed the state, right after that; it must not raise, nor wait.
+    """
+    before = getattr(_made_here, "changed", None)
+    _made_here.changed = changed
+    try:
+        yield
+    finally:
+        _made_here.changed = before
 
 
 class Observing:
@@ -45,6 +65,15 @@ class Observing:
         self._ending: threading.Thread | None = None
         self._state = Connection.OFFLINE
         self._reason: DeviceError | None = None
+        self._turn = threading.Lock()
+        self._pause = FIRST_PAUSE
+        made_here: Callable[[], None] | None = getattr(_made_here, "changed", None)
+        self._changed: Callable[[], None] = (lambda: None) if made_here is None else made_here
+
+    @property
+    def reason(self) -> str:
+        """Tell why the connection is lost or failed; empty when it is not."""
+        return str(self._reason or "") if self._state in (Connection.LOST, Connection.FAILED) else ""
 
     @property
     def state(self) -> Connection:
@@ -58,8 +87,11 @@ class Observing:
 
     def settled(self) -> None:
         """Note that somebody has taken note of the connection being back."""
-        if self._state is Connection.BACK:
+        with self._turn:
+            if self._state is not Connection.BACK:
+                return
             self._state = Connection.ONLINE
+        self._changed()
 
     def check(self) -> None:
         """Return when the device is observed. Raises NotConnected, or ConnectionLost with what it was lost by."""
@@ -77,17 +109,18 @@ class Observing:
                 return
             deadline = time.monotonic() + timeout
             self._await_former(timeout)
-            self._state = Connection.CONNECTING
+            self._enter(Connection.CONNECTING)
             try:
                 self._open(max(deadline - time.monotonic(), 0.001))
             except BaseException as e:
                 self._close()
-                self._state = Connection.FAILED
                 self._reason = e if isinstance(e, DeviceError) else None
+                self._enter(Connection.FAILED)
                 raise
             self._reason = None
             self._stopping = threading.Event()
-            self._state = Connection.ONLINE
+            self._pause = FIRST_PAUSE
+            self._enter(Connection.ONLINE)
             self._thread = threading.Thread(
                 target=self._run, args=(self._stopping,), name=f"observing {self.what}", daemon=True
             )
@@ -101,7 +134,17 @@ class Observing:
             if thread is not None and thread is not threading.current_thread():
                 thread.join(STOP_WITHIN)
                 self._ending = thread if thread.is_alive() else None
-            self._state = Connection.OFFLINE
+            self._enter(Connection.OFFLINE)
+
+    def _enter(self, state: Connection, stopping: threading.Event | None = None) -> bool:
+        """Change the state, unless `stopping` says that this is over; tells whether it did."""
+        with self._turn:
+            if stopping is not None and stopping.is_set():
+                return False
+            changes, self._state = self._state is not state, state
+        if changes:
+            self._changed()
+        return True
 
     def _await_former(self, timeout: float) -> None:
         """Let a thread end that `stop` could not wait for: at its end it closes what is open."""
@@ -114,32 +157,44 @@ class Observing:
     def _run(self, stopping: threading.Event) -> None:
         try:
             while not stopping.is_set():
-                try:
-                    self._watch(stopping)
-                except DeviceError as e:
-                    self._come_back(stopping, e)
+                since = time.monotonic()
+                loss = self._attempt(lambda: self._watch(stopping))
+                if loss is None:
+                    stopping.wait(BREATH)  # a watch that returns at once must not keep a processor busy
+                    continue
+                if time.monotonic() - since >= STEADY:
+                    self._pause = FIRST_PAUSE
+                self._come_back(stopping, loss)
         finally:
             self._close()
 
+    def _attempt(self, work: Callable[[], None]) -> DeviceError | None:
+        """Do something of the driver's; gives what went wrong. A mistake in it is a loss too: nobody watches then."""
+        try:
+            work()
+        except DeviceError as e:
+            return e
+        except Exception as e:
+            if self._state is not Connection.LOST:  # else it was told, and attempts go on
+                log.exception("%s: an error inside the driver", self.what)
+            return ConnectionLost(f"{self.what}: an error inside the driver", f"{type(e).__name__}: {e}")
+        return None
+
     def _come_back(self, stopping: threading.Event, loss: DeviceError) -> None:
-        if stopping.is_set():
-            return
         self._reason = loss
-        self._state = Connection.LOST
+        if not self._enter(Connection.LOST, stopping):
+            return
         log.warning("%s lost: %s", self.what, loss)
-        self._tell_lost(loss)
-        since, pause = time.monotonic(), FIRST_PAUSE
+        self._attempt(lambda: self._tell_lost(loss))
+        since = time.monotonic()
         while True:
             self._close()
-            if stopping.wait(pause):
+            if stopping.wait(self._pause):
                 return
-            pause = min(2.0 * pause, LONGEST_PAUSE)
-            try:
-                self._open(ATTEMPT_TIMEOUT)
-            except DeviceError as e:
-                self._reason = e
+            self._pause = min(2.0 * self._pause, LONGEST_PAUSE)
+            if (error := self._attempt(lambda: self._open(ATTEMPT_TIMEOUT))) is not None:
+                self._reason = error
                 continue
-            if not stopping.is_set():
-                self._state = Connection.BACK
+            if self._enter(Connection.BACK, stopping):
                 log.warning("%s back after %.1f s", self.what, time.monotonic() - since)
             return
