@@ -14,7 +14,6 @@ from arcor2_fakes.erp.http import REASONS, BadRequest, Request, Requests, answer
 from arcor2_fakes.erp.planning import Planning, Problem
 from arcor2_fakes.wire import Connection, TcpWire
 
-
 LONGEST_OFF: Final = 60.0
 """s a power cycle may take."""
 
