@@ -18,7 +18,9 @@ class CellDevice(Data, frozen=True, forbid_unknown_fields=True):
     """One device: its name in the scene, its object type, its settings by name.
 
     bench: for the conformance suite, `module:Class` of a bench that knows more of the device than its settings say.
-    wire: for the suite, the settings that name host and port, or the port alone, of the connection that it may cut.
+    wire: for the suite, the settings that name host and port, or the port alone, of the connection that it may cut; a
+    number is a port that the device always has. real: whether it is a real device, which the suite does not touch
+    unasked; where it is not given, whatever is not on this machine is real.
     """
 
     name: str
@@ -26,7 +28,8 @@ class CellDevice(Data, frozen=True, forbid_unknown_fields=True):
     settings: dict[str, Any] = field(default_factory=dict)
     pose: Pose | Unset = UNSET
     bench: str | Unset = UNSET
-    wire: list[str] | Unset = UNSET
+    wire: list[str | int] | Unset = UNSET
+    real: bool | Unset = UNSET
 
     def __post_init__(self) -> None:
         if not is_valid_name(self.name):
