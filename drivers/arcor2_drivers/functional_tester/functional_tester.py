@@ -70,7 +70,7 @@ class FunctionalTester(Machine, CollisionObject):
         newest = self._observer.newest()
         if self._in_control and newest is not None and newest.state not in RUNNING:
             with contextlib.suppress(DeviceError):  # it is gone; its watchdog deals with that
-                self._observer.link.write(Holding.HOST_WATCHDOG, 0, timeout=0.3)
+                self._observer.link.write_registers(Holding.HOST_WATCHDOG, 0, timeout=0.3)
         self._drop_control()
         self._observer.disconnect()
 
@@ -98,7 +98,7 @@ class FunctionalTester(Machine, CollisionObject):
 
     def alarms(self) -> list[Alarm]:
         """Give the fault that stands."""
-        inputs = self._observer.current()
+        inputs = self._observer.current().value
         if not inputs.fault_code:
             return []
         fault = fault_of(inputs.fault_code)
@@ -106,21 +106,21 @@ class FunctionalTester(Machine, CollisionObject):
 
     def acknowledge(self, code: str) -> None:
         """Clear the fault `code`. Raises NotFound when it does not stand, Refused while its cause stands."""
-        if code == "0" or str(self._observer.fresh().fault_code) != code:
+        if code == "0" or str(self._observer.fresh().value.fault_code) != code:
             raise NotFound(f"{self._observer.who} has no alarm {code}")
         self.clear()
 
     # -------------------------------------------------------------------------------- control
     def take_control(self) -> None:
         """Arm the tester's host watchdog; from then on commands are sent. Raises NotInControl naming who has it."""
-        inputs = self._observer.fresh()
+        inputs = self._observer.fresh().value
         if (owner := self._other_owner(inputs)) is not None:
             raise NotInControl(f"{self._observer.who}: control is refused: {owner} has it")
         if self._in_control:
             return
         losses, link = self._observer.losses, self._observer.link
-        link.write(Holding.HOST_WATCHDOG, self._watchdog_ms)
-        if (kept := link.read_holding()[Holding.HOST_WATCHDOG]) != self._watchdog_ms:
+        link.write_registers(Holding.HOST_WATCHDOG, self._watchdog_ms)
+        if (kept := self._observer.read_holding()[Holding.HOST_WATCHDOG]) != self._watchdog_ms:
             raise Refused(f"{self._observer.who}: host_watchdog is {kept} ms after {self._watchdog_ms} was written")
         self._in_control = self._observer.guarded = True
         try:
@@ -134,10 +134,10 @@ class FunctionalTester(Machine, CollisionObject):
         """Switch the host watchdog off. Raises Refused while a test runs."""
         if not self._in_control:
             return
-        state = self._observer.fresh().state
+        state = self._observer.fresh().value.state
         if state in RUNNING:
             raise Refused(f"{self._observer.who}: release_control is refused in state {title(state)}: stop the test")
-        self._observer.link.write(Holding.HOST_WATCHDOG, 0)
+        self._observer.link.write_registers(Holding.HOST_WATCHDOG, 0)
         self._drop_control()
 
     def control_owner(self) -> str | None:
@@ -157,7 +157,7 @@ class FunctionalTester(Machine, CollisionObject):
         self._in_control = self._observer.guarded = False
 
     def _require_control(self, what: str) -> Inputs:
-        inputs = self._observer.fresh()
+        inputs = self._observer.fresh().value
         owner = self._other_owner(inputs)
         if owner is not None or not self._in_control:
             refused = f"{self._observer.who}: {what} is refused in state {title(inputs.state)}"
@@ -167,20 +167,20 @@ class FunctionalTester(Machine, CollisionObject):
     # -------------------------------------------------------------------------------- machine
     def machine_state(self) -> MachineState:
         """Give the present state. Raises Stale when the newest is too old, NotConnected, ConnectionLost."""
-        return self._observer.current().state
+        return self._observer.current().value.state
 
     def unit_mode(self) -> UnitMode:
         """Give what the key switch at the station says."""
-        return self._observer.current().mode
+        return self._observer.current().value.mode
 
     def counters(self) -> dict[str, int]:
         """Give the boards tested, passed and failed since the tester was switched on."""
-        inputs = self._observer.current()
+        inputs = self._observer.current().value
         return {"tested": inputs.tested, "passed": inputs.passed, "failed": inputs.failed}
 
     def permissives(self) -> list[tuple[str, bool]]:
         """Give what a test needs, each with whether it is met."""
-        inputs = self._observer.current()
+        inputs = self._observer.current().value
         return [
             ("door closed", inputs.door_closed),
             ("board present", inputs.board_present),
@@ -191,7 +191,7 @@ class FunctionalTester(Machine, CollisionObject):
 
     def stop_reason(self) -> str:
         """Tell why it stopped or aborted; empty when it did neither."""
-        inputs = self._observer.current()
+        inputs = self._observer.current().value
         if inputs.fault_code:
             return f"fault {inputs.fault_code}: {fault_of(inputs.fault_code).text}"
         if inputs.state in FALLEN:
@@ -201,7 +201,7 @@ class FunctionalTester(Machine, CollisionObject):
     def wait_for(self, state: MachineState, timeout: float) -> None:
         """Return when it is in `state`. Raises DeviceTimeout after `timeout` s, DeviceFault when it aborts instead."""
         what = f"reaching {title(state)}"
-        self._handshake.reach({state}, timeout, what, self._handshake.begin(what))
+        self._handshake.reach({state}, timeout, what, self._observer.begin(what))
 
     def command(self, command: MachineCommand) -> None:
         """Give a command; return when the tester has taken it. Raises Refused, naming command and state."""
@@ -210,7 +210,7 @@ class FunctionalTester(Machine, CollisionObject):
     def _command(self, command: MachineCommand, then: MachineState | None = None) -> None:
         """Give a command and see the tester arrive in the state `then`."""
         name = command.name.lower()
-        go_on = self._handshake.begin(name)
+        go_on = self._observer.begin(name)
         self._require_control(name)
         self._handshake.give(command, go_on)
         if then is not None:
@@ -222,11 +222,11 @@ class FunctionalTester(Machine, CollisionObject):
         What waits here ends with Cancelled at once. Nothing is sent when control is not ours: what runs then was
         started by somebody else.
         """
-        self._handshake.stop_waiting()
+        self._observer.stop_waiting()
         if not self._in_control:
             return
-        go_on = self._handshake.begin("stop")
-        if self._observer.fresh().state in FALLEN | {S.STOPPED, S.CLEARING}:
+        go_on = self._observer.begin("stop")
+        if self._observer.fresh().value.state in FALLEN | {S.STOPPED, S.CLEARING}:
             return
         self._handshake.give(MachineCommand.STOP, go_on)
         self._handshake.reach({S.STOPPED, *FALLEN}, TRANSITION, "stop", go_on)
@@ -253,10 +253,10 @@ class FunctionalTester(Machine, CollisionObject):
         assert 1 <= program <= 9
 
         what = f"test with program {program}"
-        go_on = self._handshake.begin(what)
+        go_on = self._observer.begin(what)
         before = self._require_control("test")
         if before.state in PASSING:
-            before = self._observer.wait(lambda now: now.state not in PASSING, TRANSITION, "coming to rest")
+            before = self._observer.wait(lambda now: now.state not in PASSING, TRANSITION, "coming to rest").value
         if before.state in FALLEN:
             raise self._handshake.fault(before, f"test is refused in state {title(before.state)}: what ran before")
         if before.state in (S.COMPLETE, S.STOPPED):
@@ -264,7 +264,7 @@ class FunctionalTester(Machine, CollisionObject):
             before = self._handshake.reach({S.IDLE}, TRANSITION, "the reset before the test", go_on)
         expected = (before.result_number + 1) & 0xFFFF
         go_on()
-        self._observer.link.write(Holding.TEST_PROGRAM, program)
+        self._observer.link.write_registers(Holding.TEST_PROGRAM, program)
 
         def finished(inputs: Inputs) -> bool:
             go_on()
@@ -276,7 +276,7 @@ class FunctionalTester(Machine, CollisionObject):
 
         try:
             self._handshake.give(MachineCommand.START, go_on)
-            after = self._observer.wait(finished, self._test_timeout, what)
+            after = self._observer.wait(finished, self._test_timeout, what).value
         except DeviceTimeout:
             with contextlib.suppress(DeviceError):  # the tester's watchdog is left then
                 self.stop()  # nothing may go on that nobody waits for any more
@@ -301,7 +301,7 @@ class FunctionalTester(Machine, CollisionObject):
         return self._measured("contact_resistance").contact_resistance
 
     def _measured(self, what: str) -> Inputs:
-        inputs = self._observer.fresh()
+        inputs = self._observer.fresh().value
         if inputs.result == 0:
             raise Refused(f"{self._observer.who}: {what} is refused in state {title(inputs.state)}: nothing was tested")
         return inputs
@@ -309,7 +309,7 @@ class FunctionalTester(Machine, CollisionObject):
     @action
     def board_present(self, *, an: str | None = None) -> bool:
         """Tell whether a board lies in the fixture."""
-        return self._observer.fresh().board_present
+        return self._observer.fresh().value.board_present
 
     @action
     def reset(self, *, an: str | None = None) -> None:

@@ -5,8 +5,9 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from arcor2_hw.exceptions import Cancelled, DeviceError, DeviceFault, DeviceTimeout, Refused, SafetyStop
+from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, Refused, SafetyStop
 from arcor2_hw.objects import MachineCommand, MachineState
+from arcor2_hw.objects.polled import GoOn
 
 from .observer import Observer
 from .registers import (
@@ -27,9 +28,6 @@ from .settings import FunctionalTesterSettings
 TRANSITION: Final = 3.0
 """s the tester has to pass through a short state: Resetting, Clearing, Stopping, Aborting take some 0.2 s."""
 
-GoOn = Callable[[], None]
-"""Returns while one may go on; raises Cancelled or ConnectionLost when not."""
-
 
 class Handshake:
     """Hands commands over, one at a time."""
@@ -39,24 +37,6 @@ class Handshake:
         self._settings = settings
         self._who = observer.who
         self._one_command = threading.Lock()
-        self._stops = 0
-
-    # -------------------------------------------------------------------------------- giving up
-    def stop_waiting(self) -> None:
-        """End with Cancelled what was begun before."""
-        self._stops += 1
-        self._observer.wake()
-
-    def begin(self, what: str) -> GoOn:
-        """Give the check for what begins now: it raises after a stop, and after a loss that is over already."""
-        stops, losses = self._stops, self._observer.losses
-
-        def check() -> None:
-            if self._stops != stops:
-                raise Cancelled(f"{self._who}: {what} was stopped")
-            self._observer.check_unbroken(losses)
-
-        return check
 
     # -------------------------------------------------------------------------------- commands
     def give(self, command: MachineCommand, go_on: GoOn) -> None:
@@ -65,17 +45,17 @@ class Handshake:
         if command not in COMMANDS:
             raise Refused(f"{self._who}: {name} is refused in state {self._state()}: it has no such command")
         with self._one_command:
-            before = self._observer.fresh()
+            before = self._observer.fresh().value
             link = self._observer.link
             # Not counted here: the tester may have been switched off and on, or another host may have been at it.
-            sequence = (link.read_holding()[Holding.COMMAND_SEQUENCE] + 1) & 0xFFFF
+            sequence = (self._observer.read_holding()[Holding.COMMAND_SEQUENCE] + 1) & 0xFFFF
             go_on()
-            link.write(Holding.COMMAND, command, sequence)
+            link.write_registers(Holding.COMMAND, command, sequence)
             after = self._observer.wait(
                 lambda now: now.command_acknowledged == sequence,
                 4.0 * self._settings.request_timeout,
                 f"taking the command {name}",
-            )
+            ).value
         if after.command_result != ACCEPTED:
             why = REFUSALS.get(after.command_result, f"result {after.command_result}")
             if before.emergency_stop:
@@ -83,7 +63,7 @@ class Handshake:
             raise Refused(f"{self._who}: {name} is refused in state {title(before.state)}: {why}")
 
     def _state(self) -> str:
-        return title(self._observer.fresh().state)
+        return title(self._observer.fresh().value.state)
 
     def reach(self, wanted: set[MachineState], timeout: float, what: str, go_on: GoOn) -> Inputs:
         """Wait for one of the states. Raises DeviceTimeout, and DeviceFault or SafetyStop when it aborts instead."""
@@ -96,7 +76,7 @@ class Handshake:
                 raise self.fault(inputs, what)
             return False
 
-        return self._observer.wait(arrived, timeout, what)
+        return self._observer.wait(arrived, timeout, what).value
 
     def fault(self, inputs: Inputs, what: str) -> DeviceError:
         """Give the error for a tester that has aborted."""
@@ -110,7 +90,7 @@ class Handshake:
     # -------------------------------------------------------------------------------- door
     def move_door(self, command: int, what: str, arrived: Callable[[Inputs], bool]) -> None:
         """Move the door and wait for its end position. The tester tells no refusal, so the state is looked at."""
-        go_on = self.begin(what)
+        go_on = self._observer.begin(what)
         began = time.monotonic()
 
         def done(inputs: Inputs) -> bool:
@@ -129,9 +109,9 @@ class Handshake:
         self._observer.wait(movable, TRANSITION, f"{what}: reaching a state that lets the door move")
         with self._one_command:
             link = self._observer.link
-            sequence = (link.read_holding()[Holding.DOOR_SEQUENCE] + 1) & 0xFFFF
+            sequence = (self._observer.read_holding()[Holding.DOOR_SEQUENCE] + 1) & 0xFFFF
             go_on()
-            link.write(Holding.DOOR_COMMAND, command, sequence)
+            link.write_registers(Holding.DOOR_COMMAND, command, sequence)
         left = max(0.1, began + self._settings.door_timeout - time.monotonic())
         try:
             self._observer.wait(done, left, what)

@@ -5,26 +5,28 @@ import random
 import threading
 import time
 from collections.abc import Callable, Mapping
-from typing import Final, NamedTuple
+from typing import Final
 
-from arcor2_hw.data.base import Timestamp, now
+from arcor2_hw.data.base import now
 from arcor2_hw.exceptions import (
     Cancelled,
     ConnectionLost,
     DeviceError,
+    DeviceFault,
     DeviceTimeout,
     NotInControl,
     OutOfRange,
     Refused,
 )
-from arcor2_hw.objects.observing import Observing
+from arcor2_hw.objects.modbus_link import ModbusLink
+from arcor2_hw.objects.polled import Polled, Snapshot
 
-from .edges import Debounced, Subscriptions
-from .link import BlockLink
+from .edges import Debounced, Edge, Subscriptions
 from .points import Point
 from .registers import (
     ACKNOWLEDGE,
     COMMAND,
+    IMAGE_COUNT,
     LONGEST_PULSE,
     PULSE,
     RELEASE,
@@ -32,6 +34,7 @@ from .registers import (
     Image,
     WatchdogState,
     arming,
+    decode,
     watchdog_address,
     word,
 )
@@ -39,17 +42,11 @@ from .settings import BlockSettings, within
 
 PERIOD: Final = 0.02
 """s between readings: an edge is seen when the level stands that long."""
+REFUSALS: Final = {4: "an expired watchdog holds the output"}
+"""Modbus exceptions as the block's page says, where they mean something else than usual."""
 
 
-class Snapshot(NamedTuple):
-    """What was read, and when it was asked for: on the monotonic clock and in UTC."""
-
-    image: Image
-    asked: float
-    stamp: Timestamp
-
-
-class Block:
+class Block(Polled[Image]):
     """Keeps the newest image of a block, and control of its outputs once that was taken.
 
     tick: called on the observing thread after each reading while we have control.
@@ -59,74 +56,77 @@ class Block:
         self, name: str, settings: BlockSettings, points: Mapping[str, Point], tick: Callable[[], None] = lambda: None
     ) -> None:
         self._settings, self.points, self._tick = settings, points, tick
-        self.link = BlockLink(name, settings)
-        self.who = self.link.who
-        self.observing = Observing(self.who, self._open, self._watch, self.link.close, self._lost)
+        self.link = ModbusLink(
+            name,
+            settings.host,
+            settings.port,
+            settings.unit_id,
+            settings.request_timeout,
+            serial_port=settings.serial_port,
+            baudrate=settings.baudrate,
+            exceptions=REFUSALS,
+        )
+        # A reading asked for twice with the line drained in between, behind another request of the same kind.
+        self._patience = 6.0 * settings.request_timeout
+        super().__init__(
+            self.link.who,
+            self._open_block,
+            self._read_image,
+            self.link.close,
+            quiet=PERIOD,
+            busy=PERIOD,
+            answers_within=self._patience,
+            taken=self._note,
+            after=self._keep_control,
+            lost=lambda _: self._drop("control ended when the connection was lost"),
+            interrupt=self.link.close,
+        )
         self.subscriptions = Subscriptions()
         self._watchdog = watchdog_address(settings.watchdog)
         self._number = random.randint(1, 0xFFFF)  # tells our watchdog from another host's
         self._inputs = {
             name: Debounced(name, point.io.debounce) for name, point in points.items() if point.kind in ("DI", "DO")
         }
-        self._news = threading.Condition()
+        self._edges: list[Edge] = []
         self._commands = threading.Lock()
-        self._newest: Snapshot | None = None
         self._armed = 0.0
         self._triggered = 0.0
         self.in_control = False
         self._why_not = "nobody has control"
-        self._losses = 0
-        self._stops = 0
-        self._loss: DeviceError | None = None
-        self._ending = False
-        self._hurry = threading.Event()
 
     # -------------------------------------------------------------------------------- life
-    def connect(self, timeout: float) -> None:
-        """Begin to observe. Raises NotConnected, DeviceTimeout, DeviceFault, ConnectionLost."""
-        self._ending = False
-        self.observing.start(timeout)
-
     def disconnect(self) -> None:
         """Put our outputs into their safe state and stop observing; harmless when it was not."""
         with contextlib.suppress(DeviceError):  # it is gone; its watchdog deals with that
             if self.in_control and self.observing.online:
                 self.link.write_registers(self._watchdog + COMMAND, RELEASE, timeout=0.3)
-        self._ending = True
         self._drop("nobody has control")
-        self.link.close()
-        self._hurry.set()
-        self.observing.stop()
-        self._newest = None
-        self.stop()
-
-    def stop(self) -> None:
-        """End whatever waits, with Cancelled. Outputs stay, but a pulse that is waited for ends."""
-        with self._news:
-            self._stops += 1
-            self._news.notify_all()
+        super().disconnect()
+        self.stop_waiting()
 
     # -------------------------------------------------------------------------------- control
     def take_control(self) -> None:
         """Arm the block's watchdog with what each output does on loss; no output is written. Raises NotInControl."""
         with self._commands:
-            if (owner := self._other_owner(self.fresh().image)) is not None:
+            if (owner := self._other_owner(self.fresh().value)) is not None:
                 raise NotInControl(f"{self.who}: control is refused: {owner} has it")
             if self.in_control:
                 return
-            losses = self._losses
+            losses = self.losses
             registers = arming(self.points.values(), self._settings.watchdog_ms, self._number)
             self.link.write_registers(self._watchdog + COMMAND, ACKNOWLEDGE)
             self.link.write_registers(self._watchdog, *registers)
-            kept = self.link.read_registers(self._watchdog, len(registers))
+            kept = self.link.read_holding_registers(self._watchdog, len(registers))
             if kept != registers:
                 raise Refused(f"{self.who}: its watchdog keeps {kept} after {registers} was written")
-            with self._news:
+            with self.taking:
                 self._armed = self._triggered = time.monotonic()
                 self.in_control = True
-            if losses != self._losses:
+            try:
+                self.check_unbroken(losses)
+            except DeviceError:
                 self._drop("the connection was lost")
-                raise ConnectionLost(f"{self.who}: the connection was lost", str(self._loss or ""))
+                raise
             self.observing.settled()
 
     def release_control(self) -> None:
@@ -140,11 +140,11 @@ class Block:
         """Tell who has control: us, another host by its number, or nobody."""
         if self.in_control:
             return "us"
-        newest = self._newest
-        return None if newest is None else self._other_owner(newest.image)
+        newest = self.newest()
+        return None if newest is None else self._other_owner(newest)
 
     def _other_owner(self, image: Image) -> str | None:
-        state, number = image.watchdogs[self._settings.watchdog], image.numbers[self._settings.watchdog]
+        state, number = image.watchdog(self._settings.watchdog)
         if state is WatchdogState.RUNNING and number != self._number:
             return f"another host (number {number} on watchdog {self._settings.watchdog})"
         return None
@@ -206,14 +206,14 @@ class Block:
             raise
 
     def _pulse(self, point: Point, duration: float) -> None:
-        stops = self._stops
+        go_on = self.begin(f"the pulse of {point.io.name}")
         self.link.write_registers(PULSE + point.channel, round(1000.0 * duration))
 
         def over(image: Image) -> bool:
             self.require_control(f"the pulse of {point.io.name}")
             return not image.digital("DO", point.channel)
 
-        self.wait(over, duration + self._patience, f"the pulse of {point.io.name}", stops)
+        self.wait(over, duration + self._patience, f"the pulse of {point.io.name}", go_on)
 
     def set_again(self, name: str, value: bool) -> None:
         """Switch a digital output; a second time when no answer came. Only where doing it twice does no harm."""
@@ -222,81 +222,46 @@ class Block:
         except DeviceTimeout:
             self.write_digital(name, value)
 
-    # -------------------------------------------------------------------------------- waiting
-    @property
-    def stops(self) -> int:
-        """Give how often `stop` was called."""
-        return self._stops
-
-    @property
-    def _patience(self) -> float:
-        # A reading asked for twice with the line drained in between, behind another request of the same kind.
-        return 6.0 * self._settings.request_timeout
-
-    def newest(self) -> Image | None:
-        """Give the newest image however old, None when there never was one."""
-        newest = self._newest
-        return None if newest is None else newest.image
-
-    def ask(self) -> Snapshot:
+    # -------------------------------------------------------------------------------- images
+    def ask(self) -> Snapshot[Image]:
         """Read an image now, on the caller's thread: quicker than `fresh`, and unknown to points that are debounced."""
         self.observing.check()
         asked, stamp = time.monotonic(), now()
-        return Snapshot(self.link.read_image(), asked, stamp)
+        return Snapshot(self._read_image(), asked, stamp)
 
-    def fresh(self) -> Snapshot:
-        """Give an image that was asked for after this call. Raises DeviceTimeout, NotConnected, ConnectionLost."""
-        return self.wait(lambda _: True, self._patience, "telling its state")
-
-    def wait(self, holds: Callable[[Image], bool], timeout: float, what: str, stops: int | None = None) -> Snapshot:
-        """Give the first image asked for from now on of which `holds` is true; `holds` may raise.
-
-        stops: of when the caller began; a stop since then ends the waiting. Raises DeviceTimeout naming `what` after
-        `timeout` s, ConnectionLost as soon as the connection is lost, Cancelled.
-        """
-        began, losses = time.monotonic(), self._losses
-        self._hurry.set()
-        with self._news:
-            while True:
-                if stops not in (None, self._stops):
-                    raise Cancelled(f"{self.who}: {what} was stopped")
-                if losses != self._losses:
-                    raise ConnectionLost(f"{self.who}: the connection was lost", str(self._loss or "")) from self._loss
-                self.observing.check()
-                newest = self._newest
-                if newest is not None and newest.asked >= began and holds(newest.image):
-                    return newest
-                left = began + timeout - time.monotonic()
-                if left <= 0.0:
-                    raise DeviceTimeout(f"{self.who}: {what} took longer than {timeout:g} s")
-                self._news.wait(left)
+    def _read_image(self, timeout: float | None = None) -> Image:
+        words = self.link.read_input_registers(0, IMAGE_COUNT, timeout)
+        try:
+            return decode(words)
+        except ValueError as error:
+            raise DeviceFault(f"{self.who} tells what no block of this kind tells: {error}") from error
 
     # -------------------------------------------------------------------------------- on the observing thread
-    def _open(self, timeout: float) -> None:
+    def _open_block(self, timeout: float) -> Image:
         deadline = time.monotonic() + timeout
         for each in self._inputs.values():
             each.forget()
         self.link.open(timeout)
         # Asked for twice at most, a serial line drained in between.
-        self._take(min(self._settings.request_timeout, max(0.02, (deadline - time.monotonic()) / 3.0)))
+        return self._read_image(min(self._settings.request_timeout, max(0.02, (deadline - time.monotonic()) / 3.0)))
 
-    def _watch(self, stopping: threading.Event) -> None:
-        while not stopping.is_set():
-            self._hurry.wait(PERIOD)
-            self._hurry.clear()
-            if stopping.is_set():
-                return
-            try:
-                self._take(self._settings.request_timeout)
-                if self.in_control:
-                    self._keep_quiet()
-                    self._tick()
-            except NotInControl:
-                continue  # given back or lost meanwhile
-            except DeviceError:
-                if not self._ending:
-                    raise
-                stopping.wait(0.5)  # closed by us: no loss to tell of
+    def _note(self, snapshot: Snapshot[Image]) -> None:
+        image, asked, _ = snapshot
+        self._check_control(image, asked)
+        for name, each in self._inputs.items():
+            point = self.points[name]
+            edge = each.take(image.digital(point.kind, point.channel), asked)
+            if edge is not None:
+                self._edges.append(edge)
+
+    def _keep_control(self) -> None:
+        edges, self._edges = self._edges, []
+        for edge in edges:
+            self.subscriptions.tell(edge)
+        if self.in_control:
+            with contextlib.suppress(NotInControl):  # given back or lost meanwhile
+                self._keep_quiet()
+                self._tick()
 
     def _keep_quiet(self) -> None:
         if time.monotonic() - self._triggered < self._settings.watchdog_ms / 5000.0:
@@ -307,34 +272,13 @@ class Block:
             self.link.write_registers(self._watchdog + TRIGGER, self._number)
         self._triggered = time.monotonic()
 
-    def _take(self, timeout: float) -> None:
-        asked, stamp = time.monotonic(), now()
-        image = self.link.read_image(timeout)
-        edges = []
-        with self._news:
-            self._newest = Snapshot(image, asked, stamp)
-            self._check_control(image, asked)
-            for name, each in self._inputs.items():
-                point = self.points[name]
-                edges.append(each.take(image.digital(point.kind, point.channel), asked))
-            self._news.notify_all()
-        for edge in filter(None, edges):
-            self.subscriptions.tell(edge)
-
     def _check_control(self, image: Image, asked: float) -> None:
         if not self.in_control or asked < self._armed:
             return
-        state = image.watchdogs[self._settings.watchdog]
+        state, _ = image.watchdog(self._settings.watchdog)
         if state is WatchdogState.EXPIRED:
             self._drop("the block's watchdog has expired; its outputs are in their safe state until control is taken")
         elif state is WatchdogState.OFF:
             self._drop("the block's watchdog is off: it was switched off and on, or another host was at it")
         elif (owner := self._other_owner(image)) is not None:
             self._drop(f"{owner} has control")
-
-    def _lost(self, error: DeviceError) -> None:
-        self._drop("control ended when the connection was lost")
-        with self._news:
-            self._loss = error
-            self._losses += 1
-            self._news.notify_all()

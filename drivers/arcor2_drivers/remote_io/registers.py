@@ -35,38 +35,45 @@ class WatchdogState(enum.IntEnum):
 
 
 class Image(NamedTuple):
-    """The process image, of one instant."""
+    """The process image, of one instant: the input registers as they came, taken apart where somebody looks."""
 
-    digital_inputs: int
-    digital_outputs: int
-    analog_inputs: tuple[int, ...]
-    analog_outputs: tuple[int, ...]
-    diagnosis: int
-    watchdogs: tuple[WatchdogState, ...]
-    numbers: tuple[int, ...]
+    words: Sequence[int]
+
+    @property
+    def digital_inputs(self) -> int:
+        """Give the inputs as bits."""
+        return self.words[0]
+
+    @property
+    def digital_outputs(self) -> int:
+        """Give the outputs as bits."""
+        return self.words[1]
+
+    @property
+    def diagnosis(self) -> int:
+        """Give the diagnosis bits."""
+        return self.words[8]
 
     def digital(self, kind: str, channel: int) -> bool:
         """Give a digital channel."""
-        return bool((self.digital_inputs if kind == "DI" else self.digital_outputs) >> channel & 1)
+        return bool(self.words[0 if kind == "DI" else 1] >> channel & 1)
 
     def analog(self, kind: str, channel: int) -> int:
         """Give the raw value of an analogue channel."""
-        return (self.analog_inputs if kind == "AI" else self.analog_outputs)[channel]
+        return _signed(self.words[(2 if kind == "AI" else 6) + channel])
+
+    def watchdog(self, index: int) -> tuple[WatchdogState, int]:
+        """Give what a watchdog is doing, and the number of the host that triggers it."""
+        return WatchdogState(self.words[9 + index]), self.words[13 + index]
 
 
 def decode(words: Sequence[int]) -> Image:
-    """Take input registers 0 to 16 apart. Raises ValueError for what no block tells."""
+    """Take input registers 0 to 16. Raises ValueError for what no block tells."""
     if len(words) != IMAGE_COUNT:
         raise ValueError(f"{len(words)} of {IMAGE_COUNT} input registers came")
-    return Image(
-        words[0],
-        words[1],
-        tuple(map(_signed, words[2:6])),
-        tuple(map(_signed, words[6:8])),
-        words[8],
-        tuple(WatchdogState(word) for word in words[9:13]),
-        tuple(words[13:17]),
-    )
+    if (state := max(words[9:13])) > WatchdogState.EXPIRED:
+        raise ValueError(f"a watchdog in state {state}")
+    return Image(words)
 
 
 def watchdog_address(index: int) -> int:

@@ -79,7 +79,7 @@ class RemoteIO(IOBlock):
 
     def alarms(self) -> list[Alarm]:
         """Give what the block complains of; each ends with its cause."""
-        return diagnoses(self._block.fresh().image.diagnosis)
+        return diagnoses(self._block.fresh().value.diagnosis)
 
     def take_control(self) -> None:
         """Arm the block's watchdog; outputs stay as they are. Raises NotInControl naming who has it."""
@@ -110,13 +110,13 @@ class RemoteIO(IOBlock):
         point = self._block.point(name)
         if point.io.debounce:
             _, asked, stamp = self._block.fresh()
-            return Reading[bool | float](self._block.digital(name), stamp, asked)
+            return Reading(self._block.digital(name), stamp, asked)
         image, asked, stamp = self._block.ask()
         if point.kind in ("DI", "DO"):
-            return Reading[bool | float](image.digital(point.kind, point.channel), stamp, asked)
+            return Reading(image.digital(point.kind, point.channel), stamp, asked)
         raw = image.analog(point.kind, point.channel)
         quality = Quality.BAD if point.kind == "AI" and raw == BROKEN_WIRE else Quality.GOOD
-        return Reading[bool | float](point.physical(raw), stamp, asked, quality)
+        return Reading(point.physical(raw), stamp, asked, quality)
 
     def write(self, name: str, value: bool | float) -> None:
         """Write an output. Raises Refused for an input, NotInControl, OutOfRange, ConnectionLost, DeviceTimeout."""
@@ -135,7 +135,7 @@ class RemoteIO(IOBlock):
 
     def stop(self) -> None:
         """End what waits here with Cancelled, and a pulse with its output off. No other output changes."""
-        self._block.stop()
+        self._block.stop_waiting()
 
     # -------------------------------------------------------------------------------- actions
     @action
@@ -200,12 +200,12 @@ class RemoteIO(IOBlock):
         """
         assert 0.0 <= timeout <= 600.0
 
-        block, stops = self._block, self._block.stops
+        block = self._block
+        what = f"{name} becoming {'on' if value else 'off'}"
+        go_on = block.begin(what)
         block.point(name, "DI", "DO")
         within(f"{block.who}: timeout", timeout, 0.0, LONGEST_WAIT)
         block.fresh()
         if block.digital(name) == value:
             return
-        block.wait(
-            lambda _: block.digital(name) == value, timeout, f"{name} becoming {'on' if value else 'off'}", stops
-        )
+        block.wait(lambda _: block.digital(name) == value, timeout, what, go_on)

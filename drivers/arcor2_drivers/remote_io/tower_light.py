@@ -101,7 +101,7 @@ class TowerLight(Generic):
 
     def alarms(self) -> list[Alarm]:
         """Give what the block complains of; each ends with its cause."""
-        return diagnoses(self._block.fresh().image.diagnosis)
+        return diagnoses(self._block.fresh().value.diagnosis)
 
     def take_control(self) -> None:
         """Arm the block's watchdog; the lamps stay as they are. Raises NotInControl naming who has it."""
@@ -125,7 +125,7 @@ class TowerLight(Generic):
 
     def stop(self) -> None:
         """End a sound of the buzzer; the lamps stay as they are."""
-        self._block.stop()
+        self._block.stop_waiting()
 
     # -------------------------------------------------------------------------------- actions
     @action
