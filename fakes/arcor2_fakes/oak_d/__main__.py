@@ -1,0 +1,158 @@
+"""Starts the fake camera: `python -m arcor2_fakes.oak_d`."""
+
+from __future__ import annotations
+
+import asyncio
+import importlib.util
+import sys
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import msgspec
+from cyclopts import App, Parameter, validators
+
+from arcor2_fakes.control import ControlServer, parse_address
+from arcor2_fakes.oak_d.camera import Camera
+from arcor2_fakes.oak_d.optics import Lens
+from arcor2_fakes.oak_d.pictures import Pictures
+from arcor2_fakes.oak_d.scene import Pose, Scene
+from arcor2_fakes.process import announce, run, until_told_to_end
+from arcor2_fakes.wire import TcpWire, register_faults
+
+app = App(name="arcor2_fakes.oak_d", help="Fake OAK-D: rendered colour and depth over TCP.", version_flags=[])
+
+LOOKING_DOWN: Final = Pose((0.0, 0.0, 0.8), (1.0, 0.0, 0.0, 0.0))
+"""Over the middle of the table, the picture's top towards +y."""
+SWITCHES: Final = {
+    "lens_covered": "covered",
+    "depth_off": "depth_off",
+    "overexposed": "overexposed",
+    "frozen": "frozen",
+    "wrong_checksum": "wrong_checksum",
+}
+
+
+class StartScene(msgspec.Struct, forbid_unknown_fields=True):
+    """The file given by --scene."""
+
+    things: list[dict[str, Any]] = []
+    camera: dict[str, Any] | None = None
+    table_height: float = 0.0
+
+
+def read_scene(path: Path | None) -> Scene:
+    """Read what stands there at the start. Raises ValueError naming the file."""
+    try:
+        given = StartScene() if path is None else msgspec.json.decode(path.read_bytes(), type=StartScene)
+        scene = Scene(LOOKING_DOWN, given.table_height)
+        if given.camera is not None:
+            scene.look_from(given.camera)
+        scene.replace(given.things)
+    except (OSError, ValueError) as e:
+        raise ValueError(f"scene {path}: {e}") from e
+    return scene
+
+
+def register_commands(control: ControlServer, camera: Camera, wire: TcpWire, boot_time: float) -> None:
+    """Make what the world and a test can do known to the control channel."""
+    scene = camera.scene
+
+    def switch(attribute: str) -> Any:
+        def apply(on: bool = True) -> None:
+            setattr(camera, attribute, bool(on))
+
+        return apply
+
+    def move(name: str | None = None, pose: Any = None, poses: dict[str, Any] | None = None) -> None:
+        scene.move({**(poses or {}), **({} if name is None else {name: pose})})
+
+    async def power_cycle(seconds: float | None = None) -> None:
+        camera.switch_off()
+        wire.refuse()
+        await asyncio.sleep(boot_time if seconds is None else seconds)
+        await wire.listen()
+        camera.switch_on()
+
+    async def heal() -> None:
+        for attribute in SWITCHES.values():
+            setattr(camera, attribute, False)
+        await wire.fault("heal")
+        if camera.off:
+            camera.switch_on()
+        camera.heat(48.0)
+
+    for name, attribute in SWITCHES.items():
+        control.command(name, switch(attribute))
+    control.command("scene", lambda things=(), table_height=None: scene.replace(things, table_height))
+    control.command("place", lambda thing: scene.place(thing))
+    control.command("remove", lambda name: scene.remove(name))
+    control.command("camera", lambda pose: scene.look_from(pose))
+    control.command("move", move)
+    control.command("overheat", lambda temperature=96.0: camera.heat(temperature))
+    control.command("power_cycle", power_cycle)
+    register_faults(control, {"stream": wire})
+    control.command("heal", heal)  # the device's own faults too
+
+
+@app.default
+def main(
+    *,
+    listen: str = "127.0.0.1:0",
+    control: str = "127.0.0.1:0",
+    scene: Path | None = None,
+    fps: Annotated[float, Parameter(validator=validators.Number(gt=0, lte=60))] = 30.0,
+    width: Annotated[int, Parameter(validator=validators.Number(gte=160, lte=1920))] = 1280,
+    height: Annotated[int, Parameter(validator=validators.Number(gte=120, lte=1080))] = 720,
+    noise: Annotated[float, Parameter(validator=validators.Number(gte=0, lte=10))] = 1.0,
+    boot_time: Annotated[float, Parameter(validator=validators.Number(gte=0, lte=60))] = 1.5,
+    time_scale: Annotated[float, Parameter(validator=validators.Number(gt=0, lte=100))] = 1.0,
+    seed: int = 0,
+) -> int:
+    """Start the fake; it prints one line `ready {json}` with its addresses and ends on SIGTERM.
+
+    Args:
+        listen: HOST:PORT of the stream; port 0 takes a free one.
+        control: HOST:PORT of the control channel; port 0 takes a free one.
+        scene: JSON file {"things": [...], "camera": POSE, "table_height": m} of what is there at the start.
+        fps: frames a second while somebody watches.
+        width: pixels.
+        height: pixels.
+        noise: how much of the usual noise there is; 0 for none.
+        boot_time: s for which a power cycle lasts.
+        time_scale: how many times faster than in reality it boots.
+        seed: of the noise.
+    """
+    try:
+        stream_address, control_address = parse_address(listen), parse_address(control)
+        start_scene = read_scene(scene)
+    except ValueError as e:
+        sys.stderr.write(f"oak_d: {e}\n")
+        return 2
+    for module in ("open3d", "cv2"):
+        if importlib.util.find_spec(module) is None:
+            sys.stderr.write(f"oak_d: {module} is not installed; it comes with the extra `vision`\n")
+            return 1
+
+    async def body() -> None:
+        lens = Lens(width, height)
+        pictures = Pictures(lens, noise, seed)
+        camera = Camera(start_scene, lens, fps, pictures.take)
+        wire = TcpWire("stream", *stream_address, camera.opened)
+        channel = ControlServer(*control_address)
+        register_commands(channel, camera, wire, boot_time / time_scale)
+        channel.source("truth", lambda: {**camera.truth(), "rendered": pictures.rendered})
+        await wire.listen()
+        camera.start()
+        try:
+            announce(name="oak_d", stream=wire.address, control=await channel.start())
+            await until_told_to_end()
+        finally:
+            await camera.stop()
+            wire.close()
+            await channel.close()
+
+    return run(body, "oak_d")
+
+
+if __name__ == "__main__":
+    sys.exit(app())

@@ -1,0 +1,213 @@
+"""Rendering: rays cast at the scene, a colour and a depth for every pixel, without noise."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import open3d as o3d
+
+from arcor2_fakes.oak_d.optics import Lens
+from arcor2_fakes.oak_d.scene import Matrix, Pose, Thing
+
+Bytes = npt.NDArray[np.uint8]
+Floats = npt.NDArray[np.float32]
+
+TABLE: Final = (1.6, 1.6, 0.02)
+TABLE_COLOR: Final = (172, 164, 150)
+BACKGROUND: Final = (58, 52, 48)
+LIGHT: Final = np.array([0.35, -0.25, 0.9]) / np.linalg.norm([0.35, -0.25, 0.9])
+AMBIENT: Final = 0.45
+PIXELS_PER_MODULE: Final = 24
+MOST_SOLIDS: Final = 500
+
+
+class View(NamedTuple):
+    """What the camera would see without noise: colour as B, G, R, depth in m, 0 where there is nothing."""
+
+    color: Bytes
+    depth: Floats
+
+
+class Solid(NamedTuple):
+    """A thing as triangles in its own frame, with the picture on its top, if any."""
+
+    vertices: Floats
+    triangles: npt.NDArray[np.uint32]
+    texture: Bytes | None = None
+    texture_size: tuple[float, float] = (0.0, 0.0)
+
+
+def load_mesh(path: str) -> Solid:
+    """Read a mesh, in metres. Raises ValueError when it is none."""
+    mesh = o3d.io.read_triangle_mesh(Path(path))
+    vertices = np.asarray(mesh.vertices, dtype=np.float32)
+    if not len(mesh.triangles) or not np.isfinite(vertices).all():
+        raise ValueError(f"{path} is no mesh")
+    return Solid(vertices, np.asarray(mesh.triangles, dtype=np.uint32))
+
+
+def box(size: tuple[float, float, float]) -> Solid:
+    """Give a box about its middle, 12 triangles."""
+    mesh = o3d.geometry.TriangleMesh.create_box(*size)
+    vertices = np.asarray(mesh.vertices) - np.asarray(size) / 2.0
+    return Solid(vertices.astype(np.float32), np.asarray(mesh.triangles, dtype=np.uint32))
+
+
+def _dictionary(name: str) -> Any:
+    number = getattr(cv2.aruco, name, None) if name.startswith("DICT_") else None
+    if not isinstance(number, int):
+        raise ValueError(f"no dictionary {name}")
+    return cv2.aruco.getPredefinedDictionary(number)
+
+
+def solid_of(thing: Thing) -> Solid:
+    """Give the triangles of a thing. Raises ValueError for a mesh or a marker that is none."""
+    if thing.mesh is not None:
+        return load_mesh(thing.mesh)
+    assert thing.size is not None
+    solid = box(thing.size)
+    try:
+        if (marker := thing.marker) is not None:
+            dictionary = _dictionary(marker.dictionary)
+            modules = dictionary.markerSize + 2
+            picture = cv2.aruco.generateImageMarker(dictionary, marker.id, modules * PIXELS_PER_MODULE)
+            framed = np.pad(picture, PIXELS_PER_MODULE, constant_values=255)
+            side = marker.size * (modules + 2) / modules
+            return solid._replace(texture=np.asarray(framed, np.uint8), texture_size=(side, side))
+        if (board := thing.charuco) is not None:
+            pattern = cv2.aruco.CharucoBoard(
+                (board.columns, board.rows), board.square, board.marker, _dictionary(board.dictionary)
+            )
+            pixels = 6 * PIXELS_PER_MODULE
+            picture = pattern.generateImage((board.columns * pixels, board.rows * pixels))
+            size = (board.columns * board.square, board.rows * board.square)
+            return solid._replace(texture=np.asarray(picture, np.uint8), texture_size=size)
+    except cv2.error as e:
+        raise ValueError(f"{thing.name}: {e.err}") from e
+    return solid
+
+
+class Renderer:
+    """Casts the rays of one lens: at the table when camera or table have moved, at things only where they can be seen.
+
+    Not thread-safe.
+    """
+
+    def __init__(self, lens: Lens) -> None:
+        self._lens = lens
+        self._rays = lens.rays()
+        self._solids: dict[tuple[Any, ...], Solid] = {}
+        self._behind: tuple[tuple[Pose, float], View] | None = None
+
+    def view(self, camera: Pose, table_height: float, things: tuple[Thing, ...]) -> View:
+        """Give what is seen from the camera's pose. Raises ValueError for a thing that cannot be drawn."""
+        world_from_camera = camera.matrix()
+        table = _Part(box(TABLE), Pose((0.0, 0.0, table_height - TABLE[2] / 2.0)).matrix(), TABLE_COLOR)
+        everywhere = (slice(0, self._lens.height), slice(0, self._lens.width))
+        if self._behind is None or self._behind[0] != (camera, table_height):
+            empty = View(np.zeros(self._rays.shape, np.uint8), np.zeros(self._rays.shape[:2], np.float32))
+            _Cast([table]).into(empty, self._rays, world_from_camera, everywhere)
+            self._behind = ((camera, table_height), empty)
+        behind = self._behind[1]
+        view = View(behind.color.copy(), behind.depth.copy())
+        parts = [_Part(self._solid(thing), thing.pose.matrix(), thing.color) for thing in things]
+        if parts:
+            cast = _Cast([table, *parts])
+            for part in parts:
+                where = self._lens.bounds(np.linalg.inv(world_from_camera) @ part.pose, part.solid.vertices)
+                if where is not None:
+                    cast.into(view, self._rays, world_from_camera, where)
+        return View(np.asarray(cv2.GaussianBlur(view.color, (3, 3), 0.7), np.uint8), view.depth)
+
+    def _solid(self, thing: Thing) -> Solid:
+        key = (thing.size, thing.mesh, thing.marker, thing.charuco)
+        if key not in self._solids:
+            if len(self._solids) > MOST_SOLIDS:
+                self._solids.clear()
+            self._solids[key] = solid_of(thing)
+        return self._solids[key]
+
+
+class _Part(NamedTuple):
+    """A solid that stands somewhere."""
+
+    solid: Solid
+    pose: Matrix
+    color: tuple[int, int, int]
+
+
+class _Cast:
+    """Parts at which rays are cast."""
+
+    def __init__(self, parts: list[_Part]) -> None:
+        self._parts = parts
+        self._scene = o3d.t.geometry.RaycastingScene()
+        palette: list[npt.NDArray[np.float64]] = [np.array([BACKGROUND[::-1]], dtype=np.float64)]
+        offsets, count = [], 1
+        for part in parts:
+            vertices = (part.solid.vertices @ part.pose[:3, :3].T + part.pose[:3, 3]).astype(np.float32)
+            self._scene.add_triangles(
+                o3d.core.Tensor.from_numpy(vertices), o3d.core.Tensor.from_numpy(part.solid.triangles)
+            )
+            shade = _shades(vertices, part.solid.triangles)
+            palette.append(shade[:, None] * np.array(part.color[::-1], dtype=np.float64))
+            offsets.append(count)
+            count += len(shade)
+        self._palette: Bytes = np.concatenate(palette).clip(0, 255).astype(np.uint8)
+        self._offsets = np.asarray(offsets, dtype=np.int32)
+
+    def into(self, view: View, rays: Floats, world_from_camera: Matrix, where: tuple[slice, slice]) -> None:
+        """Draw what is seen in one rectangle of the picture."""
+        directions = rays[where] @ world_from_camera[:3, :3].T.astype(np.float32)
+        both = np.empty((*directions.shape[:2], 6), np.float32)
+        both[..., :3] = world_from_camera[:3, 3]
+        both[..., 3:] = directions
+        hit = self._scene.cast_rays(o3d.core.Tensor.from_numpy(both))
+        # A ray is as long as 1 m along the optical axis, so that how far it went is the depth.
+        reach: Floats = hit["t_hit"].numpy()
+        there = np.isfinite(reach)
+        geometry = np.where(there, hit["geometry_ids"].numpy(), 0)
+        index = np.where(there, self._offsets[geometry] + hit["primitive_ids"].numpy().astype(np.int32), 0)
+        colors = np.take(self._palette, index, axis=0)
+        for number, part in enumerate(self._parts):
+            if part.solid.texture is not None:
+                _print(
+                    colors, there & (geometry == number), reach, directions, world_from_camera, part.solid, part.pose
+                )
+        view.color[where] = colors
+        view.depth[where] = np.where(there, reach, 0.0)
+
+
+def _shades(vertices: Floats, triangles: npt.NDArray[np.uint32]) -> npt.NDArray[np.float64]:
+    """Give how bright each triangle is."""
+    a, b, c = (vertices[triangles[:, i]].astype(np.float64) for i in range(3))
+    normals = np.cross(b - a, c - a)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    return np.asarray(AMBIENT + (1.0 - AMBIENT) * np.clip(normals @ LIGHT, 0.0, 1.0))
+
+
+def _print(
+    colors: Bytes,
+    mask: npt.NDArray[np.bool_],
+    depth: Floats,
+    directions: Floats,
+    world_from_camera: Matrix,
+    solid: Solid,
+    pose: Matrix,
+) -> None:
+    """Put a solid's picture on its top."""
+    assert solid.texture is not None
+    rows, columns = np.nonzero(mask)
+    points = world_from_camera[:3, 3] + depth[rows, columns, None] * directions[rows, columns]
+    local = (points - pose[:3, 3]) @ pose[:3, :3]
+    height, width = solid.texture.shape
+    u = (local[:, 0] / solid.texture_size[0] + 0.5) * width
+    v = (0.5 - local[:, 1] / solid.texture_size[1]) * height
+    top = local[:, 2] > solid.vertices[:, 2].max() - 1e-4
+    on = top & (u >= 0) & (u < width) & (v >= 0) & (v < height)
+    ink = solid.texture[v[on].astype(np.intp), u[on].astype(np.intp)]
+    colors[rows[on], columns[on]] = (ink.astype(np.float64) * 0.85 + 20.0).astype(np.uint8)[:, None]

@@ -1,0 +1,145 @@
+"""What stands before the camera: a table and named things. Knows neither rendering nor the wire."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+from msgspec import Meta
+from transforms3d.quaternions import quat2mat
+
+Matrix = npt.NDArray[np.float64]
+"""A rigid transform as a homogeneous 4 × 4 matrix."""
+
+Length = Annotated[float, Meta(gt=0.0, le=5.0)]
+Channel = Annotated[int, Meta(ge=0, le=255)]
+LARGEST_MESH: Final = 20_000_000
+MOST_THINGS: Final = 200
+
+
+class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A pose in the world: m, unit quaternion x, y, z, w."""
+
+    position: tuple[float, float, float]
+    orientation: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        if not all(map(math.isfinite, self.position)):
+            raise ValueError("position is not finite")
+        if not abs(math.hypot(*self.orientation) - 1.0) <= 1e-3:
+            raise ValueError("orientation is no unit quaternion x, y, z, w")
+
+    def matrix(self) -> Matrix:
+        """Give the pose as a transform."""
+        x, y, z, w = self.orientation
+        matrix = np.eye(4)
+        matrix[:3, :3] = quat2mat((w, x, y, z))
+        matrix[:3, 3] = self.position
+        return matrix
+
+
+class Marker(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """An ArUco marker in the middle of the top; `size` is the side of its black square, m."""
+
+    id: Annotated[int, Meta(ge=0, le=1023)]
+    size: Length
+    dictionary: str = "DICT_4X4_50"
+
+
+class Charuco(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A ChArUco board in the middle of the top; sides of a square and of its marker, m."""
+
+    columns: Annotated[int, Meta(ge=2, le=50)]
+    rows: Annotated[int, Meta(ge=2, le=50)]
+    square: Length
+    marker: Length
+    dictionary: str = "DICT_4X4_50"
+
+
+class Thing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A box with its pose at its middle, or a mesh with its pose at the mesh's origin."""
+
+    name: str
+    pose: Pose
+    size: tuple[Length, Length, Length] | None = None
+    mesh: str | None = None
+    color: tuple[Channel, Channel, Channel] = (150, 150, 150)
+    marker: Marker | None = None
+    charuco: Charuco | None = None
+
+    def __post_init__(self) -> None:
+        if not self.name:
+            raise ValueError("a thing needs a name")
+        if (self.size is None) == (self.mesh is None):
+            raise ValueError(f"{self.name}: either size or mesh")
+        if self.mesh is not None and (self.marker or self.charuco):
+            raise ValueError(f"{self.name}: only a box carries a marker")
+        if self.mesh is not None and not (Path(self.mesh).is_file() and Path(self.mesh).stat().st_size <= LARGEST_MESH):
+            raise ValueError(f"{self.name}: mesh {self.mesh} is no file of at most {LARGEST_MESH} bytes")
+
+
+class Scene:
+    """The table, the things, the camera. `version` grows with every change that the camera could see."""
+
+    def __init__(self, camera: Pose, table_height: float) -> None:
+        self._versions = itertools.count(1)
+        self.version = 0
+        self.camera = camera
+        self.table_height = table_height
+        self._things: dict[str, Thing] = {}
+
+    @property
+    def things(self) -> tuple[Thing, ...]:
+        """Give the things."""
+        return tuple(self._things.values())
+
+    def replace(self, things: Iterable[Any], table_height: float | None = None) -> None:
+        """Let these stand there instead of all others. Raises ValueError when one is none."""
+        new = [msgspec.convert(each, Thing) for each in things]
+        by_name = {each.name: each for each in new}
+        if len(by_name) < len(new) or len(new) > MOST_THINGS:
+            raise ValueError(f"at most {MOST_THINGS} things, each with a name of its own")
+        if table_height is not None:
+            self.table_height = float(table_height)
+        self._things = by_name
+        self._changed()
+
+    def place(self, thing: Any) -> None:
+        """Add a thing, or let it stand in the place of the one with its name."""
+        found = msgspec.convert(thing, Thing)
+        if len(self._things) >= MOST_THINGS and found.name not in self._things:
+            raise ValueError(f"at most {MOST_THINGS} things")
+        self._things[found.name] = found
+        self._changed()
+
+    def move(self, poses: dict[str, Any]) -> None:
+        """Move things. Raises LookupError when one does not stand there; then none is moved."""
+        new = {name: msgspec.convert(pose, Pose) for name, pose in poses.items()}
+        if unknown := set(new) - set(self._things):
+            raise LookupError(f"no thing {', '.join(sorted(unknown))}")
+        moved = {name: pose for name, pose in new.items() if self._things[name].pose != pose}
+        for name, pose in moved.items():
+            self._things[name] = msgspec.structs.replace(self._things[name], pose=pose)
+        if moved:
+            self._changed()
+
+    def remove(self, name: str) -> None:
+        """Take a thing away. Raises LookupError."""
+        if name not in self._things:
+            raise LookupError(f"no thing {name}")
+        del self._things[name]
+        self._changed()
+
+    def look_from(self, pose: Any) -> None:
+        """Move the camera: the pose of its optical frame, x right, y down, z forward."""
+        self.camera = msgspec.convert(pose, Pose)
+        self._changed()
+
+    def _changed(self) -> None:
+        self.version = next(self._versions)

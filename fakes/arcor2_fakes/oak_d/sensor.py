@@ -1,0 +1,65 @@
+"""The sensor: noise, exposure and what a lens or a matcher does wrong, laid over a rendered view."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from arcor2_fakes.oak_d.render import Bytes, View
+
+NORMAL_EXPOSURE: Final = 0.01
+"""s at which a picture is as bright as the scene."""
+DEPTH_RANGE: Final = (0.2, 10.0)
+"""m, of a stereo pair with extended disparity."""
+DEPTH_NOISE: Final = 0.0018
+"""Standard deviation in m at 1 m; it grows with the square of the distance, as disparity's does."""
+COLOR_NOISE: Final = 2.0
+VARIANTS: Final = 6
+"""Different noises; a standing scene costs nothing once each was laid over it."""
+HOLES: Final = 0.003
+"""Part of the pixels that have no depth for no reason."""
+EDGE: Final = 0.02
+"""m between neighbours beyond which the matcher finds nothing for half of them."""
+
+
+class Sensor:
+    """Makes pictures of views of one size. Not thread-safe."""
+
+    def __init__(self, width: int, height: int, noise: float, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        shape = (height, width)
+        self._depth_noise = [
+            (rng.standard_normal(shape, np.float32) * np.float32(DEPTH_NOISE * noise)) for _ in range(VARIANTS)
+        ]
+        self._color_noise = [
+            np.rint(rng.standard_normal((*shape, 3), np.float32) * np.float32(COLOR_NOISE * noise)).astype(np.int8)
+            for _ in range(VARIANTS)
+        ]
+        self._holes = [rng.random(shape, np.float32) < HOLES * min(noise, 1.0) for _ in range(VARIANTS)]
+        self._coin = rng.random(shape, np.float32) < 0.5 * min(noise, 1.0)
+
+    def color(self, view: View, variant: int, exposure: float, covered: bool) -> Bytes:
+        """Give the colour picture, B, G, R."""
+        if covered:
+            base: npt.NDArray[np.int16] = np.full(view.color.shape, 4, np.int16)
+        elif exposure == NORMAL_EXPOSURE:
+            base = view.color.astype(np.int16)
+        else:
+            factor = exposure / NORMAL_EXPOSURE
+            base = np.minimum(view.color.astype(np.float32) * np.float32(factor), 1000.0).astype(np.int16)
+        base += self._color_noise[variant % VARIANTS]
+        return np.asarray(np.clip(base, 0, 255), dtype=np.uint8)
+
+    def depth(self, view: View, variant: int, covered: bool) -> npt.NDArray[np.uint16]:
+        """Give the depth picture, mm, 0 where there is none."""
+        z = view.depth
+        if covered:
+            return np.zeros(z.shape, np.uint16)
+        kernel = np.ones((3, 3), np.uint8)
+        edge = (cv2.dilate(z, kernel) - cv2.erode(z, kernel)) > EDGE
+        nothing = (z < DEPTH_RANGE[0]) | (z > DEPTH_RANGE[1]) | self._holes[variant % VARIANTS] | (edge & self._coin)
+        seen = z + z * z * self._depth_noise[variant % VARIANTS]
+        return np.where(nothing, 0.0, np.rint(seen * np.float32(1000.0))).astype("<u2")

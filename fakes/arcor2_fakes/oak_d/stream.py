@@ -1,0 +1,95 @@
+"""The stream of a network source, version 1, as the source speaks it. Numbers are big-endian.
+
+    offset  size  field
+    0       4     "OAKS"
+    4       1     version, 1
+    5       1     kind
+    6       2     length of the header, bytes
+    8       4     length of the payload, bytes
+    12      4     CRC-32 (zlib) of bytes 0 to 11 and the header
+    16            header: a JSON object, UTF-8
+                  payload
+
+| kind | name    | direction | header                                                            | payload           |
+|------|---------|-----------|-------------------------------------------------------------------|-------------------|
+| 1    | hello   | to client | vendor, model, serial, firmware, width, height, fps, depth_range  | EEPROM JSON       |
+| 2    | start   | to source | client: its name; color: "bgr" or "jpeg"                          |                   |
+| 3    | frame   | to client | number, stamp, exposure, color, color_bytes, depth_bytes          | colour, depth     |
+| 4    | clock   | both      | asked: the client's clock; answer: also at, the source's clock    |                   |
+| 5    | control | to source | exposure: seconds, or null for automatic                          |                   |
+| 6    | status  | to client | temperature (deg C), exposure (s or null)                         |                   |
+| 7    | refused | to client | reason                                                            |                   |
+
+The source says hello when a client has connected and nothing more until start. `stamp` is when the exposure ended, on
+the source's clock (s, monotonic). Colour is rows of B, G, R, or a JPEG file; depth is rows of 16-bit mm, little-endian
+as the sensor gives it, 0 where there is none; a frame without depth has depth_bytes 0. Status comes with start, with
+every change and once a second. A control is answered by a status. CRC covers the framing alone: TCP has one for the
+rest, and one over 4.6 MB a frame costs more than the picture.
+"""
+
+from __future__ import annotations
+
+import enum
+import struct
+import zlib
+from collections.abc import Callable
+from typing import Any, Final
+
+import msgspec
+
+MAGIC: Final = b"OAKS"
+VERSION: Final = 1
+FIXED: Final = struct.Struct(">4sBBHII")
+LONGEST_HEADER: Final = 4096
+LONGEST_QUESTION: Final = 0
+"""Bytes of payload that a client may send: none of its messages has one."""
+
+
+class Kind(enum.IntEnum):
+    """What a message is."""
+
+    HELLO = 1
+    START = 2
+    FRAME = 3
+    CLOCK = 4
+    CONTROL = 5
+    STATUS = 6
+    REFUSED = 7
+
+
+class BadMessage(Exception):
+    """What came is no message."""
+
+
+def encode(kind: Kind, header: dict[str, Any], payload: bytes = b"", *, wrong_checksum: bool = False) -> bytes:
+    """Give a message."""
+    text = msgspec.json.encode(header)
+    front = struct.pack(">4sBBHI", MAGIC, VERSION, kind, len(text), len(payload))
+    check = zlib.crc32(text, zlib.crc32(front)) ^ (0xDEADBEEF if wrong_checksum else 0)
+    return b"".join((front, struct.pack(">I", check), text, payload))
+
+
+class Questions:
+    """Takes apart what a client sends; `take` is called with each message."""
+
+    def __init__(self, take: Callable[[Kind, dict[str, Any]], None]) -> None:
+        self._take = take
+        self._rest = b""
+
+    def feed(self, data: bytes) -> None:
+        """Take bytes. Raises BadMessage; nothing sensible can follow."""
+        self._rest += data
+        while len(self._rest) >= FIXED.size:
+            magic, version, kind, length, payload, check = FIXED.unpack_from(self._rest)
+            if magic != MAGIC or version != VERSION or length > LONGEST_HEADER or payload > LONGEST_QUESTION:
+                raise BadMessage("no message of version 1")
+            if len(self._rest) < FIXED.size + length:
+                return
+            header = self._rest[FIXED.size : FIXED.size + length]
+            if zlib.crc32(header, zlib.crc32(self._rest[:12])) != check:
+                raise BadMessage("wrong checksum")
+            self._rest = self._rest[FIXED.size + length :]
+            try:
+                self._take(Kind(kind), msgspec.json.decode(header, type=dict[str, Any]))
+            except (ValueError, msgspec.DecodeError) as e:
+                raise BadMessage(str(e)) from e
