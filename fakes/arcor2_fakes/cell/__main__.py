@@ -12,56 +12,83 @@ from typing import Annotated, Any
 from cyclopts import App, Parameter, validators
 
 from arcor2_fakes.cell.boards import MAX_BOARDS, Board, draw_boards
-from arcor2_fakes.cell.devices import DeviceGone, Fake, FakeDevices, RobotFeed
+from arcor2_fakes.cell.devices import DeviceFeed, DeviceGone, Fake, FakeDevices, RobotFeed
 from arcor2_fakes.cell.layout import Layout, LayoutError, read_layout
 from arcor2_fakes.cell.world import World
 from arcor2_fakes.control import ControlServer, parse_address
 from arcor2_fakes.process import announce, run, until_told_to_end
 
 GONE_STATUS = 3
+NAMES = {"io": "I/O block", "printer": "label printer", "arm": "two-axis robot"}
 _ROBOT_RATE = 100.0  # Hz; a tool at 1 m/s is known to a centimetre, a resting one exactly
 
 app = App(name="arcor2_fakes.cell", help="The small world of boards that the fakes share.", version_flags=[])
 
 
-def register_commands(control: ControlServer, world: World, lock: asyncio.Lock) -> None:
-    """Make what a test can do to the world known to the control channel."""
+class Cell:
+    """The world of now between its devices; `renew` puts another one in its place."""
 
-    async def gripper(works: bool) -> None:
-        async with lock:
-            world.gripper_works = bool(works)
+    def __init__(self, layout: Layout, boards: list[Board], fakes: dict[str, Fake]) -> None:
+        self._layout = layout
+        self._devices = FakeDevices(fakes, layout.gripper.sensor)
+        self._robot, self._others = RobotFeed(), DeviceFeed(layout)
+        self._fakes = fakes
+        self._lock = asyncio.Lock()
+        self.world = World(layout, boards, self._devices)
 
-    async def drop() -> None:
-        async with lock:
-            await world.drop()
+    def register(self, control: ControlServer) -> None:
+        """Make what a test can do to the world known to the control channel."""
 
-    async def sensor(stuck: bool | None) -> None:
-        async with lock:
-            await world.stick_sensor(stuck)
+        async def gripper(works: bool) -> None:
+            async with self._lock:
+                self.world.gripper_works = bool(works)
 
-    async def remove_board(code: str) -> None:
-        async with lock:
-            await world.remove(code)
+        async def drop() -> None:
+            async with self._lock:
+                await self.world.drop()
 
-    control.command("gripper", gripper)
-    control.command("drop", drop)
-    control.command("sensor", sensor)
-    control.command("remove_board", remove_board)
-    control.source("truth", world.truth)
+        async def sensor(stuck: bool | None) -> None:
+            async with self._lock:
+                await self.world.stick_sensor(stuck)
 
+        async def barrier(number: int, stuck: bool | None) -> None:
+            async with self._lock:
+                await self.world.stick_barrier(number, stuck)
 
-async def follow(world: World, feed: RobotFeed, lock: asyncio.Lock) -> str:
-    """Let the world follow the robot; gives the reason when it can't any more."""
-    began = time.monotonic()
-    try:
-        async with lock:
-            await world.begin()
-        while True:
-            sample = await feed.next()
-            async with lock:
-                await world.step(time.monotonic() - began, sample)
-    except DeviceGone as e:
-        return str(e)
+        async def remove_board(code: str) -> None:
+            async with self._lock:
+                await self.world.remove(code)
+
+        async def renew(boards: int, seed: int) -> None:
+            """Put other boards in place of all there are, and end what was stuck."""
+            if not 0 <= boards <= MAX_BOARDS:
+                raise ValueError(f"boards is 0 to {MAX_BOARDS}")
+            drawn = draw_boards(boards, seed)
+            async with self._lock:
+                if (refused := await self.world.clear_tester()) is not None:
+                    raise ValueError(refused)
+                self.world = World(self._layout, drawn, self._devices)
+                await self.world.begin()
+
+        for command in (gripper, drop, sensor, barrier, remove_board, renew):
+            control.command(command.__name__, command)
+        control.source("truth", lambda: self.world.truth())
+
+    async def follow(self) -> str:
+        """Let the world follow the devices; gives the reason when it can't any more."""
+        began = time.monotonic()
+        try:
+            await self._fakes["robot"].client.subscribe(self._robot.take, rate=_ROBOT_RATE)
+            await self._others.follow(self._fakes)
+            async with self._lock:
+                await self.world.begin()
+            while True:
+                sample = await self._robot.next()
+                self._others.check()
+                async with self._lock:
+                    await self.world.step(time.monotonic() - began, sample, self._others.inputs)
+        except DeviceGone as e:
+            return str(e)
 
 
 async def first_of(*waits: Any) -> Any:
@@ -83,16 +110,14 @@ async def live(
     async with contextlib.AsyncExitStack() as stack:
         fakes: dict[str, Fake] = {}
         for name, address in addresses.items():
-            fakes[name] = await Fake.connect(name, address, patience)
+            fakes[name] = await Fake.connect(NAMES.get(name, name), address, patience)
             stack.push_async_callback(fakes[name].client.close)
-        devices = FakeDevices(fakes["robot"], fakes["tester"], fakes["reader"], layout.gripper.sensor)
-        world, feed, lock = World(layout, boards, devices), RobotFeed(), asyncio.Lock()
-        register_commands(control, world, lock)
-        await fakes["robot"].client.subscribe(feed.take, rate=_ROBOT_RATE)
+        cell = Cell(layout, boards, fakes)
+        cell.register(control)
         await control.start()
         stack.push_async_callback(control.close)
         announce(name="cell", control=control.address, boards=len(boards))
-        ended: str = await first_of(*(fake.gone() for fake in fakes.values()), follow(world, feed, lock))
+        ended: str = await first_of(*(fake.gone() for fake in fakes.values()), cell.follow())
         return ended
 
 
@@ -103,6 +128,10 @@ def main(
     robot: str,
     tester: str,
     reader: str,
+    conveyor: str | None = None,
+    io: str | None = None,
+    printer: str | None = None,
+    arm: str | None = None,
     boards: Annotated[int, Parameter(validator=validators.Number(gte=0, lte=MAX_BOARDS))] = 5,
     seed: int = 0,
     control: str = "127.0.0.1:0",
@@ -118,17 +147,27 @@ def main(
         robot: HOST:PORT of the fake robot controller's control channel.
         tester: HOST:PORT of the fake tester's control channel.
         reader: HOST:PORT of the fake reader's control channel.
-        boards: how many boards lie in the feeder.
+        conveyor: HOST:PORT of the fake conveyor's control channel, where the layout has a belt.
+        io: HOST:PORT of the fake remote I/O block's control channel, where it has light barriers or a tower light.
+        printer: HOST:PORT of the fake label printer's control channel, where it has a place for labelling.
+        arm: HOST:PORT of the fake two-axis robot's control channel, where it has a place for labelling.
+        boards: how many boards come.
         seed: decides the boards: their codes, and which are bad.
         control: HOST:PORT of the world's own control channel; port 0 takes a free one.
         patience: how long to wait for each fake that isn't there yet, s.
     """
-    addresses = {"robot": robot, "tester": tester, "reader": reader}
+    given = {
+        **{"robot": robot, "tester": tester, "reader": reader},
+        **{"conveyor": conveyor, "io": io, "printer": printer, "arm": arm},
+    }
+    addresses = {name: address for name, address in given.items() if address is not None}
     try:
         channel = ControlServer(*parse_address(control))
         for address in addresses.values():
             parse_address(address)
         cell = read_layout(layout)
+        if missing := [name for name in cell.needs() if name not in addresses]:
+            raise LayoutError(f"layout {layout} needs --{missing[0]}")
     except (LayoutError, ValueError) as e:
         return _say(str(e), 2)
     problem: str | None = None

@@ -1,18 +1,22 @@
-"""The world's side of the fakes' control channels: what it hears of the robot and does to tester, reader and sensor."""
+"""The world's side of the fakes' control channels: what it hears of them, and what it does to them."""
 
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Mapping
 from typing import Any
 
 import msgspec
 
 from arcor2_fakes.cell.boards import Board
-from arcor2_fakes.cell.world import Robot
+from arcor2_fakes.cell.layout import Layout
+from arcor2_fakes.cell.things import Inputs, Printed, Robot
 from arcor2_fakes.control import ControlClient, ControlError
 
 _RETRY_PERIOD = 0.1
 _CONNECT_WITHIN = 1.0
+_MOTION_RATE = 100.0  # Hz; a belt at 0.5 m/s is known to 5 mm while it runs, a standing one exactly
+_OUTPUT_RATE = 10.0  # Hz; lamps are looked at, nothing follows from them
 
 
 class DeviceGone(Exception):
@@ -52,8 +56,9 @@ class Fake:
 class FakeDevices:
     """Does to the fakes what the world does to the devices."""
 
-    def __init__(self, robot: Fake, tester: Fake, reader: Fake, sensor: int | None) -> None:
-        self._robot, self._tester, self._reader = robot, tester, reader
+    def __init__(self, fakes: Mapping[str, Fake], sensor: int | None) -> None:
+        self._robot, self._tester, self._reader = fakes["robot"], fakes["tester"], fakes["reader"]
+        self._io = fakes.get("io")
         self._sensor = sensor
 
     async def put_into_tester(self, board: Board) -> str | None:
@@ -72,6 +77,11 @@ class FakeDevices:
         """Set the gripper's sensor, if there is one."""
         if self._sensor is not None:
             await self._do(self._robot, "set_input", bit=self._sensor, on=held)
+
+    async def set_barrier(self, number: int, interrupted: bool) -> None:
+        """Set the input that a light barrier is wired to."""
+        if self._io is not None:
+            await self._do(self._io, "set_input", number=number, on=interrupted)
 
     @staticmethod
     async def _try(fake: Fake, command: str, **arguments: Any) -> str | None:
@@ -118,3 +128,64 @@ class RobotFeed:
             self._arrived.clear()
             await self._arrived.wait()
         return self._samples.pop(0)
+
+
+class _Truth(msgspec.Struct):
+    """What the world reads of what a fake tells; each fake tells some of it."""
+
+    belt: float = 0.0
+    angles: dict[str, float] = {}
+    labels: list[Printed] = []
+    outputs: list[bool] = []
+
+
+class DeviceFeed:
+    """What was last heard of the devices beside the robot."""
+
+    def __init__(self, layout: Layout) -> None:
+        self.inputs = Inputs()
+        self._arm = None if layout.labelling is None else layout.labelling.arm
+        self._problem: DeviceGone | None = None
+
+    async def follow(self, fakes: Mapping[str, Fake]) -> None:
+        """Subscribe to what those of the devices tell that are there."""
+        followed = {
+            "conveyor": ("motion", _MOTION_RATE, self._belt),
+            "arm": ("motion", _MOTION_RATE, self._angles),
+            "printer": ("truth", 0.0, self._labels),
+            "io": ("truth", _OUTPUT_RATE, self._outputs),
+        }
+        for role, (source, rate, take) in followed.items():
+            if (fake := fakes.get(role)) is None:
+                continue
+
+            def heard(truth: Any, take: Any = take, fake: Fake = fake) -> None:
+                try:
+                    take(msgspec.convert(truth, _Truth))
+                except (msgspec.ValidationError, KeyError) as e:
+                    self._problem = DeviceGone(f"the {fake.name} at {fake.address} tells something else: {e}")
+
+            try:
+                heard(await fake.client.do(source))
+                await fake.client.subscribe(heard, source, rate)
+            except ControlError as e:
+                raise DeviceGone(f"the {fake.name} at {fake.address}: {e}") from e
+
+    def check(self) -> None:
+        """Raise `DeviceGone` if a device tells something else than one of its kind."""
+        if self._problem is not None:
+            raise self._problem
+
+    def _belt(self, truth: _Truth) -> None:
+        self.inputs.belt = truth.belt
+
+    def _angles(self, truth: _Truth) -> None:
+        if self._arm is not None:
+            first, second = (truth.angles[str(number)] for number in self._arm.servos)
+            self.inputs.arm = first, second
+
+    def _labels(self, truth: _Truth) -> None:
+        self.inputs.printed = truth.labels
+
+    def _outputs(self, truth: _Truth) -> None:
+        self.inputs.outputs = truth.outputs

@@ -8,7 +8,12 @@
       "tester": {PLACE},
       "good_box": {PLACE},
       "bad_box": {PLACE},
-      "table_height": 0.0
+      "table_height": 0.0,
+      "belt": {"pose": POSE, "length": 0.6, "pitch": 0.2, "board_length": 0.08, "counts_per_metre": 10000,
+               "tolerance": TOLERANCE, "barriers": [{"input": 0, "at": 0.0}]},
+      "labelling": {"place": {PLACE}, "arm": {"base": POSE, "links": [0.15, 0.1], "servos": [1, 2]},
+                    "press": {"begin": [x, y, z], "end": [x, y, z], "tolerance": 0.008}},
+      "tower": {"red": 0, "green": 2}
     }
 
 POSE is ``{"position": [x, y, z], "orientation": [x, y, z, w]}``, the orientation a unit quaternion, by default
@@ -24,6 +29,11 @@ PLACE is ``"pose": POSE, "tolerance": {"position": 0.005, "height": 0.01, "tilt"
 - A board let go, or a tip that is to grip, is at a place when it is no more than `position` away from it sideways, no
   more than `position` below and `height` above it, when its z deviates by `tilt` at most and, if `turn` is given, when
   it is turned about z by `turn` at most.
+- Instead of a `feeder`, boards may come on a `belt`; its pose is that of a board at the stop at its end, x the way it
+  runs. A light barrier is interrupted (its input of the I/O block is on) while a board is at `at`, m before the stop
+  and so 0 or negative.
+- `labelling` is the place under the label printer, and the arm whose roller presses labels on from `begin` to `end`.
+- `tower` names the outputs of the I/O block that lamps hang on. What a cell does not have is left out.
 - `reader` is the place where a board, held or on the feeder, is in the reader's view; `tester` is the fixture.
 """
 
@@ -89,6 +99,15 @@ class Tolerance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     tilt: Angle
     turn: Angle | None = None
 
+    def allows(self, place_from_board: Matrix, along: float = 0.0) -> bool:
+        """Say whether a board at this pose is close enough, to what is `along` m along the place's x axis."""
+        x, y, z = place_from_board[:3, 3]
+        if math.hypot(x - along, y) > self.position or not -self.position <= z <= self.height:
+            return False
+        if math.acos(max(-1.0, min(1.0, place_from_board[2, 2]))) > self.tilt:
+            return False
+        return self.turn is None or abs(math.atan2(place_from_board[1, 0], place_from_board[0, 0])) <= self.turn
+
 
 class Place(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Somewhere a board can be."""
@@ -98,20 +117,64 @@ class Place(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def holds(self, world_from_board: Matrix) -> bool:
         """Say whether a board at this pose is at this place."""
-        board = self.pose.inverse() @ world_from_board
-        x, y, z = board[:3, 3]
-        tolerance = self.tolerance
-        if math.hypot(x, y) > tolerance.position or not -tolerance.position <= z <= tolerance.height:
-            return False
-        if math.acos(max(-1.0, min(1.0, board[2, 2]))) > tolerance.tilt:
-            return False
-        return tolerance.turn is None or abs(math.atan2(board[1, 0], board[0, 0])) <= tolerance.turn
+        return self.tolerance.allows(self.pose.inverse() @ world_from_board)
 
 
 class Feeder(Place, frozen=True, forbid_unknown_fields=True):
     """A magazine that brings the next board to the same pick place."""
 
     refill_time: Duration = 0.3
+
+
+class Barrier(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A light barrier across the belt, wired to an input of the I/O block."""
+
+    input: Annotated[int, Meta(ge=0, le=15)]
+    at: Annotated[float, Meta(ge=-10.0, le=0.0)]
+
+
+class Belt(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A belt with a stop at its end and a loader at its beginning."""
+
+    pose: Pose
+    tolerance: Tolerance
+    length: Length
+    pitch: Length
+    board_length: Length
+    counts_per_metre: Annotated[float, Meta(ge=1.0, le=1e8)]
+    barriers: list[Barrier] = []
+
+    def __post_init__(self) -> None:
+        if not self.board_length <= self.pitch <= self.length:
+            raise ValueError("pitch is at least the board_length and at most the length")
+
+
+class Arm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A planar two-axis robot; links in m, servos by their id on the bus."""
+
+    base: Pose
+    links: tuple[Length, Length]
+    servos: tuple[int, int] = (1, 2)
+
+
+class Press(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The way over a label that presses it on, in the world."""
+
+    begin: tuple[float, float, float]
+    end: tuple[float, float, float]
+    tolerance: Length
+
+    def __post_init__(self) -> None:
+        if math.dist(self.begin, self.end) <= 2.0 * self.tolerance:
+            raise ValueError("begin and end are farther apart than twice the tolerance")
+
+
+class Labelling(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The place under the label printer, and the arm that presses labels on."""
+
+    place: Place
+    arm: Arm
+    press: Press
 
 
 class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -135,12 +198,29 @@ class Layout(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     robot: Robot
     gripper: Gripper
-    feeder: Feeder
     reader: Place
     tester: Place
     good_box: Place
     bad_box: Place
+    feeder: Feeder | None = None
+    belt: Belt | None = None
+    labelling: Labelling | None = None
+    tower: dict[str, Annotated[int, Meta(ge=0, le=15)]] = {}
     table_height: float = 0.0
+
+    def __post_init__(self) -> None:
+        if (self.feeder is None) == (self.belt is None):
+            raise ValueError("boards come from a feeder or on a belt: one of the two")
+
+    def needs(self) -> list[str]:
+        """Give which devices beside robot, tester and reader the cell needs."""
+        needed = {
+            "conveyor": self.belt is not None,
+            "io": bool(self.tower) or (self.belt is not None and bool(self.belt.barriers)),
+            "printer": self.labelling is not None,
+            "arm": self.labelling is not None,
+        }
+        return [name for name, so in needed.items() if so]
 
 
 def read_layout(path: Path) -> Layout:

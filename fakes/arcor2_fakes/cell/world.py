@@ -11,12 +11,12 @@ from transforms3d.affines import compose
 from transforms3d.euler import euler2mat
 
 from arcor2_fakes.cell.boards import Board
-from arcor2_fakes.cell.layout import Layout, Matrix, from_rotation_vector
+from arcor2_fakes.cell.labelling import LabelNest
+from arcor2_fakes.cell.layout import Layout, Matrix
+from arcor2_fakes.cell.supply import BoardBelt, Magazine, Supply
+from arcor2_fakes.cell.things import Event, Inputs, Robot, Thing
 
-ControllerPose = tuple[float, float, float, float, float, float]
-"""Position and rotation vector."""
-
-PLACES = ("feeder", "gripper", "tester", "good", "bad", "lost", "removed")
+PLACES = ("feeder", "belt", "gripper", "tester", "label", "good", "bad", "lost", "removed")
 
 # The controller's base is base_link turned by half a turn about z.
 _BASE_LINK_FROM_BASE = compose((0.0, 0.0, 0.0), euler2mat(0.0, 0.0, np.pi), np.ones(3))
@@ -43,55 +43,36 @@ class Devices(Protocol):
         """Set the gripper's sensor."""
         ...
 
-
-class Robot(msgspec.Struct, frozen=True):
-    """One sample of the robot: the TCP in the controller's base, the TCP on the flange, the digital outputs as bits."""
-
-    tcp_pose: ControllerPose
-    tcp_offset: ControllerPose
-    digital_outputs: int
-
-    def base_from_flange(self) -> Matrix:
-        """Give the flange, which stands where it stands whatever TCP somebody has set."""
-        flange: Matrix = from_rotation_vector(self.tcp_pose) @ np.linalg.inv(from_rotation_vector(self.tcp_offset))
-        return flange
-
-
-class Event(msgspec.Struct, frozen=True):
-    """Something that happened to a board, seconds after the world began."""
-
-    time: float
-    place: str
-    why: str
-
-
-class Thing:
-    """A board in the world, where it is, and what happened to it."""
-
-    def __init__(self, board: Board) -> None:
-        self.board = board
-        self.place = "feeder"
-        self.position: tuple[float, float, float] | None = None
-        self.history: list[Event] = []
+    async def set_barrier(self, number: int, interrupted: bool) -> None:
+        """Set the input of the I/O block that a light barrier is wired to."""
+        ...
 
 
 class World:
     """The boards of one run.
 
-    `step` is called with each sample of the robot, in order; what takes time (jaws, the feeder) advances with it.
+    `step` is called with each sample of the robot, in order, and with what was last heard of the other devices; what
+    takes time (jaws, the feeder) advances with it.
     """
 
     def __init__(self, layout: Layout, boards: list[Board], devices: Devices) -> None:
         self._layout = layout
         self._devices = devices
         self._things = [Thing(board) for board in boards]
-        self._feeder = list(self._things)  # the first is on top
-        self._refilled_at = 0.0  # when the top board has reached, or will reach, the pick place
+        self._belt = None if layout.belt is None else BoardBelt(layout.belt, self._things)
+        self._supply: Supply
+        if self._belt is not None:
+            self._supply = self._belt
+        else:
+            assert layout.feeder is not None, "a layout has one or the other"
+            self._supply = Magazine(layout.feeder, self._things)
+        self._nest = None if layout.labelling is None else LabelNest(layout.labelling)
+        self._missing = {name for name, part in (("belt", self._belt), ("label", self._nest)) if part is None}
+        self._inputs = Inputs()
         self._in_tester: Thing | None = None
         self._held: Thing | None = None
         self._tip_from_board: Matrix = np.eye(4)
         self._world_from_base = layout.robot.base.matrix() @ _BASE_LINK_FROM_BASE
-        self._feeder_in_view = layout.reader.holds(layout.feeder.pose.matrix())
         self._flange_from_tip = layout.gripper.tip.matrix()
         self._robot: Robot | None = None
         self._world_from_tip: Matrix | None = None
@@ -103,21 +84,34 @@ class World:
         self._sensor_stuck: bool | None = None
         self._sensor_told: bool | None = None
         self._shown: str | None = None
+        self._barriers_stuck: dict[int, bool] = {}
+        self._barriers_told: dict[int, bool] = {}
 
     async def begin(self) -> None:
         """Bring the devices in step with the world; call it once, before the first `step`."""
         await self._tell_sensor()
+        await self._tell_barriers()
         await self._devices.present(None)
 
     # ------------------------------------------------------------------------------------------------ time
 
-    async def step(self, now: float, robot: Robot) -> None:
-        """Let the world follow the robot; `now` in seconds since the world began."""
+    async def step(self, now: float, robot: Robot, inputs: Inputs | None = None) -> None:
+        """Let the world follow the robot and the other devices; `now` in seconds since the world began."""
         self._now = now
+        self._inputs = inputs = inputs or Inputs()
+        for thing, place, why in self._supply.advance(now, inputs.belt):
+            self._move(thing, place, why)
+        if self._nest is not None:
+            for thing, why in self._nest.printed(inputs.printed):
+                self._note(thing, why)
+            pressed = None if inputs.arm is None else self._nest.wiped(inputs.arm)
+            if pressed is not None:
+                self._note(pressed, "the label was pressed on")
         if robot != self._robot:  # an arm at rest costs nothing
             self._robot = robot
             self._world_from_tip = self._world_from_base @ robot.base_from_flange() @ self._flange_from_tip
         await self._drive_jaws(bool(robot.digital_outputs >> self._layout.gripper.output & 1))
+        await self._tell_barriers()
         await self._show()
 
     async def _drive_jaws(self, closing: bool) -> None:
@@ -144,11 +138,13 @@ class World:
 
     async def _grip(self) -> None:
         layout, world_from_gripped = self._layout, self._tip() @ _TIP_FROM_GRIPPED
-        top = self._top()
-        if top is not None and layout.feeder.holds(world_from_gripped):
-            self._feeder.remove(top)
-            self._refilled_at = self._now + layout.feeder.refill_time
-            await self._hold(top, layout.feeder.pose.matrix(), "taken from the feeder")
+        found = self._supply.under(world_from_gripped)
+        if found is not None:
+            self._supply.take(found[0])
+            await self._hold(*found, f"taken from the {self._supply.place}")
+        elif self._nest is not None and self._nest.thing is not None and self._nest.holds(world_from_gripped):
+            thing = self._nest.thing
+            await self._hold(thing, self._nest.layout.place.pose.matrix(), self._nest.taken())
         elif self._in_tester is not None and layout.tester.holds(world_from_gripped):
             refused = await self._devices.take_from_tester()
             if refused is None:
@@ -181,19 +177,20 @@ class World:
         elif layout.bad_box.holds(world_from_board):
             self._move(thing, "bad", why)
             return
-        elif layout.feeder.holds(world_from_board):
-            if self._top() is None:
-                self._feeder.insert(0, thing)
-                self._refilled_at = self._now
-                self._move(thing, "feeder", why)
+        elif self._nest is not None and self._nest.holds(world_from_board):
+            if self._nest.thing is None:
+                self._nest.thing = thing
+                self._move(thing, "label", why)
                 return
-            why = f"{why} over the feeder, where the next board lies already"
+            why = f"{why} under the label printer, where a board lies already"
+        elif self._supply.accepts(world_from_board):
+            refused = self._supply.put(thing, world_from_board)
+            if refused is None:
+                self._move(thing, self._supply.place, why)
+                return
+            why = f"{why} {refused}"
         x, y, _ = world_from_board[:3, 3]
         self._move(thing, "lost", why, (float(x), float(y), layout.table_height))
-
-    def _top(self) -> Thing | None:
-        """Give the board at the pick place."""
-        return self._feeder[0] if self._feeder and self._now >= self._refilled_at else None
 
     def _move(self, thing: Thing, place: str, why: str, position: tuple[float, float, float] | None = None) -> None:
         if place == "gripper":
@@ -201,7 +198,10 @@ class World:
         elif thing is self._held:
             self._held = None
         thing.place, thing.position = place, position
-        thing.history.append(Event(self._now, place, why))
+        self._note(thing, why)
+
+    def _note(self, thing: Thing, why: str) -> None:
+        thing.history.append(Event(self._now, thing.place, why))
 
     # ------------------------------------------------------------------------------------------------ sensors
 
@@ -211,13 +211,23 @@ class World:
             self._sensor_told = held
             await self._devices.set_sensor(held)
 
+    async def _tell_barriers(self) -> None:
+        if self._layout.belt is None or self._belt is None:
+            return
+        for barrier in self._layout.belt.barriers:
+            number = barrier.input
+            interrupted = self._barriers_stuck.get(number, self._belt.interrupts(barrier.at))
+            if self._barriers_told.get(number) is not interrupted:
+                self._barriers_told[number] = interrupted
+                await self._devices.set_barrier(number, interrupted)
+
     async def _show(self) -> None:
         """Let the reader see the board in its view, if there is one."""
-        window, code, top = self._layout.reader, None, self._top()
+        window, code = self._layout.reader, None
         if self._held is not None and window.holds(self._tip() @ self._tip_from_board):
             code = self._held.board.code
-        elif top is not None and self._feeder_in_view:
-            code = top.board.code
+        elif (thing := self._supply.seen_by(window)) is not None:
+            code = thing.board.code
         if code != self._shown:
             self._shown = code
             await self._devices.present(code)
@@ -239,6 +249,22 @@ class World:
         self._sensor_stuck = value
         await self._tell_sensor()
 
+    async def stick_barrier(self, number: int, value: bool | None) -> None:
+        """Let a light barrier always show this; None lets it show the truth again.
+
+        Raises:
+            ValueError: no light barrier is wired to that input.
+        """
+        belt = self._layout.belt
+        wired = [barrier.input for barrier in belt.barriers] if belt is not None else []
+        if number not in wired:
+            raise ValueError(f"no light barrier at input {number}; there are {', '.join(map(str, wired)) or 'none'}")
+        if value is None:
+            self._barriers_stuck.pop(number, None)
+        else:
+            self._barriers_stuck[number] = value
+        await self._tell_barriers()
+
     async def remove(self, code: str) -> None:
         """Take a board away by hand, for good.
 
@@ -248,17 +274,23 @@ class World:
         thing = next((thing for thing in self._things if thing.board.code == code), None)
         if thing is None:
             raise ValueError(f"no board {code}")
-        if thing is self._in_tester:
-            refused = await self._devices.take_from_tester()
-            if refused is not None:
-                raise ValueError(refused)
-            self._in_tester = None
-        if thing is self._top():
-            self._refilled_at = self._now + self._layout.feeder.refill_time
-        if thing in self._feeder:
-            self._feeder.remove(thing)
+        if thing is self._in_tester and (refused := await self.clear_tester()) is not None:
+            raise ValueError(refused)
+        if thing.place in ("feeder", "belt"):
+            self._supply.take(thing)
+        if self._nest is not None and thing is self._nest.thing:
+            self._nest.taken()
         self._move(thing, "removed", "taken away by hand")
         await self._tell_sensor()
+
+    async def clear_tester(self) -> str | None:
+        """Take what lies in the tester out of it; gives the reason if that is impossible."""
+        if self._in_tester is None:
+            return None
+        refused = await self._devices.take_from_tester()
+        if refused is None:
+            self._in_tester = None
+        return refused
 
     # ------------------------------------------------------------------------------------------------ truth
 
@@ -274,11 +306,12 @@ class World:
                     "defect": thing.board.defect,
                     "place": thing.place,
                     "position": self._position(thing),
+                    "label": None if thing.label is None else msgspec.to_builtins(thing.label),
                     "history": [msgspec.to_builtins(event) for event in thing.history],
                 }
                 for thing in self._things
             ],
-            "counts": {place: counts[place] for place in PLACES},
+            "counts": {place: counts[place] for place in PLACES if place not in self._missing},
             "gripper": {
                 "closed": self.jaws_closed,
                 "works": self.gripper_works,
@@ -286,19 +319,33 @@ class World:
                 "sensor": self._sensor_told,
                 "tip": None if tip is None else [float(value) for value in tip[:3, 3]],
             },
-            "at_pick_place": top.board.code if (top := self._top()) is not None else None,
+            "at_pick_place": top.board.code if (top := self._supply.top()) is not None else None,
             "in_view": self._shown,
+            **self._stations(),
         }
 
     def _position(self, thing: Thing) -> tuple[float, float, float] | None:
         if thing is self._held:
             x, y, z = (self._tip() @ self._tip_from_board)[:3, 3]
             return float(x), float(y), float(z)
+        if thing.place in ("feeder", "belt"):
+            return self._supply.position(thing)
         layout = self._layout
-        places = {
-            "feeder": layout.feeder,
-            "tester": layout.tester,
-            "good": layout.good_box,
-            "bad": layout.bad_box,
-        }
+        places = {"tester": layout.tester, "good": layout.good_box, "bad": layout.bad_box}
+        if layout.labelling is not None:
+            places["label"] = layout.labelling.place
         return places[thing.place].pose.position if thing.place in places else thing.position
+
+    def _stations(self) -> dict[str, Any]:
+        """Give what only some cells have."""
+        found: dict[str, Any] = {}
+        if self._belt is not None:
+            found["barriers"] = {str(number): on for number, on in self._barriers_told.items()}
+            found["belt"] = [{"code": thing.board.code, "before_stop": -s} for thing, s in self._belt.places()]
+        if self._nest is not None:
+            found["spilled_labels"] = list(self._nest.spilled)
+            found["roller"] = self._nest.roller
+        outputs = self._inputs.outputs
+        if self._layout.tower and outputs:
+            found["tower"] = {color: outputs[number] for color, number in self._layout.tower.items()}
+        return found

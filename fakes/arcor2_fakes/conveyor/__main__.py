@@ -79,6 +79,7 @@ def main(
         register_commands(channel, drive)
         register_faults(channel, {"can": hub.wire})
         channel.source("truth", drive.truth)
+        channel.source("motion", lambda: {"belt": drive.drive.belt})  # small: the world asks for it a hundred times a s
         await hub.wire.listen()
         life = asyncio.create_task(drive.run())
         try:

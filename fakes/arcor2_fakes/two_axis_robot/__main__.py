@@ -37,6 +37,13 @@ def truth(bus: Bus, line: PtyLine) -> dict[str, Any]:
     return {"servos": found, "packets": bus.packets, "plugged": line.plugged, "port": line.port}
 
 
+def motion(bus: Bus) -> dict[str, Any]:
+    """Give the angles alone, rad from the middle: the world asks for them a hundred times a second."""
+    for servo in bus.servos.values():
+        servo.advance()
+    return {"angles": {str(n): (s.position - TICKS / 2) * math.tau / TICKS for n, s in bus.servos.items()}}
+
+
 def register_commands(control: ControlServer, bus: Bus) -> None:
     """Make what the world and a test can do to the servos known to the control channel."""
 
@@ -105,6 +112,7 @@ def main(*, link: Path | None = None, control: str = "127.0.0.1:0", ids: tuple[i
         channel.command("plug", plug)
         channel.command("unplug", unplug)
         channel.source("truth", lambda: truth(bus, line))
+        channel.source("motion", lambda: motion(bus))
         await line.plug()
         try:
             announce(name="two_axis_robot", port=line.port, control=await channel.start())

@@ -1,0 +1,81 @@
+"""The place under the label printer: a label that comes out lies on the board there until an arm has pressed it on."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from arcor2_fakes.cell.layout import Labelling, Matrix
+from arcor2_fakes.cell.things import Label, Printed, Thing
+
+
+class LabelNest:
+    """One board at a time. `spilled` are labels that came out with no bare board below."""
+
+    def __init__(self, layout: Labelling) -> None:
+        self.layout = layout
+        self.thing: Thing | None = None
+        self.spilled: list[str] = []
+        self._last: int | None = None
+        self._began = False
+        self.roller: tuple[float, float, float] | None = None
+
+    def holds(self, world_from_board: Matrix) -> bool:
+        """Say whether a board there is in the nest."""
+        return self.layout.place.holds(world_from_board)
+
+    def printed(self, labels: list[Printed]) -> list[tuple[Thing, str]]:
+        """Take what the printer has printed in its life; gives the boards that got one now, and what to say of it."""
+        if self._last is None:  # what came out before the world began lies elsewhere
+            self._last = max((label.number for label in labels), default=0)
+        happened = []
+        for label in labels:
+            if label.number <= self._last:
+                continue
+            self._last = label.number
+            if self.thing is None or self.thing.label is not None:
+                self.spilled.append(label.code)
+                continue
+            self.thing.label, self._began = Label(label.code), False
+            happened.append((self.thing, f"label {label.code} came down on it"))
+        return happened
+
+    def wiped(self, angles: tuple[float, float]) -> Thing | None:
+        """Let the arm's roller be where its joints put it; gives the board whose label is pressed on by that.
+
+        A label is pressed on when the roller has gone over it from one end to the other.
+        """
+        wipe = self.layout.press
+        self.roller = here = self._roller(angles)
+        label = None if self.thing is None else self.thing.label
+        if label is None or label.pressed:
+            self._began = False
+            return None
+        begin, end = np.asarray(wipe.begin), np.asarray(wipe.end)
+        if math.dist(here, wipe.begin) <= wipe.tolerance:
+            self._began = True
+        elif self._began:
+            along = float(np.clip((here - begin) @ (end - begin) / ((end - begin) @ (end - begin)), 0.0, 1.0))
+            self._began = math.dist(here, begin + along * (end - begin)) <= wipe.tolerance
+        if self._began and math.dist(here, wipe.end) <= wipe.tolerance:
+            label.pressed, self._began = True, False
+            return self.thing
+        return None
+
+    def taken(self) -> str:
+        """Take the board out; gives what to say of it. A label that only lies there does not come along."""
+        thing, self.thing = self.thing, None
+        assert thing is not None, "there is a board to be taken"
+        if thing.label is not None and not thing.label.pressed:
+            self.spilled.append(thing.label.code)
+            thing.label = None
+            return "taken from the label printer; the label, not pressed on, fell off"
+        return "taken from the label printer"
+
+    def _roller(self, angles: tuple[float, float]) -> tuple[float, float, float]:
+        first, second = self.layout.arm.links
+        x = first * math.cos(angles[0]) + second * math.cos(angles[0] + angles[1])
+        y = first * math.sin(angles[0]) + second * math.sin(angles[0] + angles[1])
+        world = self.layout.arm.base.matrix() @ np.array([x, y, 0.0, 1.0])
+        return float(world[0]), float(world[1]), float(world[2])

@@ -1,0 +1,193 @@
+"""Where boards come from: a magazine that brings one after another to the same place, or a belt."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from arcor2_fakes.cell.layout import Belt, Feeder, Matrix, Place
+from arcor2_fakes.cell.things import Thing
+
+_TOUCHING = 1e-6
+
+
+class Supply(Protocol):
+    """What the world asks of a supply; times in s since the world began, poses in the world."""
+
+    place: str
+    """What the place of its boards is called."""
+
+    def advance(self, now: float, counts: float | None) -> list[tuple[Thing, str, str]]:
+        """Let time pass up to `now` and the belt be at `counts`; gives what happened: who, to which place, why."""
+        ...
+
+    def top(self) -> Thing | None:
+        """Give the board at the pick place."""
+        ...
+
+    def under(self, world_from_gripped: Matrix) -> tuple[Thing, Matrix] | None:
+        """Give the board that jaws there get hold of, and its pose."""
+        ...
+
+    def seen_by(self, window: Place) -> Thing | None:
+        """Give the board that lies in a reader's view."""
+        ...
+
+    def take(self, thing: Thing) -> None:
+        """Take a board away."""
+        ...
+
+    def accepts(self, world_from_board: Matrix) -> bool:
+        """Say whether a board let go here comes down on the supply."""
+        ...
+
+    def put(self, thing: Thing, world_from_board: Matrix) -> str | None:
+        """Lay a board down; gives the reason if there is no room for it."""
+        ...
+
+    def position(self, thing: Thing) -> tuple[float, float, float]:
+        """Give where a board lies."""
+        ...
+
+
+class Magazine:
+    """A stack; the next board comes to the pick place some time after the last one was taken."""
+
+    place = "feeder"
+
+    def __init__(self, feeder: Feeder, things: list[Thing]) -> None:
+        self._feeder = feeder
+        self._things = list(things)  # the first is on top
+        self._now = self._refilled_at = 0.0
+
+    def advance(self, now: float, counts: float | None) -> list[tuple[Thing, str, str]]:  # noqa: ARG002 - no belt
+        """Let time pass."""
+        self._now = now
+        return []
+
+    def top(self) -> Thing | None:
+        """Give the board at the pick place."""
+        return self._things[0] if self._things and self._now >= self._refilled_at else None
+
+    def under(self, world_from_gripped: Matrix) -> tuple[Thing, Matrix] | None:
+        """Give the top board when the jaws are at it."""
+        top = self.top()
+        return (top, self._feeder.pose.matrix()) if top is not None and self.accepts(world_from_gripped) else None
+
+    def seen_by(self, window: Place) -> Thing | None:
+        """Give the top board when the pick place is in view."""
+        return self.top() if window.holds(self._feeder.pose.matrix()) else None
+
+    def take(self, thing: Thing) -> None:
+        """Take a board away; if it was the top one, the next is on its way."""
+        if thing is self.top():
+            self._refilled_at = self._now + self._feeder.refill_time
+        self._things.remove(thing)
+
+    def accepts(self, world_from_board: Matrix) -> bool:
+        """Say whether a board let go here lies at the pick place."""
+        return self._feeder.holds(world_from_board)
+
+    def put(self, thing: Thing, world_from_board: Matrix) -> str | None:  # noqa: ARG002 - it slides into place
+        """Lay a board back."""
+        if self.top() is not None:
+            return "over the feeder, where the next board lies already"
+        self._things.insert(0, thing)
+        self._refilled_at = self._now
+        return None
+
+    def position(self, thing: Thing) -> tuple[float, float, float]:  # noqa: ARG002 - all at one place
+        """Give the pick place."""
+        return self._feeder.pose.position
+
+
+class BoardBelt:
+    """Boards on a belt that ends at a stop. A loader lays the next one on at the far end whenever there is room.
+
+    A board's place is `s`, m before the stop, negative; those that have run up wait there while the belt slips beneath.
+    """
+
+    place = "belt"
+
+    def __init__(self, belt: Belt, things: list[Thing]) -> None:
+        self._belt = belt
+        self._loader = list(things)
+        self._on: list[tuple[Thing, float]] = []  # nearest to the stop first
+        self._counts: float | None = None
+
+    def advance(self, now: float, counts: float | None) -> list[tuple[Thing, str, str]]:  # noqa: ARG002 - moved by counts
+        """Let the boards ride along."""
+        belt, happened = self._belt, []
+        if counts is not None:
+            moved = 0.0 if self._counts is None else (counts - self._counts) / belt.counts_per_metre
+            self._counts = counts
+            free, on = 0.0, []
+            for thing, s in self._on:
+                s = min(s + moved, free)
+                if s < -belt.length - _TOUCHING:
+                    happened.append((thing, "lost", "ran off the belt backwards"))
+                    continue
+                on.append((thing, s))
+                free = s - belt.board_length
+            self._on = on
+            if self._loader and (not on or on[-1][1] >= belt.pitch - belt.length):
+                thing = self._loader.pop(0)
+                self._on.append((thing, -belt.length))
+                happened.append((thing, "belt", "laid on the belt"))
+        return happened
+
+    def places(self) -> list[tuple[Thing, float]]:
+        """Give the boards on the belt and where each is, m before the stop, negative."""
+        return list(self._on)
+
+    def interrupts(self, at: float) -> bool:
+        """Say whether a board stands in the beam at `at`, m before the stop, negative."""
+        return any(abs(s - at) <= self._belt.board_length / 2.0 for _, s in self._on)
+
+    def _pose(self, s: float) -> Matrix:
+        shifted = np.eye(4)
+        shifted[0, 3] = s
+        pose: Matrix = self._belt.pose.matrix() @ shifted
+        return pose
+
+    def top(self) -> Thing | None:
+        """Give the board that lies at the stop."""
+        return self._on[0][0] if self._on and self._on[0][1] >= -_TOUCHING else None
+
+    def under(self, world_from_gripped: Matrix) -> tuple[Thing, Matrix] | None:
+        """Give the board that the jaws are at, wherever it has come to lie."""
+        local = self._belt.pose.inverse() @ world_from_gripped
+        for thing, s in self._on:
+            if self._belt.tolerance.allows(local, s):
+                return thing, self._pose(s)
+        return None
+
+    def seen_by(self, window: Place) -> Thing | None:
+        """Give the board in view."""
+        return next((thing for thing, s in self._on if window.holds(self._pose(s))), None)
+
+    def take(self, thing: Thing) -> None:
+        """Take a board away, from the belt or out of the loader."""
+        self._on = [(other, s) for other, s in self._on if other is not thing]
+        self._loader = [other for other in self._loader if other is not thing]
+
+    def accepts(self, world_from_board: Matrix) -> bool:
+        """Say whether a board let go here comes down on the belt."""
+        local = self._belt.pose.inverse() @ world_from_board
+        s = float(local[0, 3])
+        return -self._belt.length <= s <= self._belt.tolerance.position and self._belt.tolerance.allows(local, s)
+
+    def put(self, thing: Thing, world_from_board: Matrix) -> str | None:
+        """Lay a board on the belt."""
+        s = min(float((self._belt.pose.inverse() @ world_from_board)[0, 3]), 0.0)
+        if any(abs(s - other) < self._belt.board_length - _TOUCHING for _, other in self._on):
+            return "onto a board that lies on the belt"
+        self._on = sorted([*self._on, (thing, s)], key=lambda placed: -placed[1])
+        return None
+
+    def position(self, thing: Thing) -> tuple[float, float, float]:
+        """Give where a board lies; one in the loader is at the belt's beginning."""
+        s = next((s for other, s in self._on if other is thing), -self._belt.length)
+        x, y, z = self._pose(s)[:3, 3]
+        return float(x), float(y), float(z)

@@ -1,0 +1,325 @@
+"""The belt with its light barriers, and the place where labels come down on boards and are pressed on."""
+
+import copy
+import itertools
+import math
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import arcor2_fakes.cell
+from arcor2_fakes.cell.boards import Board
+from arcor2_fakes.cell.layout import Layout
+from arcor2_fakes.cell.supply import BoardBelt
+from arcor2_fakes.cell.things import Inputs, Printed, Robot, Thing
+from arcor2_fakes.cell.world import World
+
+PLAIN = msgspec.json.decode(Path(arcor2_fakes.cell.__file__).with_name("example.json").read_bytes())
+TOLERANCE = {"position": 0.01, "height": 0.02, "tilt": 0.15}
+UP_Y = [0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5)]  # x of the belt along y of the world
+STOP, NEST = (0.4, -0.3, 0.08), (0.45, -0.08, 0.08)
+BEGIN, END = (0.45, -0.1, 0.09), (0.45, -0.06, 0.09)
+COUNTS = 1000.0  # per metre
+WHOLE = {
+    **{name: part for name, part in PLAIN.items() if name != "feeder"},
+    "reader": {"pose": {"position": STOP}, "tolerance": TOLERANCE},
+    "belt": {
+        "pose": {"position": STOP, "orientation": UP_Y},
+        **{"tolerance": TOLERANCE, "length": 0.6, "pitch": 0.2, "board_length": 0.08, "counts_per_metre": COUNTS},
+        "barriers": [{"input": 0, "at": 0.0}, {"input": 3, "at": -0.2}],
+    },
+    "labelling": {
+        "place": {"pose": {"position": NEST}, "tolerance": TOLERANCE},
+        "arm": {"base": {"position": [0.65, -0.08, 0.09]}, "links": [0.15, 0.1]},
+        "press": {"begin": BEGIN, "end": END, "tolerance": 0.008},
+    },
+    "tower": {"green": 2},
+}
+LAYOUT = msgspec.convert(WHOLE, Layout)
+BOARDS = [Board("A"), Board("B", "short"), Board("C")]
+TIP = 0.1
+
+
+class Devices:
+    """Remembers what it was told; the tester takes everything."""
+
+    def __init__(self) -> None:
+        self.barriers: list[tuple[int, bool]] = []
+        self.shown: str | None = None
+
+    async def put_into_tester(self, board: Board) -> str | None:
+        return None
+
+    async def take_from_tester(self) -> str | None:
+        return None
+
+    async def present(self, code: str | None) -> None:
+        self.shown = code
+
+    async def set_sensor(self, held: bool) -> None:
+        pass
+
+    async def set_barrier(self, number: int, interrupted: bool) -> None:
+        self.barriers.append((number, interrupted))
+
+
+def joints(x: float, y: float) -> tuple[float, float]:
+    """The arm's angles for a point of the world, elbow on one side."""
+    x, y = x - 0.65, y + 0.08
+    cosine = (x * x + y * y - 0.15**2 - 0.1**2) / (2 * 0.15 * 0.1)
+    elbow = math.acos(max(-1.0, min(1.0, cosine)))
+    return math.atan2(y, x) - math.atan2(0.1 * math.sin(elbow), 0.15 + 0.1 * math.cos(elbow)), elbow
+
+
+class Cell:
+    """A world with a robot that jumps, a belt that is pushed, and a printer."""
+
+    def __init__(self, boards: list[Board] = BOARDS) -> None:
+        self.devices = Devices()
+        self.world = World(LAYOUT, boards, self.devices)
+        self.inputs = Inputs(belt=0.0, arm=(0.0, 0.0))
+        self.now, self.bits = 0.0, 0
+        self.pose: Any = (0.0, 0.6, 0.5, 0.0, math.pi, 0.0)
+
+    async def wait(self, seconds: float = 0.1) -> None:
+        for _ in range(round(seconds / 0.02)):
+            self.now += 0.02
+            await self.world.step(self.now, Robot(self.pose, (0.0,) * 6, self.bits), copy.copy(self.inputs))  # type: ignore[arg-type]
+
+    async def run(self, metres: float) -> None:
+        assert self.inputs.belt is not None
+        begin = self.inputs.belt
+        for part in range(1, 21):
+            self.inputs.belt = begin + metres * COUNTS * part / 20
+            await self.wait(0.02)
+
+    async def at(self, x: float, y: float, z: float) -> None:
+        self.pose = (-x, -y, z + TIP, 0.0, math.pi, 0.0)
+        await self.wait()
+
+    async def grip(self, on: bool) -> None:
+        self.bits = int(on)
+        await self.wait(0.3)
+
+    async def carry(self, source: Any, target: Any) -> None:
+        await self.at(*source)
+        await self.grip(True)
+        await self.at(*target)
+        await self.grip(False)
+
+    async def print(self, code: str) -> None:
+        number = len(self.inputs.printed) + 1
+        fields = [{"text": "PASSED"}, {"barcode": True, "text": code}]
+        self.inputs.printed = [*self.inputs.printed, Printed(number, fields)]
+        await self.wait()
+
+    async def roll(self, *points: tuple[float, ...]) -> None:
+        """Bring the roller to one point after the other, on a straight way."""
+        x, y, _ = self.world.truth()["roller"]
+        for target in points:
+            for part in range(1, 11):
+                here = x + (target[0] - x) * part / 10, y + (target[1] - y) * part / 10
+                self.inputs.arm = joints(*here)
+                await self.wait(0.02)
+            x, y = target[0], target[1]
+
+    def board(self, code: str) -> dict[str, Any]:
+        return next(board for board in self.world.truth()["boards"] if board["code"] == code)
+
+
+async def in_nest(cell: Cell) -> None:
+    await cell.world.begin()
+    await cell.run(0.7)
+    await cell.carry(STOP, NEST)
+    assert cell.board("A")["place"] == "label"
+
+
+# ---------------------------------------------------------------------------------------------------- belt
+async def test_boards_ride_interrupt_barriers_and_wait_at_the_stop() -> None:
+    cell = Cell()
+    await cell.world.begin()
+    assert cell.devices.barriers == [(0, False), (3, False)]
+    await cell.run(0.3)
+    assert [board["before_stop"] for board in cell.world.truth()["belt"]] == pytest.approx([0.3, 0.5], abs=0.035)
+    assert cell.devices.barriers == [(0, False), (3, False)]
+    assert cell.devices.shown is None
+    await cell.run(0.5)
+    truth = cell.world.truth()
+    assert truth["at_pick_place"] == cell.devices.shown == "A"
+    # The first stands at the stop, the others have run up against it; a board on the way cut the second beam twice.
+    assert next(board["before_stop"] for board in truth["belt"]) == 0.0
+    assert cell.devices.barriers.count((3, True)) >= 2
+    assert (0, True) in cell.devices.barriers
+    await cell.run(1.0)
+    assert [board["before_stop"] for board in cell.world.truth()["belt"]] == pytest.approx([0.0, 0.08, 0.16])
+    cell.devices.barriers.clear()
+    await cell.carry(STOP, (0.2, 0.5, 0.06))
+    assert (0, False) in cell.devices.barriers
+    assert cell.board("A")["place"] == "good"
+    assert cell.world.truth()["at_pick_place"] is None  # the belt stands: the next does not come
+    await cell.run(0.08)
+    assert cell.world.truth()["at_pick_place"] == "B"
+
+
+async def test_a_board_is_gripped_where_it_lies_and_nowhere_else() -> None:
+    cell = Cell()
+    await cell.world.begin()
+    await cell.run(0.5)
+    s = cell.world.truth()["belt"][0]["before_stop"]
+    assert 0.05 < s < 0.2
+    await cell.carry(STOP, (0.2, 0.5, 0.06))
+    assert cell.board("A")["place"] == "belt"
+    await cell.carry((STOP[0], STOP[1] - s, STOP[2]), (0.2, 0.5, 0.06))
+    assert cell.board("A")["place"] == "good"
+
+
+async def test_a_board_laid_onto_another_is_lost_and_one_on_the_bare_belt_rides_on() -> None:
+    cell = Cell()
+    await cell.world.begin()
+    await cell.run(0.7)
+    await cell.at(*STOP)
+    await cell.grip(True)
+    await cell.run(0.2)
+    await cell.at(STOP[0], STOP[1] - 0.02, STOP[2])
+    await cell.grip(False)
+    assert cell.board("A")["place"] == "lost"
+    assert "onto a board" in cell.board("A")["history"][-1]["why"]
+    await cell.carry(STOP, (STOP[0], STOP[1] - 0.4, STOP[2]))
+    assert cell.board("B")["place"] == "belt"
+    await cell.run(1.0)
+    assert [board["code"] for board in cell.world.truth()["belt"]] == ["C", "B"]
+
+
+async def test_a_belt_that_runs_backwards_loses_its_boards() -> None:
+    cell = Cell([Board("A")])
+    await cell.world.begin()
+    await cell.run(0.2)
+    await cell.run(-0.3)
+    assert cell.board("A")["place"] == "lost"
+    assert "backwards" in cell.board("A")["history"][-1]["why"]
+
+
+async def test_a_stuck_barrier_shows_what_is_not_so() -> None:
+    cell = Cell()
+    await cell.world.begin()
+    await cell.world.stick_barrier(0, True)
+    assert cell.devices.barriers[-1] == (0, True)
+    await cell.run(0.8)
+    assert (0, False) not in cell.devices.barriers[3:]
+    await cell.world.stick_barrier(0, None)
+    with pytest.raises(ValueError, match="no light barrier at input 7; there are 0, 3"):
+        await cell.world.stick_barrier(7, True)
+
+
+@settings(max_examples=60, deadline=None)
+@given(pushes=st.lists(st.floats(-0.05, 0.3), max_size=40), takes=st.lists(st.booleans(), min_size=40, max_size=40))
+def test_boards_on_a_belt_never_overlap_nor_pass_the_stop(pushes: list[float], takes: list[bool]) -> None:
+    things = [Thing(Board(str(number))) for number in range(8)]
+    assert LAYOUT.belt is not None
+    belt, counts = BoardBelt(LAYOUT.belt, things), 0.0
+    belt.advance(0.0, counts)
+    for push, take in zip(pushes, takes, strict=False):
+        counts += push * COUNTS
+        belt.advance(0.0, counts)
+        places = [s for _, s in belt.places()]
+        assert all(-0.6 - 1e-6 <= s <= 0.0 for s in places)
+        assert all(ahead - behind >= 0.08 - 1e-9 for ahead, behind in itertools.pairwise(places))
+        if take and (top := belt.top()) is not None:
+            belt.take(top)
+
+
+# ---------------------------------------------------------------------------------------------------- labels
+async def test_a_label_comes_down_on_the_board_below_and_stays_once_it_is_pressed_on() -> None:
+    cell = Cell()
+    await in_nest(cell)
+    await cell.print("A")
+    assert cell.board("A")["label"] == {"code": "A", "pressed": False}
+    await cell.roll(BEGIN, END)
+    assert cell.board("A")["label"] == {"code": "A", "pressed": True}
+    await cell.carry(NEST, (0.2, 0.5, 0.06))
+    assert (cell.board("A")["place"], cell.board("A")["label"]) == ("good", {"code": "A", "pressed": True})
+    assert cell.world.truth()["spilled_labels"] == []
+
+
+async def test_a_label_that_only_lies_there_falls_off() -> None:
+    cell = Cell()
+    await in_nest(cell)
+    await cell.print("A")
+    await cell.carry(NEST, (0.2, 0.5, 0.06))
+    assert cell.board("A")["label"] is None
+    assert cell.world.truth()["spilled_labels"] == ["A"]
+
+
+@pytest.mark.parametrize(
+    "way",
+    [
+        [END, BEGIN],
+        [BEGIN],
+        [BEGIN, (0.5, -0.08), END],
+        [(0.46, -0.1 - 0.03), (0.5, -0.08)],
+    ],
+    ids=["the wrong way round", "half", "off the label in between", "beside it"],
+)
+async def test_a_label_is_not_pressed_on_by(way: list[tuple[float, ...]]) -> None:
+    cell = Cell()
+    await in_nest(cell)
+    await cell.print("A")
+    await cell.roll((0.55, -0.1), *way)
+    assert not cell.board("A")["label"]["pressed"]
+
+
+async def test_rolling_before_the_label_is_there_presses_nothing() -> None:
+    cell = Cell()
+    await in_nest(cell)
+    await cell.roll(BEGIN, END)
+    await cell.print("A")
+    await cell.wait(0.5)
+    assert not cell.board("A")["label"]["pressed"]
+
+
+async def test_labels_that_no_bare_board_is_below_are_spilled() -> None:
+    cell = Cell()
+    cell.inputs.printed = [Printed(1, [{"barcode": True, "text": "of yesterday"}])]
+    await cell.world.begin()
+    await cell.wait()
+    await cell.print("nobody")
+    await cell.run(0.7)
+    await cell.carry(STOP, NEST)
+    await cell.print("A")
+    await cell.print("twice")
+    assert cell.world.truth()["spilled_labels"] == ["nobody", "twice"]
+    assert cell.board("A")["label"]["code"] == "A"
+
+
+async def test_lamps_are_what_the_outputs_say() -> None:
+    cell = Cell()
+    cell.inputs.outputs = [False, True, True]
+    await cell.wait()
+    assert cell.world.truth()["tower"] == {"green": True}
+
+
+# ---------------------------------------------------------------------------------------------------- layout
+@pytest.mark.parametrize(
+    ("change", "names"),
+    [
+        (lambda whole: whole.update(feeder=PLAIN["feeder"]), "feeder or on a belt"),
+        (lambda whole: whole["belt"].update(pitch=0.05), "pitch"),
+        (lambda whole: whole["belt"]["barriers"][0].update(at=0.1), "barriers"),
+        (lambda whole: whole["labelling"]["press"].update(end=list(BEGIN)), "begin and end"),
+        (lambda whole: whole["labelling"]["arm"].update(links=[0.1]), "links"),
+    ],
+)
+def test_a_layout_that_makes_no_sense_is_refused(change: Any, names: str) -> None:
+    whole = copy.deepcopy(WHOLE)
+    change(whole)
+    with pytest.raises(msgspec.ValidationError, match=names):
+        msgspec.convert(whole, Layout)
+
+
+def test_a_layout_says_which_devices_it_needs() -> None:
+    assert LAYOUT.needs() == ["conveyor", "io", "printer", "arm"]
+    assert msgspec.convert(PLAIN, Layout).needs() == []
