@@ -1,0 +1,1 @@
+"""A production planning service (ERP) over REST: orders in, results out by a stored outbox (docs/devices/erp.md)."""

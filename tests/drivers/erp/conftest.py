@@ -1,0 +1,54 @@
+"""A fake planning service in a process of its own, and the drivers on its wire."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from arcor2_drivers.erp.erp_service import ErpService
+from arcor2_drivers.erp.settings import ErpSettings
+from tests.fakes.conftest import FakeProcess, start_fake, wait_for
+
+__all__ = ["start_fake", "wait_for"]
+
+
+@pytest.fixture(scope="module")
+def one_fake() -> Iterator[FakeProcess]:
+    fake = FakeProcess("erp")
+    fake.truth()  # opens the control channel, which lives as long
+    yield fake
+    fake.end()
+
+
+@pytest.fixture
+def fake(one_fake: FakeProcess) -> Iterator[FakeProcess]:
+    """A service with an empty plan; one process serves the tests of a file."""
+    for command in ("heal", "work", "forget"):
+        one_fake.control.do(command)
+    yield one_fake
+    for command in ("heal", "work"):
+        one_fake.control.do(command)
+
+
+@pytest.fixture
+def make(tmp_path: Path) -> Iterator[Callable[..., ErpService]]:
+    """Gives ``make("http://127.0.0.1:4000", poll=0.1)``: a driver, not connected; it is disconnected in the end."""
+    made: list[ErpService] = []
+
+    def build(url: str, **settings: Any) -> ErpService:
+        usual = {"outbox": str(tmp_path), "request_timeout": 0.5, "longest_pause": 0.5, "poll": 0.1}
+        erp = ErpService("erp_id", "planning", ErpSettings(url, **{**usual, **settings}))
+        made.append(erp)
+        return erp
+
+    yield build
+    for erp in made:
+        erp.disconnect()
+
+
+@pytest.fixture
+def erp(fake: FakeProcess, make: Callable[..., ErpService]) -> ErpService:
+    erp = make(fake.ready["url"])
+    erp.connect()
+    return erp
