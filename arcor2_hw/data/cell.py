@@ -8,6 +8,8 @@ from msgspec import field
 
 from arcor2_hw.data.base import UNSET, Data, Unset, is_valid_name
 from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.parameter import Parameter
+from arcor2_hw.data.scene import Scene, SceneObjectOverride
 from arcor2_hw.exceptions import InvalidData, NotFound
 
 MAX_SIZE: Final = 1 << 20
@@ -63,6 +65,47 @@ def read_cell(path: Path) -> Cell:
         raise InvalidData(f"{path} cannot be read: {error.strerror}") from None
     except msgspec.DecodeError as error:  # also for a wrong value
         raise InvalidData(f"{path}: {error}") from None
+
+
+def overlay(cell: Cell, scene: Scene) -> list[SceneObjectOverride]:
+    """Give the settings that a cell lays over those of a scene's objects of the same names.
+
+    Poses stay the scene's: action points are taught relative to them. A device that is not in the scene is left out;
+    `strangers` gives those. Raises InvalidData naming the object when its type is another one.
+    """
+    found = []
+    for scene_object in scene.objects:
+        device = cell.device(scene_object.name)
+        if device is None or not device.settings:
+            continue
+        if device.type != scene_object.type:
+            raise InvalidData(
+                f"{device.name} is a {scene_object.type} in the scene {scene.name} and a {device.type} in the cell file"
+            )
+        parameters = [
+            Parameter(name, _kind(value), msgspec.json.encode(value).decode())
+            for name, value in device.settings.items()
+        ]
+        found.append(SceneObjectOverride(scene_object.id, parameters))
+    return found
+
+
+def strangers(cell: Cell, scene: Scene) -> list[str]:
+    """Give the names in a cell that no object of the scene has: misspelt, or not used there."""
+    names = {scene_object.name for scene_object in scene.objects}
+    return [device.name for device in cell.devices if device.name not in names]
+
+
+def _kind(value: Any) -> str:
+    """Give the parameter type of the protocol for a plain value; the driver's own hints decide in the end."""
+    match value:
+        case bool():
+            return "boolean"
+        case int():
+            return "integer"
+        case float():
+            return "double"
+    return "string"
 
 
 def write_cell(cell: Cell) -> bytes:

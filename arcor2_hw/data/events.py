@@ -6,6 +6,7 @@ from typing import Any, Final
 from msgspec import Struct, field
 
 from arcor2_hw.data.base import UNSET, Data, Unset
+from arcor2_hw.data.device import Connection
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import ObjectTypeMeta
 from arcor2_hw.data.package import CollisionModels, PackageStateEnum, PackageSummary
@@ -26,11 +27,15 @@ from arcor2_hw.data.scene import BareScene, Scene, SceneObject
 
 
 class EventType(Struct, frozen=True):
-    """Declares one event: the type of its data (None: it has none) and the least role that gets it."""
+    """Declares one event: the type of its data (None: it has none) and the least role that gets it.
+
+    `additional`: it is not of the ARCOR2 protocol, and goes only to clients that subscribed to it.
+    """
 
     name: str
     data: Any
     role: Role
+    additional: bool = False
 
 
 class Event(Data, frozen=True):
@@ -257,6 +262,18 @@ class ProjectExceptionData(Data, frozen=True):
     handled: bool = False
 
 
+class ObjectStateData(Data, frozen=True):
+    """What the event ObjectState carries: how the connection of an object of the scene or program in operation is.
+
+    reason: why it is lost or failed, or why all ended. overlaid: the settings that come from the server's cell file.
+    """
+
+    object_id: str
+    state: Connection
+    reason: str | Unset = UNSET
+    overlaid: list[str] | Unset = UNSET
+
+
 class ChangeType(enum.StrEnum):
     """What happened to the item that an event carries."""
 
@@ -308,6 +325,7 @@ EVENTS: Final = {
         EventType("PackageInfo", PackageInfoData, Role.OPERATOR),
         EventType("PackageState", PackageStateData, Role.OPERATOR),
         EventType("ProjectException", ProjectExceptionData, Role.OPERATOR),
+        EventType("ObjectState", ObjectStateData, Role.OPERATOR, additional=True),
     )
 }
-"""Every event of the protocol by name."""
+"""Every event of the protocol, and of ours beside it, by name."""

@@ -22,6 +22,7 @@ class Generic(abc.ABC):
     `__init__` and closes in `cleanup`; it works as it is.
 
     Class data: `_ABSTRACT` (may it not be placed in a scene), `loss_reaction` (what the device does when it loses us),
+    `loss_ends_program` (a program that runs is stopped when this device is lost; false where work may go on without),
     `DYNAMIC_PARAMS` {parameter: (method giving its values, names of the parameters it needs)}, `CANCEL_MAPPING`
     {action: method that cancels it}, `category` and `icon` for the editor.
     """
@@ -30,6 +31,7 @@ class Generic(abc.ABC):
     DYNAMIC_PARAMS: ClassVar[dict[str, tuple[str, set[str]]]] = {}
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {}
     loss_reaction: ClassVar[LossReaction] = LossReaction.holds()
+    loss_ends_program: ClassVar[bool] = True
 
     def __init__(self, obj_id: str, name: str, settings: Settings | None = None) -> None:
         self.id = obj_id
@@ -75,6 +77,11 @@ class Generic(abc.ABC):
     def connection(self) -> Connection:
         """Tell how the connection is; a type without one is always online."""
         return Connection.ONLINE
+
+    @property
+    def connection_reason(self) -> str:
+        """Tell why the connection is lost or failed; for types that do not keep it by `Observing`, which is asked."""
+        return ""
 
     @property
     def health(self) -> Health:

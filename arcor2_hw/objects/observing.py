@@ -28,8 +28,8 @@ _made_here = threading.local()
 
 
 @contextlib.contextmanager
-def listening(changed: Callable[[], None]) -> Iterator[None]:
-    """Have `changed` called at every change of state of the connections that are made on this thread meanwhile.
+def listening(changed: "Callable[[Observing], None]") -> Iterator[None]:
+    """Have `changed` called with each connection that is made on this thread meanwhile, whenever its state changes.
 
     It is called on the thread that changed the state, right after that; it must not raise, nor wait.
     """
@@ -67,8 +67,7 @@ class Observing:
         self._reason: DeviceError | None = None
         self._turn = threading.Lock()
         self._pause = FIRST_PAUSE
-        made_here: Callable[[], None] | None = getattr(_made_here, "changed", None)
-        self._changed: Callable[[], None] = (lambda: None) if made_here is None else made_here
+        self._listener: Callable[[Observing], None] | None = getattr(_made_here, "changed", None)
 
     @property
     def reason(self) -> str:
@@ -91,7 +90,7 @@ class Observing:
             if self._state is not Connection.BACK:
                 return
             self._state = Connection.ONLINE
-        self._changed()
+        self._tell_changed()
 
     def check(self) -> None:
         """Return when the device is observed. Raises NotConnected, or ConnectionLost with what it was lost by."""
@@ -143,8 +142,12 @@ class Observing:
                 return False
             changes, self._state = self._state is not state, state
         if changes:
-            self._changed()
+            self._tell_changed()
         return True
+
+    def _tell_changed(self) -> None:
+        if self._listener is not None:
+            self._listener(self)
 
     def _await_former(self, timeout: float) -> None:
         """Let a thread end that `stop` could not wait for: at its end it closes what is open."""

@@ -1,7 +1,7 @@
 """All devices of a scene: brought up at once, stopped at once, closed at once."""
 
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from queue import Empty, SimpleQueue
 from typing import Final
 
@@ -55,6 +55,8 @@ class Cell:
         self._devices: dict[str, Device] = {}
         self._ended: SimpleQueue[Job | None] = SimpleQueue()
         self._abandoned = False
+        self.changed: Callable[[Device], None] = lambda _: None
+        """Called when the connection of a device changes, on the thread that keeps it."""
 
     def __iter__(self) -> Iterator[Device]:
         return iter(list(self._devices.values()))
@@ -74,7 +76,7 @@ class Cell:
         began = time.monotonic()
         pending: dict[Job, tuple[Device, float]] = {}
         for each in how:
-            self._devices[each.scene_object.id] = Device(each)
+            self._devices[each.scene_object.id] = Device(each, lambda device: self.changed(device))
         for device in self:
             opening, deadline = device.open(self._ended.put)
             pending[opening] = (device, began + deadline)

@@ -6,9 +6,18 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from arcor2_hw.actions import deadline_of
-from arcor2_hw.exceptions import Arcor2Error, Arcor2NotImplemented, DeviceError, InvalidData, NotConnected
+from arcor2_hw.data.device import Connection
+from arcor2_hw.exceptions import (
+    Arcor2Error,
+    Arcor2NotImplemented,
+    ConnectionLost,
+    DeviceError,
+    InvalidData,
+    NotConnected,
+)
 from arcor2_hw.objects import Axis, Generic, Robot
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
+from arcor2_hw.objects.observing import Observing, listening
 from arcor2_hw.runtime.creation import Recipe
 from arcor2_hw.runtime.lane import Job, Lane
 from arcor2_hw.runtime.values import decode_arguments
@@ -65,10 +74,15 @@ def overrides(cls: type[Generic], name: str) -> bool:
 
 
 class Device:
-    """One object of the scene. Every call on the instance is made on one of its lanes."""
+    """One object of the scene. Every call on the instance is made on one of its lanes.
 
-    def __init__(self, recipe: Recipe) -> None:
+    `changed` is called when its connection changes, on the thread that keeps the connection.
+    """
+
+    def __init__(self, recipe: Recipe, changed: "Callable[[Device], None]" = lambda _: None) -> None:
         self.recipe = recipe
+        self._changed = changed
+        self._lives: list[Observing] = []
         self.id = recipe.scene_object.id
         self.name = recipe.scene_object.name
         self.instance: Generic | None = None
@@ -87,11 +101,29 @@ class Device:
         return job, deadline
 
     def _open(self) -> None:
-        instance = self.recipe.make()
-        self.instance = instance
-        instance.connect()
+        with listening(self._life_changed):
+            instance = self.recipe.make()
+            self.instance = instance
+            instance.connect()
         if self.closing:  # came up too late: nobody waits any more
             instance.cleanup()
+
+    def _life_changed(self, life: Observing) -> None:
+        if life not in self._lives:
+            self._lives.append(life)
+        self._changed(self)
+
+    def connection_reason(self) -> str:
+        """Tell why the connection is lost or failed; empty when it is not, or when nobody knows."""
+        given = "" if self.instance is None else self.instance.connection_reason
+        return given or next((life.reason for life in self._lives if life.reason), "")
+
+    def require_not_lost(self, method: str) -> None:
+        """ConnectionLost while the connection is lost: an action would be sent into nothing."""
+        if self.require().connection is Connection.LOST:
+            raise ConnectionLost(
+                f"{self.name}: {method} was not done: the connection is lost", self.connection_reason()
+            )
 
     def begin_close(self) -> Job | None:
         """Begin to disconnect; gives the call, None when there is nothing to close.
@@ -156,6 +188,7 @@ class Device:
 
         def run() -> Any:
             if control:
+                self.require_not_lost(method)
                 self.take_control()
             return bound(**keywords)
 

@@ -40,6 +40,8 @@ GONE_WITHIN: Final = 1.8
 """Seconds from the loss of the server to the end of this process, whatever hangs."""
 NUDGE_PERIOD: Final = 0.1
 """Seconds between two interruptions of a script that does not end although it is stopped."""
+LOST_WITHIN: Final = 5.0
+"""Seconds that a script gets to end when it is stopped because a device is lost, as when somebody stops it."""
 FLUSH: Final = 0.3
 """Seconds for the last messages."""
 
@@ -73,7 +75,7 @@ class Host:
         self._work: SimpleQueue[m.HostBound] = SimpleQueue()
         self._subscribed: dict[str, m.Subscribe] = {}
         self._streams = Streams(self._cell, self._send_stream)
-        self._watch = Watch(self._cell, self.link.post)
+        self._watch = Watch(self._cell, self.link.post, self._lost)
         self._leaving = threading.Event()
         self._types: str | None = None
         self._wake, wake_up = socket.socketpair()
@@ -144,11 +146,15 @@ class Host:
 
     def _run_package(self, message: m.RunPackage) -> None:
         program = Program(
-            self, message.package_id, start_paused=message.start_paused, breakpoints=frozenset(message.breakpoints)
+            self,
+            message.package_id,
+            start_paused=message.start_paused,
+            breakpoints=frozenset(message.breakpoints),
+            here=message.cell,
         )
         self._cell = program.cell
         self._streams = Streams(program.cell, self._send_stream)
-        self._watch = Watch(program.cell, self.link.post)
+        self._watch = Watch(program.cell, self.link.post, self._lost)
         program.inside = True
         self.program = program
         set_current(program)
@@ -231,6 +237,14 @@ class Host:
         if self.program is not None and not self.program.stop_requested:
             self.program.stop()
             self._nudge()
+
+    def _lost(self, device: Device, reason: str) -> None:
+        """End the program that works with a device that is lost; a scene that is online goes on without it."""
+        program = self.program
+        if program is None or not device.recipe.cls.loss_ends_program or not program.device_lost(device, reason):
+            return
+        self._nudge()
+        self.clock.after(LOST_WITHIN, lambda: program.ended or os._exit(4))
 
     def _call(self, message: m.Call) -> None:
         device: Device | None = None

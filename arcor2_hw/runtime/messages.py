@@ -9,6 +9,7 @@ from typing import Any, Final
 import msgspec
 from msgspec import Struct, field
 
+from arcor2_hw.data.cell import Cell
 from arcor2_hw.data.device import Alarm, Connection, Health
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.project import Project
@@ -57,13 +58,17 @@ class OpenScene(ToHost, frozen=True):
 
 
 class RunPackage(ToHost, frozen=True):
-    """Run script.py of a package directory. The script's life is told by ProgramChanged and ProgramEvent."""
+    """Run script.py of a package directory. The script's life is told by ProgramChanged and ProgramEvent.
+
+    cell: the settings of devices at this place, which win over those of the package.
+    """
 
     package_id: str
     directory: str
     start_paused: bool = False
     breakpoints: list[str] = field(default_factory=list)
     streaming_period: float = 0.1
+    cell: Cell | None = None
 
 
 class Call(ToHost, frozen=True):
@@ -189,13 +194,14 @@ class ProgramChanged(ToServer, frozen=True):
 
 
 class DeviceChanged(ToServer, frozen=True):
-    """A device's connection, health, alarms or owner of control changed."""
+    """A device's connection, health, alarms or owner of control changed; `reason` why the connection is lost."""
 
     object_id: str
     connection: Connection
     health: Health
     alarms: list[Alarm] = field(default_factory=list)
     control_owner: str | None = None
+    reason: str = ""
 
 
 class LogLine(ToServer, frozen=True):

@@ -7,6 +7,7 @@ from typing import Any, Final, Protocol
 
 import msgspec
 
+from arcor2_hw.data.cell import Cell as CellFile
 from arcor2_hw.data.events import (
     ActionStateAfterData,
     ActionStateBeforeData,
@@ -16,7 +17,7 @@ from arcor2_hw.data.events import (
 )
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.project import Project, ProjectRobotJoints
-from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound, ProgramStopped
+from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, InvalidData, NotFound, ProgramStopped
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.device import STOP_DEADLINE, Device, describe
 from arcor2_hw.runtime.lane import Job
@@ -45,9 +46,17 @@ class Program:
     """One run. `stop` comes from another thread, all else from the script's threads."""
 
     def __init__(
-        self, channel: Channel, package_id: str, *, start_paused: bool = False, breakpoints: Set[str] = frozenset()
+        self,
+        channel: Channel,
+        package_id: str,
+        *,
+        start_paused: bool = False,
+        breakpoints: Set[str] = frozenset(),
+        here: CellFile | None = None,
     ) -> None:
         self.channel = channel
+        self.here = here
+        """The settings of devices at this place, which win over those of the package."""
         self.package_id = package_id
         self.cell = Cell()
         self.breakpoints = frozenset(breakpoints)
@@ -65,6 +74,8 @@ class Program:
         self.error: BaseException | None = None
         self._blamed: tuple[BaseException, Device] | None = None
         self._main = threading.main_thread()
+        self._telling = threading.Lock()
+        self._device_lost = False
         self._stops: list[tuple[Device, Job]] = []
         self._stop_sent = threading.Event()
         self._action_ids: dict[str, str] = {}
@@ -153,6 +164,17 @@ class Program:
         self.cell.abandon()
         self.gate.stop()
 
+    def device_lost(self, device: Device, reason: str) -> bool:
+        """Stop because a device is lost; tells whether that was necessary."""
+        error = ConnectionLost(f"{device.name}: the connection is lost, so the program was stopped", reason)
+        with self._telling:
+            if self.ended or self.stop_requested or self.error is not None:
+                return False
+            self._device_lost = True
+            self._tell_exception(describe(device, error))
+        self.stop()
+        return True
+
     def settle(self, failed: bool) -> Arcor2Error | None:
         """Wait for the stop that was sent; after a failure send it, so that nothing goes on moving.
 
@@ -166,8 +188,11 @@ class Program:
 
     def exception(self, error: BaseException) -> None:
         """Tell of an exception that ended the script; one that was told already is not told again."""
-        if self.error is error:
-            return
+        with self._telling:
+            if self.error is not error and not self._device_lost:
+                self._tell_exception(error)
+
+    def _tell_exception(self, error: BaseException) -> None:
         self.error = error
         text = str(error) or type(error).__name__
         if self._blamed is not None and self._blamed[0] is error:

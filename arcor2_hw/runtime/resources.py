@@ -4,6 +4,7 @@ import types
 from pathlib import Path
 from typing import Any
 
+from arcor2_hw.data.cell import overlay
 from arcor2_hw.data.events import PackageInfoData
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.project import ActionPoint, Project, ProjectRobotJoints
@@ -92,7 +93,8 @@ class Resources:
         program.check()
         classes = {name: find_type(name) for name in {o.type for o in data.scene.objects}}
         try:
-            program.cell.open(recipes(data.scene, classes, data.models, data.project.object_overrides))
+            here = [] if program.here is None else overlay(program.here, data.scene)
+            program.cell.open(recipes(data.scene, classes, data.models, [*data.project.object_overrides, *here]))
             program.check()
             program.cell.take_control()
         except SceneFault as fault:

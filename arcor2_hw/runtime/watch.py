@@ -1,5 +1,6 @@
 """What is told of devices without being asked: joints and end effectors of robots, connection, health, alarms."""
 
+import threading
 import time
 from collections.abc import Callable
 from typing import Any, Final
@@ -22,6 +23,7 @@ OBSERVE_PERIOD: Final = 0.25
 INQUIRY_PERIOD: Final = 1.0
 """Seconds between two looks at alarms and control, for which a driver may have to ask."""
 
+_WITH_REASON: Final = (Connection.LOST, Connection.FAILED)
 _encode = msgspec.json.Encoder().encode
 
 
@@ -74,11 +76,22 @@ class Streams:
 
 
 class Watch:
-    """Compares what devices say of their condition with what they said last, and tells changes."""
+    """Compares what devices say of their condition with what they said last, and tells changes.
 
-    def __init__(self, cell: Cell, tell: Callable[[DeviceChanged], None]) -> None:
+    A connection that changes is told at once, each loss and each return once. `lost` is called after a loss was told.
+    """
+
+    def __init__(
+        self,
+        cell: Cell,
+        tell: Callable[[DeviceChanged], None],
+        lost: Callable[[Device, str], None] = lambda *_: None,
+    ) -> None:
         self._cell = cell
         self._tell = tell
+        self._lost = lost
+        self._turn = threading.Lock()
+        cell.changed = self._glance
         self._pending: dict[str, Job] = {}
         self._known: dict[str, DeviceChanged] = {}
         self._inquired: dict[str, float] = {}
@@ -102,6 +115,12 @@ class Watch:
             except DeviceTimeout as error:
                 job.finish(None, error)
 
+    def _glance(self, device: Device) -> None:
+        """Look at the connection alone, which is memory. On the thread that keeps it."""
+        instance = device.instance
+        if instance is not None and not device.closing:
+            self._compare(device, instance, None)
+
     def _observe(self, device: Device, instance: Generic) -> None:
         before = self._known.get(device.id)
         alarms: list[Alarm] = [] if before is None else before.alarms
@@ -111,12 +130,28 @@ class Watch:
             self._inquired[device.id] = moment
             alarms = _told(instance.alarms, alarms)
             owner = _told(instance.control_owner, owner)
-        connection = _told(lambda: instance.connection, Connection.FAILED)
         health = _told(lambda: instance.health, Health.FAILURE)
-        found = DeviceChanged(device.id, connection, health, alarms, owner)
-        if found != before:
+        self._compare(device, instance, (health, alarms, owner))
+
+    def _compare(self, device: Device, instance: Generic, asked: tuple[Health, list[Alarm], str | None] | None) -> None:
+        with self._turn:  # the connection is read in here, so that what is told last is what was so last
+            before = self._known.get(device.id)
+            if asked is None:
+                asked = (Health.NORMAL, [], None)
+                if before is not None:
+                    asked = (before.health, before.alarms, before.control_owner)
+            connection = _told(lambda: instance.connection, Connection.FAILED)
+            reason = _told(device.connection_reason, "") if connection in _WITH_REASON else ""
+            was = Connection.OFFLINE if before is None else before.connection
+            if before is not None and connection is was:
+                reason = before.reason  # that of the loss: what further attempts meet is no news
+            found = DeviceChanged(device.id, connection, *asked, reason)
+            if found == before:
+                return
             self._known[device.id] = found
             self._tell(found)
+        if connection is Connection.LOST and was is not Connection.LOST:
+            self._lost(device, reason)
 
 
 def _told(ask: Callable[[], Any], otherwise: Any) -> Any:

@@ -12,6 +12,7 @@ from arcor2_hw.data.events import (
     ChangeType,
     Event,
     MainScreen,
+    ObjectStateData,
     PackageInfoData,
     PackageStateData,
     ProjectExceptionData,
@@ -21,7 +22,7 @@ from arcor2_hw.data.package import PackageStateEnum, PackageSummary
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.runtime import messages as m
 from arcor2_server.build.versions import check_versions
-from arcor2_server.cell.devices import DeviceBoard, DeviceStatus
+from arcor2_server.cell.devices import DeviceBoard, DeviceStatus, overlay_for
 from arcor2_server.cell.host import CellHost
 from arcor2_server.packages import Packages
 from arcor2_server.rpc.registry import RequestRefused, make_event
@@ -55,7 +56,7 @@ class Execution:
         self._host: CellHost | None = None
         self._info: bytes | None = None
         self._before: bytes | None = None
-        self._board = DeviceBoard()
+        self._board = DeviceBoard(lambda data: services.hub.broadcast(make_event("ObjectState", data)))
         self._killing: asyncio.TimerHandle | None = None
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -73,6 +74,10 @@ class Execution:
     def devices(self) -> list[DeviceStatus]:
         """Give what the devices of the running program say of themselves."""
         return self._board.statuses() if self.busy else []
+
+    def object_states(self) -> list[ObjectStateData]:
+        """Give the connections of the objects of the running program."""
+        return self._board.states() if self.busy else []
 
     def greeting(self) -> list[Event]:
         """Give the events that tell a new connection of the running program; none when none runs."""
@@ -130,7 +135,14 @@ class Execution:
         self._board.clear()
         self._enter(S.STARTED)
         period = self._services.settings.streaming_period
-        message = m.RunPackage(package_id, str(directory.resolve()), start_paused, sorted(breakpoints), period)
+        message = m.RunPackage(
+            package_id,
+            str(directory.resolve()),
+            start_paused,
+            sorted(breakpoints),
+            period,
+            self._services.settings.cell,
+        )
         self._spawn(self._begin(message), "program start")
         self._spawn(self._note_run(package_id), "note of the run")
 
@@ -227,7 +239,8 @@ class Execution:
             case "PackageInfo":
                 self._info = message.encoded
                 info = msgspec.json.decode(message.encoded, type=_InfoEvent)
-                self._board.show(info.data.scene.objects)
+                _, overlaid = overlay_for(self._services.settings.cell, info.data.scene)
+                self._board.show(info.data.scene.objects, overlaid)
                 asyncio.get_running_loop().call_later(SPARE_AFTER, self._services.cell.hosts.prepare)
             case "ActionStateBefore":
                 self._before = message.encoded
@@ -264,6 +277,7 @@ class Execution:
 
     def _ended(self) -> None:
         self._host = None
+        self._board.clear("" if self.last_error is None else self.last_error.message)
         self._info = self._before = None
         if self._killing is not None:
             self._killing.cancel()

@@ -16,6 +16,7 @@ class Hub:
 
     def __init__(self) -> None:
         self.clients: set[Client] = set()
+        self._subscribers: dict[str, set[Client]] = {}
         self.on_leave: list[Callable[[Client], None]] = []
         self.main_screen = make_event("ShowMainScreen", ShowMainScreenData(MainScreen.SCENES_LIST))
         """What a client sees that connects while nothing is open: the last ShowMainScreen, without `highlight`."""
@@ -27,11 +28,22 @@ class Hub:
     def remove(self, client: Client) -> None:
         """Forget a connection, and tell those who keep something for it (subscriptions)."""
         self.clients.discard(client)
+        for subscribers in self._subscribers.values():
+            subscribers.discard(client)
         for forget in self.on_leave:
             forget(client)
 
+    def subscribe(self, client: Client, names: set[str], send: bool) -> None:
+        """Send additional events to a client, or no longer."""
+        for name in names:
+            subscribers = self._subscribers.setdefault(name, set())
+            if send:
+                subscribers.add(client)
+            else:
+                subscribers.discard(client)
+
     def broadcast(self, event: Event, *, besides: Client | None = None) -> None:
-        """Send an event to all clients whose role may see it, but not to `besides`."""
+        """Send an event to all whose role may see it, but not to `besides`; an additional one to subscribers."""
         if isinstance(event.data, ShowMainScreenData):
             self.main_screen = make_event(event.event, ShowMainScreenData(event.data.what))
         if self.clients:
@@ -39,8 +51,10 @@ class Hub:
 
     def broadcast_encoded(self, name: str, message: bytes, *, besides: Client | None = None) -> None:
         """Send an event that is encoded already (it comes so from the cell host)."""
-        least = EVENTS[name].role
-        for client in tuple(self.clients):
+        declared = EVENTS[name]
+        least = declared.role
+        to = self._subscribers.get(name, set()) & self.clients if declared.additional else self.clients
+        for client in tuple(to):
             if client is not besides and client.role >= least:
                 client.put(message)
 

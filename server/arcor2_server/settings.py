@@ -7,6 +7,7 @@ from typing import Any, Final, Self
 
 import msgspec
 
+from arcor2_hw.data.cell import Cell
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
 
@@ -21,6 +22,8 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     port: int = 6789
     database_url: str = ""
     """SQLAlchemy URL of an asynchronous driver; empty: SQLite in the data directory."""
+    cell: Cell | None = None
+    """Settings of devices at this place, laid over those of scenes and packages by the objects' names."""
     lock_timeout: float = 300.0
     """Locks of a user who left are released after this time."""
     lock_retries: int = 13

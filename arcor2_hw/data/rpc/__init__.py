@@ -48,6 +48,7 @@ from arcor2_hw.data.rpc.general import IdArgs as IdArgs
 from arcor2_hw.data.rpc.general import MarkersCornersArgs as MarkersCornersArgs
 from arcor2_hw.data.rpc.general import RegisterUserArgs as RegisterUserArgs
 from arcor2_hw.data.rpc.general import RenameArgs as RenameArgs
+from arcor2_hw.data.rpc.general import SubscribeEventsArgs as SubscribeEventsArgs
 from arcor2_hw.data.rpc.general import SystemInfoData as SystemInfoData
 from arcor2_hw.data.rpc.general import TypeArgs as TypeArgs
 from arcor2_hw.data.rpc.locks import LockType as LockType
@@ -237,6 +238,7 @@ RPCS: Final = {
         Rpc("StopPackage", None, None, Role.OPERATOR),
         Rpc("StopRobot", StopRobotArgs, None, Role.OPERATOR),
         Rpc("StopScene", None, None, Role.STANDARD_USER, dry_run=True),
+        Rpc("SubscribeEvents", SubscribeEventsArgs, None, Role.OPERATOR, additional=True),
         Rpc("SystemInfo", None, SystemInfoData, Role.OPERATOR),
         Rpc("TemporaryPackage", TemporaryPackageArgs, None, Role.STANDARD_USER, args_optional=True),
         Rpc("UpdateAction", UpdateActionArgs, None, Role.STANDARD_USER, dry_run=True),

@@ -12,6 +12,7 @@ class Rpc(Struct, frozen=True):
     """Declares one request: types of `args` and of the answer's `data` (None: there is none), and the least role.
 
     `args_optional`: the arguments may be left out. `dry_run`: the request may ask for its checks alone.
+    `additional`: it is not of the ARCOR2 protocol (docs/protocol.md).
     """
 
     name: str
@@ -20,6 +21,7 @@ class Rpc(Struct, frozen=True):
     role: Role
     args_optional: bool = False
     dry_run: bool = False
+    additional: bool = False
 
 
 class Request(Data, frozen=True):

@@ -46,6 +46,13 @@ class RenameArgs(Data, frozen=True):
     new_name: str
 
 
+class SubscribeEventsArgs(Data, frozen=True):
+    """Arguments of SubscribeEvents: names of additional events, to be sent to this client or no longer."""
+
+    events: set[str]
+    send: bool = True
+
+
 class SystemInfoData(Data, frozen=True):
     """What SystemInfo answers."""
 

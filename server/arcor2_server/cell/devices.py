@@ -1,15 +1,25 @@
 """What is known of the devices that a cell host holds: connection, health, alarms, control."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 
-from arcor2_hw.data.base import Data
+import msgspec
+import structlog
+
+from arcor2_hw.data.base import UNSET, Data
+from arcor2_hw.data.cell import Cell, overlay, strangers
 from arcor2_hw.data.device import Alarm, Connection, Health
-from arcor2_hw.data.scene import SceneObject
+from arcor2_hw.data.events import ObjectStateData
+from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.runtime.messages import DeviceChanged
+
+log = structlog.get_logger(__name__)
 
 
 class DeviceStatus(Data, frozen=True):
-    """One object of the scene in operation; `answering` is false while its cell host is silent."""
+    """One object of the scene in operation; `answering` is false while its cell host is silent.
+
+    reason: why the connection is lost. overlaid: the settings that come from the server's cell file.
+    """
 
     id: str
     name: str
@@ -19,35 +29,78 @@ class DeviceStatus(Data, frozen=True):
     alarms: list[Alarm]
     control_owner: str | None
     answering: bool = True
+    reason: str = ""
+    overlaid: list[str] = msgspec.field(default_factory=list)
+
+
+def overlay_for(cell: Cell | None, scene: Scene) -> tuple[list[SceneObjectOverride], dict[str, list[str]]]:
+    """Give what the server's cell file lays over a scene, and the names of these settings by object; told in the log.
+
+    Raises InvalidData naming the object whose type is another one.
+    """
+    if cell is None:
+        return [], {}
+    overrides = overlay(cell, scene)
+    names = {scene_object.id: scene_object.name for scene_object in scene.objects}
+    for override in overrides:
+        laid = {parameter.name: parameter.value for parameter in override.parameters}
+        log.info("settings from the cell file", object=names[override.id], settings=laid)
+    if unknown := strangers(cell, scene):
+        log.warning("the cell file names what is not in the scene", objects=unknown, scene=scene.name)
+    return overrides, {override.id: [parameter.name for parameter in override.parameters] for override in overrides}
 
 
 class DeviceBoard:
-    """Keeps the newest word of each device."""
+    """Keeps the newest word of each device. `tell` gets each change of a connection, once."""
 
-    def __init__(self) -> None:
+    def __init__(self, tell: Callable[[ObjectStateData], None]) -> None:
+        self._tell = tell
+        self._overlaid: Mapping[str, list[str]] = {}
         self._objects: dict[str, SceneObject] = {}
         self._said: dict[str, DeviceChanged] = {}
         self.answering = True
 
-    def clear(self) -> None:
-        """Begin anew."""
+    def clear(self, reason: str = "") -> None:
+        """Begin anew: what was connected is offline now, for a reason."""
+        before, self._said = self._said, {}
+        for said in before.values():
+            if said.connection is not Connection.OFFLINE:
+                self._tell(ObjectStateData(said.object_id, Connection.OFFLINE, reason or UNSET))
         self._objects.clear()
-        self._said.clear()
+        self._overlaid = {}
         self.answering = True
 
-    def show(self, objects: Iterable[SceneObject]) -> None:
-        """Take the objects of a scene; those that have said nothing yet are offline."""
+    def show(self, objects: Iterable[SceneObject], overlaid: Mapping[str, list[str]]) -> None:
+        """Take the objects of a scene; those that have said nothing yet are offline.
+
+        overlaid: by id, the settings that come from the server's cell file.
+        """
         self._objects = {obj.id: obj for obj in objects}
+        self._overlaid = overlaid
 
     def changed(self, message: DeviceChanged) -> None:
         """Take what a device says."""
+        before = self._said.get(message.object_id)
         self._said[message.object_id] = message
+        if before is None or before.connection is not message.connection:
+            self._tell(self._state(message))
+
+    def states(self) -> list[ObjectStateData]:
+        """Give the connection of every object, in the order of the scene."""
+        return [self._state(self._word(object_id)) for object_id in self._objects]
+
+    def _word(self, object_id: str) -> DeviceChanged:
+        return self._said.get(object_id) or DeviceChanged(object_id, Connection.OFFLINE, Health.NORMAL)
+
+    def _state(self, said: DeviceChanged) -> ObjectStateData:
+        overlaid = self._overlaid.get(said.object_id)
+        return ObjectStateData(said.object_id, said.connection, said.reason or UNSET, overlaid or UNSET)
 
     def statuses(self) -> list[DeviceStatus]:
         """Give all objects in the order of the scene."""
         found = []
         for obj in self._objects.values():
-            said = self._said.get(obj.id) or DeviceChanged(obj.id, Connection.OFFLINE, Health.NORMAL)
+            said = self._word(obj.id)
             found.append(
                 DeviceStatus(
                     obj.id,
@@ -58,6 +111,8 @@ class DeviceBoard:
                     said.alarms,
                     said.control_owner,
                     self.answering,
+                    said.reason,
+                    list(self._overlaid.get(obj.id, ())),
                 )
             )
         return found

@@ -9,7 +9,7 @@ import structlog
 
 from arcor2_hw.actions.json_values import encode
 from arcor2_hw.data.base import UNSET, Unset
-from arcor2_hw.data.events import ActionResultData, Event, SceneStateData, SceneStateEnum
+from arcor2_hw.data.events import ActionResultData, Event, ObjectStateData, SceneStateData, SceneStateEnum
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.robot import Joint
@@ -18,7 +18,7 @@ from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, DeviceTimeout
 from arcor2_hw.runtime import messages as m
 from arcor2_server.cell.actions import RunningAction
-from arcor2_server.cell.devices import DeviceBoard, DeviceStatus
+from arcor2_server.cell.devices import DeviceBoard, DeviceStatus, overlay_for
 from arcor2_server.cell.host import CellHost
 from arcor2_server.cell.hosts import CellHosts
 from arcor2_server.client import Client
@@ -58,7 +58,7 @@ class OnlineCell:
         self._task: asyncio.Task[None] | None = None
         self._answer: asyncio.Future[m.ErrorData | None] | None = None
         self._subscribers: dict[tuple[str, RobotEventKind], set[Client]] = {}
-        self._board = DeviceBoard()
+        self._board = DeviceBoard(lambda data: services.hub.broadcast(make_event("ObjectState", data)))
         self._background: set[asyncio.Task[None]] = set()
         self._preparing = asyncio.get_running_loop().call_later(SPARE_AFTER, self.hosts.prepare)
         services.hub.on_leave.append(self._forget_client)
@@ -82,6 +82,10 @@ class OnlineCell:
     def devices(self) -> list[DeviceStatus]:
         """Give what the devices of the scene say of themselves; none while it is offline."""
         return self._board.statuses() if self.state is not SceneStateEnum.STOPPED else []
+
+    def object_states(self) -> list[ObjectStateData]:
+        """Give the connections of the scene's objects; none while it is offline."""
+        return self._board.states() if self.state is not SceneStateEnum.STOPPED else []
 
     def _tell(self, state: SceneStateEnum, message: str = "") -> None:
         self.state = state
@@ -114,7 +118,6 @@ class OnlineCell:
     async def _start(self, scene: Scene) -> None:
         self._tell(SceneStateEnum.STARTING)
         self._board.clear()
-        self._board.show(scene.objects)
         try:
             problem = await self._bring_up(scene)
         except Arcor2Error as error:
@@ -135,6 +138,9 @@ class OnlineCell:
     async def _bring_up(self, scene: Scene) -> str | None:
         """Give why the scene did not come up, None when it did."""
         services = self._services
+        self._board.show(scene.objects, {})
+        here, overlaid = overlay_for(services.settings.cell, scene)
+        self._board.show(scene.objects, overlaid)
         names = {obj.type for obj in scene.objects}
         models: dict[str, ObjectModel] = {}
         for name in names:
@@ -146,7 +152,7 @@ class OnlineCell:
             scene,
             services.types.type_codes(names),
             models,
-            [] if project is None else project.object_overrides,
+            [*([] if project is None else project.object_overrides), *here],
             services.settings.streaming_period,
         )
         self._answer = asyncio.get_running_loop().create_future()
@@ -172,6 +178,7 @@ class OnlineCell:
 
     def _gone_offline(self, message: str = "") -> None:
         self._host = None
+        self._board.clear(message)
         self.results.clear()
         self.moving.clear()
         self._subscribers.clear()
@@ -246,6 +253,7 @@ class OnlineCell:
                     "device",
                     id=message.object_id,
                     connection=message.connection.value,
+                    reason=message.reason,
                     health=message.health.value,
                     alarms=[alarm.text for alarm in message.alarms],
                     control=message.control_owner,

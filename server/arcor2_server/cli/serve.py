@@ -17,7 +17,8 @@ import uvicorn
 import uvloop
 from cyclopts import Parameter, validators
 
-from arcor2_hw.exceptions import InvalidData, StorageError
+from arcor2_hw.data.cell import read_cell
+from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound, StorageError
 from arcor2_server import logging as server_logging
 from arcor2_server.cli.status import ExitStatus
 from arcor2_server.settings import ServerSettings
@@ -39,6 +40,7 @@ def serve(
     host: str | None = None,
     port: Annotated[int | None, Parameter(validator=validators.Number(gte=0, lte=65535))] = None,
     data_dir: Path | None = None,
+    cell: Path | None = None,
     log_level: str = "info",
 ) -> int:
     """Serve the websocket and REST interfaces until SIGTERM or Ctrl-C.
@@ -53,13 +55,20 @@ def serve(
         Port to listen on (6789); 0 takes any free one, which `ready` then tells.
     data_dir
         Where scenes, projects and packages are kept ($XDG_DATA_HOME/arcor2-hw); created when missing.
+    cell
+        A cell.yaml whose settings of devices win over those of scenes and packages, by the objects' names.
     log_level
         What is logged on standard error: debug, info, warning or error.
     """
     # Start-up makes much that stays and little that goes: collecting would only look at it again and again.
     gc.disable()
     try:
-        settings = ServerSettings.from_environment(host=host, port=port, data_dir=data_dir)
+        here = None if cell is None else read_cell(cell)
+    except Arcor2Error as error:
+        sys.stderr.write(f"arcor2-hw serve: {' '.join(str(error).split())}\n")
+        return ExitStatus.NOT_FOUND if isinstance(error, NotFound) else ExitStatus.CELL_UNUSABLE
+    try:
+        settings = ServerSettings.from_environment(host=host, port=port, data_dir=data_dir, cell=here)
         server_logging.set_up(log_level)
     except (InvalidData, KeyError) as error:
         sys.stderr.write(f"arcor2-hw serve: {error}\n")

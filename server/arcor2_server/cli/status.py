@@ -27,5 +27,9 @@ class ExitStatus(enum.IntEnum):
     """What was named does not exist."""
     ANALYSIS_PROBLEMS = 10
     """An object type has problems."""
+    CELL_UNUSABLE = 11
+    """A cell file is damaged, or says what cannot be."""
+    DEVICE_UNREACHABLE = 12
+    """A device did not connect, or is not fit for work."""
     INTERRUPTED = 130
     """Ctrl-C (128 + SIGINT)."""

@@ -5,9 +5,10 @@ from typing import Any, Final
 
 from msgspec import Raw
 
-from arcor2_hw.data.rpc import RegisterUserArgs, SystemInfoData
+from arcor2_hw.data.events import EVENTS
+from arcor2_hw.data.rpc import RegisterUserArgs, SubscribeEventsArgs, SystemInfoData
 from arcor2_server.hub import encode
-from arcor2_server.rpc.registry import HANDLERS, Context, at_once, rpc
+from arcor2_server.rpc.registry import HANDLERS, Context, RequestRefused, at_once, make_event, rpc
 from arcor2_server.services import Services
 
 VERSION: Final = "1.4.0"
@@ -49,3 +50,18 @@ def _kept_system_info(services: Services) -> Raw:  # noqa: ARG001
 async def register_user(context: Context, args: RegisterUserArgs) -> None:
     """Log in at this connection."""
     context.events_to_caller += await context.services.users.register(context.client, args.user_name)
+
+
+@rpc("SubscribeEvents")
+async def subscribe_events(context: Context, args: SubscribeEventsArgs) -> None:
+    """Send additional events to this connection, or no longer; ObjectState first tells how everything is now."""
+    offered = {event.name for event in EVENTS.values() if event.additional}
+    if unknown := args.events - offered:
+        raise RequestRefused(
+            f"No additional event is called {', '.join(sorted(unknown))}; there is {', '.join(sorted(offered))}."
+        )
+    services = context.services
+    services.hub.subscribe(context.client, args.events, args.send)
+    if args.send and "ObjectState" in args.events:
+        states = services.execution.object_states() or services.cell.object_states()
+        context.events_to_caller += [make_event("ObjectState", state) for state in states]

@@ -41,7 +41,7 @@ class Device:
         self.attempts: list[float] = []
         self.losses: list[DeviceError] = []
         self.path: list[Connection] = []
-        with listening(lambda: self.path.append(self.life.state)):
+        with listening(lambda life: self.path.append(life.state)):
             self.life = Observing("line 7", self.open, self.watch, self.close, self.losses.append)
 
     def open(self, timeout: float) -> None:
@@ -192,7 +192,7 @@ def test_a_connection_that_breaks_as_soon_as_it_is_back_is_not_hurried(monkeypat
     monkeypatch.setattr(observing, "LONGEST_PAUSE", 0.1)
     device = Device()
     device.watch = lambda stopping: device.until(lambda: True) or _break()  # type: ignore[method-assign]
-    with listening(lambda: device.path.append(device.life.state)):
+    with listening(lambda life: device.path.append(life.state)):
         device.life = Observing("line 7", device.open, device.watch, device.close)
     device.life.start(1.0)
     time.sleep(0.5)
@@ -222,7 +222,7 @@ def test_a_mistake_in_the_drivers_watch_is_a_loss(quick: None, caplog: pytest.Lo
             raise mistakes.pop()
         stopping.wait()
 
-    with listening(lambda: device.path.append(device.life.state)):
+    with listening(lambda life: device.path.append(life.state)):
         device.life = Observing("line 7", device.open, watch, device.close)
     device.life.start(1.0)
     device.until(lambda: device.life.state is C.BACK)

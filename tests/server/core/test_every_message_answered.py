@@ -101,8 +101,8 @@ def meaningless(kind: Any) -> Any:
 
 @pytest.mark.parametrize("user", [None, "ann"])
 async def test_every_request_is_answered(server: ServerProcess, user: str | None) -> None:
-    """All 118 at once over one connection: each gets exactly one answer, with its id and name."""
-    assert len(RPCS) == 118
+    """All of them at once over one connection: each gets exactly one answer, with its id and name."""
+    assert len(RPCS) >= 118
     async with talking(server.url, user) as talker:
         sent = {}
         for number, (name, declared) in enumerate(RPCS.items(), 1):
