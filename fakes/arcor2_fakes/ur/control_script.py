@@ -155,7 +155,7 @@ class ControlScript(Program):
             18: lambda: self._freedrive(True),
             19: lambda: self._freedrive(False),
             24: lambda: self._set_servo(interpreter.joints(self._six(0))),
-            25: lambda: self._write_int(1, int(c.contact)),
+            25: lambda: self._write_int(1, int(c.touching)),
             26: lambda: self._write_doubles((c.period,)),
             27: lambda: self._write_doubles(c.arm.q),
             28: lambda: self._write_doubles(c.arm.pose),
@@ -184,8 +184,8 @@ class ControlScript(Program):
             58: lambda: self._write_doubles(flange_pose(c)),
             60: lambda: self._write_int(1, int(self._reachable(self._six(0)))),
             61: lambda: self._write_int(1, int(self._reachable(self._six(0)))),
-            64: lambda: self._write_int(1, int(c.contact)),
-            65: lambda: self._set_payload(),
+            64: lambda: self._write_int(1, int(c.touching)),
+            65: lambda: self._set_payload(with_inertia=True),
             70: self._jacobian,
         }
 
@@ -224,7 +224,7 @@ class ControlScript(Program):
 
     def _move_until_contact(self) -> Steps:
         twist, acceleration = self._six(0), max(0.01, self._double(12))
-        while not self._c.contact:
+        while not self._c.touching:
             if type(self._arm.motion) is not LinearSpeed:
                 self._arm.motion = LinearSpeed(self._arm, twist, acceleration)
             yield
@@ -298,9 +298,12 @@ class ControlScript(Program):
     def _reachable(self, pose: tuple[float, ...]) -> bool:
         return bool(self._c.chain.solutions(from_pose(pose)))
 
-    def _set_payload(self) -> None:
+    def _set_payload(self, with_inertia: bool = False) -> None:
         mass, cog = self._double(0), self._six(1)[:3]
-        self._interpreter.at_once(Call("set_payload", (mass, cog if any(cog) else None)))
+        if with_inertia:
+            self._interpreter.at_once(Call("set_target_payload", (mass, cog, self._six(4))))
+        else:
+            self._interpreter.at_once(Call("set_payload", (mass, cog if any(cog) else None)))
 
     def _freedrive(self, on: bool) -> None:
         self._c.freedrive = on

@@ -7,8 +7,10 @@ from collections import deque
 from collections.abc import Callable, Generator
 from typing import Any
 
+from arcor2_fakes.ur.contact import COLLISION, TOUCH, Obstacle
 from arcor2_fakes.ur.kinematics import Chain
-from arcor2_fakes.ur.motion import Arm, MotionRefused
+from arcor2_fakes.ur.motion import Arm
+from arcor2_fakes.ur.paths import MotionRefused
 from arcor2_fakes.ur.states import MAY_MOVE, SAFETY_BITS, JointMode, RobotMode, Runtime, SafetyMode
 
 log = logging.getLogger("controller")
@@ -20,7 +22,6 @@ _EMERGENCY_DECELERATION = 24.0  # rad/s^2
 _POWER_ON_TIME = 4.0  # s
 _BRAKE_RELEASE_TIME = 3.0  # s
 _KEPT = 200  # commands and stops remembered for the truth
-
 Steps = Generator[None, None, None]
 """A running piece of program: each step ends where the real one waits for the next control cycle."""
 
@@ -64,6 +65,7 @@ class Controller:
         self.load_program: Callable[[str], Program] | None = None
         self.freedrive = False
         self.contact = False
+        self.place_obstacle(None)
         self.payload, self.payload_cog, self.payload_inertia = 0.0, (0.0, 0.0, 0.0), (0.0,) * 6
         self.tcp_offset: tuple[float, ...] = (0.0,) * 6
         self.input_ints, self.input_doubles = [0] * 48, [0.0] * 48
@@ -118,6 +120,25 @@ class Controller:
                 self.protective_stop(str(e))
         elif self.arm.rate != (0.0 if self.arm.held else self.arm.slider):
             self.arm.step(self.period)
+        if self.obstacle is not None:
+            self._touch(self.obstacle)
+
+    def _touch(self, obstacle: Obstacle) -> None:
+        force = obstacle.force(self.arm.pose)
+        self.tcp_force = (*force, 0.0, 0.0, 0.0)
+        if math.hypot(*force) > COLLISION and self.safety in MAY_MOVE and self.arm.moving:
+            self.arm.halt(_EMERGENCY_DECELERATION)
+            self.protective_stop("the tool has run into something")
+
+    @property
+    def touching(self) -> bool:
+        """Whether the controller takes the tool for in contact."""
+        return self.contact or math.hypot(*self.tcp_force[:3]) > TOUCH
+
+    def place_obstacle(self, obstacle: Obstacle | None) -> None:
+        """Puts something in the tool's way, or takes it away."""
+        self.obstacle: Obstacle | None = obstacle
+        self.tcp_force: tuple[float, ...] = (0.0,) * 6
 
     def after(self, seconds: float, do: Callable[[], None]) -> None:
         """Does something so much later, in the controller's time and by `time_scale`."""
@@ -156,8 +177,10 @@ class Controller:
 
     def _condition(self, mode: SafetyMode, on: bool) -> None:
         self._conditions[mode] = on
-        # The worst prevails; the numbers rise with it but for recovery.
-        rank = [m for m in SafetyMode if self._conditions[m] and m is not SafetyMode.RECOVERY]
+        # The worst prevails; the numbers rise with it, but for recovery, which hides no protective stop.
+        rank = [m for m in SafetyMode if self._conditions[m]]
+        if self._conditions[SafetyMode.PROTECTIVE_STOP] and SafetyMode.RECOVERY in rank:
+            rank.remove(SafetyMode.RECOVERY)
         before, self.safety = self.safety, max(rank, default=SafetyMode.NORMAL)
         self.arm.speed_limit = REDUCED_JOINT_SPEED if self._conditions[SafetyMode.REDUCED] else math.pi
         if self.safety is not before:
@@ -216,8 +239,13 @@ class Controller:
         self._cut(SafetyMode.VIOLATION if violation else SafetyMode.FAULT)
 
     def reduced(self, on: bool) -> None:
-        """Reduced mode: lower limits from the next motion on."""
+        """Lower limits from the next motion on."""
         self._condition(SafetyMode.REDUCED, on)
+
+    def recovery(self, on: bool) -> None:
+        """The arm is outside its safety limits: no program runs, a person moves it back by hand."""
+        self.stop_program("recovery")
+        self._condition(SafetyMode.RECOVERY, on)
 
     def restart_safety(self) -> None:
         """Clears violation and fault; the arm is left without power."""

@@ -9,7 +9,8 @@ import math
 from collections.abc import Sequence
 from typing import Protocol
 
-from arcor2_fakes.ur.kinematics import Chain, Transform, compose, difference, from_pose, to_pose
+from arcor2_fakes.ur.kinematics import Chain, Transform, to_pose
+from arcor2_fakes.ur.paths import JointBlend, JointMove, Joints, LinearBlend, LinearMove, MotionRefused
 
 MAX_JOINT_SPEED = math.pi  # rad/s, UR5e data sheet: 180 degrees per second on every joint
 MAX_JOINT_ACCELERATION = 40.0  # rad/s^2, beyond what any program may ask for
@@ -18,12 +19,6 @@ JOINT_RANGE = math.tau  # rad either way
 PROGRAM_STOP_DECELERATION = 14.0  # rad/s^2, when a program ends or a thread is killed in mid-move
 _PAUSE_TIME = 0.2  # s from full speed to rest on the path
 _PROTECTIVE_TIME = 0.08  # s, the same for a protective stop
-
-Joints = Sequence[float]
-
-
-class MotionRefused(Exception):
-    """The controller's own supervision refuses to go on; it ends in a protective stop."""
 
 
 class Motion(Protocol):
@@ -36,83 +31,6 @@ class Motion(Protocol):
     def step(self, arm: "Arm", dt: float, /) -> Joints:
         """Positions after `dt` seconds of this motion's own time."""
         ...
-
-
-class Profile:
-    """A trapezoidal (or triangular) velocity profile over `length`, at rest at both ends."""
-
-    def __init__(self, length: float, velocity: float, acceleration: float) -> None:
-        self.length = length
-        self.acceleration = acceleration
-        self.peak = min(velocity, math.sqrt(length * acceleration)) if length > 0.0 else 0.0
-        self.ramp = self.peak / acceleration
-        cruise = (length - self.peak * self.ramp) / self.peak if self.peak > 0.0 else 0.0
-        self.duration = 2.0 * self.ramp + cruise
-
-    def position(self, t: float) -> float:
-        """Distance covered after `t` seconds."""
-        if t >= self.duration:
-            return self.length
-        if t < self.ramp:
-            return 0.5 * self.acceleration * t * t
-        left = self.duration - t
-        if left < self.ramp:
-            return self.length - 0.5 * self.acceleration * left * left
-        return self.peak * (t - 0.5 * self.ramp)
-
-
-class JointMove:
-    """movej: all joints start and end together, the one with the longest way keeps the limits."""
-
-    along_path = True
-
-    def __init__(self, start: Joints, goal: Joints, velocity: float, acceleration: float) -> None:
-        self._start, self._goal = tuple(start), tuple(goal)
-        self._way = tuple(g - s for s, g in zip(start, goal, strict=True))
-        self.profile = Profile(max(map(abs, self._way)), velocity, acceleration)
-        self._t = 0.0
-        self.done = self.profile.length == 0.0
-
-    def step(self, _: "Arm", dt: float) -> Joints:
-        """Positions after `dt` seconds."""
-        self.done = self.done or self._t >= self.profile.duration  # one cycle at the goal: the velocity is then zero
-        self._t += dt
-        if self._t >= self.profile.duration:
-            return self._goal
-        f = self.profile.position(self._t) / self.profile.length
-        return [s + f * w for s, w in zip(self._start, self._way, strict=True)]
-
-
-class LinearMove:
-    """movel: the TCP on a straight line at the given speed, turning at an even rate."""
-
-    along_path = True
-
-    def __init__(self, arm: "Arm", goal: Transform, velocity: float, acceleration: float) -> None:
-        self._start = arm.chain.forward(arm.q)
-        self._shift, self._turn = difference(self._start, goal)
-        length = math.dist((0.0, 0.0, 0.0), self._shift)
-        if length < 1e-6:  # turning only: the limits then count in rad
-            length = math.dist((0.0, 0.0, 0.0), self._turn)
-        self.profile = Profile(length, velocity, acceleration)
-        self._t = 0.0
-        self.done = length < 1e-9
-
-    def step(self, arm: "Arm", dt: float) -> Joints:
-        """Positions after `dt` seconds. Raises `MotionRefused` in a singularity or out of reach."""
-        if self.done or dt == 0.0:
-            return arm.q
-        self.done = self._t >= self.profile.duration  # one cycle at the goal: the velocity is then zero
-        self._t += dt
-        f = self.profile.position(self._t) / self.profile.length
-        x, y, z, origin = self._start
-        turned = compose(from_pose((0.0, 0.0, 0.0, *(f * r for r in self._turn))), (x, y, z, (0.0, 0.0, 0.0)))
-        there = (origin[0] + f * self._shift[0], origin[1] + f * self._shift[1], origin[2] + f * self._shift[2])
-        guess = [a + v * arm.period for a, v in zip(arm.q, arm.qd, strict=True)]
-        q = arm.chain.follow((turned[0], turned[1], turned[2], there), guess)
-        if q is None:
-            raise MotionRefused("the line leaves the reach of the arm")
-        return q
 
 
 class JointSpeed:
@@ -270,16 +188,27 @@ class Arm:
         self.chain.set_tcp(offset)
         self._pose = None
 
-    def move_joints(self, goal: Joints, velocity: float, acceleration: float) -> None:
-        """Starts a movej. Velocity and acceleration beyond the arm's own are cut, as the controller does."""
+    def move_joints(self, goal: Joints, velocity: float, acceleration: float, blend: bool = False) -> None:
+        """Starts a movej. Velocity and acceleration beyond the arm's own are cut, as the controller does.
+
+        With `blend` it begins while the movej before comes to its end.
+        """
         if max(map(abs, goal)) > JOINT_RANGE:
             raise MotionRefused("the goal is beyond the joint limits")
         velocity, acceleration = min(velocity, self.speed_limit), min(acceleration, MAX_JOINT_ACCELERATION)
-        self.motion = JointMove(self.q, goal, velocity, acceleration)
+        leaving = self.motion if blend else None
+        if isinstance(leaving, JointMove | JointBlend):
+            self.motion = JointBlend(leaving, JointMove(leaving.goal, goal, velocity, acceleration))
+        else:
+            self.motion = JointMove(self.q, goal, velocity, acceleration)
 
-    def move_linear(self, goal: Transform, velocity: float, acceleration: float) -> None:
-        """Starts a movel."""
-        self.motion = LinearMove(self, goal, min(velocity, MAX_TCP_SPEED), acceleration)
+    def move_linear(self, goal: Transform, velocity: float, acceleration: float, blend: bool = False) -> None:
+        """Starts a movel; with `blend` while the movel before comes to its end."""
+        velocity, leaving = min(velocity, MAX_TCP_SPEED), self.motion if blend else None
+        if isinstance(leaving, LinearMove | LinearBlend):
+            self.motion = LinearBlend(leaving, LinearMove(leaving.goal, goal, velocity, acceleration))
+        else:
+            self.motion = LinearMove(self.chain.forward(self.q), goal, velocity, acceleration)
 
     def halt(self, deceleration: float = PROGRAM_STOP_DECELERATION, linear: bool = False) -> None:
         """Ends the present motion and brings the arm to rest; it will not go on afterwards."""

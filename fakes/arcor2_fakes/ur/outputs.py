@@ -46,6 +46,8 @@ def readers(c: Controller) -> dict[str, Reader]:
         "target_TCP_pose": lambda: arm.pose,
         "actual_TCP_speed": arm.twist,
         "target_TCP_speed": arm.twist,
+        "actual_TCP_force": lambda: c.tcp_force,
+        "tcp_force_scalar": lambda: (sum(f * f for f in c.tcp_force[:3]) ** 0.5,),
         "actual_digital_input_bits": lambda: (c.digital_inputs,),
         "actual_digital_output_bits": lambda: (c.digital_outputs,),
         "actual_execution_time": constant(0.00021),

@@ -4,7 +4,8 @@ import logging
 
 from arcor2_fakes.ur.control_script import ControlScript
 from arcor2_fakes.ur.controller import Controller, Program, Refused
-from arcor2_fakes.ur.urscript import Interpreter, ScriptProgram, Splitter, calls
+from arcor2_fakes.ur.language import WrittenProgram
+from arcor2_fakes.ur.urscript import Interpreter, Splitter, calls
 from arcor2_fakes.wire import Connection
 
 log = logging.getLogger("script")
@@ -53,7 +54,11 @@ class ScriptPort:
         if ControlScript.is_one(text):
             program = ControlScript(self.controller, text)
         else:
-            program = ScriptProgram(self.controller, name, text)
+            try:
+                program = WrittenProgram(self.controller, name, text)
+            except ValueError as e:
+                log.info("program %s cannot be read: %s", name, e)
+                return
         try:
             self.controller.start_program(program)
         except Refused as e:

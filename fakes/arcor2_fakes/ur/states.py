@@ -67,4 +67,4 @@ SAFETY_BITS = {
     SafetyMode.FAULT: 1 << 9 | _STOPPED,
 }
 
-MAY_MOVE = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED, SafetyMode.RECOVERY})
+MAY_MOVE = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED})

@@ -4,7 +4,8 @@ To read and subscribe: `truth` (everything), `pose` (the little a world follows 
 (frames that ask for a stop, stamped at arrival), `commands_taken` (motions really run), `popup`. To do, with `on` true
 or false: `safeguard_stop` (`reports_paused`), `emergency_stop` (`system`), `reduced`, `remote_control`,
 `foreign_program`, `power`, `contact`, `fieldbus` (owns registers 0 to 23). To do: `protective_stop`, `violation`,
-`fault`, `boot`, `brake_release`, `operational_mode` mode, `set_input` bit on, `speed_slider` fraction, `place` q (a
+`fault`, `boot`, `obstacle` point normal stiffness (a plane in the base, in m and N/m; `no_obstacle` takes it away),
+`recovery` on, `brake_release`, `operational_mode` mode, `set_input` bit on, `speed_slider` fraction, `place` q (a
 test's set-up), `guide` q speed (by hand, in freedrive only), `in_use` and `not_found` names of RTDE variables. The
 faults of the wires rtde, script and dashboard are those of `arcor2_fakes.wire`.
 """
@@ -14,6 +15,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from arcor2_fakes.control import ControlServer
+from arcor2_fakes.ur.contact import STIFFNESS, Obstacle
 from arcor2_fakes.ur.controller import Controller
 from arcor2_fakes.ur.dashboard import Dashboard
 from arcor2_fakes.ur.motion import JOINT_RANGE, Guided
@@ -33,6 +35,8 @@ def truth(c: Controller, rtde: RtdeServer, script: ScriptPort) -> dict[str, Any]
         "tcp_offset": c.tcp_offset,
         "payload": c.payload,
         "payload_cog": c.payload_cog,
+        "payload_inertia": c.payload_inertia,
+        "tcp_force": c.tcp_force,
         "moving": c.arm.moving,
         "program": c.program.name if c.program is not None else None,
         "register_offset": c.program.register_offset if c.program is not None else None,
@@ -132,6 +136,9 @@ def register(control: ControlServer, c: Controller, rtde: RtdeServer, script: Sc
     def contact(on: bool) -> None:
         c.contact = on
 
+    def obstacle(point: Sequence[float], normal: Sequence[float], stiffness: float = STIFFNESS) -> None:
+        c.place_obstacle(Obstacle.of(point, normal, stiffness))
+
     def remote(on: bool) -> None:
         c.remote = on
         c.changed()
@@ -171,6 +178,9 @@ def register(control: ControlServer, c: Controller, rtde: RtdeServer, script: Sc
     control.command("guide", guide)
     control.command("speed_slider", slider)
     control.command("contact", _switch(contact))
+    control.command("obstacle", obstacle)
+    control.command("no_obstacle", lambda: c.place_obstacle(None))
+    control.command("recovery", _switch(c.recovery))
     control.command("fieldbus", _switch(fieldbus))
     control.command("in_use", lambda names: in_use(names))
     control.command("not_found", lambda names: rtde.not_found.update(names))

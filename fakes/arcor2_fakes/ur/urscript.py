@@ -1,6 +1,7 @@
-"""URScript, as far as clients send it: programs told apart, calls with literal arguments, run one after another.
+"""URScript, as far as clients send it: programs told apart, calls with literal arguments, what each call does.
 
-Not a URScript interpreter: no variables, conditions or loops. A statement it does not know is logged and passed over.
+Programs with variables, conditions, loops and threads are run by `language`. Motions blend with one of their own kind
+only; the blend begins with the braking of the first, so that a large radius is not made use of as a controller does.
 """
 
 import ast
@@ -14,6 +15,8 @@ from typing import Any
 
 from arcor2_fakes.ur.controller import Controller, Program, Steps
 from arcor2_fakes.ur.kinematics import from_pose
+from arcor2_fakes.ur.motion import Motion
+from arcor2_fakes.ur.paths import JointBlend, JointMove, LinearBlend, LinearMove
 
 log = logging.getLogger("script")
 
@@ -119,6 +122,8 @@ class Interpreter:
 
     def __init__(self, controller: Controller) -> None:
         self.controller = controller
+        self._left: Motion | None = None
+        """The motion that a blend has left before its end."""
 
     def run(self, statements: Sequence[Call]) -> Steps:
         """All of them in order. Raises `MotionRefused`, or `ValueError` and the like."""
@@ -131,10 +136,11 @@ class Interpreter:
             case "movej":
                 goal = call.get("q", 0, None)
                 q = self.joints(goal) if isinstance(goal, Pose) else goal
-                yield from self.move_joints(q, call.get("v", 2, 1.05), call.get("a", 1, 1.4))
+                yield from self.move_joints(q, call.get("v", 2, 1.05), call.get("a", 1, 1.4), call.get("r", 4, 0.0))
             case "movel" | "movep":
                 goal = call.get("pose", 0, None)
-                yield from self.move_linear(goal, call.get("v", 2, 0.25), call.get("a", 1, 1.2), isinstance(goal, Pose))
+                v, a, r = call.get("v", 2, 0.25), call.get("a", 1, 1.2), call.get("r", 4, 0.0)
+                yield from self.move_linear(goal, v, a, isinstance(goal, Pose), r)
             case "stopj" | "stopl":
                 yield from self.stop(call.get("a", 0, 2.0), linear=call.name == "stopl")
             case "sleep":
@@ -165,6 +171,10 @@ class Interpreter:
                 c.arm.set_tcp(first)
             case "set_payload":
                 c.payload, c.payload_cog = float(first), tuple(second or c.payload_cog)
+                c.payload_inertia = (0.0,) * 6
+            case "set_target_payload":
+                inertia = call.get("inertia", 2, (0.0,) * 6)
+                c.payload, c.payload_cog, c.payload_inertia = float(first), tuple(second), tuple(inertia)
             case "textmsg" | "popup":
                 log.info("message: %s", call.arguments)
             case _:
@@ -179,26 +189,34 @@ class Interpreter:
         """get_inverse_kin. Raises `NoSolution`."""
         return self.controller.chain.inverse(from_pose(pose), near or self.controller.arm.q)
 
-    def move_joints(self, q: Sequence[float], velocity: float, acceleration: float) -> Steps:
-        """movej: to its end, or until another motion has taken its place."""
+    def move_joints(self, q: Sequence[float], velocity: float, acceleration: float, blend: float = 0.0) -> Steps:
+        """movej: to its end, to within the blend of it, or until another motion has taken its place."""
         arm = self.controller.arm
         self._check(q, velocity, acceleration)
-        self.controller.note_command("movej", q=list(q), v=velocity, a=acceleration)
-        while arm.moving:  # a motion that was cut off ends first
-            yield
-        arm.move_joints(q, velocity, acceleration)
-        yield from self._to_end()
+        self.controller.note_command("movej", q=list(q), v=velocity, a=acceleration, r=blend)
+        blends = isinstance(arm.motion, JointMove | JointBlend)
+        yield from self._free(blends)
+        arm.move_joints(q, velocity, acceleration, blends)
+        yield from self._to_end(blend, self.controller.chain.forward(q)[3])
 
-    def move_linear(self, goal: Sequence[float], velocity: float, acceleration: float, is_pose: bool) -> Steps:
+    def move_linear(
+        self, goal: Sequence[float], velocity: float, acceleration: float, is_pose: bool, blend: float = 0.0
+    ) -> Steps:
         """movel to a pose, or to where joints have the TCP."""
         arm = self.controller.arm
         self._check(goal, velocity, acceleration)
         target = from_pose(goal) if is_pose else self.controller.chain.forward(goal)
-        self.controller.note_command("movel", goal=list(goal), v=velocity, a=acceleration)
-        while arm.moving:
+        self.controller.note_command("movel", goal=list(goal), v=velocity, a=acceleration, r=blend)
+        blends = isinstance(arm.motion, LinearMove | LinearBlend)
+        yield from self._free(blends)
+        arm.move_linear(target, velocity, acceleration, blends)
+        yield from self._to_end(blend, target[3])
+
+    def _free(self, blends: bool) -> Steps:
+        """Wait until the next motion may begin: at once when it blends with the one that this program left early."""
+        arm = self.controller.arm
+        while arm.moving and not (blends and arm.motion is self._left):
             yield
-        arm.move_linear(target, velocity, acceleration)
-        yield from self._to_end()
 
     def stop(self, deceleration: float, linear: bool) -> Steps:
         """stopl or stopj: until the arm stands."""
@@ -207,10 +225,13 @@ class Interpreter:
         arm.halt(max(0.01, deceleration), linear)
         yield from self._to_end()
 
-    def _to_end(self) -> Steps:
+    def _to_end(self, blend: float = 0.0, corner: Sequence[float] = ()) -> Steps:
         arm = self.controller.arm
         motion = arm.motion
         while motion is not None and arm.motion is motion:
+            if blend > 0.0 and motion.along_path and _rounds(motion) and math.dist(arm.pose[:3], corner) <= blend:
+                self._left = motion
+                return
             yield
 
     @staticmethod
@@ -221,17 +242,8 @@ class Interpreter:
             raise ValueError("a motion needs a velocity and an acceleration above zero")
 
 
-class ScriptProgram(Program):
-    """A program sent by a client, such as a custom script."""
-
-    def __init__(self, controller: Controller, name: str, text: str) -> None:
-        self.name = name
-        self._interpreter = Interpreter(controller)
-        self._calls = calls(text)
-
-    def run(self) -> Steps:
-        """The calls in order."""
-        yield from self._interpreter.run(self._calls)
+def _rounds(motion: Motion) -> bool:
+    return isinstance(motion, JointMove | JointBlend | LinearMove | LinearBlend) and motion.braking
 
 
 class ForeignProgram(Program):

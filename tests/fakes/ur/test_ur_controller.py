@@ -7,8 +7,9 @@ import pytest
 from arcor2_fakes.ur.control_script import ControlScript
 from arcor2_fakes.ur.controller import HOME, Controller, Refused
 from arcor2_fakes.ur.dashboard import NOT_IN_LOCAL, Dashboard
+from arcor2_fakes.ur.language import WrittenProgram
 from arcor2_fakes.ur.states import RobotMode, Runtime, SafetyMode
-from arcor2_fakes.ur.urscript import Call, ForeignProgram, ScriptProgram, Splitter, calls, parse_call
+from arcor2_fakes.ur.urscript import Call, ForeignProgram, Splitter, calls, parse_call
 
 GOAL = [1.5, *HOME[1:]]
 
@@ -32,7 +33,7 @@ def until(c, holds, within=20.0):
 
 
 def start_move(c, v=1.0):
-    c.start_program(ScriptProgram(c, "move", f"movej({GOAL}, a=2, v={v})"))
+    c.start_program(WrittenProgram(c, "move", f"movej({GOAL}, a=2, v={v})"))
     wait(c, 0.8)
     assert c.arm.moving
 
@@ -167,7 +168,7 @@ def test_reduced_mode_caps_the_speed(c):
 
 
 def test_impossible_line_is_a_protective_stop(c):
-    c.start_program(ScriptProgram(c, "far", "movel(p[-2.0, 0, 0.3, 0, 3.14, 0], a=1.2, v=0.5)"))
+    c.start_program(WrittenProgram(c, "far", "movel(p[-2.0, 0, 0.3, 0, 3.14, 0], a=1.2, v=0.5)"))
     until(c, lambda: c.safety is SafetyMode.PROTECTIVE_STOP)
     until(c, lambda: not c.arm.moving)
     assert math.hypot(*c.arm.pose[:3]) < 1.1
@@ -344,7 +345,7 @@ def test_senseless_numbers_end_the_program_not_the_controller(c, code, doubles, 
     "line", ["movej([1,2])", "movej('x')", "movel(p[9,9,9,0,0,0])", "movej(p[9,9,9,0,0,0])", "sleep([])"]
 )
 def test_senseless_scripts_end_in_an_error(c, line):
-    c.start_program(ScriptProgram(c, "bad", line))
+    c.start_program(WrittenProgram(c, "bad", line))
     wait(c, 8.0)
     assert c.program is None or c.safety is SafetyMode.PROTECTIVE_STOP
     assert not c.arm.moving

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from arcor2_fakes.ur.kinematics import Chain, from_pose
-from arcor2_fakes.ur.motion import Arm, JointSpeed, MotionRefused, Profile
+from arcor2_fakes.ur.motion import Arm, JointSpeed
+from arcor2_fakes.ur.paths import MotionRefused, Profile
 
 DT = 0.002
 HOME = (0.0, -math.pi / 2, math.pi / 2, -math.pi / 2, -math.pi / 2, 0.0)
