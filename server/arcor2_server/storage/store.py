@@ -1,7 +1,10 @@
 """Reading and writing saved documents; what a method wrote is on disk when it returns."""
 
+import contextlib
+import sqlite3
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import Any, Final, Self
 
 import msgspec
@@ -52,6 +55,7 @@ class Storage:
         if settings.database_url:
             engine = create_async_engine(settings.database_url)
         else:
+            _check_opens(settings.documents_database)
             # One connection: SQLite writes one at a time anyway, and each connection costs a thread.
             engine = create_async_engine(
                 f"sqlite+aiosqlite:///{settings.documents_database}", pool_size=1, max_overflow=0
@@ -346,6 +350,18 @@ class Storage:
 
 def _model_row(model: Models) -> ModelRow:
     return ModelRow(id=model.id, kind=model.type().value, document=_encode(model))
+
+
+def _check_opens(path: Path) -> None:
+    """Raise StorageError where there is no opening the file.
+
+    aiosqlite leaves a thread to itself after an open that failed, which then speaks to a loop that may be closed.
+    """
+    try:
+        with contextlib.closing(sqlite3.connect(path)):
+            return
+    except sqlite3.Error as error:
+        raise StorageError(f"cannot use the database {path}: {error}", detail=str(error)) from error
 
 
 def _prepare_sqlite(connection: Any, _record: Any) -> None:
