@@ -5,7 +5,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from benchmarks import building, operation, requests, robot
+from benchmarks import building, buses, operation, requests, robot
 from benchmarks.figures import Report
 
 
@@ -22,6 +22,8 @@ async def main(rooms: list[str]) -> None:
             await building.build(report)
         if not rooms or "robot" in rooms:
             await robot.run(report, directory)
+        if not rooms or "buses" in rooms:
+            await buses.run(report, directory)
     report.table()
 
 

@@ -25,6 +25,9 @@ GOALS: Final[dict[str, tuple[str, str]]] = {
     "stop_latency_p99_ms": ("ms", "<= 100"),
     "ur_stream_lost": ("%", "<= 0.5"),
     "ur_stream_core_percent": ("% of a core", "<= 10"),
+    "modbus_read_ratio": ("of the bare library's rate", ">= 0.9"),
+    "can_pdo_lost": ("of 2000 frames", "<= 0"),
+    "dynamixel_sync_read_6_ms": ("ms", "<= 1"),
     "build_1000_ms": ("ms", "linear"),
 }
 
@@ -41,6 +44,8 @@ class Figure:
     def reached(self) -> bool | None:
         """Tell whether the goal is reached; None when it is no number."""
         goal = GOALS.get(self.name, ("", ""))[1]
+        if goal.startswith(">="):
+            return self.value >= float(goal[2:])
         return self.value <= float(goal[2:]) if goal.startswith("<=") else None
 
 

@@ -10,7 +10,8 @@ from typing import Final
 
 from pymodbus import FramerType
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
-from pymodbus.exceptions import ConnectionException, ModbusException
+from pymodbus.client.base import ModbusBaseSyncClient
+from pymodbus.exceptions import ConnectionException, ModbusException, ModbusIOException
 from pymodbus.pdu import ModbusPDU
 
 __all__ = ["Client", "ConnectionException", "ModbusException", "ModbusPDU", "SerialClient", "TcpClient"]
@@ -30,12 +31,33 @@ SHORTEST_SILENCE: Final = 0.00175
 logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)
 
 
-class TcpClient(ModbusTcpClient):
-    """Modbus TCP. `deadline` (monotonic, s) ends the waiting for an answer, however it dribbles in."""
+class _Exchange(ModbusBaseSyncClient):
+    """One request, one answer, one time limit: no retries, no state from one request to the next but its number."""
 
     deadline = 0.0
+    """When waiting for an answer ends, however it dribbles in (monotonic, s)."""
     received = False
     """Whether anything has come since the request was sent."""
+    _number = 0
+
+    def execute(self, no_response_expected: bool, request: ModbusPDU) -> ModbusPDU:
+        """Give the answer of this very request. Raises ModbusException without one, ConnectionException, OSError."""
+        self._number = self._number % 0xFFFF + 1
+        # A serial line knows no numbers; its framer gives 0, which the comparison lets pass.
+        request.transaction_id = self._number
+        self.send(self.framer.buildFrame(request))
+        came = b""
+        while data := self.recv(None):
+            came += data
+            used, answer = self.framer.handleFrame(came, request.dev_id, self._number)
+            if answer is not None:
+                return answer
+            came = came[used:]
+        raise ModbusIOException("no answer in time")
+
+
+class TcpClient(_Exchange, ModbusTcpClient):
+    """Modbus TCP."""
 
     def __init__(self, host: str, port: int, timeout: float) -> None:
         super().__init__(host, port=port, timeout=timeout, retries=0)
@@ -78,11 +100,8 @@ class TcpClient(ModbusTcpClient):
             socket.shutdown(2)
 
 
-class SerialClient(ModbusSerialClient):
+class SerialClient(_Exchange, ModbusSerialClient):
     """Modbus RTU with eight data bits. Waits for bytes instead of asking each millisecond whether there are any."""
-
-    deadline = 0.0
-    received = False
 
     def __init__(self, port: str, baudrate: int, parity: str, stopbits: int, timeout: float) -> None:
         super().__init__(

@@ -1,0 +1,84 @@
+"""The field buses on their fakes: what a driver costs beside the bare library, and what a bus loses."""
+
+import asyncio
+import random
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from pymodbus.client import ModbusTcpClient
+
+from arcor2_drivers.remote_io.registers import IMAGE_COUNT
+from arcor2_drivers.remote_io.remote_io import RemoteIO
+from arcor2_drivers.remote_io.settings import RemoteIOSettings
+from arcor2_drivers.two_axis_robot.bus import Bus
+from arcor2_drivers.two_axis_robot.registers import PRESENT_POSITION, STATE
+from arcor2_server.demo.processes import Child, python_module
+from benchmarks.figures import Figure, Report, median
+
+SERVOS = (1, 2, 3, 4, 5, 6)
+
+
+def seconds_each(call: Callable[[], object], n: int) -> float:
+    """Give the mean time of a call over `n` of them."""
+    began = time.perf_counter()
+    for _ in range(n):
+        call()
+    return (time.perf_counter() - began) / n
+
+
+def modbus_reads(address: str, rounds: int = 150, n: int = 100) -> Figure:
+    """Read one point by the driver, and what it reads for that by the bare library, in turns on one fake.
+
+    Each has its own connection; the driver observes the block meanwhile, as it always does. What a round measures
+    first is left to chance, so that a machine that is getting slower favours neither.
+    """
+    host, _, port = address.rpartition(":")
+    bare = ModbusTcpClient(host, port=int(port))
+    block = RemoteIO("block", "block", RemoteIOSettings(host, int(port), points="part=DI0"))
+    calls: list[Callable[[], object]] = [
+        lambda: bare.read_input_registers(0, count=IMAGE_COUNT, device_id=1),
+        lambda: block.read("part"),
+    ]
+    bare.connect()
+    block.connect()
+    try:
+        samples: tuple[list[float], list[float]] = ([], [])
+        for _ in range(rounds):
+            for each in random.sample((0, 1), 2):
+                samples[each].append(seconds_each(calls[each], n))
+    finally:
+        block.disconnect()
+        bare.close()
+    library, driver = (1.0 / median(each) for each in samples)
+    note = f"driver {driver:.0f}/s, library {library:.0f}/s"
+    return Figure("modbus_read_ratio", driver / library, 2 * rounds * n, note)
+
+
+def dynamixel_reads(port: str, n: int = 1000) -> Figure:
+    """Read the positions of six servos at once, through the driver's bus; the pty has no bit rate."""
+    bus = Bus("servos", port, 1_000_000)
+    bus.open()
+    try:
+        samples = [seconds_each(lambda: bus.sync_read(SERVOS, PRESENT_POSITION), 1) for _ in range(n)]
+        whole = [seconds_each(lambda: bus.sync_read(SERVOS, STATE), 1) for _ in range(n // 2)]
+    finally:
+        bus.close()
+    note = f"worst {max(samples) * 1e3:.2f} ms; all that changes ({STATE.size} bytes each) {median(whole) * 1e3:.2f} ms"
+    return Figure("dynamixel_sync_read_6_ms", median(samples) * 1e3, n, note)
+
+
+async def run(report: Report, directory: Path) -> None:
+    """Measure everything in this room."""
+
+    async def on_fake(name: str, key: str, measure: Callable[[str], Figure], *arguments: str) -> None:
+        fake = Child(name, python_module(f"arcor2_fakes.{name}", *arguments), directory / f"{name}.log")
+        try:
+            addresses = await fake.start_json()
+            report.add(await asyncio.to_thread(measure, addresses[key]))
+        finally:
+            await fake.stop()
+
+    await on_fake("remote_io", "modbus", modbus_reads)
+    ids = [argument for number in SERVOS for argument in ("--ids", str(number))]
+    await on_fake("two_axis_robot", "port", dynamixel_reads, *ids)
