@@ -65,6 +65,18 @@ class Stale(DeviceError):
     code = "stale"
 
 
+class NoDepth(DeviceError):
+    """The camera gives no depth, or too little of the picture has one."""
+
+    code = "no_depth"
+
+
+class Overexposed(DeviceError):
+    """Too much of the picture is white: there is more light than the exposure takes."""
+
+    code = "overexposed"
+
+
 class DeviceFault(DeviceError):
     """The device reports a fault of its own."""
 

@@ -18,11 +18,25 @@ def _encode_other(value: Any) -> Any:
     if is_picture(value):
         # The protocol carries a picture's file as Latin-1 text: JPEG, but depth and masks must not lose anything.
         with io.BytesIO() as file:
-            value.save(file, format="JPEG" if value.mode in ("L", "RGB", "CMYK", "YCbCr") else "PNG")
+            if value.mode in ("L", "RGB", "CMYK", "YCbCr"):
+                value.save(file, format="JPEG")
+            else:
+                value.save(file, format="PNG", pnginfo=_notes(value))
             return file.getvalue().decode("latin-1")
     if callable(getattr(value, "tolist", None)):
         return value.tolist()
     raise NotImplementedError(f"a {type(value).__name__} has no form in JSON")
+
+
+def _notes(picture: Any) -> Any:
+    """Give, as text chunks of a PNG, what is noted on a picture; reading the file puts it back into `info`."""
+    from PIL.PngImagePlugin import PngInfo
+
+    notes = PngInfo()
+    for key, text in picture.info.items():
+        if isinstance(key, str) and isinstance(text, str):
+            notes.add_text(key, text)
+    return notes
 
 
 _encoder: Final = msgspec.json.Encoder(enc_hook=_encode_other)
