@@ -47,6 +47,7 @@ class ErpService(Generic):
 
     _ABSTRACT = False
     loss_reaction: ClassVar[LossReaction] = LossReaction.continues()  # it plans for others too
+    loss_ends_program: ClassVar[bool] = False  # results wait in the outbox; production goes on
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"next_order": "stop", "wait_until_sent": "stop"}
 
     def __init__(self, obj_id: str, name: str, settings: ErpSettings) -> None:
