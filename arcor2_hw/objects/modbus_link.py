@@ -92,6 +92,7 @@ class ModbusLink:
                 client.wake()
         with self._one_request:
             self._close()
+            self._loss = None  # what failed just now was our own doing
 
     def _open(self, timeout: float) -> None:
         try:

@@ -1,0 +1,172 @@
+"""Polled: states that are new enough, waits that end for every reason there is."""
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from arcor2_hw.data.device import Connection
+from arcor2_hw.exceptions import Cancelled, ConnectionLost, DeviceTimeout, NotConnected, Stale
+from arcor2_hw.objects.polled import Polled, Snapshot
+
+
+class Device:
+    """Counts how often it was read; can hold its answer back, and break."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.broken = False
+        self.answers = threading.Event()
+        self.answers.set()
+        self.told: list[str] = []
+
+    def open(self, timeout: float) -> int:
+        if self.broken:
+            raise NotConnected("still broken")
+        return self.read()
+
+    def read(self) -> int:
+        self.answers.wait(5.0)
+        if self.broken:
+            raise ConnectionLost("it broke")
+        self.count += 1
+        return self.count
+
+
+@pytest.fixture
+def device() -> Device:
+    return Device()
+
+
+@pytest.fixture
+def polled(device: Device) -> Iterator[Polled[int]]:
+    polled = Polled(
+        "thing at home",
+        device.open,
+        device.read,
+        lambda: None,
+        quiet=0.05,
+        busy=0.002,
+        fresh=0.3,
+        lost=lambda error: device.told.append(str(error)),
+        interrupt=device.answers.set,
+    )
+    polled.connect(1.0)
+    yield polled
+    device.answers.set()
+    polled.disconnect()
+
+
+def failing(call: Callable[[], object]) -> tuple[threading.Thread, list[BaseException]]:
+    errors: list[BaseException] = []
+
+    def run() -> None:
+        try:
+            call()
+        except BaseException as error:
+            errors.append(error)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    return thread, errors
+
+
+def test_fresh_is_asked_for_after_the_call(polled: Polled[int], device: Device) -> None:
+    for _ in range(20):
+        began = time.monotonic()
+        assert polled.fresh().asked >= began
+
+
+def test_nothing_is_told_that_was_being_read_when_one_began_to_wait(polled: Polled[int], device: Device) -> None:
+    device.answers.clear()
+    polled.hurry()
+    time.sleep(0.1)  # it is being read now
+    count = device.count
+    seen: list[int] = []
+    thread, errors = failing(lambda: seen.append(polled.fresh().value))
+    time.sleep(0.05)
+    device.answers.set()
+    thread.join()
+    assert not errors
+    assert seen[0] >= count + 2
+
+
+def test_it_reads_faster_while_somebody_waits(polled: Polled[int], device: Device) -> None:
+    before = device.count
+    with pytest.raises(DeviceTimeout, match=r"^thing at home: nothing ever took longer than 0\.5 s$"):
+        polled.wait(lambda _: False, 0.5, "nothing ever")
+    assert device.count - before > 20  # 10 at the quiet pace
+
+
+def test_a_state_gets_stale(polled: Polled[int], device: Device) -> None:
+    assert polled.current().value >= 1
+    device.answers.clear()
+    time.sleep(0.5)
+    with pytest.raises(Stale, match=r"^thing at home: the newest state is 0\.\d+ s old, 0\.3 s at most"):
+        polled.current()
+    assert polled.newest() is not None
+
+
+def test_a_stop_ends_what_was_begun_and_nothing_else(polled: Polled[int], device: Device) -> None:
+    go_on = polled.begin("pressing")
+    thread, errors = failing(lambda: polled.wait(lambda _: False, 5.0, "pressing", go_on))
+    time.sleep(0.05)
+    polled.stop_waiting()
+    thread.join(2.0)
+    assert isinstance(errors[0], Cancelled)
+    assert str(errors[0]) == "thing at home: pressing was stopped"
+    with pytest.raises(Cancelled):
+        go_on()
+    polled.begin("pressing again")()
+
+
+def test_a_loss_ends_what_waits_even_when_it_is_over_at_once(polled: Polled[int], device: Device) -> None:
+    go_on = polled.begin("pressing")
+    thread, errors = failing(lambda: polled.wait(lambda _: False, 5.0, "pressing"))
+    time.sleep(0.05)
+    device.broken = True
+    thread.join(2.0)
+    device.broken = False
+    assert isinstance(errors[0], ConnectionLost)
+    assert device.told == ["it broke"]
+    deadline = time.monotonic() + 5.0
+    while polled.observing.state is not Connection.BACK:
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    with pytest.raises(ConnectionLost):
+        go_on()
+    polled.begin("pressing again")()
+    assert polled.fresh().value
+
+
+def test_disconnecting_ends_what_waits_and_tells_no_loss(polled: Polled[int], device: Device) -> None:
+    thread, errors = failing(lambda: polled.wait(lambda _: False, 5.0, "pressing"))
+    time.sleep(0.05)
+    device.answers.clear()
+    polled.disconnect()
+    thread.join(2.0)
+    assert isinstance(errors[0], NotConnected)
+    assert device.told == []
+    assert polled.newest() is None
+
+
+def test_nothing_is_taken_while_somebody_holds_it(device: Device) -> None:
+    """What `taken` sees and what others see is one instant."""
+    taken: list[int] = []
+
+    def note(snapshot: Snapshot[int]) -> None:
+        taken.append(snapshot.value)
+
+    polled = Polled("thing", device.open, device.read, lambda: None, quiet=0.002, taken=note)
+    polled.connect(1.0)
+    try:
+        for _ in range(20):
+            with polled.taking:
+                assert taken[-1] == polled.newest()
+                held = len(taken)
+                time.sleep(0.005)
+                assert len(taken) == held
+            polled.fresh()
+    finally:
+        polled.disconnect()
