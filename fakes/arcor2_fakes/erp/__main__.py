@@ -48,6 +48,7 @@ def register_commands(control: ControlServer, planning: Planning, port: Port) ->
     control.command("forbid", forbid)
     control.command("forget", planning.forget)
     control.command("lose_answers", port.lose_answers)
+    control.command("mistake", port.mistake)
     control.command("fail", fail)
     control.command("work", port.heal)
     control.command("received", lambda: list(port.received))

@@ -50,7 +50,7 @@ class Port:
         self.received: deque[dict[str, Any]] = deque(maxlen=1000)
         self.total = 0
         self.changed: Callable[[], None] = lambda: None  # called when something was taken
-        self._lost_answers = 0
+        self._lost_answers = self._mistakes = 0
         self._failing: tuple[int, float, str, bool] | None = None  # status, s to wait, path, after it was done
         self._failures = 0
         self._starting: asyncio.Future[None] | None = None
@@ -60,6 +60,10 @@ class Port:
         """Do the next `count` POSTs, and reset the connection instead of answering."""
         self._lost_answers = int(count)
 
+    def mistake(self, count: int = 1) -> None:
+        """Answer the next `count` POSTs, which are not done, as if they had another key."""
+        self._mistakes = int(count)
+
     def fail(self, status: int, count: int = 1, retry_after: float = 0.0, path: str = "", done: bool = False) -> None:
         """Answer the next `count` requests (-1: all) of a path (empty: all) with a status; `done`: after doing them."""
         if status not in REASONS:
@@ -68,7 +72,7 @@ class Port:
 
     def heal(self) -> None:
         """Lose and fail no more."""
-        self._lost_answers = self._failures = 0
+        self._lost_answers = self._failures = self._mistakes = 0
         self._failing = None
 
     def power_cycle(self, seconds: float = 1.0) -> None:
@@ -111,6 +115,10 @@ class Port:
         failing = self._failure(request)
         if failing is not None and not failing[3]:
             self._tell_failure(connection, failing)
+            return
+        if self._mistakes > 0 and request.method == "POST":
+            self._mistakes -= 1
+            connection.send(answer(201, {"key": "0" * 32, "number": 1, "order": None}))
             return
         try:
             self._authorised(request)

@@ -1,5 +1,6 @@
 """A fake planning service in a process of its own, and the drivers on its wire."""
 
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -8,9 +9,35 @@ import pytest
 
 from arcor2_drivers.erp.erp_service import ErpService
 from arcor2_drivers.erp.settings import ErpSettings
+from arcor2_hw.exceptions import Arcor2Error
 from tests.fakes.conftest import FakeProcess, start_fake, wait_for
 
 __all__ = ["start_fake", "wait_for"]
+
+
+class Waiting:
+    """A call on a thread of its own."""
+
+    def __init__(self, call: Callable[[], object]) -> None:
+        self.result: object = None
+        self._thread = threading.Thread(target=self._run, args=(call,), daemon=True)
+        self._thread.start()
+
+    def _run(self, call: Callable[[], object]) -> None:
+        try:
+            self.result = call()
+        except Arcor2Error as error:
+            self.result = error
+
+    def outcome(self, within: float = 5.0) -> object:
+        self._thread.join(within)
+        assert not self._thread.is_alive(), f"it has not ended within {within:g} s"
+        return self.result
+
+
+def serials(fake: FakeProcess, order: str = "A-1") -> list[str]:
+    """Give what the service has of an order, in the order in which it came."""
+    return [result["serial"] for result in fake.truth()["results"] if result["order"] == order]
 
 
 @pytest.fixture(scope="module")

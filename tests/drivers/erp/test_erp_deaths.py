@@ -1,0 +1,125 @@
+"""The process is killed, or the service: every result that was stored arrives, once and in order."""
+
+import random
+import select
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from arcor2_drivers.erp.erp_service import ErpService
+from tests.drivers.erp.conftest import serials
+from tests.fakes.conftest import FakeProcess
+
+REPORTING = """
+import sys
+from arcor2_drivers.erp.erp_service import ErpService
+from arcor2_drivers.erp.settings import ErpSettings
+url, outbox, first, count = sys.argv[1:]
+erp = ErpService("id", "orphan", ErpSettings(url, outbox=outbox, request_timeout=10.0))
+erp.connect()
+for number in range(int(first), int(first) + int(count)):
+    erp.report_result("A-1", f"S-{number}", True)
+    print(number, flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def order(fake: FakeProcess) -> str:
+    fake.control.do("add_order", order="A-1", product="PCB", quantity=1000)
+    return "A-1"
+
+
+@pytest.fixture
+def reporting(tmp_path: Path) -> Any:
+    """Gives ``reporting(url, 0, 5)``: a process that reports and stays; its standard output tells what was stored."""
+    processes: list[subprocess.Popen[str]] = []
+
+    def start(url: str, first: int, count: int) -> subprocess.Popen[str]:
+        command = [sys.executable, "-c", REPORTING, url, str(tmp_path), str(first), str(count)]
+        processes.append(subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True))
+        return processes[-1]
+
+    yield start
+    for process in processes:
+        process.kill()
+        process.communicate()
+
+
+def test_killed_between_sending_and_answer(
+    fake: FakeProcess, make: Callable[..., ErpService], order: str, reporting: Any
+) -> None:
+    process = reporting(fake.ready["url"], 1, 1)
+    fake.control.wait_until(lambda t: t["results"], within=20.0)
+    assert process.stdout.readline() == "1\n"
+    process.kill()
+    process.wait()
+    fake.control.do("slow", seconds=3.0)  # connecting takes as long, too
+    process = reporting(fake.ready["url"], 2, 1)
+    fake.control.wait_until(lambda t: len(t["results"]) == 2, within=20.0)  # done; its answer is 3 s away
+    process.kill()
+    process.wait()
+    fake.control.do("heal")
+    assert fake.truth()["repeated"] == 0
+    erp = make(fake.ready["url"])
+    erp.connect()
+    erp.wait_until_sent(5.0)
+    assert serials(fake) == ["S-1", "S-2"]
+    assert fake.truth()["repeated"] == 1, "the result was not sent again, so it was not killed in between"
+
+
+def test_many_deaths_lose_nothing_and_double_nothing(
+    fake: FakeProcess, make: Callable[..., ErpService], order: str, reporting: Any
+) -> None:
+    drawn = random.Random(7)
+    stored: list[int] = []
+    for life in range(4):
+        process = reporting(fake.ready["url"], 100 * life, 100)
+        until = None
+        while until is None or time.monotonic() < until:
+            readable, _, _ = select.select([process.stdout], [], [], 0.01)
+            if readable:
+                line = process.stdout.readline()
+                if not line:
+                    break
+                stored.append(int(line))
+                until = until or time.monotonic() + drawn.uniform(0.01, 0.15)
+        process.kill()
+        process.wait()
+        stored += [int(line) for line in process.stdout.read().split("\n") if line.strip()]
+    erp = make(fake.ready["url"])
+    erp.connect()
+    erp.wait_until_sent(20.0)
+    came = [int(serial.removeprefix("S-")) for serial in serials(fake)]
+    assert came == sorted(set(came)), "out of order, or twice"
+    assert set(stored) <= set(came), "what was stored has not come"
+    assert len(set(came) - set(stored)) <= 4, "at most the one result per life that was stored and not yet told of"
+
+
+def test_the_service_dies_and_starts_again_with_its_store(
+    start_fake: Callable[..., FakeProcess], make: Callable[..., ErpService], tmp_path: Path
+) -> None:
+    store = str(tmp_path / "plan.jsonl")
+    first = start_fake("erp", "--store", store, "--order", "A-1=PCB:10")
+    where = first.ready["url"].removeprefix("http://")
+    erp = make(first.ready["url"])
+    erp.connect()
+    assert erp.next_order()[4] == 10
+    erp.report_result("A-1", "S-0", True)
+    erp.wait_until_sent(5.0)
+    first.control.do("slow", seconds=30.0)
+    erp.report_result("A-1", "S-1", True)
+    first.control.wait_until(lambda t: len(t["results"]) == 2)  # done, and its answer will never come
+    first.process.kill()
+    first.process.wait()
+    erp.report_result("A-1", "S-2", False)
+    second = start_fake("erp", "--store", store, "--listen", where)
+    erp.wait_until_sent(20.0)
+    assert serials(second) == ["S-0", "S-1", "S-2"]
+    assert second.truth()["repeated"] >= 1
+    assert erp.next_order()[4] == 7

@@ -1,0 +1,128 @@
+"""Results: on disk before the action returns, at the service exactly once and in order, whatever happens in between."""
+
+import time
+
+import pytest
+
+from arcor2_drivers.erp.erp_service import ErpService
+from arcor2_hw.data.device import Connection, Health
+from arcor2_hw.exceptions import DeviceTimeout
+from tests.drivers.erp.conftest import serials
+from tests.fakes.conftest import FakeProcess
+
+
+@pytest.fixture
+def order(fake: FakeProcess) -> str:
+    fake.control.do("add_order", order="A-1", product="PCB", quantity=1000)
+    return "A-1"
+
+
+def test_results_arrive_in_order_with_what_was_said(fake: FakeProcess, erp: ErpService, order: str) -> None:
+    for number in range(20):
+        erp.report_result(order, f"S-{number}", number % 3 > 0, f"{number} V")
+    erp.wait_until_sent(10.0)
+    results = fake.truth()["results"]
+    assert [(r["serial"], r["passed"], r["note"]) for r in results] == [
+        (f"S-{n}", n % 3 > 0, f"{n} V") for n in range(20)
+    ]
+    assert {r["station"] for r in results} == {"cell"}
+    assert [r["finished"] for r in results] == sorted(r["finished"] for r in results)
+    assert fake.truth()["repeated"] == 0
+    state = erp.outbox().value
+    assert (state.waiting, state.refused, state.since, state.last_error) == (0, 0, None, "")
+
+
+def test_production_goes_on_with_the_service_down(fake: FakeProcess, erp: ErpService, order: str) -> None:
+    fake.control.do("refuse")
+    fake.control.do("reset")
+    began = time.monotonic()
+    for number in range(30):
+        erp.report_result(order, f"S-{number}", True)
+    assert time.monotonic() - began < 5.0, "reporting waits for a service that is down"
+    fake.control.wait_until(lambda t: t["connections"] == 0)
+    while erp.connection is not Connection.LOST:
+        assert time.monotonic() - began < 10.0
+        time.sleep(0.02)
+    state = erp.outbox().value
+    assert state.waiting == 30
+    assert "planning at http" in state.last_error
+    with pytest.raises(DeviceTimeout, match="30 results still wait"):
+        erp.wait_until_sent(0.1)
+    fake.control.do("heal")
+    erp.wait_until_sent(10.0)
+    assert serials(fake) == [f"S-{n}" for n in range(30)]
+    while erp.connection is Connection.LOST:
+        assert time.monotonic() - began < 30.0
+        time.sleep(0.02)
+    assert erp.health is Health.NORMAL
+
+
+@pytest.mark.parametrize("fault", ["lose_answers", "half_frame", "garbage", "silence", "reset"])
+def test_each_result_once_whatever_becomes_of_the_answer(
+    fake: FakeProcess, erp: ErpService, order: str, fault: str
+) -> None:
+    erp.report_result(order, "S-0", True)
+    erp.wait_until_sent(5.0)
+    if fault == "lose_answers":
+        fake.control.do("lose_answers", count=2)
+    else:
+        fake.control.do(fault)
+    erp.report_result(order, "S-1", True)
+    erp.report_result(order, "S-2", False)
+    if fault == "lose_answers":
+        fake.control.wait_until(lambda t: t["repeated"] >= 1)
+    else:
+        time.sleep(0.7)
+        fake.control.do("heal")
+    erp.wait_until_sent(10.0)
+    assert serials(fake) == ["S-0", "S-1", "S-2"]
+
+
+def test_a_result_that_was_done_though_the_status_says_otherwise(
+    fake: FakeProcess, erp: ErpService, order: str
+) -> None:
+    fake.control.do("fail", status=500, count=2, path="/results", done=True)
+    erp.report_result(order, "S-1", True)
+    erp.wait_until_sent(10.0)
+    assert serials(fake) == ["S-1"]
+    assert fake.truth()["repeated"] == 2
+
+
+def test_an_answer_for_another_message_counts_for_nothing(fake: FakeProcess, erp: ErpService, order: str) -> None:
+    fake.control.do("mistake", count=1)
+    erp.report_result(order, "S-1", True)
+    erp.wait_until_sent(10.0)
+    assert serials(fake) == ["S-1"]
+
+
+def test_a_pause_the_service_asks_for_is_kept(fake: FakeProcess, erp: ErpService, order: str) -> None:
+    fake.control.do("fail", status=503, count=1, retry_after=2, path="/results")
+    erp.report_result(order, "S-1", True)
+    erp.wait_until_sent(10.0)
+    asked = [each["at"] for each in fake.control.do("received") if '"S-1"' in each["body"]][-2:]
+    assert 2.0 <= asked[1] - asked[0] < 6.0
+
+
+def test_attempts_become_rarer_while_the_service_fails(fake: FakeProcess, erp: ErpService, order: str) -> None:
+    fake.control.do("fail", status=503, count=-1, path="/results")
+    before = len([each for each in fake.control.do("received") if each["path"] == "/results"])
+    erp.report_result(order, "S-1", True)
+    time.sleep(2.2)
+    attempts = len([each for each in fake.control.do("received") if each["path"] == "/results"]) - before
+    assert 2 <= attempts <= 6, "0.2, 0.4, then every 0.5 s"
+    fake.control.do("work")
+    erp.wait_until_sent(5.0)
+    assert serials(fake) == ["S-1"]
+
+
+def test_a_message_the_service_cannot_do_holds_up_its_order_only(
+    fake: FakeProcess, erp: ErpService, order: str
+) -> None:
+    fake.control.do("add_order", order="B-1", product="PCB", quantity=1)
+    fake.control.do("fail", status=500, count=1, path="/results")
+    erp.report_result(order, "S-1", True)
+    erp.report_result(order, "S-2", True)
+    erp.report_result("B-1", "S-3", True)
+    erp.wait_until_sent(5.0)
+    came = [result["serial"] for result in fake.truth()["results"]]
+    assert came == ["S-3", "S-1", "S-2"]
