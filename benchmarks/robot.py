@@ -14,8 +14,8 @@ from arcor2_hw.data import rpc
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.robot import Joint
+from arcor2_server.demo.fakes import free_loopback_address
 from arcor2_server.demo.processes import Child, python_module
-from arcor2_server.demo.run import free_loopback_address
 from benchmarks import serving
 from benchmarks.figures import Figure, Report, median, percentile
 from benchmarks.operation import scene_state

@@ -17,9 +17,11 @@ from arcor2_hw.data import rpc
 from arcor2_hw.data.events import Event, SceneStateEnum
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
+from arcor2_server.demo.fakes import free_loopback_address
 from arcor2_server.demo.processes import Child, python_module
-from arcor2_server.demo.run import free_loopback_address
-from arcor2_server.demo.workplace import Creation, Scalar, Workplace, layout_file, load
+from arcor2_server.demo.workplace import Creation, Scalar, Workplace, load
+
+WORKPLACE = Path(__file__).parent / "workplace" / "three_devices.toml"
 
 
 async def until(ask: Callable[[], Any], what: str, timeout: float = 10.0) -> Any:
@@ -73,7 +75,7 @@ class Cell:
         await self.start_fake(
             "world",
             "arcor2_fakes.cell",
-            *("--layout", str(layout_file())),
+            *("--layout", str(WORKPLACE.with_suffix(".json"))),
             *("--robot", self.at["robot"]["control"]),
             *("--tester", self.at["tester"]["control"]),
             *("--reader", self.at["reader"]["control"]),
@@ -138,8 +140,8 @@ class Cell:
         }
 
     async def open(self, client: Client, boards: int = 2, workplace: Workplace | None = None) -> tuple[Scene, Project]:
-        """Open the demo's scene and project, made where they are missing."""
-        creation = Creation(client, workplace or load(), self.addresses())
+        """Open the scene and project of the three devices, made where they are missing."""
+        creation = Creation(client, workplace or load(WORKPLACE), self.addresses())
         scene = await creation.open_scene()
         return scene, await creation.open_project(scene, {"boards": boards})
 

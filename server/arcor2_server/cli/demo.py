@@ -24,27 +24,33 @@ def demo(
     host: str = "127.0.0.1",
     port: Annotated[int, Parameter(validator=validators.Number(gte=0, lte=65535))] = 6789,
     data_dir: Path | None = None,
+    fast: bool = False,
     picture: Path | None = None,
 ) -> int:
     """Bring up the demo workplace and run its program.
 
-    A robot, a tester and a barcode reader are simulated at the far end of their real protocols. The program scans,
-    tests and sorts boards. Afterwards the server goes on until Ctrl-C.
+    A cell for testing printed circuit boards: robot, two-axis robot, tester, belt, I/O block with tower light, reader,
+    label printer and planning service are simulated at the far end of their real protocols. The program works off an
+    order: boards are scanned, tested, labelled when good, sorted and reported. Afterwards the server goes on until
+    Ctrl-C, also when a fault ended the program: `arcor2-hw fake` makes and mends faults.
 
     Parameters
     ----------
     boards
-        How many boards lie in the feeder.
+        How many boards the order is for.
     seed
         Draws which boards are bad; drawn itself, and told, when it is not given.
     once
-        End when the program has run. The exit status is 0 only if every board lies in the right box.
+        End when the program has run. The exit status is 0 only if every board lies in the right box, the good ones
+        bear their label, and the planning service has exactly the results.
     host
         Address on which the server listens.
     port
         Port of the server; 0 takes any free one.
     data_dir
         Where scenes, projects and packages are kept.
+    fast
+        Let the robot and the tester hurry.
     picture
         Write what the terminal showed when the last board was done to this SVG file.
     """
@@ -53,7 +59,9 @@ def demo(
     console = Console(highlight=False)
     with Display(console, boards) as display:
         display.note(f"{boards} boards, seed {drawn}")
-        job = Demo(host=host, port=port, data_dir=directory, boards=boards, seed=drawn, once=once, display=display)
+        job = Demo(
+            host=host, port=port, data_dir=directory, boards=boards, seed=drawn, once=once, display=display, fast=fast
+        )
         try:
             outcome = asyncio.run(job.run())
         except asyncio.CancelledError:

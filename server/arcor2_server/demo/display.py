@@ -83,11 +83,17 @@ class Display:
         if number == of:
             self._pictured = [self._view()]
 
-    def finish(self, summary: str, misplaced: list[str]) -> None:
+    def failed(self, problem: str) -> None:
+        """Say what ended the program before its time."""
+        self._now = ""
+        self.close()
+        self._out(Text(problem, "red"))
+
+    def finish(self, summary: str, wrong: list[str]) -> None:
         """Say how the cycle ended."""
         self._now = ""
         self.close()
-        lines = [*(Text(line, "red") for line in misplaced), Text(summary, "bold")]
+        lines = [*(Text(line, "red") for line in wrong), Text(summary, "bold")]
         for line in lines:
             self._out(line)
         self._pictured += lines

@@ -2,11 +2,8 @@
 
 import asyncio
 import contextlib
-import random
 import signal
-import socket
 import time
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,6 +16,8 @@ from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.data.project import Project
 from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, DeviceTimeout
 from arcor2_server.demo.display import Display
+from arcor2_server.demo.fakes import Fake, Ready, fakes, wires, world_arguments
+from arcor2_server.demo.outcome import Outcome, wrong_boards, wrong_results
 from arcor2_server.demo.processes import Child, ChildFailed, python_module
 from arcor2_server.demo.workplace import Creation, Scalar, layout_file, load
 
@@ -26,49 +25,17 @@ ONLINE_TIMEOUT: Final = 30.0
 BOARD_TIMEOUT: Final = 120.0
 """Seconds without any event after which the program counts as stuck."""
 DEVICE_POLL: Final = 0.5
+ACCELERATIONS: Final[dict[str, Scalar]] = {"joint_acceleration": 10.0, "tcp_acceleration": 5.0}
+"""rad/s² and m/s²: what acceleration 1 of the robot means."""
+FAST: Final[dict[str, Scalar]] = {"speed": 1.0, "slow_speed": 0.7}
+"""What the project's constants are when the cell hurries."""
+FAST_ACCELERATIONS: Final[dict[str, Scalar]] = {"joint_acceleration": 30.0, "tcp_acceleration": 15.0}
 
 
 class ProgramFailed(Arcor2Error):
     """The program of the demo did not run to its end."""
 
     code = "program_failed"
-
-
-@dataclass
-class Outcome:
-    """Readings taken apart: what the script found, and where the boards lie in the end."""
-
-    boards: int = 0
-    passed: int = 0
-    failed: int = 0
-    seconds: float = 0.0
-    finished: bool = False
-    misplaced: list[str] = field(default_factory=list)
-
-    @property
-    def right(self) -> bool:
-        """Tell whether the program ended as meant with every board in the right box."""
-        return self.finished and not self.misplaced
-
-    def summary(self) -> str:
-        """Give the line that ends the cycle."""
-        return f"cycle complete: {self.boards} boards, {self.passed} passed, {self.failed} failed, {self.seconds:.1f} s"
-
-
-def free_loopback_address(ports: tuple[int, ...] = (30004, 30003, 29999)) -> str:
-    """Find an address 127.x.y.z on which all `ports` are free: a UR controller's ports are fixed."""
-    for _ in range(100):
-        address = f"127.{random.randint(1, 254)}.{random.randint(0, 255)}.{random.randint(1, 254)}"
-        with contextlib.ExitStack() as stack:
-            try:
-                for port in ports:
-                    probe = stack.enter_context(socket.socket())
-                    probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-                    probe.bind((address, port))
-            except OSError:
-                continue
-            return address
-    raise ChildFailed("No loopback address has the ports of a UR controller free.")
 
 
 def first_of(group: BaseExceptionGroup[Any]) -> BaseException:
@@ -89,9 +56,9 @@ async def ask(address: str, do: str) -> Any:
             finally:
                 writer.close()
     except (OSError, TimeoutError, msgspec.DecodeError) as e:
-        raise ConnectionLost(f"The small world at {address} does not answer.", str(e)) from e
+        raise ConnectionLost(f"The fake at {address} does not answer.", str(e)) from e
     if not answer.get("ok"):
-        raise ChildFailed(f"The small world refuses {do}: {answer.get('error')}")
+        raise ChildFailed(f"The fake at {address} refuses {do}: {answer.get('error')}")
     return answer.get("data")
 
 
@@ -99,7 +66,16 @@ class Demo:
     """One run of the demo."""
 
     def __init__(
-        self, *, host: str, port: int, data_dir: Path, boards: int, seed: int, once: bool, display: Display
+        self,
+        *,
+        host: str,
+        port: int,
+        data_dir: Path,
+        boards: int,
+        seed: int,
+        once: bool,
+        display: Display,
+        fast: bool = False,
     ) -> None:
         self._host = host
         self._port = port
@@ -107,6 +83,7 @@ class Demo:
         self._boards = boards
         self._seed = seed
         self._once = once
+        self._fast = fast
         self._display = display
         self._children: list[Child] = []
         self._stop = asyncio.Event()
@@ -137,67 +114,83 @@ class Demo:
             stop.cancel()
             for number in (signal.SIGINT, signal.SIGTERM):
                 loop.remove_signal_handler(number)
-            # The server first: it stops motion while the robot still listens.
-            for child in reversed(self._children):
-                await child.stop()
+            # The server first: it stops motion while the devices still listen. Then the world, which ends with a fake.
+            order = {"server": 0, "world": 1}
+            for child in sorted(self._children, key=lambda child: order.get(child.name, 2)):
+                if child.name in order:
+                    await child.stop()
+            await asyncio.gather(*(child.stop() for child in self._children))
 
     async def _job(self) -> Outcome:
-        robot = free_loopback_address()
-        ur = self._child("robot", python_module("arcor2_fakes.ur", "--host", robot, "--control", "127.0.0.1:0"))
-        tester = self._child("tester", python_module("arcor2_fakes.functional_tester", "--control", "127.0.0.1:0"))
-        reader = self._child("reader", python_module("arcor2_fakes.barcode_reader", "--control", "127.0.0.1:0"))
-        self._display.note("starting the robot, the tester, the reader and the server")
-        server_arguments = ("serve", "--host", self._host, "--port", str(self._port), "--data-dir", str(self._data_dir))
-        async with asyncio.TaskGroup() as starts:
-            found = [starts.create_task(child.start_json()) for child in (ur, tester, reader)]
-        ur_at, tester_at, reader_at = (task.result() for task in found)
+        started, server_at = await self._start_all()
         world = self._child(
             "world",
             python_module(
                 "arcor2_fakes.cell",
-                *("--layout", str(layout_file())),
-                *("--robot", ur_at["control"], "--tester", tester_at["control"], "--reader", reader_at["control"]),
-                *("--boards", str(self._boards), "--seed", str(self._seed), "--control", "127.0.0.1:0"),
+                *world_arguments(started, layout_file(), self._boards, self._seed),
+                *("--control", "127.0.0.1:0"),
             ),
         )
-        server = self._child("server", python_module("arcor2_server.cli.main", *server_arguments))
-        async with asyncio.TaskGroup() as starts:
-            world_start, server_start = starts.create_task(world.start_json()), starts.create_task(server.start())
-        world_at, url = world_start.result(), server_start.result()
-        self._display.addresses(url, {"robot": robot, "tester": tester_at["modbus"], "reader": reader_at["port"]})
-        (self._data_dir / "demo.json").write_bytes(
-            msgspec.json.format(
-                msgspec.json.encode(
-                    {"url": url, "robot": ur_at, "tester": tester_at, "reader": reader_at, "world": world_at}
-                )
-            )
-        )
-        tester_host, _, tester_port = str(tester_at["modbus"]).rpartition(":")
-        addresses: dict[str, Scalar] = {
-            "robot": robot,
-            "tester_host": tester_host,
-            "tester_port": int(tester_port),
-            "reader": reader_at["port"],
-        }
-        async with Client(url, "demo") as client:
-            poll = asyncio.create_task(self._display.follow_devices(url, DEVICE_POLL))
+        at: dict[str, Any] = {name: ready for name, (_, ready) in started.items()}
+        at["world"] = await world.start_json()
+        self._display.addresses(server_at, wires(started))
+        (self._data_dir / "demo.json").write_bytes(msgspec.json.format(msgspec.json.encode({"url": server_at, **at})))
+        settings: dict[str, Scalar] = {"outbox": str((self._data_dir / "outbox").absolute())}
+        settings |= FAST_ACCELERATIONS if self._fast else ACCELERATIONS
+        for fake, ready in started.values():
+            settings |= fake.settings(ready)
+        problem: Arcor2Error | None = None
+        outcome = Outcome()
+        async with Client(server_at, "demo") as client:
+            poll = asyncio.create_task(self._display.follow_devices(server_at, DEVICE_POLL))
             try:
-                outcome = await self._cycle(client, addresses, world_at["control"])
+                await self._cycle(client, settings, outcome)
+                outcome.wrong = await self._wrong(at)
+            except ProgramFailed as e:
+                if self._once:
+                    raise
+                problem = e
             finally:
                 poll.cancel()
                 with contextlib.suppress(asyncio.CancelledError):
                     await poll
-        self._display.finish(outcome.summary(), outcome.misplaced)
+        if problem is None:
+            self._display.finish(outcome.summary(), outcome.wrong)
+        else:
+            self._display.failed(str(problem))
         if not self._once:
-            self._display.serving(url)
+            self._display.serving(server_at)
             await self._stop.wait()
         return outcome
 
-    async def _cycle(self, client: Client, addresses: dict[str, Scalar], world: str) -> Outcome:
-        creation = Creation(client, load(), addresses)
+    async def _start_all(self) -> tuple[dict[str, tuple[Fake, Ready]], str]:
+        """Start the fakes and the server, all at once; gives what their ready lines say."""
+        wanted = fakes(self._boards, self._seed, self._fast)
+        self._display.note(f"starting {', '.join(fake.name for fake in wanted)} and the server")
+        server = self._child(
+            "server",
+            python_module(
+                *("arcor2_server.cli.main", "serve", "--host", self._host, "--port", str(self._port)),
+                *("--data-dir", str(self._data_dir)),
+            ),
+        )
+        children = [
+            self._child(fake.name, python_module(fake.module, *fake.arguments, "--control", "127.0.0.1:0"))
+            for fake in wanted
+        ]
+        async with asyncio.TaskGroup() as starts:
+            found = [starts.create_task(child.start_json()) for child in children]
+            serving = starts.create_task(server.start())
+        ready = [task.result() for task in found]
+        return {fake.name: (fake, said) for fake, said in zip(wanted, ready, strict=True)}, serving.result()
+
+    async def _cycle(self, client: Client, settings: dict[str, Scalar], outcome: Outcome) -> None:
+        workplace = load()
+        creation = Creation(client, workplace, settings)
         self._display.note("opening the workplace")
+        await creation.close_all()
         scene = await creation.open_scene()
-        project = await creation.open_project(scene, {"boards": self._boards})
+        project = await creation.open_project(scene, FAST if self._fast else workplace.constants)
         self._display.note("going online")
         await client.call("StartScene")
         await self._scene_state(client, SceneStateEnum.STARTED)
@@ -207,24 +200,23 @@ class Demo:
         self._display.note("building the package")
         built = await client.call("BuildProject", rpc.BuildProjectArgs(project.id, project.name))
         await client.call("CloseProject")
-        started = time.monotonic()
+        began = time.monotonic()
         await client.call("RunPackage", rpc.RunPackageArgs(built.package_id))
-        outcome = await self._follow(client, project)
-        outcome.seconds = time.monotonic() - started
-        outcome.misplaced = await self._misplaced(world)
-        return outcome
+        await self._follow(client, project, outcome)
+        outcome.seconds = time.monotonic() - began
 
     async def _scene_state(self, client: Client, wanted: SceneStateEnum) -> None:
+        begun = False  # opening a scene tells that it is stopped, too
         while True:
             event = await client.next_event("SceneState", timeout=ONLINE_TIMEOUT)
             if event.data.state is wanted:
                 return
-            if event.data.state is SceneStateEnum.STOPPED:
+            begun = begun or event.data.state is SceneStateEnum.STARTING
+            if event.data.state is SceneStateEnum.STOPPED and begun:
                 raise ProgramFailed(f"The workplace did not come online: {event.data.message or 'no reason given'}")
 
-    async def _follow(self, client: Client, project: Project) -> Outcome:
+    async def _follow(self, client: Client, project: Project, outcome: Outcome) -> None:
         actions = {action.id: action for point in project.action_points for action in point.actions}
-        outcome = Outcome()
         problem = ""
         while True:
             try:
@@ -248,13 +240,9 @@ class Demo:
                     if problem:
                         raise ProgramFailed(f"The program ended with an error: {problem}")
                     outcome.finished = True
-                    return outcome
+                    return
 
-    async def _misplaced(self, world: str) -> list[str]:
-        truth = await ask(world, "truth")
-        wrong = []
-        for board in truth["boards"]:
-            wanted = "bad" if board["defect"] else "good"
-            if board["place"] != wanted:
-                wrong.append(f"board {board['code']} lies in {board['place']}, not in {wanted}")
-        return wrong
+    @staticmethod
+    async def _wrong(at: dict[str, Any]) -> list[str]:
+        world, erp = await ask(at["world"]["control"], "truth"), await ask(at["erp"]["control"], "truth")
+        return wrong_boards(world) + wrong_results(world, erp)

@@ -1,12 +1,14 @@
 """The demo workplace: read from workplace.toml, and created through the protocol as any client would."""
 
+import contextlib
 from importlib.resources import files
+from pathlib import Path
 from typing import Any, Final
 
 import msgspec
 from msgspec import UNSET, Struct, field
 
-from arcor2_hw.client import Client
+from arcor2_hw.client import Client, RequestFailed
 from arcor2_hw.data import rpc
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.events import Event
@@ -49,7 +51,10 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Step(Struct, frozen=True, forbid_unknown_fields=True):
-    """An action: on a point, by an object. A parameter "@point" is that point's pose, "$name" a project parameter."""
+    """An action: on a point, by an object.
+
+    A parameter "@point" is that point's pose, "$name" a project parameter, "#result" the result of an earlier step.
+    """
 
     name: str
     point: str
@@ -82,9 +87,10 @@ class Workplace(Struct, frozen=True, forbid_unknown_fields=True):
     constants: dict[str, Scalar]
 
 
-def load() -> Workplace:
-    """Read the workplace that comes with the product."""
-    return msgspec.toml.decode((files(__package__) / "workplace.toml").read_bytes(), type=Workplace)
+def load(file: Path | None = None) -> Workplace:
+    """Read a workplace; without a file the one that comes with the product."""
+    given = files(__package__) / "workplace.toml" if file is None else file
+    return msgspec.toml.decode(given.read_bytes(), type=Workplace)
 
 
 def layout_file() -> Any:
@@ -110,6 +116,13 @@ class Creation:
         self._client = client
         self._workplace = workplace
         self._addresses = addresses
+
+    async def close_all(self) -> None:
+        """Close what the server reopened from a run that was cut off; edits that nobody saved are let go."""
+        with contextlib.suppress(RequestFailed):  # none is open
+            await self._client.call("CloseProject", rpc.CloseProjectArgs(force=True))
+        with contextlib.suppress(RequestFailed):
+            await self._client.call("CloseScene", rpc.CloseSceneArgs(force=True))
 
     # ------------------------------------------------------------------------------------------------ scene
     def _settings(self, obj: Object) -> list[Parameter]:
@@ -217,6 +230,7 @@ class Creation:
             orientations[point.name] = (await self._added("OrientationChanged")).data.id
             await self._client.call("WriteUnlock", rpc.WriteUnlockArgs(points[point.name]))
         actions: dict[str, Action] = {}
+        results: dict[str, str] = {}
         declared = {
             obj.type: {action.name: action for action in await self._client.call("GetActions", rpc.TypeArgs(obj.type))}
             for obj in self._workplace.objects
@@ -224,7 +238,7 @@ class Creation:
         for step in self._workplace.steps:
             obj = objects[step.object]
             given = [
-                self._parameter(step, name, value, declared[obj.type][step.action], orientations, parameters)
+                self._parameter(step, name, value, declared[obj.type][step.action], orientations, parameters, results)
                 for name, value in step.parameters.items()
             ]
             await self._client.call(
@@ -233,12 +247,13 @@ class Creation:
                     points[step.point], step.name, f"{obj.id}/{step.action}", given, [Flow(outputs=step.results)]
                 ),
             )
-            actions[step.name] = (await self._added("ActionChanged")).data
-        results = {result: step.name for step in self._workplace.steps for result in step.results}
+            added: Action = (await self._added("ActionChanged")).data
+            actions[step.name] = added
+            results |= {result: f"{added.id}/default/{number}" for number, result in enumerate(step.results)}
         for link in self._workplace.logic:
             condition: ProjectLogicIf | Unset = UNSET
             if link.result:
-                condition = ProjectLogicIf(f"{actions[results[link.result]].id}/default/0", _json(link.value))
+                condition = ProjectLogicIf(results[link.result], _json(link.value))
             start = link.start if link.start == "START" else actions[link.start].id
             end = link.end if link.end == "END" else actions[link.end].id
             await self._client.call("AddLogicItem", rpc.AddLogicItemArgs(start, end, condition))
@@ -251,6 +266,7 @@ class Creation:
         action: ObjectAction,
         orientations: dict[str, str],
         parameters: dict[str, str],
+        results: dict[str, str],
     ) -> ActionParameter:
         meta = next((meta for meta in action.parameters if meta.name == name), None)
         if meta is None:
@@ -259,4 +275,6 @@ class Creation:
             return ActionParameter(name, meta.type, _json(orientations[value[1:]]))
         if isinstance(value, str) and value.startswith("$"):
             return ActionParameter(name, "project_parameter", _json(parameters[value[1:]]))
+        if isinstance(value, str) and value.startswith("#"):
+            return ActionParameter(name, "link", _json(results[value[1:]]))
         return ActionParameter(name, meta.type, _json(value))

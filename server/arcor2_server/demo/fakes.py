@@ -1,0 +1,98 @@
+"""The simulated devices of the demo: how each is started, and where a scene finds it."""
+
+import contextlib
+import random
+import socket
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from msgspec import Struct
+
+from arcor2_server.demo.processes import ChildFailed
+from arcor2_server.demo.workplace import Scalar
+
+Ready = Mapping[str, Any]
+"""What a fake's ready line says."""
+
+_UR_PORTS: Final = (30004, 30003, 29999)
+_FAST_TESTER: Final = 3.0
+
+
+class Fake(Struct, frozen=True):
+    """A fake: its name in the demo, its module, and what it is started with.
+
+    `wire` is what its ready line calls its wire; `settings` gives what the scene's settings call it. `role` is what the
+    small world calls it; empty when the world has nothing to do with it.
+    """
+
+    name: str
+    module: str
+    arguments: tuple[str, ...]
+    wire: str
+    settings: Callable[[Ready], dict[str, Scalar]]
+    role: str = ""
+
+
+def _host_and_port(name: str, key: str) -> Callable[[Ready], dict[str, Scalar]]:
+    def split(ready: Ready) -> dict[str, Scalar]:
+        host, _, port = str(ready[key]).rpartition(":")
+        return {f"{name}_host": host, f"{name}_port": int(port)}
+
+    return split
+
+
+def _plain(name: str, key: str, prefix: str = "") -> Callable[[Ready], dict[str, Scalar]]:
+    return lambda ready: {name: f"{prefix}{ready[key]}"}
+
+
+def fakes(boards: int, seed: int, fast: bool) -> list[Fake]:
+    """Give the fakes of one run; `fast` lets the machines among them hurry."""
+    robot = free_loopback_address(_UR_PORTS)
+    loopback = "127.0.0.1:0"
+    hurry = ("--time-scale", f"{_FAST_TESTER:g}") if fast else ()
+    order = f"ORDER-{seed:06d}=Controller board:{boards}"
+    return [
+        Fake("robot", "arcor2_fakes.ur", ("--host", robot), "host", _plain("robot", "host"), "robot"),
+        Fake("tester", "arcor2_fakes.functional_tester", hurry, "modbus", _host_and_port("tester", "modbus"), "tester"),
+        Fake("reader", "arcor2_fakes.barcode_reader", (), "port", _plain("reader", "port"), "reader"),
+        Fake("belt", "arcor2_fakes.conveyor", (), "can", _plain("belt", "can", "socket://"), "conveyor"),
+        Fake("io", "arcor2_fakes.remote_io", (), "modbus", _host_and_port("io", "modbus"), "io"),
+        Fake(
+            "printer", "arcor2_fakes.label_printer", ("--tcp", loopback), "port", _plain("printer", "port"), "printer"
+        ),
+        Fake("press", "arcor2_fakes.two_axis_robot", (), "port", _plain("press", "port"), "arm"),
+        Fake("erp", "arcor2_fakes.erp", ("--order", order), "url", _plain("erp", "url")),
+    ]
+
+
+def wires(started: Mapping[str, tuple[Fake, Ready]]) -> dict[str, str]:
+    """Give where each device is, for people; the tower light hangs on the I/O block."""
+    found = {name: str(ready[fake.wire]).removeprefix("socket://") for name, (fake, ready) in started.items()}
+    return found | {"tower": found["io"]}
+
+
+def world_arguments(
+    started: Mapping[str, tuple[Fake, Ready]], layout: Path | Any, boards: int, seed: int
+) -> tuple[str, ...]:
+    """Give what the small world is started with."""
+    follows = [
+        part for fake, ready in started.values() if fake.role for part in (f"--{fake.role}", str(ready["control"]))
+    ]
+    return ("--layout", str(layout), *follows, "--boards", str(boards), "--seed", str(seed))
+
+
+def free_loopback_address(ports: tuple[int, ...] = _UR_PORTS) -> str:
+    """Find an address 127.x.y.z on which all `ports` are free: a UR controller's ports are fixed."""
+    for _ in range(100):
+        address = f"127.{random.randint(1, 254)}.{random.randint(0, 255)}.{random.randint(1, 254)}"
+        with contextlib.ExitStack() as stack:
+            try:
+                for port in ports:
+                    probe = stack.enter_context(socket.socket())
+                    probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                    probe.bind((address, port))
+            except OSError:
+                continue
+            return address
+    raise ChildFailed("No loopback address has the ports of a UR controller free.")
