@@ -15,9 +15,11 @@ def spec() -> Path:
     return path
 
 
-@pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep in one process what shares a fake: a module, or the suite's cases on one bench."""
+    """Keep in one process what shares a fake: a module, or the suite's cases on one bench.
+
+    Not `trylast`: xdist reads the groups then, and a plugin that is registered later would come after it.
+    """
     for item in items:
         callspec = getattr(item, "callspec", None)
         bench = callspec.params.get("arcor2_running_bench") if callspec is not None else None
