@@ -15,10 +15,11 @@ def spec() -> Path:
     return path
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Keep in one process what shares a fake: a module, or the suite's cases on one bench.
 
-    Not `trylast`: xdist reads the groups then, and a plugin that is registered later would come after it.
+    First of all, since xdist reads the groups in a hook of the same name.
     """
     for item in items:
         callspec = getattr(item, "callspec", None)
