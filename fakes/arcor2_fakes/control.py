@@ -3,7 +3,8 @@
 One request a line, ``{"id": 1, "do": "truth", ...}``, one answer, ``{"id": 1, "ok": true, "data": ...}`` or
 ``{"id": 1, "ok": false, "error": "..."}``. ``{"id": 2, "do": "subscribe", "to": "truth", "rate": 50}`` makes the fake
 push ``{"event": "truth", "data": ...}`` that often (Hz); with rate 0 it pushes whenever the fake calls `publish`.
-``{"do": "unsubscribe", "to": "truth"}`` ends it, ``{"do": "commands"}`` lists what there is.
+``{"do": "unsubscribe", "to": "truth"}`` ends it, ``{"do": "commands"}`` lists what there is, ``{"do": "describe"}``
+says what each takes.
 
 A fake makes a `ControlServer`, registers its commands and sources, and hands it its wires (`arcor2_fakes.wire`), which
 brings the faults every fake knows: silence, reset, half_frame, garbage, slow, refuse, heal. `ControlClient` (asyncio)
@@ -165,7 +166,9 @@ class _Session:
 
     def _call(self, name: object, arguments: dict[str, Any]) -> Any:
         if name == "commands":
-            return sorted({*self._commands, "commands", "subscribe", "unsubscribe"})
+            return sorted({*self._commands, "commands", "describe", "subscribe", "unsubscribe"})
+        if name == "describe":
+            return [_described(command, handler) for command, handler in sorted(self._commands.items())]
         if name == "subscribe":
             return self._subscribe(**arguments)
         if name == "unsubscribe":
@@ -205,6 +208,19 @@ class _Session:
 
     def _send(self, message: dict[str, Any]) -> None:
         self._writer.write(_encoder.encode(message) + b"\n")
+
+
+def _described(name: str, handler: Handler) -> dict[str, Any]:
+    """Give a command's name, what it takes: ``name``, ``[name]`` or ``name=default``, and its first line of text."""
+    takes = []
+    for each in inspect.signature(handler).parameters.values():
+        if each.default is each.empty:
+            takes.append(each.name)
+        else:
+            value = msgspec.json.encode(each.default).decode()
+            takes.append(f"[{each.name}]" if each.default is None else f"{each.name}={value}")
+    lines = (handler.__doc__ or "").strip().splitlines()
+    return {"name": name, "takes": takes, "text": lines[0] if lines else ""}
 
 
 def _data(answer: Any, command: str) -> Any:

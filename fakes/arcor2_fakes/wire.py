@@ -6,12 +6,23 @@ import os
 import socket
 import struct
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from typing import Any, Protocol, cast
 
 from arcor2_fakes.control import ControlServer
 
 FAULTS = ("silence", "reset", "half_frame", "garbage", "slow", "refuse", "heal")
+CHECKSUM = "wrong_checksum"
+_TEXTS = {
+    "silence": "carry nothing in either direction",
+    "reset": "break every connection",
+    "half_frame": "send half of the next frame and then nothing",
+    "garbage": "send random bytes in place of frames",
+    "slow": "send everything so many seconds late",
+    "refuse": "take no new connection",
+    "heal": "be well again",
+    CHECKSUM: "send frames whose checksum is wrong",
+}
 _RESET_ON_CLOSE = struct.pack("ii", 1, 0)  # struct linger: on, 0 s: closing sends RST
 _TIMER_GRAIN = 0.001  # s, of the event loop
 _MAX_UNSENT = (
@@ -26,6 +37,7 @@ class Faults:
         self.silent = False
         self.half_next = False
         self.garbage = False
+        self.wrong_checksum = False
         self.delay = 0.0
 
     def outgoing(self, frame: bytes) -> bytes:
@@ -37,11 +49,13 @@ class Faults:
             return frame[: max(1, len(frame) // 2)]
         if self.garbage:
             return os.urandom(len(frame))
+        if self.wrong_checksum:
+            return frame[:-1] + bytes([frame[-1] ^ 0x01])
         return frame
 
     def set(self, fault: str, seconds: float = 1.0) -> None:
         """Applies one of `FAULTS`; reset and refuse belong to the transport and change nothing here."""
-        if fault not in FAULTS:
+        if fault not in (*FAULTS, CHECKSUM):
             raise ValueError(f"no fault {fault!r}; there are {', '.join(FAULTS)}")
         if fault == "silence":
             self.silent = True
@@ -49,12 +63,14 @@ class Faults:
             self.half_next = True
         elif fault == "garbage":
             self.garbage = True
+        elif fault == CHECKSUM:
+            self.wrong_checksum = True
         elif fault == "slow":
             if not 0.0 <= seconds <= 600.0:
                 raise ValueError("seconds is 0 to 600")
             self.delay = seconds
         elif fault == "heal":
-            self.silent = self.half_next = self.garbage = False
+            self.silent = self.half_next = self.garbage = self.wrong_checksum = False
             self.delay = 0.0
 
 
@@ -66,21 +82,31 @@ class Faulty(Protocol):
         ...
 
 
-def register_faults(control: ControlServer, wires: dict[str, Faulty]) -> None:
-    """Makes each fault a command: ``{"do": "slow", "wire": "rtde", "seconds": 2}``; without a wire: to all."""
+def register_faults(control: ControlServer, wires: dict[str, Faulty], checked: Container[str] = ()) -> None:
+    """Makes each fault a command: ``{"do": "slow", "wire": "rtde", "seconds": 2}``; without a wire: to all.
 
-    async def apply(kind: str, wire: str | None, seconds: float) -> None:
-        if wire is not None and wire not in wires:
-            raise ValueError(f"no wire {wire!r}; there are {', '.join(wires)}")
-        for name, faulty in wires.items():
+    `checked` names the wires whose frames end in a checksum; they can be told to send wrong ones.
+    """
+
+    async def apply(kind: str, among: dict[str, Faulty], wire: str | None, seconds: float) -> None:
+        if wire is not None and wire not in among:
+            raise ValueError(f"no wire {wire!r}; there are {', '.join(among)}")
+        for name, faulty in among.items():
             if wire in (None, name):
                 await faulty.fault(kind, seconds)
 
-    def command(kind: str) -> Callable[..., Any]:
-        return lambda wire=None, seconds=1.0: apply(kind, wire, seconds)
+    def command(kind: str, among: dict[str, Faulty]) -> Callable[..., Any]:
+        def fault(wire: str | None = None, seconds: float = 1.0) -> Any:
+            return apply(kind, among, wire, seconds)
+
+        fault.__doc__ = f"Let the wire {_TEXTS[kind]}."
+        return fault
 
     for kind in FAULTS:
-        control.command(kind, command(kind))
+        control.command(kind, command(kind, wires))
+    with_checksum = {name: wire for name, wire in wires.items() if name in checked}
+    if with_checksum:
+        control.command(CHECKSUM, command(CHECKSUM, with_checksum))
 
 
 class Connection(asyncio.Protocol):

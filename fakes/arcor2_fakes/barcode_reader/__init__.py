@@ -7,3 +7,5 @@ Not modelled: baud rate and parity (a pty takes any), the time characters take o
 in view at once, symbologies, and set-up commands of real readers. A dirty window only makes decoding five times as
 slow.
 """
+
+WIRE = "ASCII lines on a pty, or TCP"

@@ -16,3 +16,5 @@ askew, a board gripped while another lies below it, what the arm hides from the 
 again or are picked up from where they fell, a tester's door that closes on the arm, weight, and a robot whose
 calibration differs from its nominal kinematics.
 """
+
+WIRE = "the control channels of the others"

@@ -4,3 +4,5 @@ In its own process: `python -m arcor2_fakes.dobot_magician`. Not modelled: force
 parallelogram, blending (continuous path modes), jogging, arcs, laser, rail, inputs and outputs other than a stepper,
 download of the queue, the time of day. A forced stop stands at once, as steppers do that lose no step.
 """
+
+WIRE = "Dobot protocol on a pty"

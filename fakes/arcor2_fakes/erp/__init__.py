@@ -4,3 +4,5 @@ What was taken is kept in memory, or in a file that outlives the process; either
 HTTP/2, chunked requests, users and roles beyond one bearer token, orders that change or are withdrawn, keys that
 expire, requests that take the service time.
 """
+
+WIRE = "HTTP"

@@ -7,3 +7,5 @@ Not modelled: test programs with limits of their own (all of 1 to 9 measure the 
 commands (the mode is only shown), suspending, a door that jams, a board put in turned, Modbus over TLS or RTU, and more
 than one request under way on one connection.
 """
+
+WIRE = "Modbus TCP"

@@ -20,3 +20,5 @@ Not modelled: XLink and USB, booting of firmware beyond its time, the two mono c
 rendered in the colour camera's view), rolling shutter, motion blur, focus, auto exposure's settling, reflections and
 shadows, IR projector, IMU, on-device neural networks, exclusive use by one host.
 """
+
+WIRE = "frames over TCP"

@@ -6,3 +6,5 @@ are the block's own.
 Not modelled: filters and delays of real inputs, noise and settling of analogue values, loads on the outputs, rejection
 of a second TCP client, RTU timing (silent intervals), broadcast writes, and Modbus over TLS.
 """
+
+WIRE = "Modbus TCP, or RTU on a pty"

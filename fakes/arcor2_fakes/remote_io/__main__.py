@@ -86,7 +86,7 @@ def main(*, host: str = "127.0.0.1", port: int = 0, serial: bool = False, contro
         modbus = SerialPort(registers) if serial else TcpPort(host, port, registers)
         channel = ControlServer(control_host, control_port)
         register_commands(channel, block, modbus)
-        register_faults(channel, {"modbus": modbus})
+        register_faults(channel, {"modbus": modbus}, checked=("modbus",) if serial else ())
         channel.source("truth", lambda: truth(block))
         await modbus.open()
         try:

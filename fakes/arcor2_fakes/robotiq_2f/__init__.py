@@ -4,3 +4,5 @@ Fingers that move in time, parts between them, activation, object detection and 
 (ATR), the dynamics of fingers and parts (a part is rigid and a force is only remembered), encompassing grips, several
 grippers behind one port, motor current that follows from a force.
 """
+
+WIRE = "ASCII on TCP, and Modbus RTU on a pty"

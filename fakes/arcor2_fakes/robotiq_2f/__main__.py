@@ -63,7 +63,7 @@ def main(
         channel = ControlServer(*control_address)
         register_commands(channel, gripper)
         channel.command("pace", pace.set)
-        register_faults(channel, {"ascii": port.wire, "rtu": serial.line})
+        register_faults(channel, {"ascii": port.wire, "rtu": serial.line}, checked=("rtu",))
 
         def truth() -> dict[str, Any]:
             return {

@@ -7,3 +7,5 @@ Not modelled: the time bytes take on the line and the return delay, baud rate an
 operating modes other than position, fast sync, bulk and registered instructions, indirect addresses, loads, gains,
 temperature over time, and what an echoing adapter sends back. Homing offset shifts the position at once.
 """
+
+WIRE = "Dynamixel protocol 2.0 on a pty"

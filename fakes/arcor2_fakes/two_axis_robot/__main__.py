@@ -108,7 +108,7 @@ def main(*, link: Path | None = None, control: str = "127.0.0.1:0", ids: tuple[i
 
         channel = ControlServer(*control_address)
         register_commands(channel, bus)
-        register_faults(channel, {"serial": line})
+        register_faults(channel, {"serial": line}, checked=("serial",))
         channel.command("plug", plug)
         channel.command("unplug", unplug)
         channel.source("truth", lambda: truth(bus, line))

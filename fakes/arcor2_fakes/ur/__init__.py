@@ -9,3 +9,5 @@ communication interface, URScript beyond calls with literal arguments, the 500 H
 a real controller sends besides, the teach pendant and its popups, users and installations, RTDE protocol version 1.
 An error at run time ends a program without the popup. After a safeguard stop there is no reset input.
 """
+
+WIRE = "RTDE, script port and dashboard on TCP"

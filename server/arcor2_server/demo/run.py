@@ -14,11 +14,12 @@ from arcor2_hw.data import rpc
 from arcor2_hw.data.events import Event, SceneStateEnum
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.data.project import Project
-from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, DeviceTimeout
+from arcor2_hw.exceptions import Arcor2Error, DeviceTimeout
+from arcor2_server.demo.control import ask
 from arcor2_server.demo.display import Display
 from arcor2_server.demo.fakes import Fake, Ready, fakes, wires, world_arguments
 from arcor2_server.demo.outcome import Outcome, wrong_boards, wrong_results
-from arcor2_server.demo.processes import Child, ChildFailed, python_module
+from arcor2_server.demo.processes import Child, python_module
 from arcor2_server.demo.workplace import Creation, Scalar, layout_file, load
 
 ONLINE_TIMEOUT: Final = 30.0
@@ -42,24 +43,6 @@ def first_of(group: BaseExceptionGroup[Any]) -> BaseException:
     """Give the first error in a group: what a person wants to read is what began it."""
     first: BaseException = group.exceptions[0]
     return first_of(first) if isinstance(first, BaseExceptionGroup) else first
-
-
-async def ask(address: str, do: str) -> Any:
-    """Ask a fake's control channel; raises ConnectionLost naming the address."""
-    host, _, port = address.rpartition(":")
-    try:
-        async with asyncio.timeout(5):
-            reader, writer = await asyncio.open_connection(host, int(port), limit=4 * 1024 * 1024)
-            try:
-                writer.write(msgspec.json.encode({"id": 1, "do": do}) + b"\n")
-                answer = msgspec.json.decode(await reader.readline())
-            finally:
-                writer.close()
-    except (OSError, TimeoutError, msgspec.DecodeError) as e:
-        raise ConnectionLost(f"The fake at {address} does not answer.", str(e)) from e
-    if not answer.get("ok"):
-        raise ChildFailed(f"The fake at {address} refuses {do}: {answer.get('error')}")
-    return answer.get("data")
 
 
 class Demo:
@@ -88,6 +71,7 @@ class Demo:
         self._children: list[Child] = []
         self._stop = asyncio.Event()
         self._logs = data_dir / "logs"
+        self._where = data_dir / "demo.json"
 
     def _child(self, name: str, command: list[str]) -> Child:
         child = Child(name, command, self._logs / f"{name.replace(' ', '_')}.log")
@@ -100,6 +84,7 @@ class Demo:
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.add_signal_handler(number, self._stop.set)
         self._logs.mkdir(parents=True, exist_ok=True)
+        self._where.unlink(missing_ok=True)
         job = asyncio.create_task(self._job())
         stop = asyncio.create_task(self._stop.wait())
         try:
@@ -120,6 +105,7 @@ class Demo:
                 if child.name in order:
                     await child.stop()
             await asyncio.gather(*(child.stop() for child in self._children))
+            self._where.unlink(missing_ok=True)
 
     async def _job(self) -> Outcome:
         started, server_at = await self._start_all()
@@ -134,7 +120,7 @@ class Demo:
         at: dict[str, Any] = {name: ready for name, (_, ready) in started.items()}
         at["world"] = await world.start_json()
         self._display.addresses(server_at, wires(started))
-        (self._data_dir / "demo.json").write_bytes(msgspec.json.format(msgspec.json.encode({"url": server_at, **at})))
+        self._where.write_bytes(msgspec.json.format(msgspec.json.encode({"url": server_at, **at})))
         settings: dict[str, Scalar] = {"outbox": str((self._data_dir / "outbox").absolute())}
         settings |= FAST_ACCELERATIONS if self._fast else ACCELERATIONS
         for fake, ready in started.values():

@@ -1,0 +1,34 @@
+"""One question to the control channel of a fake."""
+
+import asyncio
+from typing import Any
+
+import msgspec
+
+from arcor2_hw.exceptions import ConnectionLost, Refused
+
+MOST = 4 * 1024 * 1024
+"""Bytes of an answer."""
+
+
+async def ask(address: str, do: str, *, within: float = 5.0, **arguments: Any) -> Any:
+    """Ask a fake at HOST:PORT and give its data.
+
+    Raises ConnectionLost naming the address when it does not answer within so many seconds, Refused with its reason.
+    """
+    host, _, port = address.rpartition(":")
+    try:
+        async with asyncio.timeout(within):
+            reader, writer = await asyncio.open_connection(host.strip("[]"), int(port), limit=MOST)
+            try:
+                writer.write(msgspec.json.encode({"id": 1, "do": do, **arguments}) + b"\n")
+                answer = msgspec.json.decode(await reader.readline())
+            finally:
+                writer.close()
+    except (OSError, OverflowError, ValueError, msgspec.DecodeError) as e:
+        reason = "no answer in time" if isinstance(e, TimeoutError) else "it is no control channel of a fake"
+        reason = "nobody listens there" if isinstance(e, ConnectionRefusedError) else reason
+        raise ConnectionLost(f"the fake at {address} does not answer: {reason}", str(e)) from e
+    if not isinstance(answer, dict) or not answer.get("ok"):
+        raise Refused(f"the fake at {address} refuses: {answer.get('error') if isinstance(answer, dict) else answer}")
+    return answer.get("data")
