@@ -25,23 +25,30 @@ class Snapshot(NamedTuple, Generic[T]):
     asked: float
     stamp: Timestamp
 
+    @classmethod
+    def by(cls, read: Callable[[], T]) -> "Snapshot[T]":
+        """Make one of what `read` gives, asked for now."""
+        asked, stamp = time.monotonic(), now()
+        return cls(read(), asked, stamp)
+
 
 class Polled(Generic[T]):
     """Keeps the newest state of a device; the connection's life is Observing's.
 
-    who: name and address, for errors. open_(timeout): opens and gives the first state. read(): gives a state. close():
-    closes, harmless when closed. quiet, busy: s between readings while nobody waits, and while somebody does. fresh: s
-    a state counts for `current`. answers_within: s one reading takes at most, asked twice and behind another. All of
-    the following are called on the observing thread: taken(snapshot) before others see the state, and while nobody
-    else gets one; after() after each reading; lost(error) once per loss. interrupt(): ends a reading that waits, when
-    we disconnect. All callables raise DeviceError.
+    who: name and address, for errors. open_(timeout): opens and gives the first state, made by `Snapshot.by`. read():
+    gives a state, or None when there is nothing to take because states come unasked, by `put`. close(): closes,
+    harmless when closed. quiet, busy: s between readings while nobody waits, and while somebody does. fresh: s a state
+    counts for `current`. answers_within: s one reading takes at most, asked twice and behind another. All of the
+    following are called on the observing thread: taken(snapshot) before others see the state, and while nobody else
+    gets one; after() after each reading; lost(error) once per loss. interrupt(): ends a reading that waits, when we
+    disconnect. All callables raise DeviceError.
     """
 
     def __init__(
         self,
         who: str,
-        open_: Callable[[float], T],
-        read: Callable[[], T],
+        open_: Callable[[float], Snapshot[T]],
+        read: Callable[[], T | None],
         close: Callable[[], None],
         *,
         quiet: float = 0.1,
@@ -136,6 +143,10 @@ class Polled(Generic[T]):
             finally:
                 self._waiting -= 1
 
+    def put(self, value: T, asked: float) -> None:
+        """Take a state that came unasked, on the thread it came on; `asked` is since when it holds (monotonic)."""
+        self._set(Snapshot(value, asked, now()))
+
     def wake(self) -> None:
         """Let everybody who waits look again."""
         with self._news:
@@ -170,7 +181,7 @@ class Polled(Generic[T]):
 
     # -------------------------------------------------------------------------------- on the observing thread
     def _first(self, timeout: float) -> None:
-        self._take(lambda: self._open(timeout))
+        self._set(self._open(timeout))
 
     def _watch(self, stopping: threading.Event) -> None:
         while not stopping.is_set():
@@ -179,16 +190,20 @@ class Polled(Generic[T]):
             if stopping.is_set():
                 return
             try:
-                self._take(self._read)
+                self._take()
                 self._after()
             except DeviceError:
                 if not self._ending:
                     raise
                 stopping.wait(CLOSED_BY_US)  # no loss to tell of
 
-    def _take(self, read: Callable[[], T]) -> None:
+    def _take(self) -> None:
         asked, stamp = time.monotonic(), now()
-        snapshot = Snapshot(read(), asked, stamp)
+        value = self._read()
+        if value is not None:
+            self._set(Snapshot(value, asked, stamp))
+
+    def _set(self, snapshot: Snapshot[T]) -> None:
         with self._news:
             self._taken(snapshot)
             self._newest = snapshot

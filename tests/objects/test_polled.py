@@ -21,10 +21,10 @@ class Device:
         self.answers.set()
         self.told: list[str] = []
 
-    def open(self, timeout: float) -> int:
+    def open(self, timeout: float) -> Snapshot[int]:
         if self.broken:
             raise NotConnected("still broken")
-        return self.read()
+        return Snapshot.by(self.read)
 
     def read(self) -> int:
         self.answers.wait(5.0)
@@ -168,5 +168,26 @@ def test_nothing_is_taken_while_somebody_holds_it(device: Device) -> None:
                 time.sleep(0.005)
                 assert len(taken) == held
             polled.fresh()
+    finally:
+        polled.disconnect()
+
+
+def test_a_state_that_comes_unasked(device: Device) -> None:
+    """What is read may be nothing then; what is put counts since when it holds."""
+    polled: Polled[int] = Polled("thing", device.open, lambda: None, lambda: None, busy=0.002)
+    polled.connect(1.0)
+    try:
+        first = polled.current()
+        asked: list[float] = []
+        thread, errors = failing(lambda: asked.append(polled.wait(lambda value: value > 6, 5.0, "seven").asked))
+        polled.put(6, time.monotonic())
+        polled.put(7, began := time.monotonic() + 1e-3)
+        thread.join(5.0)
+        assert not errors
+        assert asked == [began]
+        assert (first.value, polled.newest()) == (1, 7)
+        polled.put(8, time.monotonic() - 1.0)
+        with pytest.raises(Stale):
+            polled.current()
     finally:
         polled.disconnect()

@@ -1,9 +1,7 @@
-"""CiA 301 and 402 as far as used: indices, states, control words, and the texts of error codes."""
+"""CiA 301 and 402 as far as used: indices, states and control words."""
 
 import enum
 from typing import Final, NamedTuple
-
-from arcor2_hw.data.device import Severity
 
 
 class Entry(NamedTuple):
@@ -106,46 +104,17 @@ def power(statusword: int) -> Power:
     raise ValueError(f"status word {statusword:04X}h is no state of CiA 402")
 
 
-class Fault(NamedTuple):
-    """What an error code means and what a person should do."""
+class State(NamedTuple):
+    """What the drive tells of itself; position and velocity in counts, counts/s."""
 
-    text: str
-    remedy: str
-    severity: Severity = Severity.ERROR
+    power: Power
+    statusword: int
+    mode: int
+    position: int
+    velocity: int
+    error_code: int
 
-
-_RESET: Final = "then reset the fault"
-_FAULTS: Final = {
-    0x2310: Fault("continuous overcurrent", f"see that the belt runs freely, {_RESET}"),
-    0x2320: Fault("short circuit or earth leakage", f"have the motor cable checked, {_RESET}", Severity.CRITICAL),
-    0x3210: Fault("overvoltage of the DC link", f"check the braking resistor and the supply, {_RESET}"),
-    0x3220: Fault("undervoltage of the DC link", f"check the supply, {_RESET}"),
-    0x4210: Fault("the drive is too hot", f"let it cool, see that air gets to it, {_RESET}"),
-    0x4310: Fault("the motor is too hot", f"let it cool, {_RESET}"),
-    0x5441: Fault("contactor or emergency stop input", f"release the emergency stop, {_RESET}", Severity.CRITICAL),
-    0x7121: Fault("the motor is blocked", f"free the belt, {_RESET}"),
-    0x7305: Fault("encoder 1 fails", f"check the encoder's cable, {_RESET} and home"),
-    0x8110: Fault("CAN overrun", f"check the load of the bus, {_RESET}"),
-    0x8130: Fault("our heartbeat did not come", "check the CAN bus and this computer, then take control again"),
-    0x8611: Fault("following error", f"see that the belt runs freely, {_RESET}"),
-    0x8612: Fault("reference limit", f"move off the limit, {_RESET}"),
-}
-_CLASSES: Final = {
-    0x1: "generic error",
-    0x2: "current",
-    0x3: "voltage",
-    0x4: "temperature",
-    0x5: "device hardware",
-    0x6: "device software",
-    0x7: "additional modules",
-    0x8: "monitoring",
-    0x9: "external error",
-    0xF: "specific to the device",
-}
-
-
-def fault_of(code: int) -> Fault:
-    """Give what an error code means; by its class when it is not known itself (CiA 301, table of EMCY codes)."""
-    return _FAULTS.get(code) or Fault(
-        _CLASSES.get(code >> 12, "unknown error"), f"look the code up in the drive's manual, {_RESET}"
-    )
+    @classmethod
+    def of(cls, statusword: int, mode: int, position: int, velocity: int, error_code: int) -> "State":
+        """Make one. Raises ValueError when the status word is none of CiA 402."""
+        return cls(power(statusword), statusword, mode, position, velocity, error_code)

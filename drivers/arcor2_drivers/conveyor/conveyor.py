@@ -1,4 +1,4 @@
-"""The conveyor as an object type: an Axis on a CiA 402 drive, positions and speeds of the belt in m and m/s."""
+"""The conveyor as an object type: an Axis and a Machine on a CiA 402 drive; positions and speeds in m and m/s."""
 
 import contextlib
 from typing import ClassVar, Final
@@ -6,13 +6,16 @@ from typing import ClassVar, Final
 from arcor2_hw.actions import action
 from arcor2_hw.data.device import Alarm, Connection, Health, Identity, LossReaction, Reading
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, NotFound, NotInControl, OutOfRange, Refused
-from arcor2_hw.objects import Axis
+from arcor2_hw.objects import Axis, Machine, MachineCommand, MachineState
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
+from arcor2_hw.objects.polled import GoOn
 
 from . import cia402
-from .cia402 import FAULTY, Power
-from .motion import GoOn, Motion
-from .observer import Observer, Snapshot
+from .cia402 import FAULTY, Power, State
+from .emergencies import fault_of
+from .motion import Motion
+from .observer import Observer
+from .packml import STATES, Unit
 from .settings import LONGEST_HEARTBEAT, LONGEST_MOVE, LONGEST_RAMP, ConveyorSettings
 
 MARGIN: Final = 30.0
@@ -21,14 +24,21 @@ NOTICES: Final = 0.1
 """s from the heartbeat's time-out until the drive slows down."""
 
 
-class Conveyor(Axis):
+class Conveyor(Machine, Axis):
     """A belt conveyor with a servo drive (CANopen, CiA 402)."""
 
     _ABSTRACT = False
+    states: ClassVar[frozenset[MachineState]] = STATES
     loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(
         LONGEST_HEARTBEAT / 1000.0 + NOTICES + LONGEST_RAMP
     )
-    CANCEL_MAPPING: ClassVar[dict[str, str]] = {"home": "halt", "move_to": "halt", "move_by": "halt", "run": "halt"}
+    CANCEL_MAPPING: ClassVar[dict[str, str]] = {
+        "home": "halt",
+        "move_to": "halt",
+        "move_by": "halt",
+        "run": "halt",
+        "start": "halt",
+    }
 
     def __init__(self, obj_id: str, name: str, settings: ConveyorSettings) -> None:
         super().__init__(obj_id, name, settings)
@@ -36,6 +46,7 @@ class Conveyor(Axis):
         self._observer = Observer(name, settings, self._drop_control)
         self._motion = Motion(self._observer, settings)
         self._who = self._observer.who
+        self._unit = Unit(self._who, self._motion, settings.counts(settings.belt_speed))
         self._in_control = self._homed = False
 
     # -------------------------------------------------------------------------------- connection
@@ -45,7 +56,7 @@ class Conveyor(Axis):
 
     def disconnect(self) -> None:
         """Give control back and stop observing. A belt that moves is stopped; failing that, the drive does it."""
-        self._motion.stop_waiting()
+        self._observer.stop_waiting()
         if self._in_control and self._observer.observing.online:
             newest = self._observer.newest()
             with contextlib.suppress(DeviceError):  # it is gone; the drive listens for our heartbeat
@@ -78,16 +89,16 @@ class Conveyor(Axis):
 
     def alarms(self) -> list[Alarm]:
         """Give the fault that stands, or the emergency that was not taken back."""
-        now = self._observer.current()
+        now = self._observer.current().value
         code = now.error_code if now.power in FAULTY else self._observer.emergency
         if not code:
             return []
-        fault = cia402.fault_of(code)
+        fault = fault_of(code)
         return [Alarm(f"{code:04X}h", fault.severity, fault.text, fault.remedy, self._observer.emergency_since)]
 
     def acknowledge(self, code: str) -> None:
         """Reset the fault `code`. Raises NotFound when it does not stand, Refused while its cause stands."""
-        now = self._observer.fresh()
+        now = self._observer.fresh().value
         if now.power not in FAULTY or f"{now.error_code:04X}h" != code:
             raise NotFound(f"{self._who} has no alarm {code} to acknowledge")
         self.fault_reset()
@@ -95,7 +106,7 @@ class Conveyor(Axis):
     # -------------------------------------------------------------------------------- control
     def take_control(self) -> None:
         """Arm what the drive does when it loses us; from then on it is commanded. Raises NotInControl, Refused."""
-        now = self._observer.fresh()
+        now = self._observer.fresh().value
         if self._in_control:
             return
         losses, link = self._observer.losses, self._observer.link
@@ -116,8 +127,10 @@ class Conveyor(Axis):
         for entry, value in armed:
             if (kept := link.read(entry)) != value:
                 raise Refused(f"{self._who}: {entry.title} is {kept} after {value} was written")
+        self._observer.listen()
         link.start_node()
         link.heartbeat()
+        self._unit.forget()
         self._in_control = self._observer.guarded = True
         try:
             self._observer.check_unbroken(losses)
@@ -130,7 +143,7 @@ class Conveyor(Axis):
         """Switch the torque off and the drive's guard over us. Raises Refused while the belt moves."""
         if not self._in_control:
             return
-        if not self._motion.stands(self._observer.fresh()):
+        if not self._motion.stands(self._observer.fresh().value):
             raise Refused(f"{self._who}: release_control is refused while the belt moves: halt it")
         self._disarm()
         self._drop_control()
@@ -142,7 +155,7 @@ class Conveyor(Axis):
         newest = self._observer.newest()
         return "somebody who enabled the drive" if newest is not None and newest.power is Power.ENABLED else None
 
-    def _other_owner(self, now: Snapshot, consumer: int) -> str | None:
+    def _other_owner(self, now: State, consumer: int) -> str | None:
         master, limit = consumer >> 16 & 0x7F, consumer & 0xFFFF
         if limit and self._observer.heard(master, limit / 1000.0):
             return f"node {master} has it, the drive listens for its heartbeat"
@@ -158,11 +171,12 @@ class Conveyor(Axis):
     def _drop_control(self) -> None:
         """Forget control; after a loss the drive may have been off, so that its zero is unknown too."""
         self._observer.guarded = self._in_control = False
+        self._unit.forget()
         self._homed = self._homed and self._observer.observing.online
 
-    def _begin(self, what: str, resting: bool = True) -> tuple[Snapshot, GoOn]:
-        go_on = self._motion.begin(what)
-        now = self._observer.fresh()
+    def _begin(self, what: str, resting: bool = True) -> tuple[State, GoOn]:
+        go_on = self._observer.begin(what)
+        now = self._observer.fresh().value
         if not self._in_control:
             refused = f"{self._who}: {what} is refused in state {now.power}"
             raise NotInControl(f"{refused}: {self.control_owner() or 'nobody'} has control")
@@ -173,13 +187,13 @@ class Conveyor(Axis):
     # -------------------------------------------------------------------------------- values
     def position(self) -> Reading[float]:
         """Give the belt's position, m. Raises Stale when the newest is too old, NotConnected, ConnectionLost."""
-        now = self._observer.current()
-        return Reading(self._units.metres(now.position), now.stamp, now.asked)
+        now, asked, stamp = self._observer.current()
+        return Reading(self._units.metres(now.position), stamp, asked)
 
     def velocity(self) -> Reading[float]:
         """Give the belt's velocity, m/s. Raises like `position`."""
-        now = self._observer.current()
-        return Reading(self._units.metres(now.velocity), now.stamp, now.asked)
+        now, asked, stamp = self._observer.current()
+        return Reading(self._units.metres(now.velocity), stamp, asked)
 
     @property
     def homed(self) -> bool:
@@ -195,7 +209,8 @@ class Conveyor(Axis):
         if not self._homed:
             raise Refused(f"{self._who}: {what} is refused in state {now.power}: it is not homed")
         target = self._units.counts(position)
-        self._motion.move(target, False, self._units.rate(velocity), target, what, go_on)
+        with self._unit.act(what):
+            self._motion.move(target, False, self._units.rate(velocity), target, what, go_on)
 
     def move_relative(self, distance: float, velocity: float) -> None:
         """Move by `distance`, m, with `velocity`, m/s; return when it is there."""
@@ -204,7 +219,8 @@ class Conveyor(Axis):
         end = self._units.metres(now.position) + distance
         self._check(end, velocity, what)
         by = self._units.counts(distance)
-        self._motion.move(by, True, self._units.rate(velocity), now.position + by, what, go_on)
+        with self._unit.act(what):
+            self._motion.move(by, True, self._units.rate(velocity), now.position + by, what, go_on)
 
     def move_velocity(self, velocity: float) -> None:
         """Run with `velocity`, m/s, until halted; return when it is reached."""
@@ -212,7 +228,8 @@ class Conveyor(Axis):
         if not abs(velocity) <= self._units.max_speed:
             raise OutOfRange(f"{self._who}: {what}: velocity must be at most {self._units.max_speed:g} m/s")
         _, go_on = self._begin(what, resting=False)
-        self._motion.run(self._units.counts(velocity), what, go_on)
+        with self._unit.act(what):
+            self._motion.run(self._units.counts(velocity), what, go_on)
 
     def _check(self, position: float, speed: float, what: str) -> None:
         s = self._units
@@ -222,17 +239,85 @@ class Conveyor(Axis):
         if not 0.0 < speed <= s.max_speed:
             raise OutOfRange(f"{self._who}: {what}: speed must be above 0 and at most {s.max_speed:g} m/s")
         longest = LONGEST_MOVE * speed
-        if abs(position - s.metres(self._observer.current().position)) > longest:
+        if abs(position - s.metres(self._observer.current().value.position)) > longest:
             raise OutOfRange(f"{self._who}: {what} would take longer than {LONGEST_MOVE:g} s at {speed:g} m/s")
 
+    # -------------------------------------------------------------------------------- machine
+    def machine_state(self) -> MachineState:
+        """Give the present state. Raises Stale when the newest is too old, NotConnected, ConnectionLost."""
+        return self._unit.state(self._observer.current().value)
+
+    def command(self, command: MachineCommand) -> None:
+        """Give a command; return when the belt is in the state it leads to. Raises Refused, NotInControl."""
+        now, go_on = self._begin(command.name.lower(), resting=False)
+        if command in (MachineCommand.STOP, MachineCommand.ABORT):
+            self._observer.stop_waiting()
+        self._unit.command(command, now, go_on)
+
+    def wait_for(self, state: MachineState, timeout: float) -> None:
+        """Return when the belt is in `state`. Raises DeviceTimeout after `timeout` s, DeviceFault when it aborts."""
+        what = f"becoming {state.name.lower()}"
+
+        def arrived(now: State) -> bool:
+            if now.power in FAULTY and state not in (MachineState.ABORTED, MachineState.ABORTING):
+                raise self._motion.fault(now, f"{what} ended")
+            return self._unit.state(now) is state
+
+        self._observer.wait(arrived, timeout, what, self._observer.begin(what))
+
+    def stop_reason(self) -> str:
+        """Tell why the belt is aborted, empty when it is not."""
+        return self._unit.reason(self._observer.current().value)
+
+    def permissives(self) -> list[tuple[str, bool]]:
+        """Give what a start needs, each with whether it is met."""
+        now = self._observer.current().value
+        return [
+            ("control is taken", self._in_control),
+            ("no fault stands", now.power not in FAULTY and not self._unit.aborted),
+            ("the drive is enabled", now.power is Power.ENABLED),
+            ("the belt stands", self._motion.stands(now)),
+        ]
+
     # -------------------------------------------------------------------------------- actions
+    @action
+    def reset(self, *, an: str | None = None) -> None:
+        """Enable the drive, so that the belt can be started; return when it is idle."""
+        self.command(MachineCommand.RESET)
+
+    @action
+    def start(self, *, an: str | None = None) -> None:
+        """Let the belt run with its speed of the settings; it has to be idle. Return when it has its speed."""
+        self.command(MachineCommand.START)
+
+    @action
+    def hold(self, *, an: str | None = None) -> None:
+        """Stop the running belt for a while, the torque stays on; return when it stands."""
+        self.command(MachineCommand.HOLD)
+
+    @action
+    def unhold(self, *, an: str | None = None) -> None:
+        """Let the belt run again as it did before the hold."""
+        self.command(MachineCommand.UNHOLD)
+
+    @action
+    def abort(self, *, an: str | None = None) -> None:
+        """Stop the belt quickly; it has to be cleared afterwards."""
+        self.command(MachineCommand.ABORT)
+
+    @action
+    def clear(self, *, an: str | None = None) -> None:
+        """Clear a fault or an abort after its cause was dealt with; the belt is stopped then."""
+        self.command(MachineCommand.CLEAR)
+
     @action(deadline=LONGEST_MOVE + MARGIN)
     def home(self, *, an: str | None = None) -> None:
         """Find the zero of the belt; return when it is found."""
         _, go_on = self._begin("home")
-        self._homed = False
         losses = self._observer.losses
-        self._motion.home("home", go_on)
+        with self._unit.act("home"):
+            self._homed = False
+            self._motion.home("home", go_on)
         self._homed = True
         if self._observer.losses != losses:
             self._homed = False
@@ -273,7 +358,7 @@ class Conveyor(Axis):
     @action
     def halt(self, *, an: str | None = None) -> None:
         """Slow the belt down; return when it stands. A move under way ends with Cancelled."""
-        self._motion.stop_waiting()
+        self._observer.stop_waiting()
         if self._in_control:
             self._motion.halt()
 
@@ -284,7 +369,7 @@ class Conveyor(Axis):
     @action
     def quick_stop(self, *, an: str | None = None) -> None:
         """Stop the belt as quickly as its settings allow; return when it stands, without torque."""
-        self._motion.stop_waiting()
+        self._observer.stop_waiting()
         if self._in_control:
             self._motion.quick_stop()
 
@@ -293,8 +378,9 @@ class Conveyor(Axis):
         """Reset a fault after its cause was dealt with; the belt does not move by that."""
         _, go_on = self._begin("fault_reset", resting=False)
         self._motion.fault_reset(go_on)
+        self._unit.forget()
 
     @action
     def belt_position(self, *, an: str | None = None) -> float:
         """Give the belt's position, m."""
-        return self._units.metres(self._observer.fresh().position)
+        return self._units.metres(self._observer.fresh().value.position)

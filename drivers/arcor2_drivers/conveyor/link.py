@@ -172,6 +172,11 @@ class CanLink:
         """Give the link up for `error` until it is opened again."""
         self._lose(error)
 
+    def check(self) -> None:
+        """Return while the link is well. Raises what it was lost by."""
+        if self.loss is not None:
+            raise _again(self.loss)
+
     # -------------------------------------------------------------------------------- requests
     def read(self, entry: Entry) -> int:
         """Read a value. Raises DeviceTimeout, ConnectionLost, DeviceFault when the drive refuses."""

@@ -5,11 +5,13 @@ import threading
 from collections.abc import Callable
 from typing import Final
 
-from arcor2_hw.exceptions import Cancelled, DeviceError, DeviceFault, DeviceTimeout, Refused
+from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, Refused
+from arcor2_hw.objects.polled import GoOn
 
 from . import cia402
-from .cia402 import FAULTY, Mode, Power
-from .observer import Observer, Snapshot
+from .cia402 import FAULTY, Mode, Power, State
+from .emergencies import fault_of
+from .observer import Observer
 from .settings import ConveyorSettings
 
 STEP: Final = 1.0
@@ -19,9 +21,6 @@ MARGIN: Final = 2.0
 STANDS: Final = 0.001
 """m/s: slower than that it stands; a velocity that is measured never is quite zero."""
 
-GoOn = Callable[[], None]
-"""Returns while one may go on; raises Cancelled or ConnectionLost when not."""
-
 
 class Motion:
     """Moves the belt, one motion at a time."""
@@ -30,25 +29,7 @@ class Motion:
         self._observer, self._link, self._settings = observer, observer.link, settings
         self._who = observer.who
         self._one_step = threading.Lock()
-        self._stops = 0
         self._stands = max(settings.rate(STANDS), 1)
-
-    # -------------------------------------------------------------------------------- giving up
-    def begin(self, what: str) -> GoOn:
-        """Give the check for what begins now: it raises after a stop, and after a loss that is over already."""
-        stops, losses = self._stops, self._observer.losses
-
-        def check() -> None:
-            if self._stops != stops:
-                raise Cancelled(f"{self._who}: {what} was stopped")
-            self._observer.check_unbroken(losses)
-
-        return check
-
-    def stop_waiting(self) -> None:
-        """End with Cancelled what was begun before."""
-        self._stops += 1
-        self._observer.wake()
 
     def control(self, word: int, go_on: GoOn) -> None:
         """Write the control word, unless a stop has come: from then on nothing overtakes it."""
@@ -56,34 +37,36 @@ class Motion:
             go_on()
             self._link.write(cia402.CONTROLWORD, word)
 
-    def stands(self, now: Snapshot) -> bool:
+    def stands(self, now: State) -> bool:
         """Tell whether the belt stands."""
         return abs(now.velocity) <= self._stands
 
-    def fault(self, now: Snapshot, what: str) -> DeviceFault:
+    def fault(self, now: State, what: str) -> DeviceFault:
         """Give the error for a drive in fault."""
         code = now.error_code or self._observer.emergency
-        fault = cia402.fault_of(code)
+        fault = fault_of(code)
         return DeviceFault(
             f"{self._who}: {what}: fault {code:04X}h, {fault.text}; {fault.remedy}", fault_code=f"{code:04X}h"
         )
 
-    def _enabled(self, now: Snapshot, what: str) -> None:
+    def _enabled(self, now: State, what: str) -> None:
         if now.power in FAULTY:
             raise self.fault(now, f"{what} ended")
         if now.power is not Power.ENABLED:
             emergency = self._observer.emergency
-            why = f": {cia402.fault_of(emergency).text} ({emergency:04X}h)" if emergency else ""
+            why = f": {fault_of(emergency).text} ({emergency:04X}h)" if emergency else ""
             raise DeviceFault(f"{self._who}: {what} ended: the drive went to {now.power}{why}")
 
     # -------------------------------------------------------------------------------- enabling
     def enable(self, mode: Mode, what: str, go_on: GoOn) -> None:
         """Bring the drive to Operation enabled in a mode, standing. Raises DeviceFault, DeviceTimeout, Cancelled."""
-        now = self._observer.fresh()
+        now = self._observer.fresh().value
         if now.power in FAULTY:
             raise self.fault(now, f"{what} is refused in state {now.power}")
         if now.power is Power.QUICK_STOP:
-            now = self._observer.wait(lambda s: s.power is not Power.QUICK_STOP, STEP, f"{what}: leaving quick stop")
+            now = self._observer.wait(
+                lambda s: s.power is not Power.QUICK_STOP, STEP, f"{what}: leaving quick stop"
+            ).value
         if now.power is Power.ENABLED and now.mode == mode:
             return
         self._link.write(cia402.TARGET_VELOCITY, 0)
@@ -99,25 +82,30 @@ class Motion:
         self.control(cia402.CW_ENABLE, go_on)
         self._step(lambda s: s.power is Power.ENABLED, f"{what}: enabling", go_on)
 
-    def _step(self, arrived: Callable[[Snapshot], bool], what: str, go_on: GoOn) -> Snapshot:
-        def holds(now: Snapshot) -> bool:
+    def make_ready(self, what: str, go_on: GoOn) -> None:
+        """Be enabled in profile velocity, standing: ready to run."""
+        self.enable(Mode.PROFILE_VELOCITY, what, go_on)
+        self.control(cia402.CW_ENABLE, go_on)
+
+    def _step(self, arrived: Callable[[State], bool], what: str, go_on: GoOn) -> State:
+        def holds(now: State) -> bool:
             go_on()
             if now.power in FAULTY:
                 raise self.fault(now, f"{what} ended")
             return arrived(now)
 
-        return self._observer.wait(holds, STEP, what)
+        return self._observer.wait(holds, STEP, what).value
 
-    def _reach(self, arrived: Callable[[Snapshot], bool], timeout: float, what: str, go_on: GoOn) -> Snapshot:
+    def _reach(self, arrived: Callable[[State], bool], timeout: float, what: str, go_on: GoOn) -> State:
         """Wait while enabled; when that fails the belt is halted, for nobody waits for it any more."""
 
-        def holds(now: Snapshot) -> bool:
+        def holds(now: State) -> bool:
             go_on()
             self._enabled(now, what)
             return arrived(now)
 
         try:
-            return self._observer.wait(holds, timeout, what)
+            return self._observer.wait(holds, timeout, what).value
         except DeviceTimeout:
             with contextlib.suppress(DeviceError):  # the drive listens for our heartbeat
                 self.halt()
@@ -135,7 +123,7 @@ class Motion:
         self.control(cia402.CW_ENABLE, go_on)
         self.control(cia402.CW_ENABLE | cia402.CW_START, go_on)
 
-        def homed(now: Snapshot) -> bool:
+        def homed(now: State) -> bool:
             if now.statusword & cia402.HOMING_ERROR:
                 raise DeviceFault(f"{self._who}: {what} ended with a homing error (method {s.homing_method})")
             wanted = cia402.HOMING_ATTAINED | cia402.TARGET_REACHED
@@ -148,7 +136,7 @@ class Motion:
         """Move to `target`, or by it, in counts; `expected` is where it has to end."""
         s, write = self._settings, self._link.write
         self.enable(Mode.PROFILE_POSITION, what, go_on)
-        before = self._observer.fresh()
+        before = self._observer.fresh().value
         self.control(cia402.CW_ENABLE, go_on)
         write(cia402.PROFILE_VELOCITY, speed)
         write(cia402.TARGET_POSITION, target)
@@ -212,7 +200,9 @@ class Motion:
 
     def fault_reset(self, go_on: GoOn) -> None:
         """Reset a fault. Raises Refused while its cause stands."""
-        now = self._observer.wait(lambda s: s.power is not Power.FAULT_REACTION, MARGIN, "the reaction to the fault")
+        now = self._observer.wait(
+            lambda s: s.power is not Power.FAULT_REACTION, MARGIN, "the reaction to the fault"
+        ).value
         if now.power is not Power.FAULT:
             return
         self.control(cia402.CW_DISABLE_VOLTAGE, go_on)

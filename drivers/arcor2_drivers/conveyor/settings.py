@@ -50,6 +50,8 @@ class ConveyorSettings(Settings):
     :param tolerance: how far from its target a move may end, m
     :param heartbeat_ms: ms without our heartbeat after which the drive stops
     :param sdo_timeout: seconds the drive has to answer a request
+    :param pdo_period_ms: ms between the PDOs by which the drive tells its state while we have control; 0: it is asked
+    :param belt_speed: m/s the belt runs with when it is started as a machine; negative for backwards
     """
 
     channel: str
@@ -69,6 +71,8 @@ class ConveyorSettings(Settings):
     tolerance: float = 0.002
     heartbeat_ms: int = 600
     sdo_timeout: float = 0.2
+    pdo_period_ms: int = 10
+    belt_speed: float = 0.2
 
     def __post_init__(self) -> None:
         if not self.channel.strip():
@@ -95,6 +99,9 @@ class ConveyorSettings(Settings):
         _within("homing_timeout", self.homing_timeout, 0.5, LONGEST_MOVE)
         _within("tolerance", self.tolerance, 1.0 / abs(self.counts_per_metre), 1.0)
         _within("heartbeat_ms", self.heartbeat_ms, 200, LONGEST_HEARTBEAT)
+        if self.pdo_period_ms:
+            _within("pdo_period_ms", self.pdo_period_ms, 2, 100)
+        _within("belt_speed", abs(self.belt_speed), 0.001, self.max_speed)
         # A request that is answered only just in time must not cost the heartbeat.
         _within("sdo_timeout", self.sdo_timeout, 0.02, self.heartbeat_ms / 2000.0)
 

@@ -69,7 +69,7 @@ class Observer(Polled[Inputs]):
         return self.link.read_holding_registers(0, HOLDING_COUNT)
 
     # -------------------------------------------------------------------------------- on the observing thread
-    def _open_tester(self, timeout: float) -> Inputs:
+    def _open_tester(self, timeout: float) -> Snapshot[Inputs]:
         left_alone = self._leave_alone_until - time.monotonic()
         if left_alone > 0.0:
             raise NotConnected(f"{self.who} is left alone for {left_alone:.1f} s, so that it notices that we were gone")
@@ -77,7 +77,8 @@ class Observer(Polled[Inputs]):
         self.link.open(timeout)
         self._life = (-1, 0.0)
         # Each of the two readings may be asked for twice.
-        return self._read_inputs(min(self._settings.request_timeout, max(0.05, (deadline - time.monotonic()) / 4.0)))
+        first = min(self._settings.request_timeout, max(0.05, (deadline - time.monotonic()) / 4.0))
+        return Snapshot.by(lambda: self._read_inputs(first))
 
     def _read_inputs(self, timeout: float | None = None) -> Inputs:
         registers = self.link.read_input_registers(0, INPUT_COUNT, timeout)

@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from arcor2_hw.data.base import now
 from arcor2_hw.exceptions import (
     Cancelled,
     ConnectionLost,
@@ -226,8 +225,7 @@ class Block(Polled[Image]):
     def ask(self) -> Snapshot[Image]:
         """Read an image now, on the caller's thread: quicker than `fresh`, and unknown to points that are debounced."""
         self.observing.check()
-        asked, stamp = time.monotonic(), now()
-        return Snapshot(self._read_image(), asked, stamp)
+        return Snapshot.by(self._read_image)
 
     def _read_image(self, timeout: float | None = None) -> Image:
         words = self.link.read_input_registers(0, IMAGE_COUNT, timeout)
@@ -237,13 +235,14 @@ class Block(Polled[Image]):
             raise DeviceFault(f"{self.who} tells what no block of this kind tells: {error}") from error
 
     # -------------------------------------------------------------------------------- on the observing thread
-    def _open_block(self, timeout: float) -> Image:
+    def _open_block(self, timeout: float) -> Snapshot[Image]:
         deadline = time.monotonic() + timeout
         for each in self._inputs.values():
             each.forget()
         self.link.open(timeout)
         # Asked for twice at most, a serial line drained in between.
-        return self._read_image(min(self._settings.request_timeout, max(0.02, (deadline - time.monotonic()) / 3.0)))
+        first = min(self._settings.request_timeout, max(0.02, (deadline - time.monotonic()) / 3.0))
+        return Snapshot.by(lambda: self._read_image(first))
 
     def _note(self, snapshot: Snapshot[Image]) -> None:
         image, asked, _ = snapshot

@@ -3,7 +3,10 @@
 `python -m arcor2_fakes.conveyor --help`. Every TCP client is one Lawicel adapter on the same bus; frames are neither
 lost nor reordered. The drive is written from CiA 301 and CiA 402-2; it moves in real time.
 
-Not modelled: PDO and SYNC (everything goes by SDO), block transfer, storing parameters (1010h), LSS, node guarding,
+Not modelled: SYNC and RPDOs (it is commanded by SDO; its two TPDOs go by event and timer, without inhibit time), block
+transfer, storing parameters (1010h), LSS, node guarding,
 arbitration and bit errors of the bus, jerk limits, homing methods other than 19 and 37, queued set-points (a new one
 replaces the old), 605Ah other than 2, coasting (without torque the belt stands at once), wrap-around of the position.
 """
+
+WIRE = "CANopen by slcan over TCP"

@@ -12,6 +12,7 @@ from arcor2_fakes.wire import Connection, TcpWire
 OK, BELL = b"\r", b"\a"
 _FRAMES_KEPT = 400
 _LONGEST_COMMAND = 64
+_FIRST_PDO, _FIRST_SDO = 0x180, 0x580
 _DATA_FRAME = re.compile(rb"t([0-7][0-9A-Fa-f]{2})([0-8])((?:[0-9A-Fa-f]{2})*)")
 
 Receive = Callable[[int, bytes], None]
@@ -75,9 +76,10 @@ class Hub:
 
     def transmit(self, identifier: int, data: bytes, sender: Adapter | None = None) -> None:
         """Put a frame on the bus; without a sender it is the drive's."""
-        self.frames.append(
-            {"time": time.monotonic(), "id": identifier, "data": data.hex(), "from_host": sender is not None}
-        )
+        if not _FIRST_PDO <= identifier < _FIRST_SDO:  # they would push out all others
+            self.frames.append(
+                {"time": time.monotonic(), "id": identifier, "data": data.hex(), "from_host": sender is not None}
+            )
         for adapter in tuple(self.adapters):
             if adapter is not sender:
                 adapter.deliver(identifier, data)

@@ -10,8 +10,9 @@ from typing import Any
 from arcor2_fakes.conveyor.dictionary import BAD_VALUE, Abort, Dictionary, Entry, add_drive
 from arcor2_fakes.conveyor.drive import HEARTBEAT_ERROR, Drive
 from arcor2_fakes.conveyor.hub import Hub
+from arcor2_fakes.conveyor.pdo import Tpdo
 
-TICK = 0.005
+TICK = 0.0025
 BOOT_TIME = 0.03
 _OPERATIONAL, _STOPPED, _PRE_OPERATIONAL = 5, 4, 127
 _UNKNOWN_COMMAND, _TOGGLE = 0x05040001, 0x05030000
@@ -51,6 +52,12 @@ class Node:
         for subindex, value in enumerate((4, 0x3E7, 0x48, 0x307, 1000 + number)):
             entries[0x1018, subindex] = Entry("I" if subindex else "B", lambda value=value: value)  # type: ignore[misc]
         add_drive(dictionary, self.drive)
+        self.pdos = (
+            Tpdo(0, number, (0x6041,), self._send_pdo),
+            Tpdo(1, number, (0x6041, 0x6064), self._send_pdo),
+        )
+        for pdo in self.pdos:
+            pdo.enter(dictionary)
 
     def _set_consumer(self, value: int) -> None:
         if value >> 24 or (value & 0xFFFF and not 1 <= value >> 16 <= 127):
@@ -83,6 +90,9 @@ class Node:
                 self._next_heartbeat = now + self._heartbeat_ms / 1000.0
                 self._send(0x700, bytes([self._nmt]))
             self._watch_master(now)
+            if self._nmt == _OPERATIONAL:
+                for pdo in self.pdos:
+                    pdo.tick(now)
 
     def _watch_master(self, now: float) -> None:
         limit = self._consumer & 0xFFFF
@@ -110,6 +120,10 @@ class Node:
     def _send(self, service: int, data: bytes) -> None:
         if not self.silent and not self._booted_at:
             self._hub.transmit(service + self.number, data)
+
+    def _send_pdo(self, identifier: int, data: bytes) -> None:
+        if not self.silent:
+            self._hub.transmit(identifier, data)
 
     def _emergency(self, code: int) -> None:
         self._send(0x80, struct.pack("<HB5x", code, self._error_register() if code else 0))
@@ -199,4 +213,5 @@ class Node:
             "parameters": dict(vars(drive.parameters)),
             "writes": list(self.writes),
             "frames": list(self._hub.frames),
+            "pdos_sent": [pdo.sent for pdo in self.pdos],
         }

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from arcor2_drivers.conveyor import cia402
+from arcor2_drivers.conveyor import cia402, emergencies
 from arcor2_drivers.conveyor.conveyor import Conveyor
 from arcor2_drivers.conveyor.settings import ConveyorSettings
 from arcor2_hw.data.device import Connection, Health
@@ -219,4 +219,4 @@ def test_status_words_and_codes() -> None:
     assert cia402.power(0x0217) is cia402.Power.QUICK_STOP
     with pytest.raises(ValueError, match="006Fh"):
         cia402.power(0x006F)
-    assert cia402.fault_of(0x4123).text == "temperature"
+    assert emergencies.fault_of(0x4123).text == "temperature"
