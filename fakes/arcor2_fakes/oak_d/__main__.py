@@ -136,7 +136,7 @@ def main(
     async def body() -> None:
         lens = Lens(width, height)
         pictures = Pictures(lens, noise, seed)
-        camera = Camera(start_scene, lens, fps, pictures.take)
+        camera = Camera(start_scene, lens, fps, pictures.warm, pictures.take)
         wire = TcpWire("stream", *stream_address, camera.opened)
         channel = ControlServer(*control_address)
         register_commands(channel, camera, wire, boot_time / time_scale)

@@ -40,17 +40,18 @@ class Client:
 
 
 class Camera:
-    """The camera without its port. `render` gives the pictures of a moment; it runs on a thread of its own."""
+    """The camera without its port. `render` gives the pictures of a moment, `warm` readies that: on other threads."""
 
     def __init__(
         self,
         scene: Scene,
         lens: Lens,
         fps: float,
+        warm: Callable[[], None],
         render: Callable[[Scene, int, float, bool], tuple[Callable[[str], bytes], bytes]],
     ) -> None:
         self.scene, self.lens, self.fps = scene, lens, fps
-        self._render = render
+        self._warm, self._render = warm, render
         self._clients: set[Client] = set()
         self._task: asyncio.Task[None] | None = None
         self._news = asyncio.Event()
@@ -152,6 +153,7 @@ class Camera:
             await asyncio.gather(self._task, return_exceptions=True)
 
     async def _run(self) -> None:
+        await asyncio.to_thread(self._warm)
         due = time.monotonic()
         last: dict[str, Any] = {}
         while True:
@@ -208,6 +210,7 @@ class Camera:
         self._booted = time.monotonic()
         self.frames = 0
         self.exposure = None
+        self.received.clear()
         self.temperature = ROOM_TEMPERATURE
         self._news.set()
 

@@ -13,7 +13,7 @@ JPEG_QUALITY = 90
 
 
 class Pictures:
-    """Renders on whichever thread asks, one at a time. Open3D and OpenCV are loaded by the first picture."""
+    """Renders on whichever thread asks, one at a time."""
 
     def __init__(self, lens: Lens, noise: float, seed: int) -> None:
         self._lens, self._noise, self._seed = lens, noise, seed
@@ -30,9 +30,11 @@ class Pictures:
 
         Raises ValueError when something of the scene cannot be rendered.
         """
+        from arcor2_fakes.oak_d import sensor
+
+        self.warm()
         with self._one:
             self._look(scene)
-            from arcor2_fakes.oak_d import sensor
 
             variant = number % sensor.VARIANTS
             if (key := ("depth", variant, covered)) not in self._done:
@@ -48,12 +50,16 @@ class Pictures:
 
         return color, depth
 
-    def _look(self, scene: Scene) -> None:
-        from arcor2_fakes.oak_d import render, sensor  # Open3D takes 0.6 s to load: not before somebody looks
+    def warm(self) -> None:
+        """Load Open3D before somebody waits for a picture: it takes a second, three on a busy machine."""
+        from arcor2_fakes.oak_d import render, sensor
 
-        if self._renderer is None:
-            self._renderer = render.Renderer(self._lens)
-            self._sensor = sensor.Sensor(self._lens.width, self._lens.height, self._noise, self._seed)
+        with self._one:
+            if self._renderer is None:
+                self._sensor = sensor.Sensor(self._lens.width, self._lens.height, self._noise, self._seed)
+                self._renderer = render.Renderer(self._lens)
+
+    def _look(self, scene: Scene) -> None:
         version = scene.version
         if version != self._version:
             self._view = self._renderer.view(scene.camera, scene.table_height, scene.things)

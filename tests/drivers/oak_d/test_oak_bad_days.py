@@ -1,0 +1,161 @@
+"""The OAK-D's driver on bad days: each fault is a typed error that names the camera, and afterwards it works again."""
+
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from arcor2_drivers.oak_d.oak_d import OakD
+from arcor2_hw.data.device import Connection, Health
+from arcor2_hw.exceptions import (
+    ConnectionLost,
+    DeviceFault,
+    DeviceTimeout,
+    NoDepth,
+    NotConnected,
+    Overexposed,
+    Stale,
+)
+from tests.fakes.conftest import FakeProcess
+
+from .conftest import PATIENCE
+
+
+def wait(holds: Callable[[], Any], within: float = 8.0) -> None:
+    deadline = time.monotonic() + within
+    while not holds():
+        assert time.monotonic() < deadline, f"not within {within:g} s"
+        time.sleep(0.02)
+
+
+def back(camera: OakD) -> None:
+    wait(lambda: camera.connection is Connection.BACK)
+    assert camera.trigger().depth is not None
+
+
+def test_a_frozen_picture_is_stale(fake: FakeProcess, camera: OakD) -> None:
+    fake.control.do("frozen")
+    time.sleep(0.6)
+    with pytest.raises(Stale, match=f"^camera at {fake.ready['stream']}: the newest picture is .* s old"):
+        camera.capture()
+    with pytest.raises(Stale, match=r"camera at .* gave no new picture|the newest picture"):
+        camera.color_image()
+    wait(lambda: camera.alarms())
+    assert [alarm.code for alarm in camera.alarms()] == ["frozen"]
+    assert camera.health is Health.FAILURE
+    assert camera.connection is Connection.ONLINE  # it sends, after all
+    fake.control.do("heal")
+    wait(lambda: not camera.alarms())
+    assert camera.capture().depth is not None
+
+
+def test_what_is_no_picture_is_an_error(fake: FakeProcess, camera: OakD) -> None:
+    fake.control.do("lens_covered")
+    time.sleep(0.1)
+    with pytest.raises(DeviceFault, match=r"^camera at .*: the picture is black") as covered:
+        camera.color_image()
+    assert covered.value.fault_code == "dark"
+    with pytest.raises(NoDepth, match=r"^camera at .*: 0\.0% of the picture have a depth"):
+        camera.depth_image()
+    fake.control.do("heal")
+    fake.control.do("overexposed")
+    time.sleep(0.1)
+    with pytest.raises(Overexposed, match=r"^camera at .* of the picture are white"):
+        camera.color_image()
+    assert camera.depth_image().size == (640, 360)
+    fake.control.do("heal")
+    fake.control.do("depth_off")
+    time.sleep(0.1)
+    assert camera.color_image().size == (640, 360)
+    frame = camera.trigger()
+    assert frame.depth is None
+    with pytest.raises(NoDepth, match="camera: the frame has no depth"):
+        camera.point_cloud(frame)
+    with pytest.raises(NoDepth):
+        camera.depth_image()
+
+
+def test_overheating_is_told_before_it_switches_itself_off(fake: FakeProcess, camera: OakD) -> None:
+    fake.control.do("overheat", temperature=95)
+    wait(lambda: camera.alarms())
+    [alarm] = camera.alarms()
+    assert (alarm.code, camera.health) == ("hot", Health.OFF_SPEC)
+    assert camera.trigger().depth is not None
+    fake.control.do("overheat", temperature=106)
+    wait(lambda: camera.connection is Connection.LOST)
+    fake.control.do("heal")
+    back(camera)
+    wait(lambda: not camera.alarms())
+
+
+def test_a_power_cycle_is_a_loss_and_the_exposure_is_set_again(fake: FakeProcess, camera: OakD) -> None:
+    camera.set_exposure(0.005)
+    fake.control.do("power_cycle")
+    wait(lambda: camera.connection is Connection.BACK)
+    assert fake.truth()["exposure"] == pytest.approx(0.005)
+    frame = camera.trigger()  # its clock has begun anew; ages are right all the same
+    assert time.monotonic() - frame.monotonic < 0.5
+
+
+@pytest.mark.parametrize("fault", ["half_frame", "garbage", "wrong_checksum", "reset"])
+def test_a_broken_stream_is_a_loss_and_comes_back(fake: FakeProcess, camera: OakD, fault: str) -> None:
+    fake.control.do(fault)
+    wait(lambda: camera.connection is not Connection.ONLINE)
+    if fault != "reset":
+        with pytest.raises((ConnectionLost, DeviceFault), match=r"camera at 127\.0\.0\.1"):
+            camera.capture()
+    fake.control.do("heal")
+    back(camera)
+
+
+def test_a_slow_stream_is_an_old_picture(fake: FakeProcess, camera: OakD) -> None:
+    fake.control.do("slow", seconds=0.7)
+    time.sleep(0.2)
+    wait(lambda: not fresh(camera), 2.0)
+    fake.control.do("heal")
+    wait(lambda: camera.connection is not Connection.LOST)
+    wait(lambda: fresh(camera))
+
+
+def fresh(camera: OakD) -> bool:
+    try:
+        camera.capture()
+    except (Stale, ConnectionLost):
+        return False
+    return True
+
+
+def test_a_stream_of_something_else(fake: FakeProcess, make: Callable[..., OakD]) -> None:
+    control = make(fake.ready["control"])  # says nothing until it is asked
+    with pytest.raises(DeviceTimeout, match=f"^camera at {fake.ready['control']} sends nothing"):
+        control.connect(0.5)
+    fake.control.do("wrong_checksum")
+    with pytest.raises(DeviceFault, match="the checksum of a message of kind hello is wrong"):
+        make(fake.ready["stream"]).connect(2.0)
+
+
+def test_no_camera_is_found_at_once(make: Callable[..., OakD], monkeypatch: pytest.MonkeyPatch) -> None:
+    import depthai as dai
+
+    monkeypatch.setattr(dai.Device, "getAllAvailableDevices", staticmethod(lambda: []))
+    for address, who in (("", "the only camera"), ("14442C10D13EABCE00", "14442C10D13EABCE00")):
+        camera = make(address)
+        began = time.monotonic()
+        with pytest.raises(NotConnected, match=f"^camera at {who} is not there") as raised:
+            camera.connect(PATIENCE)
+        assert time.monotonic() - began < 3.0  # opening one that is not there takes 11.5 s
+        assert raised.value.detail == "found: none"
+    with pytest.raises(NotConnected, match=r"^camera at 127\.0\.0\.9 cannot be reached"):
+        make("127.0.0.9").connect(2.0)
+
+
+def test_a_missing_library_names_the_extra(make: Callable[..., OakD], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "depthai", None)
+    monkeypatch.delitem(sys.modules, "arcor2_drivers.oak_d.feed", raising=False)
+    import arcor2_drivers.oak_d as package
+
+    monkeypatch.delattr(package, "feed", raising=False)
+    with pytest.raises(NotConnected, match=r"depthai is not installed here.*arcor2-hw\[depthai\]"):
+        make("127.0.0.1:1").connect(1.0)
