@@ -1,6 +1,7 @@
 """What all tests share."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -15,14 +16,20 @@ def spec() -> Path:
     return path
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     """Keep in one process what shares a fake: a module, or the suite's cases on one bench.
 
-    First of all, since xdist reads the groups in a hook of the same name.
+    By the ids of the tests: the marker xdist_group has no effect with pytest 9.2 and xdist 3.8.
     """
-    for item in items:
-        callspec = getattr(item, "callspec", None)
-        bench = callspec.params.get("arcor2_running_bench") if callspec is not None else None
-        file = item.nodeid.partition("::")[0]  # not `location`: a case lies in the file of its own class
-        item.add_marker(pytest.mark.xdist_group(f"{file}:{bench.type_name() if bench else ''}"))
+    if config.getvalue("dist") != "loadgroup":
+        return None
+    from xdist.scheduler import LoadScopeScheduling
+
+    class TogetherOnOneFake(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file, _, rest = nodeid.partition("::")
+            bench = rest.rpartition("[")[2] if rest.startswith("TestConformance::") else ""
+            return f"{file}:{bench}"
+
+    return TogetherOnOneFake(config, log)
