@@ -1,0 +1,232 @@
+"""Starts the fake PLC: `python -m arcor2_fakes.opcua_plc`."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated, Any, cast
+
+from asyncua import Server, ua
+from asyncua.crypto.permission_rules import User, UserRole
+from asyncua.server.user_managers import UserManager
+from cyclopts import App, Parameter, validators
+
+from arcor2_fakes.control import ControlServer, parse_address
+from arcor2_fakes.opcua_plc.program import Host, Program, Step
+from arcor2_fakes.opcua_plc.proxy import Proxy
+from arcor2_fakes.opcua_plc.space import OFF_ON_LOSS, POINTS, Space
+from arcor2_fakes.process import announce, run, until_told_to_end
+from arcor2_fakes.wire import register_faults
+
+app = App(name="arcor2_fakes.opcua_plc", help="Fake PLC with an OPC UA server.", version_flags=[])
+SCAN = 0.01
+"""s between scans."""
+JOBS = {1: 1.0, 2: 3.0, 3: 20.0}
+"""Duration of each job, s, before the time scale."""
+
+
+class OneUser(UserManager):
+    """Lets one user in by password; with an empty name everybody."""
+
+    def __init__(self, name: str, password: str) -> None:
+        self._name, self._password = name, password
+
+    def get_user(
+        self,
+        iserver: Any,  # noqa: ARG002 - the stack's signature
+        username: str | None = None,
+        password: str | None = None,
+        certificate: Any = None,  # noqa: ARG002
+    ) -> User | None:
+        """Give the user, None for nobody."""
+        if not self._name or (username, password) == (self._name, self._password):
+            return User(role=UserRole.User)
+        return None
+
+
+class Plc:
+    """The PLC: its program on its variables."""
+
+    def __init__(self, server: Server, program: Program) -> None:
+        self.space, self.program = Space(server), program
+        self.cycles = 0
+
+    async def run(self) -> None:
+        """Scan for ever."""
+        loop = asyncio.get_running_loop()
+        while True:
+            await self.scan(loop.time())
+            await asyncio.sleep(SCAN)
+
+    async def scan(self, time: float) -> None:
+        """Read what the host wrote, run the program, tell what came of it."""
+        space, program = self.space, self.program
+        names = ("Owner", "HostLife", "Number", "Request")
+        gone = program.scan(Host(*(space.value(f"Handshake.{name}") for name in names)), time)
+        if gone:
+            await space.set("Handshake.Owner", 0)
+            for name in OFF_ON_LOSS:
+                await space.set(f"Cell.{name}", POINTS[name][2])
+        await space.set("Handshake.PlcLife", program.life)
+        # Busy falls last: who sees it fall finds how the job ended.
+        await space.set("Handshake.Code", program.code)
+        await space.set("Handshake.Done", program.step is Step.DONE)
+        await space.set("Handshake.Error", program.step is Step.ERROR)
+        await space.set("Handshake.Busy", program.moving)
+        self.cycles += 1
+
+    def truth(self) -> dict[str, Any]:
+        """Give what the PLC really does."""
+        program, space = self.program, self.space
+        return {
+            "step": program.step.value,
+            "moving": program.moving,
+            "code": program.code,
+            "done": list(program.done),
+            "owner": space.value("Handshake.Owner"),
+            "host_life": space.value("Handshake.HostLife"),
+            "points": {name: space.value(f"Cell.{name}") for name in POINTS},
+            "writes": len(space.written),
+            "written": space.written[-100:],
+            "cycles": self.cycles,
+        }
+
+    async def restart(self) -> None:
+        """Begin as after switching on."""
+        self.program.restart()
+        for name in ("Owner", "HostLife", "Number"):
+            await self.space.set(f"Handshake.{name}", 0)
+        await self.space.set("Handshake.Request", False)
+        for name, (_, _, value) in POINTS.items():
+            await self.space.set(f"Cell.{name}", value, 0)
+
+
+def register_commands(control: ControlServer, plc: Plc, proxy: Proxy) -> None:
+    """Make what the world and a test can do to the PLC known to the control channel."""
+    program, space = plc.program, plc.space
+
+    async def set_point(name: str, value: Any) -> None:
+        await space.set(f"Cell.{name}", value)
+
+    async def quality(name: str, status: str) -> None:
+        code = 0 if status == "Good" else int(getattr(ua.StatusCodes, status))
+        await space.set(f"Cell.{name}", space.value(f"Cell.{name}"), code)
+
+    async def stranger(number: int) -> None:
+        program.stranger = number > 0
+        await space.set("Handshake.Owner", int(number))
+
+    def switch(name: str) -> Any:
+        def apply(on: bool = True) -> None:
+            setattr(program, name, bool(on))
+
+        return apply
+
+    def job_error(code: int) -> None:
+        program.next_error = int(code)
+
+    async def power_cycle(seconds: float = 0.5) -> None:
+        if not 0.0 <= seconds <= 60.0:
+            raise ValueError("seconds is 0 to 60")
+        proxy.wire.refuse()
+        proxy.wire.reset()
+        await plc.restart()
+        await asyncio.sleep(seconds)
+        await proxy.wire.fault("heal")
+
+    control.command("set", set_point)
+    control.command("quality", quality)
+    control.command("stranger", stranger)
+    control.command("stuck", switch("stuck"))
+    control.command("deaf", switch("deaf"))
+    control.command("live", switch("live"))
+    control.command("job_error", job_error)
+    control.command("remove", lambda name: space.remove(f"Cell.{name}"))
+    control.command("restart", plc.restart)
+    control.command("power_cycle", power_cycle)
+
+
+async def make_server(user: str, password: str, certificate: Path | None, key: Path | None) -> Server:
+    """Make the OPC UA stack, not started, on a port of its own choice."""
+    server = Server(user_manager=OneUser(user, password) if user else None)
+    await server.init()
+    server.set_endpoint("opc.tcp://127.0.0.1:0")
+    server.set_server_name("Fake PLC")
+    await server.set_build_info("urn:arcor2-hw:fake-plc", "ARCOR2-HW", "Fake PLC 1500", "2.9", "7", datetime.now(UTC))
+    policies = [ua.SecurityPolicyType.NoSecurity]
+    if certificate is not None and key is not None:
+        await server.load_certificate(str(certificate))
+        await server.load_private_key(str(key))
+        policies = [
+            ua.SecurityPolicyType.Basic256Sha256_Sign,
+            ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt,
+        ]
+    server.set_security_policy(policies)
+    return server
+
+
+@app.default
+def main(
+    *,
+    listen: str = "127.0.0.1:0",
+    control: str = "127.0.0.1:0",
+    time_scale: Annotated[float, Parameter(validator=validators.Number(gt=0))] = 1.0,
+    patience: Annotated[float, Parameter(validator=validators.Number(gt=0))] = 1.0,
+    user: str = "",
+    password: str = "",
+    certificate: Path | None = None,
+    key: Path | None = None,
+) -> int:
+    """Start the fake; it prints one line `ready {json}` with its URL and ends on SIGTERM.
+
+    Args:
+        listen: HOST:PORT of the OPC UA server; port 0 takes a free one.
+        control: HOST:PORT of the control channel; port 0 takes a free one.
+        time_scale: how many times faster than real time the jobs are.
+        patience: s without a life sign of the host after which it is gone; not scaled.
+        user: name of the only user that is let in; empty for everybody.
+        password: password of that user.
+        certificate: PEM or DER file; the server signs and encrypts then, and takes nothing else.
+        key: PEM file of the certificate's private key.
+    """
+    try:
+        address, control_address = parse_address(listen), parse_address(control)
+    except ValueError as e:
+        sys.stderr.write(f"opcua_plc: {e}\n")
+        return 2
+
+    async def body() -> None:
+        logging.getLogger("asyncua").setLevel(logging.CRITICAL)  # broken connections are what a fake is for
+        channel = ControlServer(*control_address)
+        server = await make_server(user, password, certificate, key)
+        jobs = {number: seconds / time_scale for number, seconds in JOBS.items()}
+        plc = Plc(server, Program(jobs, 0.1 / time_scale, patience))
+        await plc.space.build()
+        await server.start()
+        inner = cast("Any", server.bserver)._server.sockets[0].getsockname()[1]
+        proxy = Proxy(*address, inner)
+        register_commands(channel, plc, proxy)
+        register_faults(channel, {"opcua": proxy.wire})
+        channel.source("truth", plc.truth)
+        scanning = asyncio.ensure_future(plc.run())
+        where = await proxy.wire.listen()
+        try:
+            announce(name="opcua_plc", url=f"opc.tcp://{where}", control=await channel.start())
+            await until_told_to_end()
+        finally:
+            scanning.cancel()
+            await proxy.close()
+            await channel.close()
+            with contextlib.suppress(asyncio.CancelledError):
+                await scanning
+            await server.stop()
+
+    return run(body, "opcua_plc")
+
+
+if __name__ == "__main__":
+    sys.exit(app())
