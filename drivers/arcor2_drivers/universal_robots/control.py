@@ -34,6 +34,8 @@ from arcor2_hw.exceptions import (
 
 from .dashboard import Dashboard
 from .observer import Observer
+from .program import Registers, RunState
+from .script_port import ScriptPort
 from .states import MAY_MOVE, REMEDIES, program_plays, safety_of
 
 STREAM_FREQUENCY: Final = 125.0
@@ -43,6 +45,8 @@ KICKS_PER_PERIOD: Final = 4.0
 UNHEALTHY: Final = 0.3
 """Seconds without an observed sample after which the session ends; the library itself needs 2.5 to notice."""
 GUARD_PERIOD: Final = 0.01
+RESUME_TIMEOUT: Final = 4.0
+"""Seconds for the control program to play again after a program of our own; it takes 0.1."""
 CALL_TIMEOUT: Final = 1.0
 """Seconds for a command that moves nothing; the library itself waits 4 to 300."""
 STOP_REACTION: Final = 0.05
@@ -78,6 +82,9 @@ class ControlSession:
         self._released = False
         self._process: subprocess.Popen[bytes] | None = None
         self._speed_until: float | None = None
+        self.registers = Registers.of(upper)
+        self.own: int | None = None
+        """The number of the run of our own program that plays, or has just ended, in place of the control program."""
 
     # -------------------------------------------------------------------------------- begin and end
     def open(self, timeout: float, dashboard: bool) -> None:
@@ -182,14 +189,8 @@ class ControlSession:
         """Begin or renew a motion by speed that ends `valid_for` s from now unless it is renewed."""
         until = time.monotonic() + valid_for
         self._speed_until = until
-        self.do(
-            "a jog",
-            command,
-            velocities,
-            acceleration,
-            valid_for,
-            valid=lambda: valid() and time.monotonic() < until,
-        )
+        in_time: Callable[[], bool] = lambda: valid() and time.monotonic() < until  # noqa: E731
+        self.do("a jog", command, velocities, acceleration, valid_for, valid=in_time)
 
     def set_output(self, number: int, on: bool) -> None:
         """Switch an output: 0 to 7 standard, 8 to 15 configurable, 16 and 17 of the tool."""
@@ -210,11 +211,59 @@ class ControlSession:
         """
         self._speed_until = None
         try:
-            self._send("a stop", "stopL", (deceleration, True)).result(STOP_REACTION)
+            if (own := self.own) is not None:
+                self._send("a stop", "halt", ())
+                self._await_reaction(own)
+            else:
+                self._send("a stop", "stopL", (deceleration, True)).result(STOP_REACTION)
         except (FutureTimeout, DeviceFault):
             self.stop_by_dashboard()
         except DeviceError as e:
             log.debug("%s: control ended while stopping: %s", self.who, e)
+
+    def _await_reaction(self, number: int) -> None:
+        """Return when the run of that number stops or has ended. Raises FutureTimeout when it does not react."""
+        until = time.monotonic() + STOP_REACTION
+        while True:
+            newest = self._observer.newest()
+            if newest is None or newest.run(self.upper) != (number, RunState.RUNNING):
+                return  # also before its first line: it looks at the register before it moves
+            if time.monotonic() > until:
+                raise FutureTimeout
+            time.sleep(GUARD_PERIOD / 4.0)
+
+    # -------------------------------------------------------------------------------- programs of our own
+    def play(self, number: int, program: str, valid: Callable[[], bool]) -> ScriptPort:
+        """Play a program of our own in place of the control program; `valid` is asked at the last moment.
+
+        Gives the connection it was sent on, to be drained and closed. `resume` follows in any case.
+        """
+        port = ScriptPort.open(self.host, CALL_TIMEOUT)
+        self.own = number  # from here on the other kicks: the library's own would wait for its program without end
+        try:
+            self.do("a program", "ready")  # behind the last of those; a wish to stop from now on is met by the program
+            if not valid():
+                raise Cancelled("a motion was stopped before it began")
+            port.send(program, CALL_TIMEOUT)
+        except Cancelled:
+            port.close()
+            self.own = None
+            raise
+        except DeviceError as e:
+            port.close()
+            self.end(e)
+            raise
+        return port
+
+    def resume(self) -> None:
+        """Have the control program play again. Raises what ended the session, DeviceFault, DeviceTimeout."""
+        if self.own is None or self.ended is not None:
+            return
+        newest = self._observer.newest()
+        if newest is None or program_plays(newest.runtime):
+            self.end(NotInControl(f"another program plays on {self.who}"))
+        self.do("the control program", "resume", timeout=RESUME_TIMEOUT)
+        self.own = None
 
     def stop_by_dashboard(self) -> None:
         """The second path of a stop: stop the program, and with it the session."""
@@ -300,7 +349,7 @@ class ControlSession:
     # -------------------------------------------------------------------------------- the guard
     def _watch(self) -> None:
         period = 1.0 / (KICKS_PER_PERIOD * self._watchdog)
-        kick = json.dumps({"do": "kickWatchdog", "args": []})
+        kicks = {own: json.dumps({"do": do, "args": []}) for own, do in ((False, "kickWatchdog"), (True, "kick"))}
         due = gone_since = 0.0
         while True:
             now = time.monotonic()
@@ -309,7 +358,7 @@ class ControlSession:
                 self.end(ConnectionLost(f"nothing is heard of {self.who}"))
             elif (safety := safety_of(newest.safety_mode)) not in MAY_MOVE:
                 self._stopped_by_safety(safety)
-            elif program_plays(newest.runtime):
+            elif program_plays(newest.runtime) or self.own is not None:
                 gone_since = 0.0
             elif gone_since == 0.0:
                 gone_since = now
@@ -325,7 +374,7 @@ class ControlSession:
                 due = now + period
                 with self._order:
                     if self.ended is None:
-                        self._write(kick)
+                        self._write(kicks[self.own is not None])
             self._ending.wait(GUARD_PERIOD)
         self._last_stop()
 

@@ -14,6 +14,7 @@ import os
 import queue
 import sys
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -29,6 +30,7 @@ COMMANDS = (
     "moveJ",
     "moveL",
     "setPayload",
+    "setTargetPayload",
     "setTcp",
     "speedJ",
     "speedL",
@@ -37,6 +39,7 @@ COMMANDS = (
     "stopScript",
     "teachMode",
 )
+RESUMED_WITHIN = 3.0  # s for the control program to play again; it takes 0.1
 OUTPUTS = ("setConfigurableDigitalOut", "setStandardDigitalOut", "setToolDigitalOut")
 
 
@@ -79,7 +82,43 @@ def _open(host: str, frequency: float, upper: bool, watchdog: float) -> dict[str
     control = RTDEControlInterface(host, frequency, flags)
     if not control.setWatchdog(watchdog):
         raise RuntimeError("the watchdog of the control program cannot be armed")
-    return {name: getattr(control, name) for name in COMMANDS} | {name: getattr(io, name) for name in OUTPUTS}
+    registers = Registers(io, 42 if upper else 18)
+
+    def resume() -> bool:
+        """Send the control program again, after one of our own, and arm its watchdog."""
+        until = time.monotonic() + RESUMED_WITHIN
+        # While the library still believes that a program runs it would send "stop" first, which the new one obeys.
+        while control.isProgramRunning() and time.monotonic() < until:
+            time.sleep(0.002)
+        control.reuploadScript()
+        while not (control.isProgramRunning() and control.setWatchdog(watchdog)):
+            if time.monotonic() > until:
+                return False
+            time.sleep(0.005)
+        return True
+
+    commands = {name: getattr(control, name) for name in COMMANDS} | {name: getattr(io, name) for name in OUTPUTS}
+    return commands | {"resume": resume, "ready": registers.ready, "kick": registers.kick, "halt": registers.halt}
+
+
+class Registers:
+    """The two integer registers that a program of our own looks at: kicks, and the wish to stop."""
+
+    def __init__(self, io: RTDEIOInterface, first: int) -> None:
+        self._io, self._first, self._kicks = io, first, 0
+
+    def ready(self) -> bool:
+        """Take back an earlier wish to stop."""
+        return bool(self._io.setInputIntRegister(self._first + 1, 0)) and self.kick()
+
+    def kick(self) -> bool:
+        """Tell the watchdog that we live."""
+        self._kicks = (self._kicks + 1) % 1000
+        return bool(self._io.setInputIntRegister(self._first, self._kicks))
+
+    def halt(self) -> bool:
+        """Wish that the program stops."""
+        return bool(self._io.setInputIntRegister(self._first + 1, 1))
 
 
 if __name__ == "__main__":

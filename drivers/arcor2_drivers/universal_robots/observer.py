@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected, Stale
 from arcor2_hw.objects.observing import Observing
 
+from .program import STATES
 from .rtde import PORT, RtdeStream, Version
 
 FIELDS: Final = [
@@ -15,6 +16,7 @@ FIELDS: Final = [
     "actual_q",
     "actual_qd",
     "actual_TCP_pose",
+    "actual_TCP_force",
     "robot_mode",
     "safety_mode",
     "runtime_state",
@@ -23,6 +25,8 @@ FIELDS: Final = [
     "actual_digital_output_bits",
     "output_int_register_2",
     "output_int_register_26",
+    "output_int_register_18",
+    "output_int_register_42",
 ]
 """The handful that is used, in the order in which `Sample` has them."""
 STALLED: Final = 0.5
@@ -36,13 +40,14 @@ _LOOK: Final = 0.1
 
 
 class Sample(NamedTuple):
-    """One sample: the controller's time, ours (monotonic), and what is known at that instant (rad, m, rad/s)."""
+    """One sample: the controller's time, ours (monotonic), and what is known then (rad, m, rad/s, N, N m)."""
 
     timestamp: float
     monotonic: float
     q: tuple[float, ...]
     qd: tuple[float, ...]
     tcp: tuple[float, ...]
+    force: tuple[float, ...]
     robot_mode: int
     safety_mode: int
     runtime: int
@@ -51,6 +56,8 @@ class Sample(NamedTuple):
     outputs: int
     asynchronous_lower: int
     asynchronous_upper: int
+    run_lower: int
+    run_upper: int
 
     @property
     def age(self) -> float:
@@ -69,6 +76,10 @@ class Sample(NamedTuple):
         """
         status = self.asynchronous_upper if upper else self.asynchronous_lower
         return status >> 24 & 0x7F, bool(status & 1 << 15)
+
+    def run(self, upper: bool) -> tuple[int, int]:
+        """Give number and state of the newest run of a program of our own."""
+        return divmod(self.run_upper if upper else self.run_lower, STATES)
 
 
 AT_REST: Final = 1e-3
@@ -149,7 +160,7 @@ class Observer:
             timestamp = row[0]
             last = self.ring[-1].timestamp if self.ring else timestamp - self.period
             self.ring.append(
-                Sample(timestamp, now, row[1:7], row[7:13], row[13:19], *row[19:])  # type: ignore[arg-type]
+                Sample(timestamp, now, row[1:7], row[7:13], row[13:19], row[19:25], *row[25:])  # type: ignore[arg-type]
             )
             self.samples_received += 1
             if timestamp > last:

@@ -3,6 +3,7 @@
 import contextlib
 import logging
 import math
+import threading
 import time
 from collections.abc import Callable, Iterator
 from typing import ClassVar, Final
@@ -21,9 +22,11 @@ from arcor2_hw.exceptions import (
     SafetyStop,
 )
 
+from .arrival import at_joints, at_pose
 from .control import ControlSession
 from .frames import from_vector, to_vector, world_from_base
 from .observer import Sample
+from .program import Tool
 from .settings import MANUAL_TCP_SPEED, UrSettings, within
 from .states import MAY_MOVE, REMEDIES, program_plays, safety_of
 from .timing import SLOWEST_FRACTION, joint_budget, linear_budget
@@ -34,9 +37,6 @@ TAKE_TIMEOUT: Final = 5.0
 POLL: Final = 0.005
 REST_WITHIN: Final = 2.0
 """Seconds after which an arm that was told to stop must stand; from full speed it takes 0.3."""
-JOINTS_REACHED: Final = 0.01
-POSITION_REACHED: Final = 0.002
-ANGLE_REACHED: Final = 0.02
 STANDING: Final = 0.5
 """Seconds an arm may stand, short of its target and with no motion running, before the move counts as failed."""
 LOWER_ONLY: Final = ((5, 23), (10, 0))
@@ -57,8 +57,8 @@ class UrArm(UrObserved):
         self._take_again = False
         self._stops = 0
         self._teaching = False
-        self._tcp = settings.tcp
-        self._payload = (settings.payload_mass, settings.payload_cog) if settings.payload_mass >= 0.0 else None
+        self._tool = Tool(settings.tcp, settings.payload_mass, settings.payload_cog)
+        self._taking = threading.Lock()
         self.last_move: MoveResult | None = None
 
     # -------------------------------------------------------------------------------- control
@@ -70,12 +70,14 @@ class UrArm(UrObserved):
     def take_control(self) -> None:
         """Take control: start the control program with its watchdog, tool and payload. Harmless when it is ours.
 
-        Raises NotInControl naming who has it, SafetyStop, Refused naming what is missing, or how the connection failed.
+        Raises NotInControl naming who has it, SafetyStop, Refused naming what is missing, ConnectionLost.
         """
-        if self._session is not None and self._session.ended is None:
-            return
-        if self._payload is None:
-            raise Refused(f"{self.name}: payload_mass is not set; state the mass at the flange before taking control")
+        with self._taking:  # what uses our outputs may take control too, at the same time
+            if not self._is_ours():
+                self._take()
+
+    def _take(self) -> None:
+        self.tool()
         sample = self._observer.sample()
         control, _ = self._at_pendant(max_age=0.0)
         safety = safety_of(sample.safety_mode)
@@ -96,19 +98,17 @@ class UrArm(UrObserved):
         session = ControlSession(self._observer, self._upper_registers(), self._ur.watchdog_frequency)
         session.open(TAKE_TIMEOUT, self._has_dashboard)
         try:
-            self._tell_tool(session, self._tcp, *self._payload)
+            self._tell_tool(session, self.tool())
         except BaseException:
             session.end(NotInControl(f"control of {self.name} was not taken"))
             raise
-        self._teaching = False
-        self._take_again = False
+        self._teaching = self._take_again = False
         self._session = session
         self._observer.observing.settled()
 
     def release_control(self) -> None:
         """Stop and give control back; harmless when it is not ours."""
-        session, self._session = self._session, None
-        self._take_again = False
+        (session, self._session), self._take_again = (self._session, None), False
         if session is None or session.ended is not None:
             return
         newest = self._observer.newest()
@@ -152,19 +152,19 @@ class UrArm(UrObserved):
         why = f": {session.ended}" if session is not None else ""
         raise NotInControl(f"control of {self.name} is not taken{why}")
 
-    def _tell_tool(self, session: ControlSession, tcp: Pose, mass: float, cog: tuple[float, float, float]) -> None:
-        session.do("the tool centre point", "setTcp", to_vector(tcp))
-        session.do("the payload", "setPayload", mass, list(cog))
+    def tool(self) -> Tool:
+        """Give the tool that the controller is told of; Refused when nobody has stated its mass."""
+        if self._tool.mass < 0.0:
+            raise Refused(f"{self.name}: payload_mass is not set; state the mass at the flange first")
+        return self._tool
 
-    def set_tool(
-        self, tcp: Pose, mass: float, cog: tuple[float, float, float], inertia: tuple[float, ...] | None = None
-    ) -> None:
-        """Tell the controller of its tool; inertia is left to the controller's own estimate."""
-        within("mass", mass, 0.0, self.max_payload)
-        if inertia is not None:
-            raise Refused(f"{self.name}: an inertia cannot be set through this driver")
-        self._tell_tool(self._controlled(), tcp, mass, cog)
-        self._tcp, self._payload = tcp, (mass, cog)
+    @staticmethod
+    def _tell_tool(session: ControlSession, tool: Tool) -> None:
+        session.do("the tool centre point", "setTcp", to_vector(tool.tcp))
+        if tool.inertia is None:
+            session.do("the payload", "setPayload", tool.mass, list(tool.cog))
+        else:
+            session.do("the payload", "setTargetPayload", tool.mass, list(tool.cog), list(tool.inertia))
 
     # -------------------------------------------------------------------------------- moving
     def check_if_ready_to_move(self) -> None:
@@ -206,19 +206,12 @@ class UrArm(UrObserved):
             distance = here.position.distance_to(there.position)
             budget = linear_budget(distance, here.orientation.angle_to(there.orientation), tcp_speed, ramp)
 
-            def reached(sample: Sample) -> bool:
-                at = from_vector(sample.tcp)
-                return (
-                    at.position.distance_to(there.position) < POSITION_REACHED
-                    and at.orientation.angle_to(there.orientation) < ANGLE_REACHED
-                )
-
             return self._run(
                 session,
                 "a linear move",
                 ("moveL", vector, tcp_speed, ramp, True),
                 budget,
-                reached,
+                at_pose(vector),
                 tcp_speed / self._ur.max_tcp_speed,
                 stops,
             )
@@ -240,7 +233,7 @@ class UrArm(UrObserved):
             "a joint move",
             ("moveJ", q, joint_speed, ramp, True),
             joint_budget(start.q, q, joint_speed, ramp),
-            lambda sample: max(abs(a - b) for a, b in zip(sample.q, q, strict=True)) < JOINTS_REACHED,
+            at_joints(q),
             joint_speed / self._ur.max_joint_speed,
             stops,
         )
@@ -251,7 +244,7 @@ class UrArm(UrObserved):
 
     def _joint_speed_cap(self) -> float:
         """Give the joint speed with which the TCP keeps its cap even if every joint adds its whole lever."""
-        levers = 3.0 * self.reach + len(JOINTS) * math.hypot(*self._tcp.position)
+        levers = 3.0 * self.reach + len(JOINTS) * math.hypot(*self._tool.tcp.position)
         return self._tcp_speed_cap() / levers
 
     @contextlib.contextmanager
@@ -384,7 +377,7 @@ class UrArm(UrObserved):
     def forward_kinematics(self, end_effector_id: str, joints: list[Joint]) -> Pose:
         """Give the TCP in the world for joints, by the controller's calibration; needs control."""
         self._check_end_effector(end_effector_id)
-        q, tcp = self._checked_joints(joints), to_vector(self._tcp)
+        q, tcp = self._checked_joints(joints), to_vector(self._tool.tcp)
         vector = self._controlled().call("forward kinematics", "getForwardKinematics", q, tcp)
         return world_from_base(self._pose) * from_vector(vector)
 

@@ -6,12 +6,13 @@ import time
 from collections.abc import Callable
 from typing import Final, Literal
 
-from arcor2_hw.data.geometry import Orientation
+from arcor2_hw.data.geometry import Orientation, Pose
 from arcor2_hw.data.robot import Control, Safety
 from arcor2_hw.exceptions import DeviceTimeout, InvalidData, NotFound, NotInControl, OutOfRange, Refused
 
 from .frames import turned, world_from_base
 from .observer import Sample
+from .program import Tool
 from .settings import within
 from .states import MODE_IDLE, MODE_RUNNING, safety_of
 from .ur_arm import UrArm
@@ -22,6 +23,9 @@ POWER_WITHIN: Final = 20.0
 BRAKES_WITHIN: Final = 20.0
 SAFETY_WITHIN: Final = 5.0
 POLL: Final = 0.02
+INERTIA_FROM: Final = (5, 10)
+MOST_INERTIA: Final = 133.0
+"""kg m², the controller's own bound."""
 
 log = logging.getLogger(__name__)
 
@@ -31,6 +35,30 @@ class UrServiced(UrArm):
 
     _ABSTRACT = True
 
+    # -------------------------------------------------------------------------------- the tool
+    def set_tool(
+        self, tcp: Pose, mass: float, cog: tuple[float, float, float], inertia: tuple[float, ...] | None = None
+    ) -> None:
+        """Tell the controller of its tool: TCP in the flange, mass kg, centre of gravity m in the flange.
+
+        `inertia`: Ixx, Iyy, Izz, Ixy, Ixz, Iyz in kg m² about the centre of gravity; None leaves it to the controller.
+        Raises OutOfRange, Refused for an inertia before controller 5.10, Refused while moving, NotInControl.
+        """
+        within("mass", mass, 0.0, self.max_payload)
+        for axis, value in zip("xyz", cog, strict=True):
+            within(f"cog {axis}", value, -1.0, 1.0)
+        if inertia is not None:
+            if len(inertia) != 6:
+                raise OutOfRange("inertia must be six numbers: Ixx, Iyy, Izz, Ixy, Ixz, Iyz")
+            for value in inertia:
+                within("inertia", value, -MOST_INERTIA, MOST_INERTIA)
+            if self._observer.version[:2] < INERTIA_FROM:
+                raise Refused(f"{self.name}: an inertia can be set from controller 5.10 on, not on this one")
+        with self._moving():
+            tool = Tool(tcp, mass, cog, inertia)
+            self._tell_tool(self._controlled(), tool)
+            self._tool = tool
+
     # -------------------------------------------------------------------------------- by hand, and by speed
     def get_hand_teaching_mode(self) -> bool:
         """Tell whether the arm can be moved by hand."""
@@ -38,8 +66,7 @@ class UrServiced(UrArm):
 
     def set_hand_teaching_mode(self, enabled: bool) -> None:
         """Make the arm movable by hand, or stiff again. Refused without a stated payload, or while moving."""
-        if self._payload is None:
-            raise Refused(f"{self.name}: hand teaching needs a stated payload_mass")
+        self.tool()
         session = self._controlled()
         if enabled and self.move_in_progress:
             raise Refused(f"{self.name} is moving already")

@@ -9,7 +9,7 @@ from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.project import ProjectRobotJoints
 from arcor2_hw.exceptions import Cancelled, DeviceFault, DeviceTimeout, OutOfRange, Refused
 
-from .ur_service import UrServiced
+from .ur_paths import UrPathed
 
 POLL: Final = 0.005
 OUTPUT_WITHIN: Final = 0.5
@@ -31,13 +31,16 @@ def behind(pose: Pose, distance: float) -> Pose:
     return pose * Pose(Position(0.0, 0.0, -distance))
 
 
-class UrTasks(UrServiced):
+class UrTasks(UrPathed):
     """A Universal Robots arm at work."""
 
     _ABSTRACT = True
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {
         "move": "stop",
         "move_to": "stop",
+        "move_through": "stop",
+        "move_to_contact": "stop",
+        "move_carefully": "stop",
         "pick": "stop",
         "place": "stop",
         "wait_for_input": "stop",
@@ -77,6 +80,58 @@ class UrTasks(UrServiced):
         assert 0.01 <= speed <= 1.0
         assert 0.01 <= acceleration <= 1.0
         self._move_joints(self._checked_joints(joints.joints), speed, acceleration, self._stops)
+
+    @action
+    def move_through(
+        self,
+        via: Pose,
+        pose: Pose,
+        blend: float = 0.05,
+        move_type: MoveType = MoveType.LINEAR,
+        speed: float = 0.25,
+        *,
+        an: str | None = None,
+    ) -> None:
+        """Move the TCP past a pose to another one without standing on the way.
+
+        :param via: pose on the way
+        :param pose: where to
+        :param blend: how near the TCP comes to the pose on the way, m; 0: it stands there
+        :param move_type: in lines, or all joints together
+        :param speed: fraction of the configured maximum
+        """
+        assert 0.0 <= blend <= 0.5
+        assert 0.01 <= speed <= 1.0
+        self._path([via, pose], blend, move_type is MoveType.LINEAR, speed, self._stops)
+
+    @action
+    def move_to_contact(
+        self, force: float = 10.0, max_distance: float = 0.1, speed: float = 0.02, *, an: str | None = None
+    ) -> None:
+        """Move along the tool's axis until it touches something, and stop there; it is an error to meet nothing.
+
+        :param force: force at which it stops, N
+        :param max_distance: how far at most, m
+        :param speed: fraction of the configured maximum
+        """
+        assert 1.0 <= force <= 100.0
+        assert 0.001 <= max_distance <= 1.0
+        assert 0.001 <= speed <= 0.25
+        here = self._world(self._observer.sample())
+        axis = Position(0.0, 0.0, 1.0).rotated(here.orientation)
+        self.move_until_contact((axis.x, axis.y, axis.z), force, max_distance, speed)
+
+    @action
+    def move_carefully(self, pose: Pose, force: float = 20.0, speed: float = 0.1, *, an: str | None = None) -> None:
+        """Move the TCP in a line to a pose, and stop with an error where a force acts on it.
+
+        :param pose: where to
+        :param force: force at which it stops, N
+        :param speed: fraction of the configured maximum
+        """
+        assert 1.0 <= force <= 100.0
+        assert 0.01 <= speed <= 1.0
+        self.move_force_limited(pose, force, speed)
 
     @action
     def pick(

@@ -1,6 +1,7 @@
 """Runs the fake controller: ``python -m arcor2_fakes.ur --host 127.0.1.1``."""
 
 import argparse
+import asyncio
 import gc
 import logging
 import re
@@ -22,6 +23,7 @@ log = logging.getLogger("main")
 
 _POLYSCOPE_X = 10  # has no dashboard server
 _MOST_AT_ONCE = 250  # control cycles made up for after the process was held up
+_CHUNK = 10  # of them without reading what has come in
 
 
 def _version(text: str) -> tuple[int, ...]:
@@ -76,12 +78,27 @@ async def _serve(options: argparse.Namespace) -> None:
     register_faults(control, dict(wires))
     register(control, controller, rtde, script, dashboard)
 
+    loop = asyncio.get_running_loop()
+    owed = 0
+
     def tick(periods: int) -> None:
+        nonlocal owed
         if periods > _MOST_AT_ONCE:
             log.warning("held up for %.2f s", periods * controller.period)
-        for _ in range(min(periods, _MOST_AT_ONCE)):
+        busy, owed = owed > 0, min(owed + periods, _MOST_AT_ONCE)
+        if not busy:
+            catch_up()
+
+    def catch_up() -> None:
+        """A few cycles; what has come in meanwhile, such as a kick of the watchdog, is read before the next few."""
+        nonlocal owed
+        cycles = min(owed, _CHUNK)
+        for _ in range(cycles):
             controller.tick()
             rtde.tick()
+        owed -= cycles
+        if owed:
+            loop.call_soon(catch_up)
 
     timer = PeriodicTimer(controller.period, tick)
     try:

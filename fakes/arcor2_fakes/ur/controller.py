@@ -65,7 +65,8 @@ class Controller:
         self.load_program: Callable[[str], Program] | None = None
         self.freedrive = False
         self.contact = False
-        self.place_obstacle(None)
+        self.obstacle: Obstacle | None = None
+        self.tcp_force: tuple[float, ...] = (0.0,) * 6
         self.payload, self.payload_cog, self.payload_inertia = 0.0, (0.0, 0.0, 0.0), (0.0,) * 6
         self.tcp_offset: tuple[float, ...] = (0.0,) * 6
         self.input_ints, self.input_doubles = [0] * 48, [0.0] * 48
@@ -137,8 +138,7 @@ class Controller:
 
     def place_obstacle(self, obstacle: Obstacle | None) -> None:
         """Puts something in the tool's way, or takes it away."""
-        self.obstacle: Obstacle | None = obstacle
-        self.tcp_force: tuple[float, ...] = (0.0,) * 6
+        self.obstacle, self.tcp_force = obstacle, (0.0,) * 6
 
     def after(self, seconds: float, do: Callable[[], None]) -> None:
         """Does something so much later, in the controller's time and by `time_scale`."""
