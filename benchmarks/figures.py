@@ -26,7 +26,7 @@ GOALS: Final[dict[str, tuple[str, str]]] = {
     "ur_stream_lost": ("%", "<= 0.5"),
     "ur_stream_core_percent": ("% of a core", "<= 10"),
     "modbus_read_ratio": ("of the bare library's rate", ">= 0.9"),
-    "can_pdo_lost": ("of 2000 frames", "<= 0"),
+    "can_pdo_lost": ("frames", "<= 0"),
     "dynamixel_sync_read_6_ms": ("ms", "<= 1"),
     "hung_beside_p99_ms": ("ms", "<= 50"),
     "build_1000_ms": ("ms", "linear"),
