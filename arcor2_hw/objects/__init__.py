@@ -5,7 +5,19 @@ from arcor2_hw.objects.generic import CollisionObject, Generic, GenericWithPose,
 from arcor2_hw.objects.machine import Machine, MachineCommand, MachineState, UnitMode
 from arcor2_hw.objects.robot import MultiArmRobot, Robot, RobotException
 from arcor2_hw.objects.settings import Settings
-from arcor2_hw.objects.small import Axis, Code, Gripper, GripResult, IOBlock, NoRead, Printer, Reader, Scale, Suction
+from arcor2_hw.objects.small import (
+    Axis,
+    Code,
+    Gripper,
+    GripResult,
+    HasPoints,
+    IOBlock,
+    NoRead,
+    Printer,
+    Reader,
+    Scale,
+    Suction,
+)
 
 __all__ = [
     "Axis",
@@ -16,6 +28,7 @@ __all__ = [
     "GenericWithPose",
     "GripResult",
     "Gripper",
+    "HasPoints",
     "IOBlock",
     "Machine",
     "MachineCommand",

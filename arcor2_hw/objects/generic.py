@@ -1,6 +1,7 @@
 """Generic, GenericWithPose, CollisionObject, VirtualCollisionObject: what every object type is."""
 
 import abc
+from collections.abc import Callable
 from typing import ClassVar
 
 from arcor2_hw.actions import action
@@ -64,6 +65,14 @@ class Generic(abc.ABC):
         """Open the connection within `timeout` seconds, to observe only; harmless when it is open.
 
         Raises NotConnected naming the address, DeviceTimeout, DeviceFault.
+        """
+
+    def attach(self, find: "Callable[[str], Generic]") -> None:  # noqa: B027
+        """Take the way to the other objects of the scene; called once, between `__init__` and `connect`.
+
+        `find` gives an object by its name or id. It raises NotFound when the scene has none, NotConnected while it is
+        not made yet: all come up at once. A method is called there on the caller's thread, beside what the object is
+        doing; so only what its type declares for that may be called, as `HasPoints` does.
         """
 
     def disconnect(self) -> None:  # noqa: B027

@@ -2,7 +2,7 @@
 
 import abc
 import enum
-from typing import ClassVar, Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple, Protocol, runtime_checkable
 
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.device import LossReaction, Reading
@@ -110,6 +110,23 @@ class IOPoint(Data, frozen=True):
     scale: float = 1.0
     debounce: float = 0.0
     on_loss: OnLoss | Unset = UNSET
+
+
+@runtime_checkable
+class HasPoints(Protocol):
+    """Named inputs and outputs that other objects may use (`Generic.attach`): an IOBlock, a robot with outputs.
+
+    All three may be called from any thread, also while the object is busy with an action.
+    """
+
+    def points(self) -> list[IOPoint]:
+        """Give the points."""
+
+    def read(self, name: str) -> Reading[bool | float]:
+        """Read a point. Raises OutOfRange for an unknown name, Stale, ConnectionLost, DeviceTimeout."""
+
+    def write(self, name: str, value: bool | float) -> None:
+        """Write an output. Raises Refused for an input, NotInControl, ConnectionLost, DeviceTimeout."""
 
 
 class IOBlock(Generic):

@@ -67,6 +67,13 @@ class Cell:
         except KeyError:
             raise NotFound(f"the scene has no object {object_id}") from None
 
+    def find(self, name: str) -> Generic:
+        """Give the instance of an object by its name or id, for another object; NotFound, NotConnected."""
+        for device in self:
+            if name in (device.name, device.id):
+                return device.require()
+        raise NotFound(f"the scene has no object {name}")
+
     # -------------------------------------------------------------------------------- up and down
     def open(self, how: Iterable[Recipe]) -> None:
         """Create and connect all objects at once; SceneFault with the first that fails, as soon as it fails.
@@ -76,7 +83,7 @@ class Cell:
         began = time.monotonic()
         pending: dict[Job, tuple[Device, float]] = {}
         for each in how:
-            self._devices[each.scene_object.id] = Device(each, lambda device: self.changed(device))
+            self._devices[each.scene_object.id] = Device(each, lambda device: self.changed(device), self.find)
         for device in self:
             opening, deadline = device.open(self._ended.put)
             pending[opening] = (device, began + deadline)

@@ -76,11 +76,18 @@ def overrides(cls: type[Generic], name: str) -> bool:
 class Device:
     """One object of the scene. Every call on the instance is made on one of its lanes.
 
-    `changed` is called when its connection changes, on the thread that keeps the connection.
+    `changed` is called when its connection changes, on the thread that keeps the connection. `find` gives the instance
+    of another object of the scene.
     """
 
-    def __init__(self, recipe: Recipe, changed: "Callable[[Device], None]" = lambda _: None) -> None:
+    def __init__(
+        self,
+        recipe: Recipe,
+        changed: "Callable[[Device], None]" = lambda _: None,
+        find: Callable[[str], Generic] | None = None,
+    ) -> None:
         self.recipe = recipe
+        self._find = find
         self._changed = changed
         self._lives: list[Observing] = []
         self.id = recipe.scene_object.id
@@ -104,6 +111,8 @@ class Device:
         with listening(self._life_changed):
             instance = self.recipe.make()
             self.instance = instance
+            if self._find is not None:
+                instance.attach(self._find)
             instance.connect()
         if self.closing:  # came up too late: nobody waits any more
             instance.cleanup()

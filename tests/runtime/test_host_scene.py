@@ -280,3 +280,39 @@ def test_the_end_of_the_process_is_seen(host: HostProcess) -> None:
     with pytest.raises(EOFError):
         host.expect(m.CallDone)
     assert host.gone() == 7
+
+
+REACHING = """
+class Reaching(Generic):
+    _ABSTRACT = False
+
+    def attach(self, find) -> None:
+        self.find = find
+
+    def connect(self, timeout: float = 5.0) -> None:
+        until = time.monotonic() + timeout
+        while True:  # all come up at once
+            try:
+                self.other = self.find("b")
+                return
+            except NotConnected:
+                assert time.monotonic() < until
+                time.sleep(0.01)
+
+    def ask(self, name: str) -> str:
+        return self.find(name).quick()
+
+    def count(self) -> int:
+        return threading.active_count()
+"""
+
+
+def test_an_object_reaches_another_by_name_while_that_is_busy(host: HostProcess) -> None:
+    objects = [scene_object("a", "Reaching"), scene_object("b", "Device", connect_takes=0.2)]
+    host.send(open_scene([type_code("Device", DEVICE), type_code("Reaching", REACHING)], *objects))
+    host.expect(m.SceneOpened)
+    hang = host.begin("obj_b", "hang", seconds=1.0)
+    assert host.call("obj_a", "ask", name="b") == "quick"
+    assert host.call("obj_a", "ask", name="obj_b") == "quick"
+    assert host.call("obj_a", "ask", name="c").code == "not_found"
+    assert host.answer(hang) == "late", "b was busy all the time"
