@@ -3,9 +3,9 @@
 import io
 import logging
 import select
+import socket as sockets
 import struct
 import time
-from socket import SO_RCVTIMEO, SO_SNDTIMEO, SOL_SOCKET
 from typing import Final
 
 from pymodbus import FramerType
@@ -13,6 +13,7 @@ from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from pymodbus.client.base import ModbusBaseSyncClient
 from pymodbus.exceptions import ConnectionException, ModbusException, ModbusIOException
 from pymodbus.pdu import ModbusPDU
+from pymodbus.pdu.register_message import ReadHoldingRegistersResponse
 
 __all__ = ["Client", "ConnectionException", "ModbusException", "ModbusPDU", "SerialClient", "TcpClient"]
 
@@ -31,6 +32,27 @@ SHORTEST_SILENCE: Final = 0.00175
 logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)
 
 
+class _HoldingRegisters(ReadHoldingRegistersResponse):
+    """An answer of registers, taken apart in one step instead of one by one."""
+
+    def decode(self, data: bytes) -> None:
+        """Take the answer apart after its function code. Raises ModbusIOException, which the decoder makes of it."""
+        count, odd = divmod(data[0], 2)
+        if odd or len(data) < 1 + data[0]:
+            raise ModbusIOException(f"{len(data) - 1} bytes came where {data[0]} were announced")
+        self.registers = struct.unpack_from(f">{count}H", data, 1)
+
+    def __str__(self) -> str:
+        """Give a name; the library asks for it at every answer, and throws it away unless it logs all."""
+        return f"answer {self.transaction_id} of {self.dev_id}"
+
+
+class _InputRegisters(_HoldingRegisters):
+    """As above, function 4."""
+
+    function_code = 4
+
+
 class _Exchange(ModbusBaseSyncClient):
     """One request, one answer, one time limit: no retries, no state from one request to the next but its number."""
 
@@ -39,6 +61,11 @@ class _Exchange(ModbusBaseSyncClient):
     received = False
     """Whether anything has come since the request was sent."""
     _number = 0
+
+    def know(self) -> None:
+        """Have answers of registers decoded by the classes above."""
+        self.register(_HoldingRegisters)
+        self.register(_InputRegisters)
 
     def execute(self, no_response_expected: bool, request: ModbusPDU) -> ModbusPDU:
         """Give the answer of this very request. Raises ModbusException without one, ConnectionException, OSError."""
@@ -62,16 +89,19 @@ class TcpClient(_Exchange, ModbusTcpClient):
     def __init__(self, host: str, port: int, timeout: float) -> None:
         super().__init__(host, port=port, timeout=timeout, retries=0)
         self._armed = 0.0
+        self.know()
 
     def connect(self) -> bool:
         """Connect within the time-out; tell whether that went well."""
         if self.socket is not None:
             return True
-        if not super().connect():  # type: ignore[no-untyped-call]
+        super().connect()  # type: ignore[no-untyped-call]
+        socket: sockets.socket | None = self.socket
+        if socket is None:
             return False
         # Blocking, with the limits kept by the kernel: one call each for sending and receiving instead of two or three.
-        self.socket.settimeout(None)
-        self.socket.setsockopt(SOL_SOCKET, SO_SNDTIMEO, _timeval(self.comm_params.timeout_connect))
+        socket.settimeout(None)
+        socket.setsockopt(sockets.SOL_SOCKET, sockets.SO_SNDTIMEO, _timeval(self.comm_params.timeout_connect))
         self._armed = 0.0
         return True
 
@@ -84,7 +114,7 @@ class TcpClient(_Exchange, ModbusTcpClient):
             return b""
         if not 0.0 <= self._armed - left <= 2.0 * GRAIN:
             self._armed = left + GRAIN
-            socket.setsockopt(SOL_SOCKET, SO_RCVTIMEO, _timeval(self._armed))
+            socket.setsockopt(sockets.SOL_SOCKET, sockets.SO_RCVTIMEO, _timeval(self._armed))
         try:
             data = socket.recv(size or LONGEST_FRAME)
         except BlockingIOError:
@@ -115,6 +145,7 @@ class SerialClient(_Exchange, ModbusSerialClient):
         )
         self._silence = max(SILENCE * BITS_OF_A_CHARACTER / baudrate, SHORTEST_SILENCE)
         self._last_byte = 0.0
+        self.know()
 
     def send(self, request: bytes, addr: tuple[str, int] | None = None) -> int:
         """Send a frame, after the silence that parts it from the last."""
