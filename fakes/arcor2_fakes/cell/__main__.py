@@ -19,6 +19,7 @@ from arcor2_fakes.control import ControlServer, parse_address
 from arcor2_fakes.process import announce, run, until_told_to_end
 
 GONE_STATUS = 3
+_PICTURE_PERIOD = 0.1  # s; the camera renders anew when something was moved
 NAMES = {"io": "I/O block", "printer": "label printer", "arm": "two-axis robot"}
 _ROBOT_RATE = 100.0  # Hz; a tool at 1 m/s is known to a centimetre, a resting one exactly
 
@@ -81,12 +82,18 @@ class Cell:
             await self._fakes["robot"].client.subscribe(self._robot.take, rate=_ROBOT_RATE)
             await self._others.follow(self._fakes)
             async with self._lock:
+                await self._devices.aim(self._layout)
                 await self.world.begin()
+            shown = -_PICTURE_PERIOD
             while True:
                 sample = await self._robot.next()
                 self._others.check()
+                now = time.monotonic() - began
                 async with self._lock:
-                    await self.world.step(time.monotonic() - began, sample, self._others.inputs)
+                    await self.world.step(now, sample, self._others.inputs)
+                    if now - shown >= _PICTURE_PERIOD:
+                        shown = now
+                        await self._devices.show(self.world.seen())
         except DeviceGone as e:
             return str(e)
 
@@ -132,6 +139,7 @@ def main(
     io: str | None = None,
     printer: str | None = None,
     arm: str | None = None,
+    camera: str | None = None,
     boards: Annotated[int, Parameter(validator=validators.Number(gte=0, lte=MAX_BOARDS))] = 5,
     seed: int = 0,
     control: str = "127.0.0.1:0",
@@ -151,6 +159,7 @@ def main(
         io: HOST:PORT of the fake remote I/O block's control channel, where it has light barriers or a tower light.
         printer: HOST:PORT of the fake label printer's control channel, where it has a place for labelling.
         arm: HOST:PORT of the fake two-axis robot's control channel, where it has a place for labelling.
+        camera: HOST:PORT of the fake camera's control channel, where it has one.
         boards: how many boards come.
         seed: decides the boards: their codes, and which are bad.
         control: HOST:PORT of the world's own control channel; port 0 takes a free one.
@@ -159,6 +168,7 @@ def main(
     given = {
         **{"robot": robot, "tester": tester, "reader": reader},
         **{"conveyor": conveyor, "io": io, "printer": printer, "arm": arm},
+        **{"camera": camera},
     }
     addresses = {name: address for name, address in given.items() if address is not None}
     try:

@@ -8,6 +8,7 @@ from typing import Any
 
 import msgspec
 
+from arcor2_fakes.cell import sight
 from arcor2_fakes.cell.boards import Board
 from arcor2_fakes.cell.layout import Layout
 from arcor2_fakes.cell.things import Inputs, Printed, Robot
@@ -58,7 +59,8 @@ class FakeDevices:
 
     def __init__(self, fakes: Mapping[str, Fake], sensor: int | None) -> None:
         self._robot, self._tester, self._reader = fakes["robot"], fakes["tester"], fakes["reader"]
-        self._io = fakes.get("io")
+        self._io, self._camera = fakes.get("io"), fakes.get("camera")
+        self._seen: dict[str, dict[str, Any]] = {}
         self._sensor = sensor
 
     async def put_into_tester(self, board: Board) -> str | None:
@@ -82,6 +84,26 @@ class FakeDevices:
         """Set the input that a light barrier is wired to."""
         if self._io is not None:
             await self._do(self._io, "set_input", number=number, on=interrupted)
+
+    async def aim(self, layout: Layout) -> None:
+        """Let the camera look from where it hangs."""
+        if self._camera is not None and layout.camera is not None:
+            pose = {"position": layout.camera.pose.position, "orientation": layout.camera.pose.orientation}
+            await self._do(self._camera, "camera", pose=pose)
+
+    async def show(self, seen: dict[str, dict[str, Any]]) -> None:
+        """Let the camera see these things, told only of what is different."""
+        if self._camera is None:
+            return
+        others, moved = sight.changes(self._seen, seen)
+        if others:
+            await self._do(self._camera, "scene", things=list(seen.values()))
+        elif moved:
+            await self._do(self._camera, "move", poses=moved)
+        if others:
+            self._seen = seen
+        else:
+            self._seen = self._seen | {name: seen[name] for name in moved}
 
     @staticmethod
     async def _try(fake: Fake, command: str, **arguments: Any) -> str | None:

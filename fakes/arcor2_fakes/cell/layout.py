@@ -33,6 +33,8 @@ PLACE is ``"pose": POSE, "tolerance": {"position": 0.005, "height": 0.01, "tilt"
   runs. A light barrier is interrupted (its input of the I/O block is on) while a board is at `at`, m before the stop
   and so 0 or negative.
 - `labelling` is the place under the label printer, and the arm whose roller presses labels on from `begin` to `end`.
+- `camera` has the pose of a camera's optical frame (x right, y down, z forward), the size of a `board`, and `things`
+  that it sees besides: boxes with `name`, `pose` of the middle, `size` and `color`.
 - `tower` names the outputs of the I/O block that lamps hang on. What a cell does not have is left out.
 - `reader` is the place where a board, held or on the feeder, is in the reader's view; `tester` is the fixture.
 """
@@ -177,6 +179,23 @@ class Labelling(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     press: Press
 
 
+class Fixture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A box that the camera sees and that never moves; its pose is that of its middle, its colour blue, green, red."""
+
+    name: str
+    pose: Pose
+    size: tuple[Length, Length, Length]
+    color: tuple[int, int, int] = (150, 150, 150)
+
+
+class Camera(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A camera: the pose of its optical frame, what stands before it, and how large a board is."""
+
+    pose: Pose
+    board: tuple[Length, Length, Length]
+    things: list[Fixture] = []
+
+
 class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Where the robot stands."""
 
@@ -205,6 +224,7 @@ class Layout(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     feeder: Feeder | None = None
     belt: Belt | None = None
     labelling: Labelling | None = None
+    camera: Camera | None = None
     tower: dict[str, Annotated[int, Meta(ge=0, le=15)]] = {}
     table_height: float = 0.0
 
@@ -219,6 +239,7 @@ class Layout(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             "io": bool(self.tower) or (self.belt is not None and bool(self.belt.barriers)),
             "printer": self.labelling is not None,
             "arm": self.labelling is not None,
+            "camera": self.camera is not None,
         }
         return [name for name, so in needed.items() if so]
 

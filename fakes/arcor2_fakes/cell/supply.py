@@ -46,8 +46,8 @@ class Supply(Protocol):
         """Lay a board down; gives the reason if there is no room for it."""
         ...
 
-    def position(self, thing: Thing) -> tuple[float, float, float]:
-        """Give where a board lies."""
+    def pose(self, thing: Thing) -> Matrix | None:
+        """Give where a board lies; nothing for one that is still to come."""
         ...
 
 
@@ -97,9 +97,9 @@ class Magazine:
         self._refilled_at = self._now
         return None
 
-    def position(self, thing: Thing) -> tuple[float, float, float]:  # noqa: ARG002 - all at one place
+    def pose(self, thing: Thing) -> Matrix | None:  # noqa: ARG002 - all at one place
         """Give the pick place."""
-        return self._feeder.pose.position
+        return self._feeder.pose.matrix()
 
 
 class BoardBelt:
@@ -186,8 +186,6 @@ class BoardBelt:
         self._on = sorted([*self._on, (thing, s)], key=lambda placed: -placed[1])
         return None
 
-    def position(self, thing: Thing) -> tuple[float, float, float]:
-        """Give where a board lies; one in the loader is at the belt's beginning."""
-        s = next((s for other, s in self._on if other is thing), -self._belt.length)
-        x, y, z = self._pose(s)[:3, 3]
-        return float(x), float(y), float(z)
+    def pose(self, thing: Thing) -> Matrix | None:
+        """Give where a board lies on the belt."""
+        return next((self._pose(s) for other, s in self._on if other is thing), None)

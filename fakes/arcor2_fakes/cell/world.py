@@ -10,6 +10,7 @@ import numpy as np
 from transforms3d.affines import compose
 from transforms3d.euler import euler2mat
 
+from arcor2_fakes.cell import sight
 from arcor2_fakes.cell.boards import Board
 from arcor2_fakes.cell.labelling import LabelNest
 from arcor2_fakes.cell.layout import Layout, Matrix
@@ -324,17 +325,41 @@ class World:
             **self._stations(),
         }
 
-    def _position(self, thing: Thing) -> tuple[float, float, float] | None:
+    def pose(self, thing: Thing) -> Matrix | None:
+        """Give where a board is; nothing for one that is still to come or was taken away."""
         if thing is self._held:
-            x, y, z = (self._tip() @ self._tip_from_board)[:3, 3]
-            return float(x), float(y), float(z)
+            held: Matrix = self._tip() @ self._tip_from_board
+            return held
         if thing.place in ("feeder", "belt"):
-            return self._supply.position(thing)
+            return self._supply.pose(thing)
         layout = self._layout
         places = {"tester": layout.tester, "good": layout.good_box, "bad": layout.bad_box}
         if layout.labelling is not None:
             places["label"] = layout.labelling.place
-        return places[thing.place].pose.position if thing.place in places else thing.position
+        if thing.place in places:
+            return places[thing.place].pose.matrix()
+        return None if thing.position is None else compose(thing.position, np.eye(3), np.ones(3))
+
+    def _position(self, thing: Thing) -> tuple[float, float, float] | None:
+        pose = self.pose(thing)
+        return None if pose is None else (float(pose[0, 3]), float(pose[1, 3]), float(pose[2, 3]))
+
+    def seen(self) -> dict[str, dict[str, Any]]:
+        """Give what stands before the camera by name, as a fake camera takes it; nothing where there is none."""
+        camera = self._layout.camera
+        if camera is None:
+            return {}
+        found = {thing["name"]: thing for thing in sight.fixed(camera)}
+        piles: Counter[str] = Counter()
+        for thing in self._things:
+            if (pose := self.pose(thing)) is None:
+                continue
+            if thing.place in ("good", "bad"):
+                pose = pose.copy()
+                pose[2, 3] += piles[thing.place] * camera.board[2]
+                piles[thing.place] += 1
+            found[thing.board.code] = sight.board(camera, thing.board.code, pose, thing.label is not None)
+        return found
 
     def _stations(self) -> dict[str, Any]:
         """Give what only some cells have."""

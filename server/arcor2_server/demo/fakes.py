@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from msgspec import Struct
 
-from arcor2_server.demo.processes import ChildFailed
+from arcor2_server.demo.processes import ChildFailed, python_module
 from arcor2_server.demo.workplace import Scalar
 
 Ready = Mapping[str, Any]
@@ -17,13 +17,15 @@ Ready = Mapping[str, Any]
 
 _UR_PORTS: Final = (30004, 30003, 29999)
 _FAST_TESTER: Final = 3.0
+_PICTURES: Final = ("--width", "640", "--height", "360", "--fps", "5")
+"""Enough to see boards on the belt; a whole cell has to fit on two cores."""
 
 
 class Fake(Struct, frozen=True):
     """A fake: its name in the demo, its module, and what it is started with.
 
     `wire` is what its ready line calls its wire; `settings` gives what the scene's settings call it. `role` is what the
-    small world calls it; empty when the world has nothing to do with it.
+    small world calls it; empty when the world has nothing to do with it. One that computes much gives way to others.
     """
 
     name: str
@@ -32,6 +34,12 @@ class Fake(Struct, frozen=True):
     wire: str
     settings: Callable[[Ready], dict[str, Scalar]]
     role: str = ""
+    gives_way: bool = False
+
+    def command(self) -> list[str]:
+        """Give the command that starts it."""
+        first = ["nice", "-n", "10"] if self.gives_way else []
+        return [*first, *python_module(self.module, *self.arguments, "--control", "127.0.0.1:0")]
 
 
 def _host_and_port(name: str, key: str) -> Callable[[Ready], dict[str, Scalar]]:
@@ -62,6 +70,7 @@ def fakes(boards: int, seed: int, fast: bool) -> list[Fake]:
             "printer", "arcor2_fakes.label_printer", ("--tcp", loopback), "port", _plain("printer", "port"), "printer"
         ),
         Fake("press", "arcor2_fakes.two_axis_robot", (), "port", _plain("press", "port"), "arm"),
+        Fake("camera", "arcor2_fakes.oak_d", _PICTURES, "stream", _plain("camera", "stream"), "camera", True),
         Fake("erp", "arcor2_fakes.erp", ("--order", order), "url", _plain("erp", "url")),
     ]
 

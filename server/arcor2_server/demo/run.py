@@ -160,10 +160,7 @@ class Demo:
                 *("--data-dir", str(self._data_dir)),
             ),
         )
-        children = [
-            self._child(fake.name, python_module(fake.module, *fake.arguments, "--control", "127.0.0.1:0"))
-            for fake in wanted
-        ]
+        children = [self._child(fake.name, fake.command()) for fake in wanted]
         async with asyncio.TaskGroup() as starts:
             found = [starts.create_task(child.start_json()) for child in children]
             serving = starts.create_task(server.start())

@@ -121,16 +121,19 @@ class Creation:
         """Close what the server reopened from a run that was cut off; edits that nobody saved are let go."""
         with contextlib.suppress(RequestFailed):  # none is open
             await self._client.call("CloseProject", rpc.CloseProjectArgs(force=True))
+            await self._client.next_event("ProjectClosed")  # with it goes what was told of the document before
         with contextlib.suppress(RequestFailed):
             await self._client.call("CloseScene", rpc.CloseSceneArgs(force=True))
+            await self._client.next_event("SceneClosed")
 
     # ------------------------------------------------------------------------------------------------ scene
-    def _settings(self, obj: Object) -> list[Parameter]:
+    def _settings(self, obj: Object, kinds: dict[str, str]) -> list[Parameter]:
+        """Give an object's settings; `kinds` are the types that its object type declares for them."""
         settings = []
         for name, value in obj.settings.items():
             if isinstance(value, str) and value.startswith("$"):
                 value = self._addresses[value[1:]]
-            settings.append(Parameter(name, _KINDS[type(value)], _json(value)))
+            settings.append(Parameter(name, kinds.get(name, _KINDS[type(value)]), _json(value)))
         return settings
 
     async def open_scene(self) -> Scene:
@@ -143,8 +146,12 @@ class Creation:
         event = await self._client.next_event("OpenScene")
         scene: Scene = event.data.scene
         present = {obj.name: obj for obj in scene.objects}
+        declared = {
+            meta.type: {setting.name: setting.type for setting in meta.settings}
+            for meta in await self._client.call("GetObjectTypes")
+        }
         for obj in self._workplace.objects:
-            settings = self._settings(obj)
+            settings = self._settings(obj, declared.get(obj.type, {}))
             found = present.get(obj.name)
             if found is None:
                 pose = UNSET if obj.position is None else _pose(obj.position, obj.rotation)

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import arcor2_fakes.cell
+from arcor2_fakes.cell import sight
 from arcor2_fakes.cell.boards import Board
 from arcor2_fakes.cell.layout import Layout
 from arcor2_fakes.cell.supply import BoardBelt
@@ -323,3 +324,48 @@ def test_a_layout_that_makes_no_sense_is_refused(change: Any, names: str) -> Non
 def test_a_layout_says_which_devices_it_needs() -> None:
     assert LAYOUT.needs() == ["conveyor", "io", "printer", "arm"]
     assert msgspec.convert(PLAIN, Layout).needs() == []
+
+
+# ---------------------------------------------------------------------------------------------------- sight
+CAMERA = {
+    "pose": {"position": [0.4, -0.3, 0.7], "orientation": [1.0, 0.0, 0.0, 0.0]},
+    "board": [0.08, 0.06, 0.002],
+    "things": [{"name": "box", "pose": {"position": [0.2, 0.5, 0.02]}, "size": [0.2, 0.2, 0.04]}],
+}
+
+
+async def test_the_camera_sees_boards_where_they_are_and_those_in_a_box_piled_up() -> None:
+    cell = Cell()
+    cell.world = World(msgspec.convert({**WHOLE, "camera": CAMERA}, Layout), BOARDS, cell.devices)
+    await cell.world.begin()
+    await cell.run(0.7)
+    seen = cell.world.seen()
+    assert "box" in seen
+    assert seen["A"]["pose"]["position"] == pytest.approx([*STOP[:2], STOP[2] - 0.001])
+    await cell.carry(STOP, (0.2, 0.5, 0.06))
+    await cell.run(0.3)
+    await cell.carry(STOP, (0.2, 0.5, 0.06))
+    piled = [cell.world.seen()[code]["pose"]["position"][2] for code in "AB"]
+    assert piled == pytest.approx([0.059, 0.061])
+    await cell.world.remove("A")
+    assert "A" not in cell.world.seen()
+
+
+async def test_only_what_is_different_is_told_to_the_camera() -> None:
+    cell = Cell()
+    cell.world = World(msgspec.convert({**WHOLE, "camera": CAMERA}, Layout), BOARDS, cell.devices)
+    await cell.world.begin()
+    await cell.run(0.7)
+    before = cell.world.seen()
+    assert sight.changes(before, cell.world.seen()) == (False, {})
+    await cell.at(*STOP)
+    await cell.grip(True)
+    await cell.at(0.4, -0.2, 0.2)
+    others, moved = sight.changes(before, cell.world.seen())
+    assert (others, set(moved)) == (False, {"A"})
+    assert moved["A"]["position"] == pytest.approx([0.4, -0.2, 0.199])
+    await cell.at(*NEST)
+    await cell.grip(False)
+    before = cell.world.seen()
+    await cell.print("A")
+    assert sight.changes(before, cell.world.seen()) == (True, {})
