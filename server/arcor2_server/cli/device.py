@@ -18,6 +18,7 @@ from arcor2_server.cli.status import ExitStatus
 
 app = App(name="device", help="List the devices that can be used here, or show how those in operation are.")
 
+app.command("arcor2_server.cli.device_new:new", name="new")
 DEFAULT_URL: Final = "http://127.0.0.1:6789"
 PIPE_WIDTH: Final = 240
 TIMEOUT: Final = 5.0

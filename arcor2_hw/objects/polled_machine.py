@@ -1,0 +1,74 @@
+"""PolledMachine: a machine with the states of PackML whose state is read over and over. A mixin."""
+
+import abc
+from typing import TypeVar
+
+from arcor2_hw.exceptions import DeviceFault, Refused
+from arcor2_hw.objects.machine import ALLOWED, Machine, MachineCommand, MachineState
+from arcor2_hw.objects.polled import GoOn
+from arcor2_hw.objects.polled_control import PolledControl
+
+T = TypeVar("T")
+
+
+class PolledMachine(PolledControl[T], Machine):
+    """`class Press(PolledMachine[list[int]], Generic)`: a driver gives `state_of` and `write_command`."""
+
+    @abc.abstractmethod
+    def state_of(self, state: T) -> MachineState:
+        """Read the state of PackML from what was read."""
+
+    @abc.abstractmethod
+    def write_command(self, command: MachineCommand, *arguments: int) -> None:
+        """Write a command. Raises DeviceError."""
+
+    def machine_state(self) -> MachineState:
+        """Tell the present state. Raises NotConnected, ConnectionLost, Stale."""
+        return self.state_of(self.current())
+
+    def command(self, command: MachineCommand) -> None:
+        """Give a command. Raises Refused naming command and state, NotInControl."""
+        self._command(command)
+
+    def wait_for(self, state: MachineState, timeout: float) -> None:
+        """Return when the unit is in `state`. Raises DeviceTimeout after `timeout` s, DeviceFault when it aborts."""
+
+        def there(read: T) -> bool:
+            found = self.state_of(read)
+            if found is MachineState.ABORTED and state is not found:
+                raise DeviceFault(f"{self._link.who} has aborted", fault_code=self.fault_of(read))
+            return found is state
+
+        self._polled.wait(there, timeout, f"becoming {state.name}")
+
+    def run(self, timeout: float, go_on: GoOn, *arguments: int) -> T:
+        """Start, from wherever a reset leads to, and give what is read when it is complete. Within an `act`.
+
+        Raises DeviceFault when it ends in another state than Complete or Idle, DeviceTimeout after `timeout` s.
+        """
+        if self.state_of(self.fresh()) in ALLOWED[MachineCommand.RESET]:
+            self._command(MachineCommand.RESET, go_on=go_on)
+            self.wait(lambda read: self.state_of(read) is MachineState.IDLE, timeout, "resetting", go_on)
+        self._command(MachineCommand.START, *arguments, go_on=go_on)
+        end = self.wait(lambda read: not self.is_busy(read), timeout, "running", go_on)
+        if (state := self.state_of(end)) not in (MachineState.COMPLETE, MachineState.IDLE):
+            raise DeviceFault(f"{self._link.who} did not finish: it is {state.name}", fault_code=self.fault_of(end))
+        return end
+
+    # -------------------------------------------------------------------------------- hooks of PolledControl
+    def is_busy(self, state: T) -> bool:
+        """Tell whether the unit does something: any state but those that it can stay in."""
+        return self.state_of(state) not in _STAYS
+
+    def send_stop(self) -> None:
+        """Stop, where the state allows it."""
+        self.write_command(MachineCommand.STOP)
+
+    def _command(self, command: MachineCommand, *arguments: int, go_on: GoOn | None = None) -> None:
+        if (state := self.state_of(self.fresh())) not in ALLOWED[command]:
+            raise Refused(f"{self._link.who}: {command.name} is not allowed in {state.name}")
+        self.send(command.name, lambda: self.write_command(command, *arguments), go_on)
+
+
+_S = MachineState
+_STAYS = frozenset({_S.STOPPED, _S.IDLE, _S.SUSPENDED, _S.ABORTED, _S.HELD, _S.COMPLETE})

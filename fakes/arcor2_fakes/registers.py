@@ -1,0 +1,255 @@
+"""A fake that is a handful of registers: its process, its wire (Modbus, a text line, HTTP), faults and truth.
+
+A fake of a device of one's own is a class with `words`, `write` and `heard`; `serve` does the rest. The codecs stand
+here; a text or HTTP protocol of another kind is spoken by giving `answer` another function.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import sys
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from arcor2_fakes.control import ControlServer, parse_address
+from arcor2_fakes.process import announce, run, until_told_to_end
+from arcor2_fakes.serial_line import Line, PtyLine, TcpLine
+from arcor2_fakes.wire import Connection, TcpWire, register_faults
+
+READ_INPUT, WRITE_ONE, WRITE_SEVERAL = 4, 6, 16
+MAX_LINE = 4096
+Answer = Callable[["Registers", bytes], bytes]
+"""Takes a request and gives the answer; both are whole lines without their end, or for HTTP whole messages."""
+
+
+class Refusal(Exception):
+    """The device refuses what is written, in its present state."""
+
+
+class Registers(Protocol):
+    """The device: words that are read, words that are written."""
+
+    written: list[list[int]]
+    """All that was ever written: address, values."""
+
+    def words(self) -> list[int]:
+        """Give what is read, 16 bit each, at this moment."""
+        ...
+
+    def write(self, address: int, values: list[int]) -> None:
+        """Take what is written. Raises Refusal."""
+        ...
+
+    def heard(self) -> None:
+        """Note that the host spoke."""
+        ...
+
+
+def answer_line(device: Registers, line: bytes) -> bytes:
+    """Speak the starter's text protocol: `R first count` gives `= words`, `W first words` gives OK or ERR."""
+    try:
+        verb, first, *rest = line.decode("ascii").split()
+        numbers = [int(part) for part in rest]
+        if verb == "R" and len(numbers) == 1:
+            words = device.words()[int(first) : int(first) + numbers[0]]
+            return " ".join(["=", *map(str, words)]).encode()
+        if verb == "W" and numbers:
+            device.write(int(first), numbers)
+            return b"OK"
+    except (ValueError, UnicodeDecodeError):
+        return b"ERR syntax"
+    except Refusal as e:
+        return f"ERR {e}".encode()
+    return b"ERR syntax"
+
+
+def answer_http(device: Registers, request: bytes) -> bytes:
+    """Speak the starter's HTTP: `GET /registers` gives a list of words, `PUT /registers/FIRST` takes one."""
+    head, _, body = request.partition(b"\r\n\r\n")
+    method, path, *_ = head.split(b"\r\n", 1)[0].decode("latin-1").split(" ")
+    status, content = "404 Not Found", json.dumps({"error": "no such path"})
+    if (method, path) == ("GET", "/registers"):
+        status, content = "200 OK", json.dumps(device.words())
+    elif method == "PUT" and path.startswith("/registers/"):
+        try:
+            device.write(int(path.rpartition("/")[2]), [int(value) for value in json.loads(body)])
+            status, content = "200 OK", "{}"
+        except Refusal as e:
+            status, content = "409 Conflict", json.dumps({"error": str(e)})
+        except (ValueError, TypeError):
+            status, content = "400 Bad Request", json.dumps({"error": "not a list of words"})
+    return (
+        f"HTTP/1.1 {status}\r\nContent-Type: application/json\r\nContent-Length: {len(content)}\r\n\r\n{content}"
+    ).encode()
+
+
+def http_length(buffer: bytes) -> int | None:
+    """Give the length of the first whole HTTP request of a buffer, None while it is not whole."""
+    end = buffer.find(b"\r\n\r\n")
+    if end < 0:
+        return None
+    lengths = [
+        int(line.split(b":")[1]) for line in buffer[:end].split(b"\r\n") if line.lower().startswith(b"content-length:")
+    ]
+    whole = end + 4 + (lengths[0] if lengths else 0)
+    return whole if len(buffer) >= whole else None
+
+
+def line_length(buffer: bytes) -> int | None:
+    """Give the length of the first line of a buffer with its CR, None while there is no whole one."""
+    end = buffer.find(b"\r")
+    return None if end < 0 else end + 1
+
+
+def cut(
+    device: Registers, answer: Answer, length: Callable[[bytes], int | None], send: Callable[[bytes], Any], end: bytes
+) -> Callable[[bytes], None]:
+    """Give what takes bytes as they come, and answers each whole request."""
+    buffer = bytearray()
+
+    def received(data: bytes) -> None:
+        buffer.extend(data)
+        if len(buffer) > MAX_LINE:
+            buffer.clear()  # no request is so long: noise
+        while (taken := length(bytes(buffer))) is not None:
+            request = bytes(buffer[:taken]).strip(b"\r\n") if end else bytes(buffer[:taken])
+            del buffer[:taken]
+            device.heard()
+            send(answer(device, request) + end)
+
+    return received
+
+
+class _ModbusOnto(asyncio.Transport):
+    """What pymodbus takes for its transport."""
+
+    def __init__(self, connection: Connection) -> None:
+        super().__init__()
+        self._connection = connection
+
+    def write(self, data: bytes | bytearray | memoryview) -> None:
+        self._connection.send(bytes(data))
+
+    def close(self) -> None:
+        self._connection.close()
+
+    def is_closing(self) -> bool:
+        return not self._connection.alive
+
+
+def modbus_wire(device: Registers, host: str, port: int) -> TcpWire:
+    """Give a Modbus TCP port: `words` are its input registers, `write` takes its holding registers."""
+    from pymodbus.constants import ExcCodes
+    from pymodbus.server import ModbusTcpServer
+    from pymodbus.simulator import DataType, SimData, SimDevice
+
+    size = len(device.words())
+
+    async def access(
+        function: int,
+        start: int,  # noqa: ARG001
+        address: int,
+        count: int,  # noqa: ARG001
+        registers: list[int],
+        values: list[int] | list[bool] | None,
+    ) -> ExcCodes | None:
+        device.heard()
+        if function in (WRITE_ONE, WRITE_SEVERAL) and values is not None:
+            try:
+                device.write(address, [int(value) for value in values])
+            except Refusal:
+                return ExcCodes.DEVICE_BUSY
+        elif function == READ_INPUT:
+            registers[:size] = device.words()
+        return None
+
+    bits = [SimData(0, values=[False], datatype=DataType.BITS)]
+    holding = [SimData(0, values=[0] * 64, datatype=DataType.REGISTERS)]
+    inputs = [SimData(0, values=[0] * size, datatype=DataType.REGISTERS)]
+    server = ModbusTcpServer(SimDevice(1, simdata=(bits, bits, holding, inputs), action=access))
+
+    def opened(connection: Connection) -> None:
+        protocol = server.handle_new_connection()
+        protocol.connection_made(_ModbusOnto(connection))
+        connection.received = protocol.data_received
+        connection.closed = lambda: protocol.connection_lost(None)
+
+    return TcpWire("wire", host, port, opened)
+
+
+def http_wire(device: Registers, answer: Answer, host: str, port: int) -> TcpWire:
+    """Give an HTTP port."""
+
+    def opened(connection: Connection) -> None:
+        connection.received = cut(device, answer, http_length, connection.send, b"")
+
+    return TcpWire("wire", host, port, opened)
+
+
+def text_line(device: Registers, answer: Answer, host: str, port: int, serial: bool) -> Line:
+    """Give a text line: a pty, or a TCP port."""
+    received = cut(device, answer, line_length, lambda frame: line.send(frame), b"\r")
+    line: Line = PtyLine(received) if serial else TcpLine(received, host, port)
+    return line
+
+
+def serve(
+    name: str,
+    make: Callable[[], Registers],
+    truth: Callable[[Any], dict[str, Any]],
+    bus: str,
+    commands: Callable[[Any], dict[str, Callable[..., Any]]] = lambda _: {},
+    answer: Answer | None = None,
+) -> int:
+    """Run the fake of a device until it is told to end; gives the exit status.
+
+    bus: modbus, serial, tcp or http. truth: what is really so, for tests. commands: what the world does to the device,
+    by the name under which the control channel calls it. answer: the codec of a text or HTTP protocol of one's own.
+    """
+    parser = argparse.ArgumentParser(prog=name, description=f"Fake {name} on {bus}.")
+    parser.add_argument("--host", default="127.0.0.1")
+    parser.add_argument("--port", type=int, default=0, help="0 takes a free one")
+    parser.add_argument("--control", default="127.0.0.1:0", help="HOST:PORT of the control channel")
+    options = parser.parse_args()
+    try:
+        control_host, control_port = parse_address(options.control)
+    except ValueError as e:
+        sys.stderr.write(f"{name}: {e}\n")
+        return 2
+
+    async def body() -> None:
+        device = make()
+        channel = ControlServer(control_host, control_port)
+        line: Line | None = None
+        wire: TcpWire | None = None
+        if bus in ("serial", "tcp"):
+            line = text_line(device, answer or answer_line, options.host, options.port, bus == "serial")
+            await line.plug()
+            register_faults(channel, {"wire": line})
+        else:
+            wire = (
+                modbus_wire(device, options.host, options.port)
+                if bus == "modbus"
+                else http_wire(device, answer or answer_http, options.host, options.port)
+            )
+            await wire.listen()
+            register_faults(channel, {"wire": wire})
+        channel.source("truth", lambda: truth(device) | {"written": device.written})
+        for command, act in commands(device).items():
+            channel.command(command, act)
+        try:
+            address = (
+                line.port.removeprefix("socket://") if line is not None else wire.address if wire is not None else ""
+            )
+            announce(name=name, address=address, control=await channel.start())
+            await until_told_to_end()
+        finally:
+            if line is not None:
+                await line.unplug()
+            if wire is not None:
+                wire.close()
+            await channel.close()
+
+    return run(body, name)

@@ -1,0 +1,372 @@
+"""`arcor2-hw device new`: a driver, a fake, a test and a page of one's own, which pass the suite as written."""
+
+import enum
+import keyword
+import re
+import sys
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+from typing import Annotated, Final, NamedTuple
+
+from cyclopts import Parameter
+
+from arcor2_server.cli.status import ExitStatus
+
+LONGEST_NAME: Final = 24
+STARTER: Final = files("arcor2_server.cli") / "starter"
+"""Where the templates lie."""
+
+
+class Base(enum.StrEnum):
+    """What kind of device it is."""
+
+    MACHINE = "machine"
+    ROBOT = "robot"
+    CAMERA = "camera"
+    GRIPPER = "gripper"
+    IOBLOCK = "ioblock"
+    AXIS = "axis"
+    READER = "reader"
+    SCALE = "scale"
+    PRINTER = "printer"
+    GENERIC = "generic"
+
+
+class Bus(enum.StrEnum):
+    """How it is spoken to."""
+
+    MODBUS = "modbus"
+    SERIAL = "serial"
+    TCP = "tcp"
+    CAN = "can"
+    HTTP = "http"
+
+
+class Wire(NamedTuple):
+    """What a bus brings into the texts.
+
+    fields: settings as name, type, default (empty: none), description. address: the settings of a test, from `address`.
+    """
+
+    title: str
+    library: str
+    extra: str
+    fields: tuple[tuple[str, str, str, str], ...]
+    address: str
+    absent: str
+    check: str
+
+
+HOST: Final = "host, int(port)"
+_PORT_CHECK: Final = "        check_host(self.host, self.port)"
+
+WIRES: Final = {
+    Bus.MODBUS: Wire(
+        "Modbus TCP",
+        "pymodbus 3.16",
+        "[modbus]",
+        (("host", "str", "", "address or name of the device"), ("port", "int", "502", "port of its Modbus server")),
+        HOST,
+        "127.0.0.1:1",
+        _PORT_CHECK,
+    ),
+    Bus.TCP: Wire(
+        "lines of text over TCP",
+        "none",
+        "",
+        (("host", "str", "", "address or name of the device"), ("port", "int", "4001", "port it listens on")),
+        HOST,
+        "127.0.0.1:1",
+        _PORT_CHECK,
+    ),
+    Bus.SERIAL: Wire(
+        "lines of text on a serial port",
+        "pyserial 3.5",
+        "[serial]",
+        (("port", "str", "", "path of the serial port"), ("baud_rate", "int", "9600", "bits per second")),
+        "address",
+        "/dev/does-not-exist",
+        """        if not self.port.strip():
+            raise OutOfRange("port must be the path of a serial port")
+        if not 300 <= self.baud_rate <= 921600:
+            raise OutOfRange(f"baud_rate must be 300 to 921600, not {self.baud_rate!r}")""",
+    ),
+    Bus.HTTP: Wire(
+        "HTTP",
+        "httpx 0.28",
+        "",
+        (("url", "str", "", "where the device is, as http://192.168.0.7"),),
+        'f"http://{address}"',
+        "127.0.0.1:1",
+        """        if not self.url.startswith(("http://", "https://")):
+            raise OutOfRange(f"url must begin with http:// or https://, not {self.url!r}")""",
+    ),
+}
+
+
+class Kind(NamedTuple):
+    """What a base brings into the texts.
+
+    observe, ask, command, run_long: what the suite's bench calls; run_long is empty where nothing takes its time.
+    """
+
+    actions: str
+    observe: str
+    ask: str
+    command: str
+    run_long: str
+    on_loss: str
+    words: str
+    writes: str
+    does: str
+    own_test: str
+    reset: str = ""
+
+
+_NO_ACT: Final = "the device does nothing that takes its time"
+STATUS: Final = "state (0 idle, 1 busy)"
+COMMON_WORDS: Final = "fault (0: none), owner (0 nobody, 1 the host, 2 the panel)"
+
+KINDS: Final = {
+    Base.MACHINE: Kind(
+        "process",
+        "machine_state()",
+        "fresh()",
+        "command(MachineCommand.RESET)",
+        "process(8.0)",
+        "none",
+        f"state (PackML), tenths done, pieces done, {COMMON_WORDS}",
+        "command (PackML) and with a start the tenths to do; register 2: ms of silence after which it stops, 0 lets go",
+        "`process` does one piece of work: it resets the machine where necessary, starts it and waits for its end.",
+        """def test_pieces_are_counted(bench):
+    device = bench.controlled()
+    assert device.process(0.4) == 1
+    assert device.process(0.4) == 2
+    assert device.machine_state() is MachineState.COMPLETE
+
+
+def test_a_command_that_the_state_forbids_is_refused_naming_both(bench):
+    device = bench.controlled()
+    with pytest.raises(Refused, match="CLEAR is not allowed in STOPPED"):
+        device.command(MachineCommand.CLEAR)
+""",
+        """        self.do("rest")
+""",
+    ),
+    Base.GENERIC: Kind(
+        "work",
+        "current()",
+        "fresh()",
+        'send("a reset", lambda: device._io.$write(0, 3))',
+        "work(8.0)",
+        "none",
+        f"{STATUS}, tenths done, pieces done, {COMMON_WORDS}",
+        "1 go and the tenths to do, 2 stop, 3 reset; register 2: ms of silence after which it stops, 0 lets go",
+        "`work` does one piece of work and waits for its end.",
+        """def test_work_that_is_done_is_told(bench):
+    device = bench.controlled()
+    assert device.work(0.4) == 0.4
+""",
+        """        self.do("rest")
+""",
+    ),
+}
+NO_SENSE: Final = {
+    Base.ROBOT: "a robot needs its model and its kinematics: start from the robot that is most like yours "
+    "(drivers/arcor2_drivers/dobot_magician, universal_robots)",
+    Base.CAMERA: "a camera is reached by its maker's library, not by a bus: start from drivers/arcor2_drivers/oak_d",
+}
+CAN_HAS_ITS_OWN: Final = (
+    "what a CAN device is, its object dictionary says: start from drivers/arcor2_drivers/conveyor, which has CANopen's "
+    "SDO, PDO, heartbeat and EMCY"
+)
+NOT_WRITTEN: Final = "there is no starter for this base yet: take --base generic, or the driver that is most like yours"
+
+
+def refusal(base: Base, bus: Bus) -> str:
+    """Give why there is nothing to write for a base on a bus; empty when there is."""
+    if base in NO_SENSE:
+        return NO_SENSE[base]
+    if bus not in WIRES:
+        return CAN_HAS_ITS_OWN
+    return "" if base in KINDS else NOT_WRITTEN
+
+
+def new(
+    name: Annotated[
+        str, Parameter(help="Of the device, in lower case: it names the folder, the module and the class.")
+    ],
+    *,
+    base: Annotated[Base, Parameter(help="What kind of device it is.")],
+    bus: Annotated[Bus, Parameter(help="How it is spoken to.")],
+    directory: Annotated[Path, Parameter(help="Where the folder of that name is made.")] = Path(),
+) -> int:
+    """Write the driver of a device of your own, with a fake, a test and a page; all of it passes the suite at once."""
+    module = name.replace("-", "_")
+    if not re.fullmatch(rf"[a-z][a-z0-9_]{{0,{LONGEST_NAME - 1}}}", module) or keyword.iskeyword(module):
+        told = f"take up to {LONGEST_NAME} lower-case letters, digits and _"
+        sys.stderr.write(f"arcor2-hw device new: {name!r} cannot name a module: {told}\n")
+        return ExitStatus.USAGE
+    if reason := refusal(base, bus):
+        sys.stderr.write(f"arcor2-hw device new: {base} on {bus}: {reason}\n")
+        return ExitStatus.USAGE
+    root = directory / name
+    try:
+        root.mkdir(parents=True)
+        for path, text in texts(name, base, bus).items():
+            (root / path).parent.mkdir(parents=True, exist_ok=True)
+            (root / path).write_text(text, encoding="utf-8")
+    except FileExistsError:
+        sys.stderr.write(f"arcor2-hw device new: {root} is there already\n")
+        return ExitStatus.USAGE
+    except OSError as error:
+        sys.stderr.write(f"arcor2-hw device new: {root} cannot be written: {error.strerror}\n")
+        return ExitStatus.FAILED
+    sys.stdout.write(f"{root} is written. Try it:  cd {root} && python -m pytest\n")
+    return ExitStatus.OK
+
+
+def texts(name: str, base: Base, bus: Bus) -> dict[str, str]:
+    """Give the files of a new device by their path."""
+    module = name.replace("-", "_")
+    words = _words(name, module, base, bus)
+    words["control"] = _fill("control.txt", words)
+    words["long"] = _fill("long.txt", words) if KINDS[base].run_long else ""
+    found = {
+        f"{module}/__init__.py": f'"""{words["A_title"]}."""\n',
+        f"{module}/{module}.py": _fill(f"driver_{base}.py", words),
+        f"{module}/{module}_fake.py": _fill(f"fake_{base}.py", words),
+        f"{module}/quality.yaml": _fill("quality.yaml", words),
+        f"tests/test_{module}.py": _fill("test.py", words),
+        f"docs/{name}.md": _fill("page.md", words),
+        "pyproject.toml": _fill("pyproject.toml", words),
+        "cell.yaml": _fill("cell.yaml", words),
+    }
+    if bus is not Bus.MODBUS:
+        found[f"{module}/link.py"] = _fill(f"link_{bus}.py", words)
+    return found
+
+
+def _fill(template: str, words: dict[str, str]) -> str:
+    return Template((STARTER / f"{template}.tmpl").read_text(encoding="utf-8")).substitute(words)
+
+
+def _words(name: str, module: str, base: Base, bus: Bus) -> dict[str, str]:
+    """Give what stands for what in the templates."""
+    kind, wire = KINDS[base], WIRES[bus]
+    class_name = "".join(part.capitalize() for part in module.split("_"))
+    title = module.replace("_", " ")
+    article = "an" if title[0] in "aeiou" else "a"
+    modbus = bus is Bus.MODBUS
+    names = [field[0] for field in wire.fields]
+    made = ", ".join(f"settings.{field}" for field in names)
+    lines = [f"    {n}: {t}" + (f" = {d}" if d else "") for n, t, d, _ in wire.fields]
+    settings = "\n".join(
+        [
+            "@dataclasses.dataclass",
+            f"class {class_name}Settings(Settings):",
+            '    """Where the device is.',
+            "",
+            *(f"    :param {n}: {text}" for n, _, _, text in wire.fields),
+            '    """',
+            "",
+            *lines,
+            "",
+            "    def __post_init__(self) -> None:",
+            wire.check,
+            "",
+        ]
+    )
+    build = [
+        *(['host, _, port = address.rpartition(":")'] if wire.address == HOST else []),
+        f"settings = {class_name}Settings({wire.address})",
+    ]
+    made_in_test = "\n".join(f"    {line}" for line in [*build, f'return {class_name}("id", "{module}", settings)'])
+    example = {"host": "192.168.0.7", "url": "http://192.168.0.7", "port": "/dev/ttyUSB0" if bus is Bus.SERIAL else ""}
+    cell = [f"    {n}: {example.get(n) or d}" for n, _, d, _ in wire.fields]
+    write = "write_registers" if modbus else "write"
+    not_run = "" if kind.run_long else _not_run()
+    orphan = "" if not kind.run_long else _orphan(module, class_name, build, kind.run_long)
+    return {
+        "name": name,
+        "module": module,
+        "Class": class_name,
+        "title": title,
+        "a_title": f"{article} {title}",
+        "A_title": f"{article.capitalize()} {title}",
+        "bus": bus.value,
+        "wire": wire.title,
+        "library": wire.library,
+        "extra": wire.extra,
+        "read": "read_input_registers" if modbus else "read",
+        "write": write,
+        "link_import": "from arcor2_hw.objects.modbus_link import ModbusLink\n" if modbus else "",
+        "own_link_import": "" if modbus else "\nfrom .link import Link\n",
+        "link_make": f"ModbusLink(name, {made}, request_timeout=0.25)" if modbus else f"Link(name, {made})",
+        "settings_class": settings,
+        "build": made_in_test,
+        "orphan": orphan,
+        "absent": wire.absent,
+        "reset": kind.reset,
+        "observe": kind.observe,
+        "ask": kind.ask,
+        "command": Template(kind.command).substitute(write=write),
+        "run_long": kind.run_long,
+        "own_test": kind.own_test,
+        "imports": _imports(base),
+        "settings_import": "from arcor2_hw.objects.settings import check_host\n" if wire.address == HOST else "",
+        "exceptions": "" if wire.address == HOST else "from arcor2_hw.exceptions import OutOfRange\n",
+        "fault_exceptions": "from arcor2_hw.exceptions import DeviceFault"
+        + ("\n" if wire.address == HOST else ", OutOfRange\n"),
+        "actions": kind.actions,
+        "on_loss": kind.on_loss,
+        "loss_case": "test_loss_reaction" if kind.run_long else "test_control_does_not_come_back",
+        "loss_sentence": "it stops when it has not heard from us for half a second.",
+        "not_run": not_run,
+        "settings_table": "\n".join(
+            ["| setting | default | meaning |", "|---|---|---|"]
+            + [f"| `{n}` | {d or '–'} | {text} |" for n, _, d, text in wire.fields]
+        ),
+        "map": f"Read: {kind.words}. Written: register 0, {kind.writes}.",
+        "does": kind.does,
+        "cell_settings": "\n".join(cell),
+    }
+
+
+def _imports(base: Base) -> str:
+    lines = [
+        "import pytest",
+        "from arcor2_fakes.control import BlockingControlClient",
+        "from arcor2_hw.testing.bench import Bench",
+        "from arcor2_hw.testing.conformance import Conformance",
+    ]
+    if base is Base.MACHINE:
+        lines += [
+            "from arcor2_hw.exceptions import Refused",
+            "from arcor2_hw.objects import MachineCommand, MachineState",
+        ]
+    return "".join(
+        f"{line}\n" for line in sorted(lines, key=lambda line: (line.split()[0] != "import", line.split()[1]))
+    )
+
+
+def _orphan(module: str, class_name: str, build: list[str], run_long: str) -> str:
+    lines = "\n".join(build).replace('"', "'")
+    return f'''ORPHAN = """
+import sys
+from {module}.{module} import {class_name}, {class_name}Settings
+address = sys.argv[1]
+{lines}
+device = {class_name}('id', '{module}', settings)
+device.connect()
+device.take_control()
+device.{run_long}
+"""
+
+'''
+
+
+def _not_run() -> str:
+    cases = ("nothing_resumes", "loss_reaction", "stop_passes", "one_act_at_a_time", "disconnecting_ends_an_act")
+    return "\n".join(["not_run:", *(f"  {case}: {_NO_ACT}" for case in cases)])

@@ -1,0 +1,140 @@
+"""`arcor2-hw device new`: what it writes passes the suite, the linter and the analysis as it is written."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from arcor2_hw.data.cell import read_cell
+from arcor2_server.cli.device_new import KINDS, WIRES, Base, Bus, refusal, texts
+
+pytestmark = pytest.mark.timeout(180)
+COMMAND = [sys.executable, "-m", "arcor2_server.cli.main"]
+ROOT = Path(__file__).parents[3]
+RUN = [
+    (Base.MACHINE, Bus.MODBUS),
+    (Base.GENERIC, Bus.TCP),
+    (Base.GENERIC, Bus.SERIAL),
+    (Base.MACHINE, Bus.HTTP),
+]
+"""What is run here in full; every other combination is linted and analysed."""
+ALL = [(base, bus) for base in KINDS for bus in WIRES]
+
+
+def written(directory: Path, base: Base, bus: Bus, name: str = "dough-mixer") -> Path:
+    done = subprocess.run(
+        [*COMMAND, "device", "new", name, "--base", base, "--bus", bus, "--directory", str(directory)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return directory / name
+
+
+def lines(path: Path) -> int:
+    """The lines that somebody has to write: all but the empty ones."""
+    return sum(bool(line.strip()) for line in path.read_text().splitlines())
+
+
+@pytest.mark.parametrize(("base", "bus"), RUN, ids=lambda each: each.value)
+def test_the_suite_passes_at_once(tmp_path: Path, base: Base, bus: Bus) -> None:
+    root = written(tmp_path, base, bus)
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-rs"],
+        cwd=root,
+        env=os.environ,
+        capture_output=True,
+        text=True,
+        timeout=150,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout[-6000:]
+    found = re.search(r"(\d+) passed", done.stdout)
+    assert found is not None
+    assert int(found.group(1)) >= 19, "the cases of the suite, and the driver's own"
+    assert "skipped" not in done.stdout, "everything that the suite knows is shown"
+
+
+@pytest.mark.parametrize(("base", "bus"), ALL, ids=lambda each: each.value)
+@pytest.mark.parametrize("name", ["x", "feeder-of-small-round-pins"[:24]])
+def test_it_is_clean_python_whatever_its_name(tmp_path: Path, base: Base, bus: Bus, name: str) -> None:
+    for path, text in texts(name, base, bus).items():
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_text(text)
+        assert "$" not in text, path
+    for command in (["check"], ["format", "--check"]):
+        done = subprocess.run(
+            [sys.executable, "-m", "ruff", *command, "--no-cache", "."],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+    (device,) = read_cell(tmp_path / "cell.yaml").devices
+    assert device.name == name.replace("-", "_")
+
+
+def test_a_modbus_machine_takes_sixty_lines_of_each_in_three_files(tmp_path: Path) -> None:
+    root = written(tmp_path, Base.MACHINE, Bus.MODBUS, "press")
+    by_hand = [root / "press" / "press.py", root / "press" / "press_fake.py", root / "tests" / "test_press.py"]
+    assert sorted(path for path in root.rglob("*.py") if path.name != "__init__.py") == sorted(by_hand)
+    assert lines(by_hand[0]) <= 60
+    assert lines(by_hand[1]) <= 60
+
+
+def test_the_driver_is_typed(tmp_path: Path) -> None:
+    root = written(tmp_path, Base.MACHINE, Bus.MODBUS, "press")
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", "--strict", "--python-version", "3.11", "press/press.py"],
+        cwd=root,
+        env=os.environ | {"MYPYPATH": str(ROOT), "MYPY_CACHE_DIR": str(tmp_path / "mypy")},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["arm", "--base", "robot", "--bus", "modbus"], "a robot needs its model"),
+        (["eye", "--base", "camera", "--bus", "serial"], "a camera is reached by its maker's library"),
+        (["belt", "--base", "machine", "--bus", "can"], "object dictionary"),
+        (["Press!", "--base", "machine", "--bus", "modbus"], "cannot name a module"),
+        (["class", "--base", "machine", "--bus", "modbus"], "cannot name a module"),
+        (["press", "--base", "lamp", "--bus", "modbus"], "lamp"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_in_a_sentence(tmp_path: Path, arguments: list[str], said: str) -> None:
+    done = subprocess.run(
+        [*COMMAND, "device", "new", *arguments, "--directory", str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_nothing_is_overwritten(tmp_path: Path) -> None:
+    written(tmp_path, Base.GENERIC, Bus.HTTP, "scanner")
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    again = [*COMMAND, "device", "new", "scanner", "--base", "machine", "--bus", "tcp", "--directory", str(tmp_path)]
+    done = subprocess.run(again, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "is there already" in done.stderr
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+def test_every_combination_is_written_or_refused() -> None:
+    for base in Base:
+        for bus in Bus:
+            assert bool(refusal(base, bus)) is ((base, bus) not in ALL)
