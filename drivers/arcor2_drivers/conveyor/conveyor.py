@@ -111,7 +111,7 @@ class Conveyor(Machine, Axis):
             return
         losses, link = self._observer.losses, self._observer.link
         if (owner := self._other_owner(now, link.read(cia402.CONSUMER_HEARTBEAT))) is not None:
-            raise NotInControl(f"{self._who}: control is refused in state {now.power}: {owner}")
+            raise NotInControl(f"{self._who}: control is refused in state {now.power}: {owner} has it")
         s = self._units
         armed = (
             (cia402.CONSUMER_HEARTBEAT, s.master_id << 16 | s.heartbeat_ms),
@@ -153,15 +153,15 @@ class Conveyor(Machine, Axis):
         if self._in_control:
             return "us"
         newest = self._observer.newest()
-        return "somebody who enabled the drive" if newest is not None and newest.power is Power.ENABLED else None
+        return None if newest is None else self._other_owner(newest, self._observer.consumer)
 
     def _other_owner(self, now: State, consumer: int) -> str | None:
         master, limit = consumer >> 16 & 0x7F, consumer & 0xFFFF
         if limit and self._observer.heard(master, limit / 1000.0):
-            return f"node {master} has it, the drive listens for its heartbeat"
+            return f"node {master}, whose heartbeat the drive listens for,"
         if self._observer.heard(self._units.master_id, LONGEST_HEARTBEAT / 1000.0):
-            return f"another host sends heartbeats as node {self._units.master_id}"
-        return "somebody has enabled the drive" if now.power is Power.ENABLED else None
+            return f"another host, which sends heartbeats as node {self._units.master_id} too,"
+        return "somebody who enabled the drive" if now.power is Power.ENABLED else None
 
     def _disarm(self) -> None:
         link = self._observer.link

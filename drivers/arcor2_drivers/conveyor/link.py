@@ -6,7 +6,6 @@ import socket
 import struct
 import threading
 import time
-import urllib.parse
 from collections.abc import Callable
 from typing import Any, Final
 
@@ -20,6 +19,7 @@ from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, Devic
 
 from .cia402 import Entry
 from .settings import CanInterface, ConveyorSettings
+from .socketcand import SocketcandBus
 
 LOOK: Final = 0.05
 """s the receiver waits for a frame before it looks whether it should end."""
@@ -85,15 +85,14 @@ class CanLink:
         """Open the bus within `timeout` s; the drive is not asked anything. Raises NotConnected, DeviceTimeout."""
         self.close()
         settings = self._settings
-        if settings.channel.startswith("socket://"):
-            self._reach(timeout)
-        options: dict[str, Any] = {}
-        if settings.interface is CanInterface.SLCAN:
-            options = {"bitrate": settings.bitrate, "sleep_after_open": 0.0, "timeout": LOOK}
         try:
-            bus = can.Bus(channel=settings.channel, interface=settings.interface.value, **options)
+            bus = self._connected(timeout)
+        except (TimeoutError, can.CanTimeoutError) as error:
+            raise DeviceTimeout(
+                f"{self.who}: the CAN adapter cannot be reached within {timeout:.1f} s", str(error)
+            ) from error
         except (can.CanError, OSError, ValueError) as error:
-            raise NotConnected(f"{self.who}: the CAN bus cannot be opened", str(error)) from error
+            raise NotConnected(f"{self.who}: the CAN adapter cannot be reached", str(error)) from error
         self._bus, self.loss = bus, None
         network = _Network(bus)
         self._network = network
@@ -107,15 +106,18 @@ class CanLink:
         )
         self._receiver.start()
 
-    def _reach(self, timeout: float) -> None:
-        """See that somebody listens: pyserial itself waits five seconds for that, whatever it is told."""
-        where = urllib.parse.urlsplit(self._settings.channel)
-        try:
-            socket.create_connection((where.hostname or "", where.port or 0), timeout).close()
-        except TimeoutError:
-            raise DeviceTimeout(f"{self.who}: the CAN adapter cannot be reached within {timeout:.1f} s") from None
-        except OSError as error:
-            raise NotConnected(f"{self.who}: the CAN adapter cannot be reached", str(error)) from error
+    def _connected(self, timeout: float) -> can.BusABC:
+        settings = self._settings
+        options: dict[str, Any] = {}
+        if settings.channel.startswith("socket://"):
+            host, port, name = settings.server
+            if settings.interface is CanInterface.SOCKETCAND:
+                return SocketcandBus(name, host, port, timeout)
+            # See that somebody listens: pyserial itself waits five seconds for that, whatever it is told.
+            socket.create_connection((host, port), timeout).close()
+        if settings.interface is CanInterface.SLCAN:
+            options = {"bitrate": settings.bitrate, "sleep_after_open": 0.0, "timeout": LOOK}
+        return can.Bus(channel=settings.channel, interface=settings.interface.value, **options)
 
     def close(self) -> None:
         """Close; harmless when closed."""
@@ -125,6 +127,9 @@ class CanLink:
         bus, self._bus, network = self._bus, None, self._network
         port = getattr(bus, "serialPortOrig", None)
         raw = getattr(port, "_socket", None)
+        if isinstance(bus, SocketcandBus):
+            with contextlib.suppress(OSError):  # the other end was quicker
+                bus.wake()
         if isinstance(bus, slcanBus) and raw is not None:
             with contextlib.suppress(can.CanError, OSError):
                 bus.close()  # the adapter's channel

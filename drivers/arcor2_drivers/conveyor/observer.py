@@ -47,6 +47,8 @@ class Observer(Polled[State]):
         self.emergency = 0
         """Code of the newest EMCY that was not taken back."""
         self.emergency_since: Timestamp = now()
+        self.consumer = 0
+        """1016h:01 as last read: node and ms of the heartbeat that the drive listens for."""
         self.nmt: int | None = None
         """NMT state of the drive by its heartbeat: 5 Operational, 127 Pre-operational, 4 Stopped; None: never heard."""
         self.pdos = pdo.PdoState(settings.node_id)
@@ -135,6 +137,7 @@ class Observer(Polled[State]):
 
     def _ask(self) -> State:
         read = self.link.read
+        self.consumer = read(cia402.CONSUMER_HEARTBEAT)
         values = [
             read(entry)
             for entry in (

@@ -22,6 +22,7 @@ class CanInterface(StrEnum):
 
     SLCAN = "slcan"
     SOCKETCAN = "socketcan"
+    SOCKETCAND = "socketcand"
 
 
 def _within(name: str, value: float, low: float, high: float) -> None:
@@ -33,7 +34,8 @@ def _within(name: str, value: float, low: float, high: float) -> None:
 class ConveyorSettings(Settings):
     """Where the drive is, and what its counts mean.
 
-    :param channel: for slcan socket://host:port or a serial port, for socketcan the network interface
+    :param channel: for slcan socket://host:port or a serial port; for socketcan the network interface; for socketcand
+        socket://host:port/bus, as socket://10.0.0.2:29536/can0
     :param interface: how the bus is reached
     :param bitrate: bit/s of the bus; slcan only, a network interface is set up by its owner
     :param node_id: CANopen node id of the drive
@@ -79,6 +81,10 @@ class ConveyorSettings(Settings):
             raise OutOfRange("channel must be socket://host:port, a serial port, or a network interface")
         if self.channel.startswith("socket://"):
             self._check_socket()
+        if self.interface is CanInterface.SOCKETCAND and not (
+            self.channel.startswith("socket://") and self.server[2].isidentifier()
+        ):
+            raise OutOfRange(f"channel must be socket://host:port/bus for socketcand, not {self.channel!r}")
         if self.bitrate not in (10000, 20000, 50000, 100000, 125000, 250000, 500000, 800000, 1000000):
             raise OutOfRange(f"bitrate must be one of CiA 301 such as 500000, not {self.bitrate!r}")
         _within("node_id", self.node_id, 1, 127)
@@ -113,6 +119,12 @@ class ConveyorSettings(Settings):
             complete = False
         if not complete:
             raise OutOfRange(f"channel must be socket://host:port, not {self.channel!r}")
+
+    @property
+    def server(self) -> tuple[str, int, str]:
+        """Give host, port and bus of a channel that is a socket."""
+        where = urllib.parse.urlsplit(self.channel)
+        return where.hostname or "", where.port or 0, where.path.strip("/")
 
     def counts(self, value: float) -> int:
         """Give m, m/s as the drive counts them."""

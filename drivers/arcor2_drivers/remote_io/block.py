@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from arcor2_hw.exceptions import (
-    Cancelled,
     ConnectionLost,
     DeviceError,
     DeviceFault,
@@ -87,7 +86,8 @@ class Block(Polled[Image]):
             name: Debounced(name, point.io.debounce) for name, point in points.items() if point.kind in ("DI", "DO")
         }
         self._edges: list[Edge] = []
-        self._commands = threading.Lock()
+        self._commands, self._one_pulse = threading.Lock(), threading.Lock()
+        self._pulsing: set[int] = set()
         self._armed = 0.0
         self._triggered = 0.0
         self.in_control = False
@@ -197,22 +197,35 @@ class Block(Polled[Image]):
         point = self.point(name, "DO")
         within(f"{self.who}: duration", duration, 0.01, LONGEST_PULSE)
         self.require_control(f"pulsing {name}")
+        go_on = self.begin(f"the pulse of {name}")
+        with self._one_pulse:
+            if point.channel in self._pulsing:
+                raise Refused(f"{self.who}: pulsing {name} is refused while it is being pulsed")
+            self._pulsing.add(point.channel)
+
+        def over(image: Image) -> bool:
+            self.require_control(f"the pulse of {name}")
+            return not image.digital("DO", point.channel)
+
         try:
-            self._pulse(point, duration)
-        except (Cancelled, DeviceTimeout):
+            with self._one_pulse:
+                go_on()
+                self.link.write_registers(PULSE + point.channel, round(1000.0 * duration))
+            self.wait(over, duration + self._patience, f"the pulse of {name}", go_on)
+        except DeviceTimeout:
             with contextlib.suppress(DeviceError):  # the block ends it by itself
                 self.link.write_registers(PULSE + point.channel, 0)
             raise
+        finally:
+            self._pulsing.discard(point.channel)
 
-    def _pulse(self, point: Point, duration: float) -> None:
-        go_on = self.begin(f"the pulse of {point.io.name}")
-        self.link.write_registers(PULSE + point.channel, round(1000.0 * duration))
-
-        def over(image: Image) -> bool:
-            self.require_control(f"the pulse of {point.io.name}")
-            return not image.digital("DO", point.channel)
-
-        self.wait(over, duration + self._patience, f"the pulse of {point.io.name}", go_on)
+    def stop(self) -> None:
+        """End whatever waits, with Cancelled, and return when the outputs that were being pulsed are off."""
+        self.stop_waiting()
+        with self._one_pulse:
+            # What is not yet begun will not begin any more, see `pulse`.
+            for channel in sorted(self._pulsing):
+                self.link.write_registers(PULSE + channel, 0)
 
     def set_again(self, name: str, value: bool) -> None:
         """Switch a digital output; a second time when no answer came. Only where doing it twice does no harm."""

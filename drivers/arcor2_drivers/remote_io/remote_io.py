@@ -135,7 +135,7 @@ class RemoteIO(IOBlock):
 
     def stop(self) -> None:
         """End what waits here with Cancelled, and a pulse with its output off. No other output changes."""
-        self._block.stop_waiting()
+        self._block.stop()
 
     # -------------------------------------------------------------------------------- actions
     @action

@@ -125,7 +125,7 @@ class TowerLight(Generic):
 
     def stop(self) -> None:
         """End a sound of the buzzer; the lamps stay as they are."""
-        self._block.stop_waiting()
+        self._block.stop()
 
     # -------------------------------------------------------------------------------- actions
     @action

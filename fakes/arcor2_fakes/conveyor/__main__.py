@@ -12,10 +12,11 @@ from cyclopts import App, Parameter, validators
 from arcor2_fakes.control import ControlServer, parse_address
 from arcor2_fakes.conveyor.hub import Hub
 from arcor2_fakes.conveyor.node import Node
+from arcor2_fakes.conveyor.socketcand import Server
 from arcor2_fakes.process import announce, run, until_told_to_end
 from arcor2_fakes.wire import register_faults
 
-app = App(name="arcor2_fakes.conveyor", help="Fake conveyor: CiA 402 drive on CAN by slcan over TCP.", version_flags=[])
+app = App(name="arcor2_fakes.conveyor", help="Fake conveyor: CiA 402 drive on CAN.", version_flags=[])
 
 
 def register_commands(control: ControlServer, node: Node) -> None:
@@ -55,6 +56,7 @@ def main(
     *,
     host: str = "127.0.0.1",
     port: int = 0,
+    socketcand_port: int = 0,
     control: str = "127.0.0.1:0",
     node: Annotated[int, Parameter(validator=validators.Number(gte=1, lte=126))] = 5,
 ) -> int:
@@ -63,6 +65,7 @@ def main(
     Args:
         host: address the CAN adapters are served on.
         port: port they are served on; 0 takes a free one.
+        socketcand_port: port on which the same bus is served by socketcand, as can0; 0 takes a free one.
         control: HOST:PORT of the control channel; port 0 takes a free one.
         node: CANopen node id of the drive.
     """
@@ -74,22 +77,31 @@ def main(
 
     async def body() -> None:
         hub = Hub(host, port)
+        daemon = Server(hub, host, socketcand_port)
         drive = Node(hub, node)
         channel = ControlServer(control_host, control_port)
         register_commands(channel, drive)
-        register_faults(channel, {"can": hub.wire})
+        register_faults(channel, {"can": hub.wire, "socketcand": daemon.wire})
         channel.source("truth", drive.truth)
-        channel.source("motion", lambda: {"belt": drive.drive.belt})  # small: the world asks for it a hundred times a s
+        channel.source("motion", drive.motion)
         await hub.wire.listen()
+        await daemon.wire.listen()
         life = asyncio.create_task(drive.run())
         try:
-            announce(name="conveyor", can=hub.wire.address, node=node, control=await channel.start())
+            announce(
+                name="conveyor",
+                can=hub.wire.address,
+                socketcand=daemon.wire.address,
+                node=node,
+                control=await channel.start(),
+            )
             await until_told_to_end()
         finally:
             life.cancel()
             with contextlib.suppress(asyncio.CancelledError):
                 await asyncio.gather(life)
             hub.wire.close()
+            daemon.wire.close()
             await channel.close()
 
     return run(body, "conveyor")

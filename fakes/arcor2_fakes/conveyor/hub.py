@@ -6,6 +6,7 @@ import re
 import time
 from collections import deque
 from collections.abc import Callable
+from typing import Protocol
 
 from arcor2_fakes.wire import Connection, TcpWire
 
@@ -16,6 +17,14 @@ _FIRST_PDO, _FIRST_SDO = 0x180, 0x580
 _DATA_FRAME = re.compile(rb"t([0-7][0-9A-Fa-f]{2})([0-8])((?:[0-9A-Fa-f]{2})*)")
 
 Receive = Callable[[int, bytes], None]
+
+
+class Member(Protocol):
+    """Who hangs on the bus."""
+
+    def deliver(self, identifier: int, data: bytes) -> None:
+        """Take a frame that another has sent."""
+        ...
 
 
 class Adapter:
@@ -66,7 +75,7 @@ class Hub:
 
     def __init__(self, host: str, port: int) -> None:
         self.wire = TcpWire("can", host, port, self._opened)
-        self.adapters: set[Adapter] = set()
+        self.adapters: set[Member] = set()
         self.frames: deque[dict[str, object]] = deque(maxlen=_FRAMES_KEPT)
         self._listeners: list[Receive] = []
 
@@ -74,7 +83,7 @@ class Hub:
         """Have `receive` called with every frame that an adapter sends."""
         self._listeners.append(receive)
 
-    def transmit(self, identifier: int, data: bytes, sender: Adapter | None = None) -> None:
+    def transmit(self, identifier: int, data: bytes, sender: Member | None = None) -> None:
         """Put a frame on the bus; without a sender it is the drive's."""
         if not _FIRST_PDO <= identifier < _FIRST_SDO:  # they would push out all others
             self.frames.append(

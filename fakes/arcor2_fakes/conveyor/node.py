@@ -195,6 +195,10 @@ class Node:
         return bytes([toggle | (7 - len(part)) << 1 | (not rest)]) + part.ljust(7, b"\0")
 
     # -------------------------------------------------------------------------------- truth
+    def motion(self) -> dict[str, float]:
+        """Give where the belt is and how fast it goes, in counts: for a world that asks a hundred times a second."""
+        return {"belt": self.drive.belt, "velocity": self.drive.velocity}
+
     def truth(self) -> dict[str, Any]:
         """Give what is really so, whatever the wire says."""
         drive = self.drive

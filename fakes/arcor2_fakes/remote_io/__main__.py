@@ -31,6 +31,12 @@ def truth(block: Block) -> dict[str, Any]:
     }
 
 
+def outputs(block: Block) -> dict[str, Any]:
+    """Give the outputs alone, for a world that asks a hundred times a second."""
+    block.advance()
+    return {"outputs": list(block.outputs), "analog_outputs": list(block.analog_outputs)}
+
+
 def register_commands(control: ControlServer, block: Block, port: TcpPort | SerialPort) -> None:
     """Make what the world can do to the block known to the control channel."""
 
@@ -38,6 +44,14 @@ def register_commands(control: ControlServer, block: Block, port: TcpPort | Seri
         if number not in range(DIGITAL):
             raise ValueError(f"number is 0 to {DIGITAL - 1}")
         block.inputs[number] = bool(on)
+
+    def set_inputs(inputs: dict[str, bool]) -> None:
+        """Switch several inputs at one instant, as {"3": true}."""
+        wanted = {int(number): bool(on) for number, on in inputs.items()}
+        if not wanted.keys() <= set(range(DIGITAL)):
+            raise ValueError(f"numbers are 0 to {DIGITAL - 1}")
+        for number, on in wanted.items():
+            block.inputs[number] = on
 
     def set_analog(number: int, raw: int) -> None:
         if number not in range(ANALOG_IN) or not -32768 <= raw <= 32767:
@@ -59,6 +73,7 @@ def register_commands(control: ControlServer, block: Block, port: TcpPort | Seri
 
     control.command("renew", renew)
     control.command("set_input", set_input)
+    control.command("set_inputs", set_inputs)
     control.command("set_analog", set_analog)
     control.command("diagnosis", diagnosis)
     control.command("power_cycle", power_cycle)
@@ -88,6 +103,7 @@ def main(*, host: str = "127.0.0.1", port: int = 0, serial: bool = False, contro
         register_commands(channel, block, modbus)
         register_faults(channel, {"modbus": modbus}, checked=("modbus",) if serial else ())
         channel.source("truth", lambda: truth(block))
+        channel.source("outputs", lambda: outputs(block))
         await modbus.open()
         try:
             announce(name="remote_io", modbus=modbus.address, control=await channel.start())
