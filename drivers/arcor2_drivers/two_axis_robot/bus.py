@@ -40,20 +40,34 @@ class _Port(PortHandler):  # type: ignore[misc]
     """The library's port, waiting instead of spinning."""
 
     until = 0.0
+    patience = 0.0
+    """ms that an answer may keep us waiting for its first byte; the library's 34 are few on a busy computer."""
+    heard = False
 
     def readPort(self, length: int) -> bytes:  # noqa: N802 - the library's name
         if time.monotonic() > self.until:
             raise _Endless
         found: bytes = self.ser.read(max(length, 0))
+        self.heard = self.heard or bool(found)
         return found
+
+    def isPacketTimeout(self) -> bool:  # noqa: N802 - the library's name
+        if not self.heard and self.getTimeSinceStart() <= self.patience:
+            return False
+        late: bool = super().isPacketTimeout()
+        return late
 
 
 class Bus:
-    """Two servos on one serial port. Each exchange is one instruction and its answers."""
+    """Two servos on one serial port. Each exchange is one instruction and its answers.
 
-    def __init__(self, name: str, port: str, baud_rate: int) -> None:
+    `patience` is how long the first byte of an answer is waited for at least, s.
+    """
+
+    def __init__(self, name: str, port: str, baud_rate: int, patience: float = 0.0) -> None:
         self.who = f"{name} at {port}"
         self._name, self._path, self._baud_rate = name, port, baud_rate
+        self._patience = patience
         self._port: _Port | None = None
         self._packets: Any = PacketHandler(2.0)
 
@@ -64,6 +78,7 @@ class Bus:
     def open(self) -> None:
         """Open the port for us alone. Raises NotConnected naming it."""
         port = _Port(self._path)
+        port.patience = 1000.0 * self._patience
         try:
             port.baudrate = self._baud_rate
             port.openPort()
@@ -90,7 +105,7 @@ class Bus:
         port = self._port
         if port is None:
             raise NotConnected(f"{self.who} is not connected")
-        port.until = time.monotonic() + LONGEST
+        port.until, port.heard = time.monotonic() + LONGEST, False
         try:
             yield port
         except (OSError, termios.error) as e:

@@ -23,6 +23,8 @@ QUIET_PERIOD: Final = 0.03
 FRESH: Final = 0.25
 """s after which a state is too old."""
 JOB_TIMEOUT: Final = 1.5
+PATIENCE: Final = 0.35
+"""Part of the servos' watchdog for which an answer is waited for: a reading asked for twice must not trip it."""
 TURNS: Final = 0.02
 """s for which velocity 0 must be told to count as standing: a joint that turns back tells it too."""
 JITTERS: Final = 0.1
@@ -48,7 +50,7 @@ class Observer:
     """Observes both servos. Reading them is what keeps their bus watchdog quiet."""
 
     def __init__(self, name: str, settings: TwoAxisRobotSettings, lost: Callable[[DeviceError], None]) -> None:
-        self.bus = Bus(name, settings.port, settings.baud_rate)
+        self.bus = Bus(name, settings.port, settings.baud_rate, PATIENCE * settings.watchdog)
         self.who = self.bus.who
         self.setups: tuple[ServoSetup, ...] = ()
         self.losses = 0
