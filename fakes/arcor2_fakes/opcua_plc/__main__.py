@@ -159,8 +159,8 @@ async def make_server(user: str, password: str, certificate: Path | None, key: P
     await server.set_build_info("urn:arcor2-hw:fake-plc", "ARCOR2-HW", "Fake PLC 1500", "2.9", "7", datetime.now(UTC))
     policies = [ua.SecurityPolicyType.NoSecurity]
     if certificate is not None and key is not None:
-        await server.load_certificate(str(certificate))
-        await server.load_private_key(str(key))
+        await server.load_certificate(certificate)
+        await server.load_private_key(key, format="pem")
         policies = [
             ua.SecurityPolicyType.Basic256Sha256_Sign,
             ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt,

@@ -1,0 +1,297 @@
+"""One connection to an OPC UA server: asyncua's client on a thread and loop of its own, typed errors at its edge."""
+
+import asyncio
+import concurrent.futures
+import contextlib
+import logging
+import threading
+from collections.abc import Callable, Coroutine, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+from asyncua import Client, ua
+from asyncua.common.subscription import DataChangeNotif
+from asyncua.crypto import security_policies, uacrypto
+from cryptography import x509
+
+from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotConnected, Refused
+
+from .settings import OpcUaPlcSettings, Security
+
+T = TypeVar("T")
+
+PUBLISHING: Final = 50.0
+"""ms between two messages of the subscription."""
+SAMPLING: Final = 20.0
+"""ms between two looks of the server at a value."""
+KEEP_ALIVE: Final = 10
+"""Publishing intervals after which a subscription without news says so."""
+LIFETIME: Final = 200
+QUEUE: Final = 32
+"""Changes of one value that the server keeps between two messages."""
+SESSION: Final = 30_000
+"""ms a server keeps a session of which it hears nothing."""
+LAST_WORD: Final = 0.3
+"""s the server has to take note that we leave."""
+JOIN: Final = 1.0
+
+_POLICIES: Final[dict[str, Any]] = {
+    "basic256sha256": security_policies.SecurityPolicyBasic256Sha256,
+    "aes128_sha256": security_policies.SecurityPolicyAes128Sha256RsaOaep,
+    "aes256_sha256": security_policies.SecurityPolicyAes256Sha256RsaPss,
+}
+_BROKEN: Final = ("BadConnection", "BadSession", "BadSecureChannel", "BadServerNotConnected", "BadTcp", "BadShutdown")
+"""How the names of statuses begin that mean that the connection is of no use any more."""
+_DOORS: Final = ("BadUserAccessDenied", "BadIdentityToken", "BadCertificate", "BadSecurity")
+
+Changed = Callable[[str, ua.DataValue], None]
+
+
+def status_name(value: ua.DataValue) -> str:
+    """Give the name of a value's status."""
+    return "Good" if value.StatusCode is None else str(value.StatusCode.name)
+
+
+# What it logs with a stack at each broken connection is raised here as one typed error.
+logging.getLogger("asyncua").setLevel(logging.CRITICAL)
+
+
+class _Handler:
+    """Takes the subscription's news on the link's thread."""
+
+    def __init__(self, names: Mapping[ua.NodeId, list[str]], changed: Changed) -> None:
+        self._names, self._changed = names, changed
+
+    def datachange_notification(self, node: Any, val: Any, data: DataChangeNotif) -> None:
+        """Pass a new value on to whoever has the node under a name."""
+        for name in self._names.get(node.nodeid, ()):
+            self._changed(name, data.monitored_item.Value)
+
+    def status_change_notification(self, status: ua.StatusChangeNotification) -> None:
+        """Be told that the server ended the subscription: it falls silent then, which `Link.broken` finds."""
+
+
+class Link:
+    """A connection. Opened once and closed once; after a loss there is a new one.
+
+    nodes: node ids by our names. changed: called on the link's thread with each new value of `watched` names.
+    """
+
+    def __init__(
+        self,
+        who: str,
+        settings: OpcUaPlcSettings,
+        nodes: Mapping[str, str],
+        watched: Sequence[str],
+        changed: Changed,
+    ) -> None:
+        self._who, self._settings, self._watched, self._changed = who, settings, watched, changed
+        self.nodes = {name: ua.NodeId.from_string(text) for name, text in nodes.items()}
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._run, name=f"OPC UA {who}", daemon=True)
+        self._client: Client | None = None
+        self._subscription: Any = None
+        self._up = False
+
+    # -------------------------------------------------------------------------------- life
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        try:
+            self._loop.run_forever()
+        finally:
+            left = asyncio.all_tasks(self._loop)
+            for task in left:
+                task.cancel()
+            self._loop.run_until_complete(asyncio.gather(*left, return_exceptions=True))
+            self._loop.run_until_complete(self._loop.shutdown_default_executor())
+            self._loop.close()
+
+    def open(self, timeout: float) -> None:
+        """Open a session. Raises NotConnected, DeviceTimeout, Refused, DeviceFault naming a node."""
+        self._thread.start()
+        try:
+            self._call(self._connect(), timeout, f"connecting within {timeout:.1f} s")
+        except ConnectionLost as e:
+            raise NotConnected(f"{self._who} cannot be reached", e.detail) from e
+        self._up = True
+
+    async def _connect(self) -> None:
+        settings = self._settings
+        client = Client(settings.url, timeout=settings.request_timeout)
+        client.session_timeout = SESSION
+        client.name = client.description = "ARCOR2-HW"
+        self._client = client
+        if settings.user:
+            client.set_user(settings.user)
+            client.set_password(await asyncio.to_thread(_password, self._who, settings.password_file))
+        if settings.security is not Security.NONE:
+            await self._secure(client)
+        await client.connect()
+
+    def watch(self) -> None:
+        """Subscribe to the values of the watched names. Raises DeviceTimeout, ConnectionLost, DeviceFault."""
+        self._call(self._subscribe(), 2.0 * self._settings.request_timeout, "subscribing")
+
+    async def _subscribe(self) -> None:
+        client = self._client
+        assert client is not None
+        parameters = ua.CreateSubscriptionParameters()
+        parameters.RequestedPublishingInterval = PUBLISHING
+        parameters.RequestedMaxKeepAliveCount = ua.UInt32(KEEP_ALIVE)
+        parameters.RequestedLifetimeCount = ua.UInt32(LIFETIME)
+        names: dict[ua.NodeId, list[str]] = {}
+        for name in self._watched:
+            names.setdefault(self.nodes[name], []).append(name)
+        self._subscription = await client.create_subscription(parameters, _Handler(names, self._changed))
+        made = await self._subscription.subscribe_data_change(
+            [client.get_node(node) for node in names], queuesize=QUEUE, sampling_interval=SAMPLING
+        )
+        for node, result in zip(names, made, strict=True):
+            if isinstance(result, ua.StatusCode):
+                raise DeviceFault(f"{self._who}: {names[node][0]} ({node.to_string()}) {result.name}", "", result.name)
+
+    async def _secure(self, client: Client) -> None:
+        settings = self._settings
+        policy, _, mode = settings.security.rpartition("_")
+        try:
+            names = (settings.client_certificate, settings.client_key, settings.server_certificate)
+            ours, key, theirs = [await asyncio.to_thread(_properties, name) for name in names]
+            content = ours.path_or_content
+            assert isinstance(content, bytes)
+            load = x509.load_pem_x509_certificate if b"-----BEGIN" in content else x509.load_der_x509_certificate
+            others = load(content).extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+            uris = others.get_values_for_type(x509.UniformResourceIdentifier)
+            client.application_uri = uris[0] if uris else client.application_uri  # a server compares the two
+            await client.set_security(
+                _POLICIES[policy],
+                ours,
+                key,
+                server_certificate=theirs,
+                mode=ua.MessageSecurityMode.Sign if mode == "sign" else ua.MessageSecurityMode.SignAndEncrypt,
+            )
+        except (OSError, ValueError, TypeError, x509.ExtensionNotFound) as e:
+            what = "client_certificate, client_key or server_certificate cannot be used"
+            raise NotConnected(f"{self._who}: {what}", str(e)) from e
+
+    def close(self) -> None:
+        """Close; whoever waits for an answer gets ConnectionLost."""
+        if not self._thread.is_alive():
+            if not self._loop.is_closed():
+                self._loop.close()
+            return
+        up, self._up = self._up, False
+        with contextlib.suppress(DeviceError):
+            self._call(self._leave(up), 2.0 * LAST_WORD, "leaving")
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join(JOIN)
+
+    async def _leave(self, up: bool) -> None:
+        client = self._client
+        if client is None:
+            return
+        try:
+            if up and self.broken is None:
+                async with asyncio.timeout(LAST_WORD):
+                    await client.close_session()
+                    await client.close_secure_channel()
+        except (TimeoutError, OSError, ua.UaError):
+            pass  # the server ends the session by itself
+        finally:
+            client.disconnect_socket()
+
+    @property
+    def broken(self) -> str | None:
+        """Tell why the subscription brings nothing any more; None when it does."""
+        subscription = self._subscription
+        if subscription is not None and subscription.is_stale(3.0):
+            return "the subscription has fallen silent"
+        return None
+
+    # -------------------------------------------------------------------------------- requests
+    def read(self, names: Sequence[str], attribute: Any = ua.AttributeIds.Value) -> list[ua.DataValue]:
+        """Read now. Raises DeviceTimeout, ConnectionLost, DeviceFault."""
+
+        async def ask() -> list[ua.DataValue]:
+            found: list[ua.DataValue] = await self._session().read_attributes(
+                [self.nodes[name] for name in names], attribute
+            )
+            return found
+
+        return self._call(ask(), self._settings.request_timeout, f"reading {', '.join(names[:5])}")
+
+    def read_standard(self, number: int) -> Any:
+        """Read a variable of the standard's own (OPC 10000-5) by its number."""
+
+        async def ask() -> Any:
+            (found,) = await self._session().read_attributes([ua.NodeId(ua.Int32(number))], ua.AttributeIds.Value)
+            return None if found.Value is None else found.Value.Value
+
+        return self._call(ask(), self._settings.request_timeout, "reading about itself")
+
+    def write(self, values: Mapping[str, ua.Variant], timeout: float = 0.0) -> None:
+        """Write in the order given, in one request. Raises Refused naming what the server refuses."""
+
+        async def ask() -> list[ua.StatusCode]:
+            given = [ua.DataValue(value) for value in values.values()]
+            found: list[ua.StatusCode] = await self._session().write_attributes(
+                [self.nodes[name] for name in values], given, ua.AttributeIds.Value
+            )
+            return found
+
+        limit = timeout or self._settings.request_timeout
+        for name, status in zip(values, self._call(ask(), limit, f"writing {', '.join(values)}"), strict=True):
+            if not status.is_good():
+                raise Refused(
+                    f"{self._who}: writing {name} ({self.nodes[name].to_string()}): {status.name}", status.name
+                )
+
+    def _session(self) -> Any:
+        if self._client is None:
+            raise NotConnected(f"{self._who} is not connected")
+        return self._client.uaclient
+
+    def _call(self, work: Coroutine[Any, Any, T], timeout: float, what: str) -> T:
+        async def limited() -> T:
+            async with asyncio.timeout(timeout):
+                return await work
+
+        try:
+            future = asyncio.run_coroutine_threadsafe(limited(), self._loop)
+        except RuntimeError as e:  # the loop is closed
+            work.close()
+            raise ConnectionLost(f"{self._who}: the connection was closed") from e
+        try:
+            return future.result(timeout + JOIN)
+        except DeviceError:
+            raise
+        except TimeoutError as e:  # the future's own and asyncio's are the same class
+            future.cancel()
+            raise DeviceTimeout(f"{self._who}: {what}: no answer within {timeout:g} s", str(e)) from e
+        except (concurrent.futures.CancelledError, OSError) as e:
+            raise ConnectionLost(f"{self._who}: {what}: the connection broke", str(e)) from e
+        except ua.UaStatusCodeError as e:
+            raise self._typed(type(e).__name__, what, e) from e
+        except ua.UaError as e:
+            raise ConnectionLost(f"{self._who}: {what}: no sensible answer", f"{type(e).__name__}: {e}") from e
+
+    def _typed(self, name: str, what: str, error: Exception) -> DeviceError:
+        if name == "BadTimeout" or name == "BadRequestTimeout":
+            return DeviceTimeout(f"{self._who}: {what}: no answer in time", str(error))
+        if name.startswith(_BROKEN):
+            return ConnectionLost(f"{self._who}: {what}: the connection broke", str(error))
+        if name.startswith(_DOORS):
+            return Refused(f"{self._who} does not let us in: {name}", str(error))
+        return DeviceFault(f"{self._who}: {what}: {name}", str(error), name)
+
+
+def _properties(file: str) -> uacrypto.CertProperties:
+    """Give a file to asyncua, which else takes it for PEM by its name alone."""
+    content = Path(file).read_bytes()
+    return uacrypto.CertProperties(content, extension="pem" if b"-----BEGIN" in content else "der")
+
+
+def _password(who: str, file: str) -> str:
+    try:
+        return Path(file).read_text("utf-8").rstrip("\r\n")
+    except (OSError, ValueError) as e:
+        raise NotConnected(f"{who}: password_file cannot be read", str(e)) from e

@@ -1,0 +1,69 @@
+"""Values between a program and OPC UA: types, ranges, quality. Pure."""
+
+import math
+from datetime import UTC
+from typing import Any, Final
+
+from asyncua import ua
+
+from arcor2_hw.data.base import Timestamp, now
+from arcor2_hw.data.device import Quality
+
+_T: Final = ua.VariantType
+INTEGERS: Final = {
+    _T.SByte: (-128, 127),
+    _T.Byte: (0, 255),
+    _T.Int16: (-(1 << 15), (1 << 15) - 1),
+    _T.UInt16: (0, (1 << 16) - 1),
+    _T.Int32: (-(1 << 31), (1 << 31) - 1),
+    _T.UInt32: (0, (1 << 32) - 1),
+    _T.Int64: (-(1 << 63), (1 << 63) - 1),
+    _T.UInt64: (0, (1 << 64) - 1),
+}
+FLOATS: Final = {_T.Float: 3.4028234663852886e38, _T.Double: math.inf}
+
+
+def type_of(value: ua.DataValue, data_type: ua.DataValue) -> ua.VariantType | None:
+    """Give a variable's type from its value or, when that has none, from its DataType attribute; None when unknown."""
+    if value.Value is not None and value.Value.VariantType is not _T.Null:
+        return None if value.Value.is_array else value.Value.VariantType
+    node = None if data_type.Value is None else data_type.Value.Value
+    if isinstance(node, ua.NodeId) and node.NamespaceIndex == 0:
+        try:
+            return _T(int(str(node.Identifier)))
+        except ValueError:
+            return None
+    return None
+
+
+def fits(kind: ua.VariantType | None, digital: bool) -> bool:
+    """Tell whether a variable of this type may be a point."""
+    return kind is _T.Boolean if digital else kind in INTEGERS or kind in FLOATS
+
+
+def quality(value: ua.DataValue) -> Quality:
+    """Give the quality of a value: the two upper bits of its status (OPC 10000-4, 7.39)."""
+    severity = 0 if value.StatusCode is None else int(value.StatusCode.value) >> 30
+    return (Quality.GOOD, Quality.UNCERTAIN, Quality.BAD, Quality.BAD)[severity]
+
+
+def stamp(value: ua.DataValue) -> Timestamp:
+    """Give when the source had the value; the server's time, or ours, where the source's is missing."""
+    time: Any = value.SourceTimestamp or value.ServerTimestamp
+    if time is None:
+        return now()
+    return str((time if time.tzinfo else time.replace(tzinfo=UTC)).isoformat(timespec="microseconds"))
+
+
+def raw(value: float, scale: float, kind: ua.VariantType) -> int | float:
+    """Give what is written for a physical value. Raises ValueError with the range."""
+    if kind in INTEGERS:
+        low, high = INTEGERS[kind]
+        number = value / scale
+        if not math.isfinite(number) or not low <= round(number) <= high:
+            ends = sorted((low * scale, high * scale))
+            raise ValueError(f"must be {ends[0]:g} to {ends[1]:g}")
+        return round(number)
+    if not math.isfinite(value) or abs(value / scale) > FLOATS[kind]:
+        raise ValueError("must be a finite number of its type")
+    return value / scale

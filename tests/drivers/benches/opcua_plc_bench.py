@@ -1,0 +1,93 @@
+"""The PLC on its fake: job 3 takes 20 s and is stopped by its request, and by our life sign's end."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from arcor2_drivers.opcua_plc.opcua_plc import OpcUaPlc
+from arcor2_drivers.opcua_plc.settings import OpcUaPlcSettings
+from arcor2_hw.objects import Generic
+from arcor2_hw.testing.bench import Bench
+from tests.fakes.conftest import FakeProcess
+
+POINTS = "part=DI ns=2;s=Cell.PartPresent | lamp=DO ns=2;s=Cell.Lamp on_loss=off | level=AI ns=2;s=Cell.Level"
+HANDSHAKE = (
+    "owner=ns=2;s=Handshake.Owner | host_life=ns=2;s=Handshake.HostLife | plc_life=ns=2;s=Handshake.PlcLife | "
+    "number=ns=2;s=Handshake.Number | request=ns=2;s=Handshake.Request | busy=ns=2;s=Handshake.Busy | "
+    "done=ns=2;s=Handshake.Done | error=ns=2;s=Handshake.Error | code=ns=2;s=Handshake.Code"
+)
+ORPHAN = """
+import sys
+from arcor2_drivers.opcua_plc.opcua_plc import OpcUaPlc
+from arcor2_drivers.opcua_plc.settings import OpcUaPlcSettings
+plc = OpcUaPlc("id", "orphan", OpcUaPlcSettings(*sys.argv[1:]))
+plc.connect()
+plc.take_control()
+plc.run_job(3)
+"""
+
+
+class OpcUaPlcBench(Bench):
+    object_type = OpcUaPlc
+    fake: FakeProcess
+
+    def start(self) -> None:
+        self.fake = FakeProcess("opcua_plc")
+        self.do = self.fake.control.do
+
+    def end(self) -> None:
+        self.fake.end()
+
+    def reset(self) -> None:
+        self.do("heal")
+        self.do("restart")
+
+    @property
+    def address(self) -> str:
+        return str(self.fake.ready["url"])
+
+    def make(self) -> OpcUaPlc:
+        return OpcUaPlc("plc_id", "plc", OpcUaPlcSettings(self.address, POINTS, HANDSHAKE))
+
+    def absent(self) -> tuple[Generic, str]:
+        url = "opc.tcp://127.0.0.1:1"
+        return OpcUaPlc("plc_id", "plc", OpcUaPlcSettings(url, POINTS, HANDSHAKE)), url
+
+    def writes(self) -> Any:
+        return self.fake.truth()["writes"]
+
+    def cut(self) -> None:
+        self.do("silence")
+
+    def heal(self) -> None:
+        self.do("heal")
+
+    def observe(self, device: Generic) -> object:
+        assert isinstance(device, OpcUaPlc)
+        return device.read("level")
+
+    def ask(self, device: Generic) -> object:
+        return self.observe(device)
+
+    def command(self, device: Generic) -> object:
+        assert isinstance(device, OpcUaPlc)
+        return device.write_digital("lamp", True)
+
+    def run_long(self, device: Generic) -> object:
+        assert isinstance(device, OpcUaPlc)
+        return device.run_job(3)
+
+    def running(self) -> bool:
+        return bool(self.fake.truth()["moving"])
+
+    @contextmanager
+    def foreign(self) -> Iterator[None]:
+        self.do("stranger", number=77)
+        try:
+            yield
+        finally:
+            self.do("stranger", number=0)
+
+    def orphan(self) -> list[str]:
+        return [sys.executable, "-c", ORPHAN, self.address, POINTS, HANDSHAKE]

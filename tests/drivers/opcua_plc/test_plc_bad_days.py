@@ -1,0 +1,132 @@
+"""Losses of every kind, and a program that stands."""
+
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from arcor2_drivers.opcua_plc.edges import Edge
+from arcor2_drivers.opcua_plc.opcua_plc import OpcUaPlc
+from arcor2_hw.data.device import Connection, Health
+from arcor2_hw.exceptions import (
+    ConnectionLost,
+    DeviceError,
+    DeviceTimeout,
+    NotConnected,
+    NotInControl,
+    Stale,
+)
+from tests.drivers.benches.opcua_plc_bench import ORPHAN
+from tests.drivers.opcua_plc.conftest import HANDSHAKE, POINTS, Beside
+from tests.fakes.conftest import FakeProcess
+
+UP = (Connection.ONLINE, Connection.BACK)
+
+
+@pytest.mark.parametrize("fault", ["silence", "reset", "half_frame", "garbage", "power_cycle"])
+def test_lost_in_a_job_and_back(
+    fake: FakeProcess, plc: OpcUaPlc, wait_for: Any, fault: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    edges: list[Edge] = []
+    plc.subscribe("part", edges.append)
+    running = Beside(lambda: plc.run_job(3))
+    fake.control.wait_until(lambda t: t["moving"])
+    fake.control.do(fault)
+    assert isinstance(running.outcome(10.0), DeviceError)
+    wait_for(lambda: plc.connection, lambda state: state not in (Connection.ONLINE,), 5.0)
+    fake.control.wait_until(lambda t: not t["moving"], 5.0)
+    fake.control.do("heal")
+    wait_for(lambda: plc.connection, lambda state: state is Connection.BACK, 10.0)
+    assert plc.control_owner() != "us"
+    with pytest.raises(NotInControl, match="control ended when the connection was lost"):
+        plc.write_digital("lamp", True)
+    time.sleep(0.3)
+    assert not fake.truth()["moving"], "it went on by itself"
+    fake.control.do("set", name="PartPresent", value=True)
+    wait_for(lambda: [edge.value for edge in edges], lambda values: values == [True])
+    fake.control.wait_until(lambda t: t["owner"] == 0)
+    plc.take_control()
+    plc.run_job(1)
+    assert sum(" lost: " in record.message for record in caplog.records) == 1
+    assert sum(" back after " in record.message for record in caplog.records) == 1
+
+
+def test_outputs_and_job_when_our_life_sign_ends(fake: FakeProcess) -> None:
+    process = subprocess.Popen([sys.executable, "-c", ORPHAN, fake.ready["url"], POINTS, HANDSHAKE])
+    try:
+        fake.control.wait_until(lambda t: t["moving"], 20.0)
+        fake.control.do("set", name="Lamp", value=True)
+        fake.control.do("set", name="Valve", value=True)
+    finally:
+        process.kill()
+        process.wait()
+    began = time.monotonic()
+    truth = fake.control.wait_until(lambda t: not t["moving"], 5.0)
+    assert time.monotonic() - began < 2.5
+    truth = fake.control.wait_until(lambda t: t["owner"] == 0)
+    assert (truth["points"]["Lamp"], truth["points"]["Valve"]) == (False, True), "off and hold, as declared"
+    assert truth["code"] == 91
+
+
+def test_our_life_sign_outlives_a_long_job(fake: FakeProcess, plc: OpcUaPlc) -> None:
+    done = len(fake.truth()["done"])
+    plc.run_job(3)  # 4 s, four times the PLC's patience
+    assert fake.truth()["done"][done:] == [3]
+    assert plc.control_owner() == "us"
+
+
+def test_a_program_that_stands_makes_values_old(fake: FakeProcess, plc: OpcUaPlc, wait_for: Any) -> None:
+    running = Beside(lambda: plc.run_job(3))
+    fake.control.wait_until(lambda t: t["moving"])
+    fake.control.do("live", on=False)
+    assert isinstance(running.outcome(5.0), DeviceError)
+    with pytest.raises(Stale, match=r"plc at opc.tcp.*life sign of its program stands still"):
+        plc.read("level")
+    assert plc.connection in UP, "the server answers"
+    assert [alarm.code for alarm in plc.alarms()] == ["program_stands"]
+    assert plc.health is Health.FAILURE
+    with pytest.raises(NotInControl, match="stood still"):
+        plc.write_digital("lamp", True)
+    fake.control.do("live", on=True)
+    wait_for(plc.alarms, lambda alarms: alarms == [])
+    assert plc.read_analog("level") == pytest.approx(0.5)
+    with pytest.raises(NotInControl):
+        plc.write_digital("lamp", True)
+    fake.control.wait_until(lambda t: t["owner"] == 0 and not t["moving"])
+    plc.take_control()
+    plc.write_digital("lamp", True)
+
+
+def test_a_plc_that_was_switched_off_and_on_ends_control(fake: FakeProcess, plc: OpcUaPlc, wait_for: Any) -> None:
+    fake.control.do("restart")  # quicker than the connection notices
+    wait_for(plc.control_owner, lambda owner: owner is None)
+    with pytest.raises(NotInControl, match="taken control away"):
+        plc.write_digital("lamp", True)
+
+
+def test_a_slow_server(fake: FakeProcess, plc: OpcUaPlc, wait_for: Any) -> None:
+    fake.control.do("slow", seconds=1.0)
+    began = time.monotonic()
+    with pytest.raises((DeviceTimeout, ConnectionLost), match=r"plc at opc.tcp"):
+        plc.read("level")
+    assert time.monotonic() - began < 1.5
+    fake.control.do("heal")
+    wait_for(lambda: plc.connection, lambda state: state in UP, 10.0)
+    fake.control.do("set", name="Level", value=42)
+    wait_for(lambda: _level(plc), lambda level: level == pytest.approx(0.042), 10.0)
+
+
+def _level(plc: OpcUaPlc) -> float:
+    try:
+        return plc.read_analog("level")
+    except (ConnectionLost, DeviceTimeout):
+        return -1.0
+
+
+def test_nobody_there(make: Callable[..., OpcUaPlc]) -> None:
+    plc = make("opc.tcp://127.0.0.1:1")
+    with pytest.raises(NotConnected, match=r"plc at opc.tcp://127.0.0.1:1"):
+        plc.connect(1.0)
