@@ -1,77 +1,65 @@
-"""The main job as a newcomer runs it: three readings must agree, and each sabotage must change the outcome."""
+"""The main job as a newcomer runs it: four readings must agree, each sabotage must tell, and the cell starts again."""
 
 import asyncio
 import random
 import re
 import signal
-import sys
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import pytest
+import pytest_asyncio
 from pymodbus.client import AsyncModbusTcpClient
 
 from arcor2_hw.client import Client
+from arcor2_hw.data import rpc
 from arcor2_hw.data.base import Unset
-from arcor2_server.demo.run import ask
+from arcor2_hw.data.package import PackageStateEnum
+from tests.demo.running import Run, demo
 from tests.e2e.harness import until
 
-pytestmark = pytest.mark.timeout(240)
+pytestmark = [pytest.mark.timeout(240), pytest.mark.asyncio(loop_scope="module")]
+SEED = random.SystemRandom().randrange(1_000_000)
+BOARDS = 2
+GOOD = 3
+"""A seed whose first board is good."""
 
 
-class Run:
-    """One `arcor2-hw demo` process, its output and its addresses."""
+class Cell:
+    """A demo that has run its order and goes on serving, and what an observer saw of that run."""
 
-    def __init__(self, process: asyncio.subprocess.Process, data_dir: Path) -> None:
-        self.process = process
-        self.data_dir = data_dir
-        self.output = ""
+    def __init__(self, run: Run, script: list[bool]) -> None:
+        self.run, self.script = run, script
 
-    async def read(self) -> None:
-        assert self.process.stdout is not None
-        while chunk := await self.process.stdout.read(4096):
-            self.output += chunk.decode()
-
-    def at(self) -> dict[str, Any] | None:
-        file = self.data_dir / "demo.json"
-        return msgspec.json.decode(file.read_bytes()) if file.exists() else None
-
-    async def tell(self, name: str, do: str, **arguments: Any) -> Any:
-        at = self.at()
+    @property
+    def url(self) -> str:
+        at = self.run.at()
         assert at is not None
-        host, _, port = at[name]["control"].rpartition(":")
-        reader, writer = await asyncio.open_connection(host, int(port), limit=1 << 22)
-        try:
-            writer.write(msgspec.json.encode({"id": 1, "do": do, **arguments}) + b"\n")
-            answer = msgspec.json.decode(await asyncio.wait_for(reader.readline(), 5))
-        finally:
-            writer.close()
-        assert answer["ok"], answer
-        return answer.get("data")
+        return str(at["url"])
 
+    async def renew(self, boards: int = 1) -> None:
+        """What an operator does before a new start: everything is taken away, new boards are laid in."""
+        await self.run.tell("world", "renew", boards=boards, seed=GOOD)
 
-@asynccontextmanager
-async def demo(tmp_path: Path, *arguments: str) -> AsyncIterator[Run]:
-    command = [sys.executable, "-m", "arcor2_server.cli.main", "demo", "--port", "0", "--data-dir", str(tmp_path)]
-    process = await asyncio.create_subprocess_exec(
-        *command, *arguments, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT
-    )
-    run = Run(process, tmp_path)
-    reading = asyncio.create_task(run.read())
-    try:
-        yield run
-    finally:
-        if process.returncode is None:
-            process.send_signal(signal.SIGINT)
-            try:
-                await asyncio.wait_for(process.wait(), 15)
-            except TimeoutError:
-                process.kill()
-                await process.wait()
-        await reading
+    async def program(self, client: Client, at: dict[str, Callable[[], Awaitable[Any]]] | None = None) -> str:
+        """Run the program; gives what it ended with, empty for nothing. `at` is done when an action begins."""
+        packages = await client.call("ListPackages")
+        await client.call("RunPackage", rpc.RunPackageArgs(packages[-1].id))
+        names: dict[str, str] = {}
+        problem = ""
+        while True:
+            event = await client.next_event(timeout=40)
+            match event.event:
+                case "PackageInfo":
+                    points = event.data.project.action_points
+                    names = {action.id: action.name for point in points for action in point.actions}
+                case "ActionStateBefore" if at and (act := at.get(names.get(event.data.action_id, ""))):
+                    await act()
+                case "ProjectException":
+                    problem = event.data.message
+                case "PackageState" if event.data.state is PackageStateEnum.STOPPED:
+                    return problem
 
 
 async def watch(url: str, results: list[bool]) -> None:
@@ -87,65 +75,152 @@ async def watch(url: str, results: list[bool]) -> None:
                 results.append(event.data.results == ["true"])
 
 
-async def test_three_readings_agree_and_ctrl_c_ends_everything(tmp_path: Path) -> None:
-    seed = random.SystemRandom().randrange(1_000_000)
-    print(f"seed {seed}")  # noqa: T201
-    async with demo(tmp_path, "--boards", "3", "--seed", str(seed)) as run:
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def cell(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Cell]:
+    print(f"seed {SEED}")  # noqa: T201
+    async with demo(tmp_path_factory.mktemp("demo"), "--boards", str(BOARDS), "--seed", str(SEED)) as run:
         at = await until(run.at, "the demo to say where everything is", 40)
         script: list[bool] = []
         observer = asyncio.create_task(watch(at["url"], script))
         await until(lambda: "serving at" in run.output or run.process.returncode is not None, "the cycle to end", 200)
-        assert f"seed {seed}" in run.output
-        found = re.search(r"cycle complete: (\d+) boards, (\d+) passed, (\d+) failed, ([\d.]+) s", run.output)
-        assert found, run.output
-        boards, passed, failed = (int(number) for number in found.groups()[:3])
-
-        host, _, port = at["tester"]["modbus"].rpartition(":")
-        tester = AsyncModbusTcpClient(host, port=int(port))
-        await tester.connect()
-        counters = (await tester.read_input_registers(12, count=3, device_id=1)).registers
-        tester.close()
-
-        truth = await ask(at["world"]["control"], "truth")
-        where = [(board["good"], board["place"]) for board in truth["boards"]]
-
-        assert boards == 3
-        assert (script.count(True), script.count(False)) == (passed, failed)
-        assert counters == [boards, passed, failed]
-        assert sorted(where) == sorted([(True, "good")] * passed + [(False, "bad")] * failed)
-
+        yield Cell(run, script)
         run.process.send_signal(signal.SIGINT)
-        assert await asyncio.wait_for(run.process.wait(), 10) == 0, run.output
+        assert await asyncio.wait_for(run.process.wait(), 15) == 0, run.output
         await asyncio.wait_for(observer, 5)  # its events end with the server
+        assert run.at() is None
 
 
-async def test_once_ends_by_itself_with_status_0(tmp_path: Path) -> None:
-    async with demo(tmp_path, "--once", "--boards", "2", "--seed", "1") as run:
-        assert await asyncio.wait_for(run.process.wait(), 200) == 0, run.output
-        assert "cycle complete: 2 boards" in run.output
+async def test_four_readings_agree(cell: Cell) -> None:
+    run, at = cell.run, cell.run.at()
+    assert at is not None, run.output
+    assert f"seed {SEED}" in run.output
+    found = re.search(r"cycle complete: (\d+) boards, (\d+) passed, (\d+) failed, ([\d.]+) s", run.output)
+    assert found, run.output
+    boards, passed, failed = (int(number) for number in found.groups()[:3])
+
+    host, _, port = at["tester"]["modbus"].rpartition(":")
+    tester = AsyncModbusTcpClient(host, port=int(port))
+    await tester.connect()
+    counters = (await tester.read_input_registers(12, count=3, device_id=1)).registers
+    tester.close()
+    world, erp = await run.tell("world", "truth"), await run.tell("erp", "truth")
+
+    assert boards == BOARDS
+    assert passed > 0 < failed
+    assert (cell.script.count(True), cell.script.count(False)) == (passed, failed)
+    assert counters == [boards, passed, failed]
+    where = [(board["good"], board["place"]) for board in world["boards"]]
+    assert sorted(where) == sorted([(True, "good")] * passed + [(False, "bad")] * failed)
+    told = {(result["serial"], result["passed"]) for result in erp["results"]}
+    assert told == {(board["code"], board["good"]) for board in world["boards"]}
+    assert len(erp["results"]) == boards
 
 
-@pytest.mark.parametrize(
-    ("fake", "do", "arguments", "told"),
-    [
-        ("world", "gripper", {"works": False}, "robot"),
-        ("tester", "fault", {"code": 103}, "no contact"),
-        ("reader", "silence", {}, "reader"),
-    ],
-    ids=["gripper off", "tester fault", "reader silent"],
-)
-async def test_sabotage_changes_the_outcome(
-    tmp_path: Path, fake: str, do: str, arguments: dict[str, Any], told: str
-) -> None:
-    async with demo(tmp_path, "--once", "--boards", "2", "--seed", "1") as run:
+async def test_good_boards_bear_their_own_label_pressed_on(cell: Cell) -> None:
+    world, printer = await cell.run.tell("world", "truth"), await cell.run.tell("printer", "truth")
+    good = [board["code"] for board in world["boards"] if board["good"]]
+    labels = {board["code"]: board["label"] for board in world["boards"] if board["label"] is not None}
+    assert labels == {code: {"code": code, "pressed": True} for code in good}
+    assert (world["spilled_labels"], printer["counter"]) == ([], len(good))
+
+
+async def test_the_tower_was_green_while_the_program_ran_and_is_red_after_it(cell: Cell) -> None:
+    io, world = await cell.run.tell("io", "truth"), await cell.run.tell("world", "truth")
+    green = [event["on"] for event in io["history"] if event["output"] == 2]
+    assert green
+    assert (green[0], green[-1]) == (True, False)
+    assert world["tower"] == {"red": True, "amber": False, "green": False, "white": False}
+
+
+# ---------------------------------------------------------------------------------------------------- sabotage
+async def test_each_sabotage_is_told_and_the_cell_starts_again(cell: Cell) -> None:
+    tell, run = cell.run.tell, cell.run
+    await tell("erp", "add_order", order="AGAIN", product="Controller board", quantity=1)
+    async with Client(cell.url, "tests") as client:
+        # The reader is dumb.
+        await cell.renew()
+        await tell("reader", "silence")
+        problem = await cell.program(client)
+        assert "reader" in problem
+        await tell("reader", "heal")
+
+        # The belt is jammed; told by the command line, and mended by it.
+        await cell.renew()
+        status, said = await run.command("fake", "fault", "belt", "follow_error")
+        assert (status, said) == (0, "belt: follow_error done\n")
+        problem = await cell.program(client)
+        assert "belt" in problem
+        assert "8611" in problem or "following error" in problem.lower(), problem
+        assert (await run.command("fake", "fault", "belt", "follow_error", "on=false"))[0] == 0
+        assert (await run.command("fake", "fault", "belt", "power_cycle"))[0] == 0
+
+        # The light barrier sees nothing.
+        await cell.renew()
+        await tell("world", "barrier", number=0, stuck=False)
+        problem = await cell.program(client)
+        assert "io" in problem
+        assert "board_at_stop" in problem
+
+        # The gripper has no air; the barrier is mended.
+        await cell.renew()
+        await tell("world", "gripper", works=False)
+        problem = await cell.program(client)
+        assert "robot picked nothing" in problem
+
+        # The tester has no contact.
+        await cell.renew()
+        problem = await cell.program(client, {"test": lambda: tell("tester", "fault", code=103, armed=True)})
+        assert "tester" in problem
+        assert "no contact" in problem.lower()
+        await tell("tester", "command", name="clear")
+        await until(lambda: _state(run, "Stopped"), "the tester to be cleared")
+        await tell("tester", "push_door", opening=True)
+
+        # The printer is out of labels.
+        await cell.renew()
+        await tell("printer", "media", labels=0)
+        problem = await cell.program(client)
+        assert "printer" in problem
+        assert "out of labels" in problem
+        await tell("printer", "media", labels=100)
+        assert (await tell("world", "truth"))["counts"]["label"] == 1
+        assert [result for result in (await tell("erp", "truth"))["results"] if result["order"] == "AGAIN"] == []
+
+        # After all that the cell starts again. The planning service goes down meanwhile: production goes on.
+        await cell.renew()
+        missing: list[int] = []
+
+        async def down() -> None:
+            await tell("erp", "refuse")
+            await tell("erp", "reset")
+
+        async def up() -> None:
+            erp = await tell("erp", "truth")
+            missing.append(sum(result["order"] == "AGAIN" for result in erp["results"]))
+            await tell("erp", "heal")
+
+        assert await cell.program(client, {"bring": down, "all_sent": up}) == ""
+    assert missing == [0]
+    world, erp = await tell("world", "truth"), await tell("erp", "truth")
+    assert world["counts"]["good"] == 1
+    (board,) = world["boards"]
+    told = [(result["serial"], result["passed"]) for result in erp["results"] if result["order"] == "AGAIN"]
+    assert told == [(board["code"], True)]
+
+
+async def _state(run: Run, wanted: str) -> bool:
+    state: str = (await run.tell("tester", "truth"))["state"]
+    return state == wanted
+
+
+async def test_once_ends_with_one_line_when_a_fault_ends_the_program(tmp_path: Path) -> None:
+    async with demo(tmp_path, "--once", "--boards", "1", "--seed", str(GOOD)) as run:
         await until(run.at, "the demo to say where everything is", 40)
-        if fake == "tester":
-            await until(lambda: "  test" in run.output, "a test to begin", 120)
-        await run.tell(fake, do, **arguments)
-        assert await asyncio.wait_for(run.process.wait(), 200) != 0, run.output
-        assert "cycle complete: 2 boards" not in run.output
-        last = run.output.strip().splitlines()[-1]
-        assert last.startswith("arcor2-hw demo: ")
-        assert told in last, last
-        truth_known = [line for line in run.output.splitlines() if "Traceback" in line]
-        assert not truth_known, run.output
+        await until(lambda: "  order" in run.output, "the program to begin", 40)
+        await run.tell("belt", "emergency", code=0x2310)
+        assert await asyncio.wait_for(run.process.wait(), 60) == 8, run.output
+    last = run.output.strip().splitlines()[-1]
+    assert last.startswith("arcor2-hw demo: ")
+    assert "belt" in last
+    assert "cycle complete" not in run.output
+    assert "Traceback" not in run.output

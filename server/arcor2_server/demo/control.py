@@ -11,7 +11,7 @@ MOST = 4 * 1024 * 1024
 """Bytes of an answer."""
 
 
-async def ask(address: str, do: str, *, within: float = 5.0, **arguments: Any) -> Any:
+async def ask(address: str, do: str, /, *, within: float = 5.0, **arguments: Any) -> Any:
     """Ask a fake at HOST:PORT and give its data.
 
     Raises ConnectionLost naming the address when it does not answer within so many seconds, Refused with its reason.
