@@ -5,9 +5,12 @@ from collections.abc import Callable
 from typing import ClassVar, Final
 
 from arcor2_hw.actions import StrEnum, action
+from arcor2_hw.data.base import now
+from arcor2_hw.data.device import Reading
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.project import ProjectRobotJoints
 from arcor2_hw.exceptions import Cancelled, DeviceFault, DeviceTimeout, OutOfRange, Refused
+from arcor2_hw.objects.small import IOPoint, OnLoss, PointDirection, PointKind
 
 from .ur_paths import UrPathed
 
@@ -17,6 +20,22 @@ OUTPUT_WITHIN: Final = 0.5
 NOTHING_HELD: Final = "nothing_held"
 PART_LOST: Final = "part_lost"
 PART_STICKS: Final = "part_sticks"
+
+
+_GROUPS: Final = (("digital", 0, 8), ("config", 8, 8), ("tool", 16, 2))
+NUMBERS: Final = {
+    f"{group}_{direction}[{i}]": first + i
+    for direction in ("in", "out")
+    for group, first, count in _GROUPS
+    for i in range(count)
+}
+"""The number of each point among the inputs or the outputs."""
+POINTS: Final = {
+    name: IOPoint(name, PointDirection.OUTPUT, PointKind.DIGITAL, on_loss=OnLoss.HOLD)
+    if "_out" in name
+    else IOPoint(name, PointDirection.INPUT, PointKind.DIGITAL)
+    for name in NUMBERS
+}
 
 
 class MoveType(StrEnum):
@@ -224,6 +243,28 @@ class UrTasks(UrPathed):
 
         if not self._within(timeout, seen):
             raise DeviceTimeout(f"input {number} of {self.name} was not {'on' if value else 'off'} in {timeout:g} s")
+
+    # -------------------------------------------------------------------------------- points, for others in the scene
+    def points(self) -> list[IOPoint]:
+        """Give the digital inputs and outputs by the names that they have at the pendant; outputs hold on a loss."""
+        return list(POINTS.values())
+
+    def read(self, name: str) -> Reading[bool | float]:
+        """Read a point, from any thread. Raises OutOfRange for an unknown name, NotConnected, ConnectionLost, Stale."""
+        point, sample = self._point(name), self._observer.sample()
+        bits = sample.inputs if point.direction is PointDirection.INPUT else sample.outputs
+        return Reading[bool | float](bool(bits >> NUMBERS[name] & 1), now(), sample.monotonic)
+
+    def write(self, name: str, value: bool | float) -> None:
+        """Switch an output, from any thread, beside a motion. Raises OutOfRange, Refused for an input, NotInControl."""
+        if self._point(name).direction is PointDirection.INPUT:
+            raise Refused(f"{name} of {self.name} is an input")
+        self._switch(NUMBERS[name], bool(value))
+
+    def _point(self, name: str) -> IOPoint:
+        if name not in POINTS:
+            raise OutOfRange(f"{self.name} has no point {name!r}; there are {', '.join(POINTS)}")
+        return POINTS[name]
 
     # -------------------------------------------------------------------------------- gripper and outputs
     def _gripper_output(self) -> int:

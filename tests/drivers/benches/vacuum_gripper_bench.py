@@ -1,0 +1,134 @@
+"""The vacuum gripper on a fake I/O block that is its carrier; the block is observed all the time."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from arcor2_drivers.remote_io.remote_io import RemoteIO
+from arcor2_drivers.remote_io.settings import RemoteIOSettings
+from arcor2_drivers.vacuum_gripper.settings import VacuumGripperSettings
+from arcor2_drivers.vacuum_gripper.suction_gripper import SuctionGripper
+from arcor2_hw.exceptions import NotFound
+from arcor2_hw.objects import Generic
+from arcor2_hw.testing.bench import Bench
+from arcor2_hw.testing.life import wait_until
+from tests.fakes.conftest import FakeProcess
+
+POINTS = "part=DI0; vacuum=DO0 on_loss=hold; blow=DO1"
+ORPHAN = """
+import sys
+from arcor2_drivers.remote_io.remote_io import RemoteIO
+from arcor2_drivers.remote_io.settings import RemoteIOSettings
+from arcor2_drivers.vacuum_gripper.settings import VacuumGripperSettings
+from arcor2_drivers.vacuum_gripper.suction_gripper import SuctionGripper
+host, _, port = sys.argv[1].rpartition(":")
+block = RemoteIO("block_id", "block", RemoteIOSettings(host=host, port=int(port), points=sys.argv[2]))
+block.connect()
+gripper = SuctionGripper("id", "orphan", VacuumGripperSettings("block", "vacuum", "blow", "part", blow_time=8.0))
+gripper.attach(lambda _: block)
+gripper.connect()
+gripper.take_control()
+gripper.blow_off()
+"""
+CARRIER = "valve_block"
+NOBODY = "nobody"
+
+
+class SuctionGripperBench(Bench):
+    object_type = SuctionGripper
+    address = CARRIER
+    fake: FakeProcess
+    block: RemoteIO
+    nobody: RemoteIO
+    other: RemoteIO
+    case_over = False
+
+    def start(self) -> None:
+        self.fake = FakeProcess("remote_io")
+        self.fake.truth()
+        self.block = self._block(CARRIER, self.fake.ready["modbus"])
+        self.nobody = self._block(NOBODY, "127.99.77.2:502")
+        self.other = self._block("other", self.fake.ready["modbus"])
+
+    @staticmethod
+    def _block(name: str, address: str) -> RemoteIO:
+        host, _, port = address.rpartition(":")
+        settings = RemoteIOSettings(host=host, port=int(port), points=POINTS, request_timeout=0.2)
+        return RemoteIO(f"{name}_id", name, settings)
+
+    def end(self) -> None:
+        self.fake.end()
+
+    def reset(self) -> None:
+        """The carrier is up during a case, and only then: what it holds is not the case's."""
+        self.fake.control.do("heal")
+        self.fake.control.do("renew")
+        if self.case_over:
+            self.case_over = False
+        else:
+            self.block.connect()
+
+    def release(self) -> None:
+        super().release()
+        self.block.disconnect()
+        self.case_over = True
+
+    def _find(self, name: str) -> Generic:
+        for block in (self.block, self.nobody):
+            if name == block.name:
+                return block
+        raise NotFound(f"the scene has no object {name}")
+
+    def _gripper(self, carrier: str) -> SuctionGripper:
+        settings = VacuumGripperSettings(carrier, "vacuum", "blow", "part", blow_time=8.0)
+        gripper = SuctionGripper("gripper_id", "gripper", settings)
+        gripper.attach(self._find)
+        return gripper
+
+    def make(self) -> SuctionGripper:
+        return self._gripper(CARRIER)
+
+    def absent(self) -> tuple[Generic, str]:
+        return self._gripper(NOBODY), NOBODY
+
+    def writes(self) -> object:
+        return self.fake.truth()["outputs"]
+
+    def cut(self) -> None:
+        self.fake.control.do("silence")
+
+    def heal(self) -> None:
+        """Not before the carrier's watchdog has seen to the blast of air, whose output is declared to go off."""
+        wait_until(lambda: not self.running(), 3.0, "the watchdog of the carrier")
+        self.fake.control.do("heal")
+
+    def observe(self, device: Generic) -> object:
+        assert isinstance(device, SuctionGripper)
+        return device.part_held()
+
+    def ask(self, device: Generic) -> object:
+        assert isinstance(device, SuctionGripper)
+        return device.on()
+
+    def command(self, device: Generic) -> object:
+        assert isinstance(device, SuctionGripper)
+        return device.on()
+
+    def run_long(self, device: Generic) -> object:
+        assert isinstance(device, SuctionGripper)
+        return device.blow_off()
+
+    def running(self) -> bool:
+        return bool(self.fake.truth()["outputs"][1])
+
+    @contextmanager
+    def foreign(self) -> Iterator[None]:
+        self.other.connect()
+        self.other.take_control()
+        try:
+            yield
+        finally:
+            self.other.disconnect()
+
+    def orphan(self) -> list[str]:
+        return [sys.executable, "-c", ORPHAN, self.fake.ready["modbus"], POINTS]

@@ -1,0 +1,303 @@
+"""The vacuum gripper on a block: parts held, lost and stuck; stops; a carrier that is gone or has other points."""
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from arcor2_drivers.remote_io.remote_io import RemoteIO
+from arcor2_drivers.vacuum_gripper.settings import VacuumGripperSettings
+from arcor2_drivers.vacuum_gripper.suction_gripper import SuctionGripper
+from arcor2_hw.data.device import Connection, Health, LossKind
+from arcor2_hw.exceptions import (
+    Arcor2Error,
+    Cancelled,
+    ConnectionLost,
+    DeviceFault,
+    DeviceTimeout,
+    InvalidData,
+    NotConnected,
+    NotFound,
+    NotInControl,
+    OutOfRange,
+    Refused,
+    Stale,
+)
+from tests.fakes.conftest import FakeProcess
+
+from .conftest import Make
+
+VACUUM, BLOW = 0, 1
+
+
+class Beside:
+    """A call on a thread of its own."""
+
+    def __init__(self, call: Callable[[], Any]) -> None:
+        self.error: Arcor2Error | None = None
+
+        def run() -> None:
+            try:
+                call()
+            except Arcor2Error as error:
+                self.error = error
+
+        self._thread = threading.Thread(target=run)
+        self._thread.start()
+
+    def end(self, within: float = 5.0) -> Arcor2Error | None:
+        self._thread.join(within)
+        assert not self._thread.is_alive(), "it is still at it"
+        return self.error
+
+
+def wait_for(holds: Callable[[], bool], within: float = 5.0) -> None:
+    until = time.monotonic() + within
+    while not holds():
+        assert time.monotonic() < until, f"not within {within} s"
+        time.sleep(0.005)
+
+
+def part(fake: FakeProcess, there: bool) -> None:
+    fake.control.do("set_input", number=0, on=there)
+
+
+def output(fake: FakeProcess, number: int) -> bool:
+    return bool(fake.truth()["outputs"][number])
+
+
+@pytest.fixture
+def holding(gripper: SuctionGripper, fake: FakeProcess) -> SuctionGripper:
+    """With a part."""
+    part(fake, True)
+    gripper.grip()
+    return gripper
+
+
+def test_a_part_is_gripped_and_released(gripper: SuctionGripper, fake: FakeProcess) -> None:
+    doing = Beside(gripper.grip)
+    wait_for(lambda: output(fake, VACUUM))
+    time.sleep(0.1)
+    assert not gripper.part_held(), "it waits for the sensor"
+    part(fake, True)
+    assert doing.end() is None
+    assert gripper.is_part_held()
+    gripper.check_part()
+    doing = Beside(gripper.release)
+    wait_for(lambda: output(fake, BLOW))
+    assert not output(fake, VACUUM), "no blast against the vacuum"
+    part(fake, False)
+    assert doing.end() is None
+    assert not output(fake, BLOW)
+    assert gripper.alarms() == []
+
+
+def test_nothing_held_is_an_error_and_the_vacuum_is_off(make: Make, fake: FakeProcess) -> None:
+    gripper = make(grip_time=0.2)
+    gripper.connect()
+    gripper.take_control()
+    with pytest.raises(DeviceFault, match="gripper holds nothing") as fault:
+        gripper.grip()
+    assert fault.value.fault_code == "nothing_held"
+    assert not output(fake, VACUUM)
+    with pytest.raises(DeviceFault, match="lost its part"):
+        gripper.check_part()
+
+
+def test_a_part_that_sticks_is_an_error(make: Make, fake: FakeProcess) -> None:
+    gripper = make(release_time=0.2)
+    gripper.connect()
+    gripper.take_control()
+    part(fake, True)
+    gripper.grip()
+    with pytest.raises(DeviceFault, match="sticks") as fault:
+        gripper.release()
+    assert fault.value.fault_code == "part_sticks"
+    assert not output(fake, BLOW), "the blast is over all the same"
+
+
+def test_a_part_lost_on_the_way_is_an_alarm_and_an_error(holding: SuctionGripper, fake: FakeProcess) -> None:
+    part(fake, False)
+    wait_for(lambda: [alarm.code for alarm in holding.alarms()] == ["part_lost"])
+    assert holding.health is Health.CHECK_FUNCTION
+    part(fake, True)  # it hangs there again: that it was lost is not forgotten
+    with pytest.raises(DeviceFault) as fault:
+        holding.check_part()
+    assert fault.value.fault_code == "part_lost"
+    part(fake, False)
+    with pytest.raises(DeviceFault, match="lost its part before"):
+        holding.release()
+    assert not output(fake, VACUUM)
+    assert holding.alarms(), "until a person has looked"
+    with pytest.raises(NotFound):
+        holding.acknowledge("other")
+    holding.acknowledge("part_lost")
+    assert (holding.alarms(), holding.health) == ([], Health.NORMAL)
+
+
+def test_a_flicker_of_the_sensor_is_no_loss(make: Make, fake: FakeProcess) -> None:
+    gripper = make(lost_after=1.5)
+    gripper.connect()
+    gripper.take_control()
+    part(fake, True)
+    gripper.grip()
+    part(fake, False)
+    time.sleep(0.2)
+    part(fake, True)
+    time.sleep(1.6)
+    assert gripper.alarms() == []
+    gripper.off()
+    part(fake, False)
+    time.sleep(0.2)
+    assert gripper.alarms() == [], "what was let go is not lost"
+
+
+def test_a_stop_ends_the_waiting_and_lets_nothing_fall(gripper: SuctionGripper, fake: FakeProcess) -> None:
+    doing = Beside(gripper.grip)
+    wait_for(lambda: output(fake, VACUUM))
+    gripper.stop()
+    assert isinstance(doing.end(1.0), Cancelled)
+    assert output(fake, VACUUM)
+    doing = Beside(gripper.blow_off)
+    wait_for(lambda: output(fake, BLOW))
+    gripper.stop()
+    assert isinstance(doing.end(1.0), Cancelled)
+    assert not output(fake, BLOW)
+
+
+def test_one_act_at_a_time(gripper: SuctionGripper, fake: FakeProcess) -> None:
+    doing = Beside(gripper.grip)
+    wait_for(lambda: output(fake, VACUUM))
+    for second in (gripper.grip, gripper.release, gripper.blow_off):
+        with pytest.raises(Refused, match="gripper is gripping or releasing"):
+            second()
+    part(fake, True)
+    assert doing.end() is None
+
+
+def test_the_vacuum_tells_of_a_part_where_no_switch_does(make: Make, fake: FakeProcess) -> None:
+    gripper = make(part_input="", vacuum_input="pressure", part_vacuum=20_000.0, grip_time=0.3)
+    gripper.connect()
+    gripper.take_control()
+    fake.control.do("set_analog", number=0, raw=12_000)
+    assert gripper.measure_vacuum() == pytest.approx(12_000.0)
+    with pytest.raises(DeviceFault, match="holds nothing"):
+        gripper.grip()
+    fake.control.do("set_analog", number=0, raw=25_000)
+    gripper.grip()
+    assert gripper.part_held()
+
+
+def test_without_a_sensor_the_times_are_waited(make: Make, fake: FakeProcess) -> None:
+    gripper = make(part_input="", blow_output="", grip_time=0.3, release_time=0.2)
+    gripper.connect()
+    gripper.take_control()
+    began = time.monotonic()
+    gripper.grip()
+    assert time.monotonic() - began >= 0.3
+    assert gripper.part_held()
+    gripper.release()
+    assert not gripper.part_held()
+    for refused in (gripper.blow_off, gripper.measure_vacuum):
+        with pytest.raises(Refused, match="gripper has no"):
+            refused()
+
+
+# ------------------------------------------------------------------------------------------------ the carrier
+def test_connecting_switches_nothing(make: Make, fake: FakeProcess) -> None:
+    assert SuctionGripper.loss_reaction.kind is LossKind.HOLDS
+    before = fake.truth()["outputs"]
+    gripper = make()
+    assert gripper.connection is Connection.OFFLINE
+    with pytest.raises(NotConnected, match=r"gripper.*block"):
+        gripper.part_held()
+    gripper.connect()
+    assert gripper.connection is Connection.ONLINE
+    assert gripper.control_owner() != "us"
+    gripper.disconnect()
+    assert fake.truth()["outputs"] == before
+
+
+def test_without_control_nothing_is_switched(make: Make, block: RemoteIO, fake: FakeProcess) -> None:
+    gripper = make()
+    gripper.connect()
+    with pytest.raises(NotInControl, match="gripper on block"):
+        gripper.on()
+    assert not output(fake, VACUUM)
+    gripper.take_control()
+    assert block.control_owner() == "us", "control is the carrier's"
+    gripper.on()
+    assert output(fake, VACUUM)
+    gripper.disconnect()
+    assert output(fake, VACUUM), "letting go of the carrier lets no part fall"
+
+
+def test_an_output_that_does_not_hold_on_loss_is_refused(make: Make) -> None:
+    gripper = make(vacuum_output="falls")
+    with pytest.raises(InvalidData, match="falls of block goes off on a loss"):
+        gripper.connect()
+    assert gripper.connection is Connection.FAILED
+
+
+@pytest.mark.parametrize(
+    ("settings", "told"),
+    [
+        ({"carrier": "nobody"}, "nobody"),
+        ({"vacuum_output": "part2"}, "no digital output 'part2'; it has vacuum, blow, falls"),
+        ({"part_input": "pressure", "vacuum_input": ""}, "no digital input 'pressure'; it has part"),
+        ({"blow_output": "part", "part_input": ""}, "no digital output 'part'"),
+        ({"vacuum_input": "falls"}, "no analog input 'falls'"),
+    ],
+)
+def test_what_the_carrier_does_not_have_is_named(make: Make, settings: dict[str, str], told: str) -> None:
+    with pytest.raises((InvalidData, NotFound), match=told):
+        make(**settings).connect(0.3)
+
+
+def test_a_carrier_that_is_not_up_is_waited_for(make: Make, block: RemoteIO) -> None:
+    block.disconnect()
+    gripper = make()
+    began = time.monotonic()
+    with pytest.raises(NotConnected, match="gripper: block is not connected"):
+        gripper.connect(0.2)
+    assert time.monotonic() - began < 1.0
+    doing = Beside(lambda: gripper.connect(10.0))
+    time.sleep(0.1)
+    block.connect()
+    assert doing.end() is None
+    assert gripper.connection is Connection.ONLINE
+
+
+def test_a_lost_carrier_tells_nothing_old(holding: SuctionGripper, fake: FakeProcess) -> None:
+    fake.control.do("silence")
+    try:
+        wait_for(lambda: holding.connection is Connection.LOST)
+        assert holding.health is Health.FAILURE
+        with pytest.raises((ConnectionLost, DeviceTimeout, Stale), match="gripper on block"):
+            holding.part_held()
+        assert holding.alarms() == [], "who does not hear of a part does not say it is lost"
+    finally:
+        fake.control.do("heal")
+    wait_for(lambda: holding.connection in (Connection.BACK, Connection.ONLINE))
+    with pytest.raises(NotInControl):
+        holding.off()
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("carrier", " "),
+        ("vacuum_output", ""),
+        ("blow_output", "vacuum"),
+        ("grip_time", -1.0),
+        ("blow_time", 0.0),
+        ("part_vacuum", float("nan")),
+        ("lost_after", 99.0),
+    ],
+)
+def test_a_senseless_setting_is_named(name: str, value: object) -> None:
+    chosen: dict[str, Any] = {"carrier": "block", "vacuum_output": "vacuum", name: value}
+    with pytest.raises(OutOfRange, match=name if name != "blow_output" else "serves once"):
+        VacuumGripperSettings(**chosen)

@@ -1,0 +1,93 @@
+"""The vacuum gripper on the outputs of a robot: it works while the robot moves, and both take control at once."""
+
+import threading
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from arcor2_drivers.universal_robots.ur5e import UR5e
+from arcor2_drivers.vacuum_gripper.settings import VacuumGripperSettings
+from arcor2_drivers.vacuum_gripper.suction_gripper import SuctionGripper
+from arcor2_hw.exceptions import NotInControl
+from tests.drivers.universal_robots.conftest import Doing, FakeUr, make, moving, wait
+
+
+@pytest.fixture(scope="module")
+def ur() -> Iterator[FakeUr]:
+    fake = FakeUr("--time-scale", "0.1")
+    yield fake
+    fake.end()
+
+
+@pytest.fixture
+def robot(ur: FakeUr) -> Iterator[UR5e]:
+    ur.reset()
+    robot = make(ur.host)
+    robot.connect(3.0)
+    yield robot
+    ur.do("set_input", bit=16, on=False)
+    robot.disconnect()
+
+
+@pytest.fixture
+def gripper(robot: UR5e) -> Iterator[SuctionGripper]:
+    settings = VacuumGripperSettings("ur", "tool_out[0]", blow_output="config_out[1]", part_input="tool_in[0]")
+    made = SuctionGripper("gripper_id", "gripper", settings)
+    made.attach(lambda _: robot)
+    made.connect()
+    yield made
+    made.disconnect()
+
+
+def test_both_take_control_at_once_and_there_is_one(robot: UR5e, gripper: SuctionGripper, ur: FakeUr) -> None:
+    with pytest.raises(NotInControl, match="gripper on ur"):
+        gripper.on()
+    taken = ur.truth()["scripts_taken"]
+    threads = [threading.Thread(target=each.take_control) for each in (robot, gripper)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert gripper.control_owner() == robot.control_owner() == "us"
+    assert ur.truth()["scripts_taken"] == taken + 1
+
+
+def test_it_grips_while_the_robot_moves_and_keeps_its_part_at_a_stop(
+    robot: UR5e, gripper: SuctionGripper, ur: FakeUr
+) -> None:
+    gripper.take_control()
+    joints = robot.robot_joints()
+    joints[0].value += 2.0
+    going = Doing(robot.move_to_joints, joints, 0.2)
+    moving(ur)
+    gripping = Doing(gripper.grip)
+    ur.control.wait_until(lambda t: t["digital_outputs"] >> 16 & 1)
+    ur.do("set_input", bit=16, on=True)
+    gripping.result()
+    assert ur.truth()["moving"], "neither waited for the other"
+    robot.stop()
+    gripper.stop()
+    with pytest.raises(Exception, match="stopped"):
+        going.result()
+    assert ur.truth()["digital_outputs"] >> 16 & 1
+    ur.do("set_input", bit=16, on=False)
+    wait(lambda: bool(gripper.alarms()))
+    gripper.off()
+    assert not ur.truth()["digital_outputs"] >> 16 & 1
+    began = time.monotonic()
+    gripper.blow_off()
+    assert time.monotonic() - began >= 0.2
+
+
+def test_it_grips_during_a_path_of_the_robots_own_program(robot: UR5e, gripper: SuctionGripper, ur: FakeUr) -> None:
+    robot.take_control()
+    here = robot.get_end_effector_pose("tcp")
+    there = type(here)(here.position - type(here.position)(0.0, 0.2, 0.0), here.orientation)
+    going = Doing(robot.move_path, [there], 0.0, True, 0.1)
+    moving(ur)
+    gripper.on()
+    assert ur.truth()["moving"]
+    assert gripper.is_part_held() is False
+    going.result()
+    gripper.off()
