@@ -1,5 +1,6 @@
 """cell.yaml: the devices of one workplace, by name: what they are and where they are reached."""
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any, Final
 
@@ -82,12 +83,31 @@ def overlay(cell: Cell, scene: Scene) -> list[SceneObjectOverride]:
             raise InvalidData(
                 f"{device.name} is a {scene_object.type} in the scene {scene.name} and a {device.type} in the cell file"
             )
-        parameters = [
-            Parameter(name, _kind(value), msgspec.json.encode(value).decode())
-            for name, value in device.settings.items()
-        ]
-        found.append(SceneObjectOverride(scene_object.id, parameters))
+        found.append(SceneObjectOverride(scene_object.id, parameters_of(device)))
     return found
+
+
+def parameters_of(device: CellDevice) -> list[Parameter]:
+    """Give the settings of a device as the parameters of a scene's object."""
+    return [
+        Parameter(name, _kind(value), msgspec.json.encode(value).decode()) for name, value in device.settings.items()
+    ]
+
+
+def exported(scene: Scene, left_out: Collection[str] = ()) -> Cell:
+    """Give the objects of a scene as a cell, besides those whose type is left out."""
+    return Cell(
+        [
+            CellDevice(
+                scene_object.name,
+                scene_object.type,
+                {one.name: msgspec.json.decode(one.value) for one in scene_object.parameters},
+                scene_object.pose,
+            )
+            for scene_object in scene.objects
+            if scene_object.type not in left_out
+        ]
+    )
 
 
 def strangers(cell: Cell, scene: Scene) -> list[str]:

@@ -1,4 +1,4 @@
-"""`arcor2-hw device`: which devices can be used here, and how those in operation are."""
+"""`arcor2-hw device`: which devices can be used here, how those in operation are; and the integrator's commands."""
 
 import http.client
 import sys
@@ -8,19 +8,21 @@ from typing import Annotated, Any, Final
 
 import msgspec
 from cyclopts import App, Parameter
-from rich.console import Console
 from rich.table import Table
 
 from arcor2_hw.analysis import Library, installed_types
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectTypeMeta
 from arcor2_server.cli.status import ExitStatus
+from arcor2_server.cli.tables import console
 
-app = App(name="device", help="List the devices that can be used here, or show how those in operation are.")
+app = App(name="device", help="Devices: which there are, how they are; bring in one of your own.")
 
 app.command("arcor2_server.cli.device_new:new", name="new")
+app.command("arcor2_server.cli.device_scan:scan", name="scan")
+app.command("arcor2_server.cli.device_cell:export", name="export")
+app.command("arcor2_server.cli.device_cell:check", name="check")
 DEFAULT_URL: Final = "http://127.0.0.1:6789"
-PIPE_WIDTH: Final = 240
 TIMEOUT: Final = 5.0
 """Seconds in which a server answers."""
 
@@ -46,7 +48,7 @@ def list_devices() -> int:
         if found.meta.disabled:
             broken.append(one.name)
         table.add_row(one.name, found.meta.base, str(len(found.actions)), origin, text)
-    _console().print(table)
+    console().print(table)
     return ExitStatus.ANALYSIS_PROBLEMS if broken else ExitStatus.OK
 
 
@@ -72,7 +74,7 @@ def status(*, url: Annotated[str, Parameter(help="Where the server listens.")] =
     table = Table(*columns, box=None, pad_edge=False)
     for device in devices:
         table.add_row(*(_shown(device.get(column)) for column in columns))
-    _console().print(table)
+    console().print(table)
     return ExitStatus.OK
 
 
@@ -89,9 +91,3 @@ def _shown(value: Any) -> str:
     if isinstance(value, dict):
         return str(value.get("text") or value)
     return "" if value is None else str(value)
-
-
-def _console() -> Console:
-    # A pipe has no width: without one, rich would fold columns to 80 characters.
-    console = Console(highlight=False)
-    return console if console.is_terminal else Console(highlight=False, width=PIPE_WIDTH)

@@ -25,7 +25,8 @@ app.command("arcor2_server.cli.package:app", name="package", help="List the pack
 app.command(
     "arcor2_server.cli.object_type:app", name="object-type", help="Bring object types into a server, or take them out."
 )
-app.command("arcor2_server.cli.device:app", name="device", help="List the devices that can be used.")
+app.command("arcor2_server.cli.token:app", name="token", help="Say who may connect to a server, and in which role.")
+app.command("arcor2_server.cli.device:app", name="device", help="List, find, check devices; write a driver.")
 app.command("arcor2_server.cli.fake:app", name="fake", help="List and run simulated devices, and let them fail.")
 app.command("arcor2_server.cli.analyse:analyse", help="Show what an object type offers, and what is wrong with it.")
 

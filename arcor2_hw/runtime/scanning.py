@@ -1,0 +1,166 @@
+"""Finds what is connected to this machine. A process of its own: vendors' libraries may hang or crash.
+
+`python -m arcor2_hw.runtime.scanning serial | can BUS | oak` prints the Found as one JSON list. Nothing is written to a
+serial port. On a named CAN bus it listens, then reads the identity object of each node by SDO, which changes nothing.
+"""
+
+import argparse
+import logging
+import os
+import sys
+import time
+from collections.abc import Callable
+from typing import Any, Final
+
+import msgspec
+
+from arcor2_hw.data.found import Found
+from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotConnected, NotFound
+
+LISTENS: Final = 1.2
+"""Seconds of listening on a CAN bus: heartbeats come at least each second by custom."""
+ANSWERS: Final = 0.4
+"""Seconds in which the nodes answer the question who is there."""
+SDO_TIMEOUT: Final = 0.3
+DEVICE_TYPE, DEVICE_NAME, IDENTITY = 0x1000, 0x1008, 0x1018
+"""Objects of CiA 301."""
+FAILED: Final = 3
+
+
+def serial_ports() -> list[Found]:
+    """List the serial ports; none is opened. Raises NotFound when pyserial is not installed."""
+    try:
+        from serial.tools import list_ports
+    except ImportError as error:
+        raise NotFound("pyserial is not installed (arcor2-hw[serial])") from error
+    found = []
+    for port in sorted(list_ports.comports()):
+        if port.hwid in ("", "n/a") and port.description in ("", "n/a"):
+            continue  # a port that the kernel lists, with nothing behind it
+        usb = f" (USB {port.vid:04x}:{port.pid:04x})" if port.vid is not None else ""
+        found.append(Found("serial port", port.device, f"{port.description}{usb}", port.serial_number or ""))
+    return found
+
+
+def bus_options(named: str) -> dict[str, Any]:
+    """Read the name of a bus as python-can takes it. Raises InvalidData.
+
+    slcan:CHANNEL[@BITRATE] with a serial port or socket://host:port, socketcan:INTERFACE, socketcand:HOST:PORT/BUS.
+    """
+    kind, _, rest = named.partition(":")
+    if kind == "slcan" and rest:
+        channel, _, rate = rest.partition("@")
+        if rate and not rate.isdigit():
+            raise InvalidData(f"{named}: {rate!r} is no bit rate")
+        return {
+            "interface": "slcan",
+            "channel": channel,
+            "bitrate": int(rate or 500000),
+            "sleep_after_open": 0.0,
+            "timeout": 0.05,
+        }
+    if kind == "socketcan" and rest:
+        return {"interface": "socketcan", "channel": rest}
+    if kind == "socketcand":
+        server, _, bus = rest.partition("/")
+        host, _, port = server.rpartition(":")
+        if host and port.isdigit() and bus:
+            return {"interface": "socketcand", "host": host, "port": int(port), "channel": bus}
+    raise InvalidData(
+        f"{named!r} is no CAN bus; one is slcan:/dev/ttyUSB0@500000, socketcan:can0 or socketcand:HOST:PORT/can0"
+    )
+
+
+def can_nodes(named: str) -> list[Found]:
+    """Listen on a CAN bus, then read who each CANopen node is. Raises InvalidData, NotFound, NotConnected."""
+    options = bus_options(named)
+    try:
+        import can
+        import canopen
+    except ImportError as error:
+        raise NotFound("python-can and canopen are not installed (arcor2-hw[can])") from error
+    logging.getLogger("canopen").setLevel(logging.CRITICAL)  # a node without an object is no error here
+    network: Any = canopen.Network()  # no hints in the library
+    try:
+        network.connect(**options)
+    except (can.CanError, OSError, ValueError) as error:
+        raise NotConnected(f"{named} cannot be opened: {error}") from error
+    try:
+        time.sleep(LISTENS)
+        network.scanner.search()
+        time.sleep(ANSWERS)
+        return [_node(network, named, number) for number in sorted(network.scanner.nodes)]
+    except (can.CanError, OSError) as error:
+        raise NotConnected(f"{named} was lost: {error}") from error
+    finally:
+        network.disconnect()
+
+
+def _node(network: Any, named: str, number: int) -> Found:
+    """Read the identity of a node; what it does not have is left out."""
+    import canopen
+    from canopen.sdo.exceptions import SdoError
+
+    node = canopen.RemoteNode(number, canopen.ObjectDictionary())  # type: ignore[no-untyped-call]
+    network.add_node(node)
+    node.sdo.RESPONSE_TIMEOUT = SDO_TIMEOUT
+    node.sdo.MAX_RETRIES = 0
+
+    def read(index: int, sub: int = 0) -> bytes:
+        try:
+            answer: bytes = node.sdo.upload(index, sub)
+        except (SdoError, OSError):
+            return b""
+        return answer
+
+    texts = [f"node {number}"]
+    if name := read(DEVICE_NAME).decode("latin-1").strip("\0 "):
+        texts.append(name)
+    if kind := read(DEVICE_TYPE):
+        texts.append(f"profile {int.from_bytes(kind[:2], 'little')}")
+    for label, sub in (("vendor", 1), ("product", 2), ("revision", 3)):
+        if value := read(IDENTITY, sub):
+            texts.append(f"{label} 0x{int.from_bytes(value, 'little'):x}")
+    serial = read(IDENTITY, 4)
+    return Found("CAN node", named, ", ".join(texts), str(int.from_bytes(serial, "little")) if serial else "")
+
+
+def oak_cameras() -> list[Found]:
+    """List the OAK cameras on USB and in the network. Raises NotFound when depthai is not installed."""
+    try:
+        import depthai
+    except ImportError as error:
+        raise NotFound("depthai is not installed (arcor2-hw[depthai])") from error
+    library: Any = depthai
+    return [
+        Found("OAK camera", str(one.name), f"{one.state.name}, {one.protocol.name}", str(one.getDeviceId()))
+        for one in library.Device.getAllAvailableDevices()
+    ]
+
+
+def main() -> None:
+    """Scan for one kind of thing."""
+    parser = argparse.ArgumentParser(description="Finds what is connected.")
+    parser.add_argument("kind", choices=("serial", "can", "oak"))
+    parser.add_argument("bus", nargs="?", default="")
+    options = parser.parse_args()
+    results = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what a vendor's library prints
+    kinds: dict[str, Callable[[], list[Found]]] = {
+        "serial": serial_ports,
+        "oak": oak_cameras,
+        "can": lambda: can_nodes(options.bus),
+    }
+    try:
+        found = kinds[options.kind]()
+    except Arcor2Error as error:
+        sys.stderr.write(f"{error}\n")
+        sys.stderr.flush()
+        os._exit(FAILED)
+    results.write(msgspec.json.encode(found))
+    results.flush()
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main()
