@@ -186,8 +186,14 @@ class Kinematics:
             size = float(np.linalg.norm(error))
             if size < _CLOSE:
                 return q
-            square = jacobian @ jacobian.T + damping * damping * np.eye(len(error))
-            step = jacobian.T @ np.linalg.solve(square, error)
+            moved = jacobian.copy()
+            for _ in range(3):
+                square = moved @ moved.T + damping * damping * np.eye(len(error))
+                step = moved.T @ np.linalg.solve(square, error)
+                outwards = ((q <= LIMITS[:, 0]) & (step < 0.0)) | ((q >= LIMITS[:, 1]) & (step > 0.0))
+                if not outwards.any():
+                    break
+                moved[:, outwards] = 0.0
             step *= min(1.0, 0.5 / float(np.abs(step).max() + 1e-12))
             trial = np.clip(q + step, LIMITS[:, 0], LIMITS[:, 1])
             after, jacobian_after = self._linearised(trial, pose, angle)

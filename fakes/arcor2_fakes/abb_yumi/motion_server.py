@@ -1,6 +1,6 @@
 """The RAPID motion server of one arm: lines of numeric codes on a command socket and on a watch socket.
 
-A line is ``seq code argument... *check``: at most 80 characters, fields separated by one blank, the check being the sum
+A line is ``seq code argument... *check``: at most 79 characters, fields separated by one blank, the check being the sum
 of position times character code, from 1, modulo 997, of all before the asterisk. An answer is ``seq code status
 value... *check``. As in RAPID, nothing but the watch socket is read while the arm moves.
 """
@@ -19,7 +19,7 @@ from arcor2_fakes.abb_yumi.kinematics import LIMITS, Array, NotReachable, Target
 from arcor2_fakes.wire import Connection, TcpWire
 
 VERSION: Final = 1
-LONGEST_LINE: Final = 80
+LONGEST_LINE: Final = 79
 TRAP_PERIOD: Final = 0.05
 """Seconds between two looks at the watch socket while the arm moves."""
 PARTNER_WITHIN: Final = 2.0
@@ -49,6 +49,9 @@ COUNTS_OF_ACTS: Final = {
 ARGUMENTS: Final = COUNTS | COUNTS_OF_ACTS
 """How many numbers each code takes."""
 NEED_SESSION: Final = frozenset({6, 7, 30, 31, 32, 33, 34, 50, 51, 52, 54, 55})
+
+
+_PARTS: Final = frozenset({12, 42})  # answers that hold a quaternion
 
 
 class Rejected(Exception):
@@ -213,7 +216,14 @@ class MotionServer:
 
     def _answer(self, lines: Lines | None, sequence: int, code: int, status: int, *values: float) -> None:
         if lines is not None:
-            text = " ".join([str(sequence), str(code), str(status), *(_short(value) for value in values)])
+            text = " ".join(
+                [
+                    str(sequence),
+                    str(code),
+                    str(status),
+                    *(_short(value, 6 if code in _PARTS else 3) for value in values),
+                ]
+            )
             lines.connection.send(framed(text))
 
     # -------------------------------------------------------------------------------- the watch socket
@@ -391,7 +401,7 @@ class MotionServer:
     def _use_hand(self, sequence: int, code: int, values: list[float]) -> list[float] | None:
         hand = self.arm.hand
         if code == 53:
-            return [hand.width * 1e3, float(hand.vacuum)]
+            return [hand.width * 1e3]
         self.controller.wrote("hand")
         if code == 50:
             hand.calibrated = True
@@ -428,7 +438,7 @@ def _matrix(millimetres: list[float], wxyz: list[float]) -> Array:
         raise Rejected(BAD_VALUE) from None
 
 
-def _short(value: float) -> str:
-    """Give a number as RAPID's NumToStr with up to four decimals writes it, six below one."""
-    text = f"{value:.6f}" if abs(value) <= 1.0 else f"{value:.3f}"
+def _short(value: float, decimals: int) -> str:
+    """Give a number as RAPID's NumToStr writes it."""
+    text = f"{value:.{decimals}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text

@@ -1,0 +1,307 @@
+"""The two sockets to the motion server of one arm: commands, and the watch line with keep-alive and stop."""
+
+import contextlib
+import queue
+import select
+import socket
+import threading
+import time
+from collections.abc import Callable
+from typing import Final
+
+from arcor2_hw.exceptions import (
+    ConnectionLost,
+    DeviceError,
+    DeviceFault,
+    DeviceTimeout,
+    NotConnected,
+    NotInControl,
+    Refused,
+)
+
+from .motion_lines import LAST_SEQUENCE, LONGEST_LINE, MEANING, VERSION, Answer, Code, Status, answer, line
+
+ANSWER_WITHIN: Final = 1.0
+"""Seconds an answer that needs no motion may take; the server looks every 20 ms."""
+KEEP_ALIVES: Final = 4
+"""Keep-alives in the time of the watchdog."""
+LISTENS_AGAIN: Final = 0.1
+"""Seconds between two attempts to connect."""
+SILENT: Final = 0.7
+"""Seconds without an answer to a keep-alive after which the line is given up."""
+STOP_ANSWER: Final = 0.8
+"""Seconds until the server has told that the arm stands: 50 ms until it looks, 0.2 s of braking, and slack."""
+NUMBERS: Final = {"left": 1, "right": 2}
+
+
+class _Socket:
+    """A connection of lines."""
+
+    def __init__(self, raw: socket.socket) -> None:
+        self.raw = raw
+        self._rest = b""
+        self._sending = threading.Lock()
+
+    def send(self, data: bytes) -> None:
+        with self._sending:
+            self.raw.sendall(data)
+
+    def lines(self) -> list[bytes]:
+        """Give the whole lines that have come. Raises OSError, also when the other end closed."""
+        data = self.raw.recv(4096)
+        if not data:
+            raise ConnectionResetError("closed by the controller")
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        if len(self._rest) > 2 * LONGEST_LINE:
+            raise ConnectionResetError("it sends what is no line")
+        return lines
+
+
+class Command:
+    """A command that was sent: its number and what has come back."""
+
+    def __init__(self, sequence: int, code: Code) -> None:
+        self.sequence = sequence
+        self.code = code
+        self.answers: queue.SimpleQueue[Answer] = queue.SimpleQueue()
+
+    @property
+    def what(self) -> str:
+        """Give the name of the command."""
+        return self.code.name.lower().replace("_", " ")
+
+
+class ArmLine:
+    """The line to one arm's motion server. `ended` is why it is over; None while it lives."""
+
+    def __init__(self, name: str, arm: str, host: str, port: int, told_ended: Callable[[DeviceError], None]) -> None:
+        self.arm = arm
+        self.who = f"the {arm} arm of {name} ({host}:{port})"
+        self.ended: DeviceError | None = None
+        self._host, self._port = host, port
+        self._told_ended = told_ended
+        self._commands: _Socket | None = None
+        self._watch: _Socket | None = None
+        self._waiting: dict[int, Command] = {}
+        self._motion: Command | None = None
+        self._stopped: dict[int, threading.Event] = {}
+        self._sequence = 0
+        self._numbering = threading.Lock()
+        self._asking = threading.Lock()
+        self._over = threading.Event()
+        self._period = 0.1
+        self._heard = 0.0
+        self._thread: threading.Thread | None = None
+
+    # -------------------------------------------------------------------------------- its life
+    def open(self, timeout: float, watchdog: float) -> None:
+        """Connect, check who answers, and begin a session with its watchdog. Raises DeviceError, naming the address."""
+        until = time.monotonic() + timeout
+        opened: list[socket.socket] = []
+        try:
+            opened.append(self._connect(self._port, until))
+            opened.append(self._connect(self._port + 1, until))
+        except OSError as e:
+            for each in opened:
+                each.close()
+            self.ended = NotConnected(f"{self.who} is not there: is its RAPID program running?", str(e))
+            raise self.ended from e
+        self.attach(opened[0], opened[1], watchdog)
+        try:
+            version, number = self.ask(Code.HELLO, within=max(until - time.monotonic(), 0.1))[:2]
+            if version != VERSION:
+                raise Refused(f"{self.who} runs version {version:g} of the RAPID modules, not {VERSION}")
+            if number != NUMBERS[self.arm]:
+                raise Refused(f"{self.who} is the server of the other arm: check the ports")
+            self.ask(Code.BEGIN, watchdog)
+        except DeviceTimeout as e:
+            self.end(e)
+            raise DeviceTimeout(f"{self.who} does not answer: its program stands, or serves somebody else") from e
+        except (DeviceError, ValueError) as e:
+            self.end(e if isinstance(e, DeviceError) else DeviceFault(f"{self.who} answers hello wrongly"))
+            raise
+
+    def end(self, why: DeviceError, wait: bool = True) -> None:
+        """Close; the server stops its arm when it sees that. Harmless when it is over."""
+        if self.ended is None:
+            self.ended = why
+        self._over.set()
+        for each in (self._commands, self._watch):
+            if each is not None:
+                with contextlib.suppress(OSError):
+                    each.raw.shutdown(socket.SHUT_RDWR)
+        if self._thread is None:
+            self._close()
+        elif wait and self._thread is not threading.current_thread():
+            self._thread.join(1.0)
+
+    def _connect(self, port: int, until: float) -> socket.socket:
+        while True:
+            try:
+                raw = socket.create_connection((self._host, port), max(until - time.monotonic(), 0.05))
+                break
+            except ConnectionRefusedError:  # a program that was just started does not listen yet
+                if time.monotonic() + LISTENS_AGAIN > until:
+                    raise
+                time.sleep(LISTENS_AGAIN)
+        raw.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return raw
+
+    def attach(self, commands: socket.socket, watch: socket.socket, watchdog: float) -> None:
+        """Begin to keep the other end alive, by sockets that are open; they are closed at the end of the line."""
+        for each in (commands, watch):
+            each.settimeout(0.2)
+        self._commands, self._watch = _Socket(commands), _Socket(watch)
+        self._period, self._heard = watchdog / KEEP_ALIVES, time.monotonic()
+        self._thread = threading.Thread(target=self._run, name=f"watching {self.who}", daemon=True)
+        self._thread.start()
+
+    def _close(self) -> None:
+        for each in (self._commands, self._watch):
+            if each is not None:
+                each.raw.close()
+
+    # -------------------------------------------------------------------------------- asking
+    def ask(self, code: Code, *values: float, within: float = ANSWER_WITHIN) -> tuple[float, ...]:
+        """Give what the server answers. Raises DeviceTimeout, Refused with its status, or what ended the line."""
+        with self._asking:
+            if self._motion is not None:
+                raise Refused(f"{self.who} is moving: its server answers when it stands")
+            command = self._send(code, values)
+        until = time.monotonic() + within
+        try:
+            while time.monotonic() < until:
+                found = self.poll(command, 0.05)
+                if found is not None:
+                    return self.judged(found, command).values
+        finally:
+            self.forget(command)
+        raise DeviceTimeout(f"{self.who} did not answer {command.what} within {within:g} s")
+
+    def begin(self, code: Code, *values: float, valid: Callable[[], bool]) -> Command | None:
+        """Start a motion, or give None when `valid` said no just before. To be polled to its end, and forgotten."""
+        with self._asking:
+            if not valid():
+                return None
+            self._motion = self._send(code, values)
+            return self._motion
+
+    def forget(self, command: Command) -> None:
+        """Drop a command; what still comes of it answers nothing."""
+        self._waiting.pop(command.sequence, None)
+        if self._motion is command:
+            self._motion = None
+
+    def poll(self, command: Command, wait: float) -> Answer | None:
+        """Give the next answer to a command, None when none comes within `wait` s. Raises what ended the line."""
+        with contextlib.suppress(queue.Empty):
+            return command.answers.get(timeout=wait)
+        if self.ended is not None:
+            raise self.ended
+        return None
+
+    def judged(self, found: Answer, command: Command) -> Answer:
+        """Give an answer that says done. Raises Refused or DeviceFault."""
+        if found.status == Status.DONE:
+            return found
+        try:
+            status = Status(found.status)
+        except ValueError:
+            raise DeviceFault(f"{self.who} answers with status {found.status}", fault_code=found.status) from None
+        what = f"{self.who}, {command.what}: {MEANING.get(status, status.name)}"
+        if status in (Status.BAD_CHECK, Status.RAPID_ERROR):
+            number = int(found.values[0]) if found.values else int(status)
+            raise DeviceFault(what, f"status {int(status)} {found.values}", number)
+        raise Unwilling(what, status)
+
+    def stop(self) -> bool:
+        """Have the arm stop, past all else; true when the server has told within its time that the arm stands."""
+        watch = self._watch
+        if watch is None or self.ended is not None:
+            return False
+        sequence, stood = self._next(), threading.Event()
+        self._stopped[sequence] = stood
+        try:
+            watch.send(line(sequence, Code.STOP))
+        except OSError:
+            return False
+        until = time.monotonic() + STOP_ANSWER
+        while not stood.wait(0.02):
+            if self.ended is not None or time.monotonic() > until:
+                self._stopped.pop(sequence, None)
+                return False
+        return True
+
+    def _next(self) -> int:
+        with self._numbering:
+            self._sequence = self._sequence % LAST_SEQUENCE + 1
+            return self._sequence
+
+    def _send(self, code: Code, values: tuple[float, ...]) -> Command:
+        if self.ended is not None:
+            raise self.ended
+        assert self._commands is not None
+        command = Command(self._next(), code)
+        data = line(command.sequence, code, values)
+        self._waiting[command.sequence] = command
+        try:
+            self._commands.send(data)
+        except OSError as e:
+            self._waiting.pop(command.sequence, None)
+            raise ConnectionLost(f"the connection to {self.who} broke", str(e)) from e
+        return command
+
+    # -------------------------------------------------------------------------------- on its thread
+    def _run(self) -> None:
+        try:
+            self._serve()
+        except (OSError, ValueError) as e:
+            why: DeviceError = ConnectionLost(f"the connection to {self.who} broke", str(e))
+        except DeviceError as e:
+            why = e
+        else:
+            why = NotInControl(f"the line to {self.who} was closed")
+        first = self.ended is None
+        if first:
+            self.ended = why
+        self._close()
+        if first:
+            self._told_ended(why)
+
+    def _serve(self) -> None:
+        commands, watch = self._commands, self._watch
+        assert commands is not None
+        assert watch is not None
+        due = time.monotonic()
+        while not self._over.is_set():
+            now = time.monotonic()
+            if now >= due:
+                watch.send(line(self._next(), Code.KEEP_ALIVE))
+                due = now + self._period
+            ready, _, _ = select.select([commands.raw, watch.raw], [], [], max(due - time.monotonic(), 0.0))
+            for each in (commands, watch):
+                if each.raw in ready:
+                    for raw in each.lines():
+                        self._take(answer(raw), each is watch)
+            if time.monotonic() - self._heard > SILENT:
+                raise ConnectionLost(f"{self.who} has not answered for {SILENT:g} s")
+
+    def _take(self, found: Answer, from_watch: bool) -> None:
+        if not from_watch:
+            command = self._waiting.get(found.sequence)
+            if command is not None and command.code == found.code:
+                command.answers.put(found)  # any other is late: whoever asked has gone
+            return
+        self._heard = time.monotonic()
+        if found.code == Code.STOP and found.status == Status.DONE:
+            stood = self._stopped.pop(found.sequence, None)
+            if stood is not None:
+                stood.set()
+
+
+class Unwilling(Refused):
+    """The motion server refuses a command, or ended it early; `status` says how."""
+
+    def __init__(self, message: str, status: Status) -> None:
+        super().__init__(message, f"status {int(status)}")
+        self.status = status

@@ -1,0 +1,132 @@
+"""The lines of the RAPID motion server (rapid/README.md): pure functions and the numbers' meaning."""
+
+import enum
+import math
+from collections.abc import Iterable
+from typing import Final, NamedTuple
+
+from arcor2_hw.exceptions import DeviceFault
+
+VERSION: Final = 1
+LONGEST_LINE: Final = 79
+"""Characters before the line feed: a string of RAPID holds 80."""
+LAST_SEQUENCE: Final = 9999
+MOST_WAYPOINTS: Final = 50
+
+
+class Code(enum.IntEnum):
+    """What is asked for."""
+
+    HELLO = 1
+    BEGIN = 2
+    END = 3
+    SPEED = 4
+    ZONE = 5
+    TOOL = 6
+    LOAD = 7
+    JOINTS = 10
+    POSITION = 11
+    ORIENTATION = 12
+    STAGE_JOINTS = 20
+    STAGE_POSITION = 21
+    STAGE_ORIENTATION = 22
+    CLEAR_PATH = 23
+    APPEND = 24
+    MOVE_JOINTS = 30
+    MOVE_LINEAR = 31
+    MOVE_POSE = 32
+    RUN_PATH = 33
+    MOVE_TOGETHER = 34
+    INVERSE = 40
+    FORWARD_POSITION = 41
+    FORWARD_ORIENTATION = 42
+    HAND_CALIBRATE = 50
+    HAND_GRIP = 51
+    HAND_MOVE = 52
+    HAND_STATE = 53
+    HAND_VACUUM = 54
+    HAND_BLOW = 55
+    KEEP_ALIVE = 90
+    STOP = 91
+
+
+class Status(enum.IntEnum):
+    """How it went."""
+
+    DONE = 0
+    ACCEPTED = 1
+    STOPPED = 2
+    WATCHDOG = 3
+    BAD_CHECK = 10
+    BAD_CODE = 11
+    BAD_COUNT = 12
+    BAD_VALUE = 13
+    UNREACHABLE = 14
+    NO_SESSION = 15
+    BY_HAND = 16
+    NO_PARTNER = 20
+    RAPID_ERROR = 30
+
+
+MEANING: Final = {
+    Status.STOPPED: "stopped",
+    Status.WATCHDOG: "stopped by its watchdog",
+    Status.BAD_CHECK: "the check of the line was wrong",
+    Status.BAD_CODE: "the code is not known to the RAPID modules",
+    Status.BAD_COUNT: "the number of arguments was wrong",
+    Status.BAD_VALUE: "a value was refused",
+    Status.UNREACHABLE: "the target cannot be reached",
+    Status.NO_SESSION: "no session has begun, or its watchdog ended it",
+    Status.BY_HAND: "the arm is being moved by hand",
+    Status.NO_PARTNER: "the other arm did not come to the synchronised motion",
+    Status.RAPID_ERROR: "a RAPID error",
+}
+
+
+class Answer(NamedTuple):
+    """A line of the server."""
+
+    sequence: int
+    code: int
+    status: int
+    values: tuple[float, ...]
+
+
+def check(text: str) -> int:
+    """Give the check number: the sum of position (from 1) times character code, modulo 997."""
+    return sum(place * ord(sign) for place, sign in enumerate(text, 1)) % 997
+
+
+PARTS: Final = {Code.TOOL: 3, Code.STAGE_ORIENTATION: 0}
+"""From which argument on a code takes parts of a quaternion, which need six decimals; all else has three."""
+
+
+def number(value: float, decimals: int = 3) -> str:
+    """Write a number, without zeros at its end. Raises ValueError when it is not finite."""
+    if not math.isfinite(value):
+        raise ValueError("the numbers of a command must be finite")
+    text = f"{value:.{decimals}f}".rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text
+
+
+def line(sequence: int, code: Code, values: Iterable[float] = ()) -> bytes:
+    """Give the line of a command. Raises ValueError when it would be too long, or a number is not finite."""
+    first = PARTS.get(code, LONGEST_LINE)
+    numbers = (number(value, 6 if place >= first else 3) for place, value in enumerate(values))
+    text = " ".join([str(sequence), str(int(code)), *numbers])
+    out = f"{text}*{check(text)}"
+    if len(out) > LONGEST_LINE:
+        raise ValueError(f"the line has {len(out)} characters, {LONGEST_LINE} fit: {out}")
+    return f"{out}\n".encode()
+
+
+def answer(raw: bytes) -> Answer:
+    """Give what a line says. Raises DeviceFault for a line that is none."""
+    try:
+        text, star, given = raw.decode("ascii").rstrip("\r").rpartition("*")
+        if not star or int(given) != check(text):
+            raise ValueError
+        sequence, code, status, *values = text.split(" ")
+        return Answer(int(sequence), int(code), int(status), tuple(map(float, values)))
+    except ValueError:  # UnicodeDecodeError is one
+        raise DeviceFault("a line of the motion server is garbled", repr(raw[:100]), "garbled") from None

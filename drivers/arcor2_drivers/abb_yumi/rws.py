@@ -1,0 +1,123 @@
+"""Robot Web Services 1.0 (RobotWare 6): a session with digest authentication, questions, acts, ABB's own errors."""
+
+import contextlib
+import logging
+import threading
+import time
+from collections.abc import Iterator
+from typing import Any, Final
+
+import httpx
+
+from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotConnected, Refused
+
+REQUEST_TIMEOUT: Final = 0.6
+"""Seconds a request may take: the web server of an IRC5 answers within some ten ms."""
+
+Fields = dict[str, str]
+
+logging.getLogger("httpx").setLevel(logging.WARNING)  # it tells of every request otherwise, sixty a second
+
+
+class Rws:
+    """One session. It may be opened and closed again; the session at the controller lives on, until `logout`."""
+
+    def __init__(self, name: str, host: str, port: int, user: str, password: str) -> None:
+        self.name = name
+        self.address = f"{host}:{port}"
+        self.who = f"{name} (RWS of {self.address})"
+        self._user, self._password = user, password
+        self._cookies = httpx.Cookies()
+        self._client: httpx.Client | None = None
+        self._lock = threading.Lock()
+
+    def close(self) -> None:
+        """Close the connection; harmless when closed. The session stays."""
+        client, self._client = self._client, None
+        if client is not None:
+            self._cookies = client.cookies
+            client.close()
+
+    def logout(self, timeout: float = 0.2) -> None:
+        """End the session at the controller, and what it holds with it; not reaching the controller is no error."""
+        if self._client is not None:
+            with contextlib.suppress(DeviceError):
+                self._ask("GET", "/logout", {}, None, timeout)
+        self.close()
+        self._cookies = httpx.Cookies()
+
+    def get(self, path: str, timeout: float = REQUEST_TIMEOUT, **query: str) -> list[Fields]:
+        """Give the states of a resource, each with `_type` and `_title`.
+
+        Raises NotConnected, ConnectionLost, DeviceTimeout, Refused or DeviceFault with the controller's words.
+        """
+        answer = self._ask("GET", path, query, None, timeout)
+        try:
+            found = answer.json()["_embedded"]["_state"]
+            return [{str(key): str(value) for key, value in state.items()} for state in found]
+        except (ValueError, KeyError, TypeError, AttributeError):
+            raise ConnectionLost(f"{self.who} answered {path} in a form that is none", answer.text[:200]) from None
+
+    def value(self, path: str, field: str, timeout: float = REQUEST_TIMEOUT) -> str:
+        """Give one field of a resource with one state."""
+        states = self.get(path, timeout)
+        if not states or field not in states[0]:
+            raise ConnectionLost(f"{self.who} answered {path} without {field}", str(states)[:200])
+        return states[0][field]
+
+    def act(self, path: str, action: str | None, body: Fields | None = None, timeout: float = REQUEST_TIMEOUT) -> None:
+        """Have something done; raises as `get`."""
+        self._ask("POST", path, {"action": action} if action else {}, body or {}, timeout)
+
+    @contextlib.contextmanager
+    def _turn(self, timeout: float) -> Iterator[None]:
+        if not self._lock.acquire(timeout=timeout):
+            raise DeviceTimeout(f"{self.who} is busy with another request")
+        try:
+            yield
+        finally:
+            self._lock.release()
+
+    def _ask(self, method: str, path: str, query: Fields, body: Fields | None, timeout: float) -> httpx.Response:
+        until = time.monotonic() + timeout
+        with self._turn(timeout):
+            client = self._client
+            if client is None:
+                client = self._client = httpx.Client(
+                    base_url=f"http://{self.address}",
+                    auth=httpx.DigestAuth(self._user, self._password),
+                    cookies=self._cookies,
+                    trust_env=False,
+                )
+            try:
+                answer = client.request(
+                    method,
+                    path,
+                    params={**query, "json": "1"},
+                    data=body,
+                    timeout=max(until - time.monotonic(), 0.01),
+                )
+            except httpx.ConnectError as e:
+                raise NotConnected(f"{self.who} is not there", str(e)) from e
+            except httpx.TimeoutException as e:
+                raise DeviceTimeout(f"{self.who} did not answer {path} within {timeout:.2g} s") from e
+            except httpx.HTTPError as e:
+                raise ConnectionLost(f"the connection to {self.who} broke", f"{path}: {e}") from e
+        if answer.status_code >= 400:
+            raise self._refusal(answer, path)
+        return answer
+
+    def _refusal(self, answer: httpx.Response, path: str) -> DeviceError:
+        """Give the error that an answer stands for, with the controller's number and words."""
+        status = answer.status_code
+        if status == httpx.codes.UNAUTHORIZED:
+            return NotConnected(f"{self.who} refuses user {self._user!r} or the password", path)
+        told: Any = {}
+        with contextlib.suppress(ValueError, KeyError, TypeError):
+            told = answer.json()["_embedded"]["status"]
+        code, text = (told.get("code", ""), told.get("msg", "")) if isinstance(told, dict) else ("", "")
+        detail = f"{path}: HTTP {status}" + (f", code {code}" if code != "" else "")
+        words = f": {text}" if text else ""
+        if status >= 500:
+            return DeviceFault(f"{self.who} failed{words or f' with HTTP {status}'}", detail, code or status)
+        return Refused(f"{self.who} refuses{words or f' with HTTP {status}'}", detail)

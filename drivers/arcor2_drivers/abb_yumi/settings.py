@@ -1,0 +1,136 @@
+"""Settings of a YuMi, checked when they are given."""
+
+import dataclasses
+import math
+
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.exceptions import OutOfRange
+from arcor2_hw.objects import Settings
+
+LEFT = "left"
+RIGHT = "right"
+ARMS = (LEFT, RIGHT)
+MAX_PAYLOAD = 0.5
+"""kg at the flange of an arm, hand included."""
+
+
+def within(name: str, value: float, low: float, high: float) -> None:
+    """Raise OutOfRange, naming the parameter, unless the value lies in the range."""
+    if not (math.isfinite(value) and low <= value <= high):
+        raise OutOfRange(f"{name} must be {low:g} to {high:g}, not {value!r}")
+
+
+@dataclasses.dataclass
+class YumiSettings(Settings):
+    """SI units. Poses of a TCP are in the flange of its arm (tool0); its orientation is a rotation vector.
+
+    :param host: address of the controller
+    :param rws_port: port of Robot Web Services
+    :param user: user of the controller (UAS) who may change modes, run RAPID and hold mastership
+    :param password: the user's password
+    :param left_port: port of the left arm's motion server; its watch port is the next
+    :param right_port: port of the right arm's motion server; its watch port is the next
+    :param left_mass: mass at the left flange, hand included, kg; negative: nobody has stated it, control is refused
+    :param left_cog_x: centre of gravity of the left load, m
+    :param left_cog_y: centre of gravity of the left load, m
+    :param left_cog_z: centre of gravity of the left load, m
+    :param left_tcp_x: left tool centre point, m
+    :param left_tcp_y: left tool centre point, m
+    :param left_tcp_z: left tool centre point, m
+    :param left_tcp_rx: orientation at the left tool centre point, rad
+    :param left_tcp_ry: orientation at the left tool centre point, rad
+    :param left_tcp_rz: orientation at the left tool centre point, rad
+    :param right_mass: mass at the right flange, hand included, kg; negative: nobody has stated it
+    :param right_cog_x: centre of gravity of the right load, m
+    :param right_cog_y: centre of gravity of the right load, m
+    :param right_cog_z: centre of gravity of the right load, m
+    :param right_tcp_x: right tool centre point, m
+    :param right_tcp_y: right tool centre point, m
+    :param right_tcp_z: right tool centre point, m
+    :param right_tcp_rx: orientation at the right tool centre point, rad
+    :param right_tcp_ry: orientation at the right tool centre point, rad
+    :param right_tcp_rz: orientation at the right tool centre point, rad
+    :param left_gripper: the left hand has fingers
+    :param right_gripper: the right hand has fingers
+    :param left_suction: the left hand has a suction cup
+    :param right_suction: the right hand has a suction cup
+    :param max_tcp_speed: what speed 1 means in a linear move, m/s
+    :param max_joint_speed: what speed 1 means in a joint move, rad/s
+    :param clearance: the arms are kept that far apart, m, by capsules about nominal links
+    :param watchdog: an arm stops when it has heard nothing for that long, s
+    :param poll_period: pause between two looks at the controller, s
+    """
+
+    host: str
+    rws_port: int = 80
+    user: str = "Default User"
+    password: str = "robotics"  # noqa: S105 - what ABB delivers
+    left_port: int = 6101
+    right_port: int = 6111
+    left_mass: float = -1.0
+    left_cog_x: float = 0.0
+    left_cog_y: float = 0.0
+    left_cog_z: float = 0.05
+    left_tcp_x: float = 0.0
+    left_tcp_y: float = 0.0
+    left_tcp_z: float = 0.0
+    left_tcp_rx: float = 0.0
+    left_tcp_ry: float = 0.0
+    left_tcp_rz: float = 0.0
+    right_mass: float = -1.0
+    right_cog_x: float = 0.0
+    right_cog_y: float = 0.0
+    right_cog_z: float = 0.05
+    right_tcp_x: float = 0.0
+    right_tcp_y: float = 0.0
+    right_tcp_z: float = 0.0
+    right_tcp_rx: float = 0.0
+    right_tcp_ry: float = 0.0
+    right_tcp_rz: float = 0.0
+    left_gripper: bool = True
+    right_gripper: bool = True
+    left_suction: bool = False
+    right_suction: bool = False
+    max_tcp_speed: float = 0.5
+    max_joint_speed: float = 1.0
+    clearance: float = 0.02
+    watchdog: float = 0.4
+    poll_period: float = 0.1
+
+    def __post_init__(self) -> None:
+        if not self.host.strip():
+            raise OutOfRange("host must be the address of the controller")
+        if not self.user.strip():
+            raise OutOfRange("user must name a user of the controller")
+        within("rws_port", self.rws_port, 1, 65535)
+        for arm in ARMS:
+            within(f"{arm}_port", self.port(arm), 1, 65534)
+            if not getattr(self, f"{arm}_mass") < 0.0:
+                within(f"{arm}_mass", getattr(self, f"{arm}_mass"), 0.001, MAX_PAYLOAD)
+            for axis in "xyz":
+                within(f"{arm}_cog_{axis}", getattr(self, f"{arm}_cog_{axis}"), -0.5, 0.5)
+                within(f"{arm}_tcp_{axis}", getattr(self, f"{arm}_tcp_{axis}"), -0.5, 0.5)
+                within(f"{arm}_tcp_r{axis}", getattr(self, f"{arm}_tcp_r{axis}"), -2.0 * math.pi, 2.0 * math.pi)
+        if abs(self.left_port - self.right_port) < 2:
+            raise OutOfRange(f"right_port must be 2 or more away from left_port {self.left_port}: each arm takes two")
+        within("max_tcp_speed", self.max_tcp_speed, 0.01, 1.5)
+        within("max_joint_speed", self.max_joint_speed, 0.01, math.pi)
+        within("clearance", self.clearance, 0.0, 0.2)
+        # Above 0.6 s an arm could not rest within the second that the type declares.
+        within("watchdog", self.watchdog, 0.2, 0.6)
+        within("poll_period", self.poll_period, 0.02, 0.5)
+
+    def port(self, arm: str) -> int:
+        """Give the port of an arm's motion server."""
+        return self.left_port if arm == LEFT else self.right_port
+
+    def tcp(self, arm: str) -> Pose:
+        """Give an arm's TCP in its flange."""
+        x, y, z, rx, ry, rz = (getattr(self, f"{arm}_tcp_{part}") for part in ("x", "y", "z", "rx", "ry", "rz"))
+        return Pose(Position(x, y, z), Orientation.from_rotation_vector(rx, ry, rz))
+
+    def load(self, arm: str) -> tuple[float, tuple[float, float, float]] | None:
+        """Give mass (kg) and centre of gravity (m) at an arm's flange; None when nobody has stated them."""
+        mass: float = getattr(self, f"{arm}_mass")
+        x, y, z = (getattr(self, f"{arm}_cog_{axis}") for axis in "xyz")
+        return (mass, (x, y, z)) if mass >= 0.0 else None
