@@ -188,6 +188,7 @@ class Motion:
             if cia402.power(self._link.read(cia402.STATUSWORD)) is Power.ENABLED:
                 # Clearing the halt bit alone would let the drive go on with its set-point.
                 self._link.write(cia402.CONTROLWORD, cia402.CW_SWITCH_ON)
+        self._observer.wait(lambda now: now.power is not Power.ENABLED, STEP, "leaving Operation enabled")
 
     def quick_stop(self) -> None:
         """Stop on the quick stop ramp; return when the belt stands. The torque is off then."""
