@@ -1,0 +1,148 @@
+"""A crate of parts as an object type: the pose of the next part, from a depth picture."""
+
+import datetime
+from typing import TYPE_CHECKING, ClassVar
+
+from arcor2_hw.actions import action
+from arcor2_hw.data.device import Connection, LossReaction
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.exceptions import DeviceError, InvalidData, NotConnected, OutOfRange, Stale
+from arcor2_hw.objects import GenericWithPose
+from arcor2_hw.objects.frame import PictureNote
+from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
+
+from .poses import gripping
+from .settings import BinSettings
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+    from .finder import Crated, View
+    from .models import Model
+
+
+class Bin(GenericWithPose):
+    """A crate with parts of one kind in it. Its pose is the middle of its floor inside, z upwards.
+
+    It has no camera of its own: a program links a camera's depth picture to it, which says how it was taken.
+    """
+
+    _ABSTRACT = False
+    loss_reaction: ClassVar[LossReaction] = LossReaction.holds()  # there is no device that could lose us
+
+    def __init__(self, obj_id: str, name: str, pose: Pose, settings: BinSettings) -> None:
+        super().__init__(obj_id, name, pose, settings)
+        self._given = settings
+        self._model: Model | None = None
+        self._connected = Connection.OFFLINE
+
+    # -------------------------------------------------------------------------------- connection
+    def connect(self, timeout: float = DEFAULT_CONNECT_TIMEOUT) -> None:
+        """Load the model of the part. Raises NotConnected when it is none, or when Open3D is not installed."""
+        if self._model is not None:
+            return
+        self._connected = Connection.FAILED
+        try:
+            from . import models
+        except ImportError as error:
+            raise NotConnected(
+                f"{self.name}: Open3D or OpenCV is not installed here; they come with the extra `vision` "
+                "(arcor2-hw[vision])",
+                str(error),
+            ) from error
+        try:
+            self._model = models.load(self._given)
+        except models.BadModel as error:
+            raise NotConnected(f"{self.name}: {error}", self._given.part_mesh) from error
+        self._connected = Connection.ONLINE
+
+    def disconnect(self) -> None:
+        """Forget the model."""
+        self._model = None
+        self._connected = Connection.OFFLINE
+
+    @property
+    def connection(self) -> Connection:
+        """Tell whether the model is loaded."""
+        return self._connected
+
+    def _loaded(self) -> "Model":
+        if self._model is None:
+            raise NotConnected(f"{self.name} is not connected")
+        return self._model
+
+    # -------------------------------------------------------------------------------- actions
+    @action
+    def next_part(self, depth: "Image.Image", *, an: str | None = None) -> tuple[Pose, float]:
+        """Give the pose of the part to be taken next, and its quality, 0 to 1.
+
+        :param depth: depth picture of the crate, as a camera's depth_image gives
+        """
+        from .finder import find
+
+        model = self._loaded()
+        view = self._view(depth)
+        try:
+            found = find(view, self._crate(), model, self._given.tolerance, self._given.min_quality)
+        except DeviceError as error:
+            raise type(error)(f"{self.name}: {error}", error.detail) from error
+        return self.pose * Pose.from_matrix(found.pose), round(found.fit.quality, 4)
+
+    @action
+    def is_empty(self, depth: "Image.Image", *, an: str | None = None) -> bool:
+        """Tell whether nothing lies in the crate.
+
+        :param depth: depth picture of the crate, as a camera's depth_image gives
+        """
+        from .finder import lies_there
+
+        model = self._loaded()
+        try:
+            return not lies_there(self._view(depth), self._crate(), model, self._given.tolerance)
+        except DeviceError as error:
+            raise type(error)(f"{self.name}: {error}", error.detail) from error
+
+    @action
+    def grip_pose(self, part: Pose, above: float = 0.0, *, an: str | None = None) -> Pose:
+        """Give the pose for the tool at a part: z down into its top, x along its length.
+
+        :param part: what next_part gave
+        :param above: metres by which the tool is higher, for coming near and going away
+        """
+        assert 0.0 <= above <= 2.0
+
+        model = self._loaded()
+        up = self.pose.orientation.matrix()[:, 2]
+        turned = model.vertices @ part.orientation.matrix().T
+        middle = Pose(part.position, part.orientation)
+        offset = part.orientation.matrix() @ ((model.low + model.high) / 2.0)
+        offset -= (offset @ up) * up
+        for axis, value in zip("xyz", offset, strict=True):
+            setattr(middle.position, axis, getattr(part.position, axis) + float(value))
+        return gripping(middle, self.pose, float((turned @ up).max()) - self._given.grip_depth, above)
+
+    # -------------------------------------------------------------------------------- picture
+    def _crate(self) -> "Crated":
+        from .finder import Crated
+
+        return Crated(self._given.length, self._given.width, self._given.height)
+
+    def _view(self, picture: "Image.Image") -> "View":
+        import numpy as np
+
+        from .finder import View
+
+        try:
+            note = PictureNote.of(picture)
+        except InvalidData as error:
+            raise InvalidData(f"{self.name}: {error}") from error
+        age = (datetime.datetime.now(datetime.UTC) - datetime.datetime.fromisoformat(note.stamp)).total_seconds()
+        if age > self._given.max_age:
+            raise Stale(
+                f"{self.name}: the picture of {note.camera} is {age:.1f} s old, {self._given.max_age:g} s at most are "
+                "asked for"
+            )
+        depth = np.asarray(picture)
+        if depth.ndim != 2 or depth.dtype != np.uint16:
+            raise OutOfRange(f"{self.name}: depth must be a picture of 16 bits, mm, not of mode {picture.mode}")
+        return View(depth, note.parameters, (self.pose.inverted() * note.pose).matrix())

@@ -1,0 +1,230 @@
+"""Registration: the pose of a model in a cluster of points, and how well the picture agrees with it.
+
+Points are registered onto the model, not the model onto the points: what is not seen of a part pulls at nothing then.
+The quality comes from the picture: the model is rendered at the pose that was found and compared with the depth.
+"""
+
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import open3d as o3d
+
+from .models import Model
+from .segmentation import Crate, Pixels
+
+Floats = npt.NDArray[np.float64]
+
+MOST_POINTS: Final = 3000
+TRIED: Final = 4
+"""Hypotheses that are refined, of those that fit best as they are."""
+ITERATIONS: Final = 30
+ROUNDS: Final = ((3.0, 2.0), (1.5, 1.0))
+"""Of each round of ICP, in tolerances: how far a point looks for the surface, and Tukey's constant."""
+WORTH_POLISHING: Final = 0.5
+STEPS: Final = (0.001, 0.0005, 0.00025)
+"""m"""
+TURN_PER_STEP: Final = 12.0
+"""rad per m: 0.7° per mm."""
+MOST_STEPS: Final = 4
+MARGIN: Final = 6
+"""Pixels about a cluster that are compared with the model too."""
+NEAREST: Final = 0.01
+LEAST_SEEN: Final = 0.5
+"""Of the pixels in which the model should be seen, those that have to have a depth."""
+
+
+class Fit(NamedTuple):
+    """A model at a pose in the crate's frame.
+
+    quality: 0 to 1, `explained` times `covered`. explained: of the cluster's pixels, those that lie on the model.
+    covered: of the pixels in which the model should be seen, those in which it is. larger: how many times larger the
+    cluster is than that. error: m, mean distance from the model.
+    """
+
+    pose: Floats
+    quality: float
+    explained: float
+    covered: float
+    larger: float
+    error: float
+
+
+def register(crate: Crate, pixels: Pixels, model: Model, camera: Floats, rays: Any, tolerance: float) -> Fit:
+    """Find the model in a cluster.
+
+    camera: pose of the optical frame in the crate's frame, 4 × 4. rays: height × width × 2, at 1 m.
+    """
+    points = crate.points[pixels].astype(np.float64)
+    if len(points) > MOST_POINTS:
+        points = points[np.linspace(0, len(points) - 1, MOST_POINTS).astype(int)]
+    sparse = points[:: max(1, len(points) // 400)]
+    tree = o3d.core.nns.NearestNeighborSearch(
+        o3d.core.Tensor.from_numpy(np.asarray(model.cloud.points).astype(np.float32))
+    )
+    tree.knn_index()
+    floor = float(np.median(crate.points[pixels][:, 2] - crate.height[pixels]))
+    starts = _starts(points, model, floor - 2.0 * tolerance)
+    starts.sort(key=lambda pose: _distance(tree, sparse, pose, tolerance))
+    judge = _Judge(crate, pixels, model, camera, rays, tolerance)
+    fits = []
+    for start in starts[:TRIED]:
+        pose = _refined(points, model, start, tolerance)
+        fits.append(judge(pose))
+        if fits[-1].quality > 0.95:
+            break
+    best = max(fits, key=lambda fit: fit.quality)
+    if best.quality < WORTH_POLISHING:
+        return best
+    return _polished(best, judge, points)
+
+
+def _polished(fit: Fit, judge: Callable[[Floats], Fit], points: Floats) -> Fit:
+    """Slide and turn a model on its plane until no step makes the picture agree better.
+
+    A flat top gives ICP nothing to hold on to along itself; its outline in the picture does.
+    """
+    middle = np.median(points, axis=0)
+    for step in STEPS:
+        for _ in range(MOST_STEPS):
+            tried = [judge(_shifted(fit.pose, middle, move)) for move in _moves(step)]
+            better = max(tried, key=lambda each: each.quality)
+            if better.quality <= fit.quality:
+                break
+            fit = better
+    return fit
+
+
+def _moves(step: float) -> list[tuple[float, float, float]]:
+    """Give x, y in m and the turn in rad of each move of one step; a turn moves a part's ends about as far."""
+    turn = step * TURN_PER_STEP
+    return [(step, 0, 0), (-step, 0, 0), (0, step, 0), (0, -step, 0), (0, 0, turn), (0, 0, -turn)]
+
+
+def _shifted(pose: Floats, middle: Floats, move: tuple[float, float, float]) -> Floats:
+    shift = np.eye(4)
+    shift[:3, :3] = _about_z(move[2])
+    shift[:3, 3] = middle - shift[:3, :3] @ middle + np.array([move[0], move[1], 0.0])
+    return np.asarray(shift @ pose)
+
+
+def _starts(points: Floats, model: Model, lowest: float) -> list[Floats]:
+    """Give poses to begin with: each side of the bounding box upwards, turned as the rectangle about the points is.
+
+    lowest: m, the height below which nothing can be: there is the floor.
+    """
+    (x, y), _, angle = cv2.minAreaRect((points[:, :2] * 1000.0).astype(np.float32))
+    top = float(np.percentile(points[:, 2], 97))
+    middle = (model.low + model.high) / 2.0
+    found: list[tuple[float, Floats]] = []
+    for side in _sides(model.box):
+        corners = (model.vertices - middle) @ side.T
+        height = float(corners[:, 2].max())
+        for quarter in (0, 1) if model.box else (0, 1, 2, 3):
+            turn = np.radians(angle) + quarter * np.pi / 2.0
+            pose = np.eye(4)
+            pose[:3, :3] = _about_z(turn) @ side
+            pose[:3, 3] = np.array([x / 1000.0, y / 1000.0, top - height]) - pose[:3, :3] @ middle
+            found.append((top - 2.0 * height, pose))
+    possible = [pose for bottom, pose in found if bottom >= lowest]
+    return possible or [pose for _, pose in found]
+
+
+def _sides(box: bool) -> list[Floats]:
+    """Give the rotations that bring each axis of the model upwards; of a box, one of the two opposite sides."""
+    up = np.eye(3)
+    y_up = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    x_up = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+    over = np.diag([1.0, -1.0, -1.0])
+    return [up, y_up, x_up] if box else [up, over, y_up, over @ y_up, x_up, over @ x_up]
+
+
+def _about_z(angle: float) -> Floats:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _distance(tree: Any, points: Floats, pose: Floats, tolerance: float) -> float:
+    """Give how far the points are from the model on the whole; what is further than 3 tolerances counts as that."""
+    local = (points - pose[:3, 3]) @ pose[:3, :3]
+    _, squares = tree.knn_search(o3d.core.Tensor.from_numpy(local.astype(np.float32)), 1)
+    return float(np.minimum(np.sqrt(squares.numpy()), 3.0 * tolerance).mean())
+
+
+def _refined(points: Floats, model: Model, start: Floats, tolerance: float) -> Floats:
+    """Give the pose after ICP, points onto model, point to plane with Tukey's weights."""
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+    model_from_crate = np.linalg.inv(start)
+    registration = o3d.pipelines.registration
+    for reach, constant in ROUNDS:
+        result = registration.registration_icp(
+            cloud,
+            model.cloud,
+            reach * tolerance,
+            model_from_crate,
+            registration.TransformationEstimationPointToPlane(registration.TukeyLoss(constant * tolerance)),
+            registration.ICPConvergenceCriteria(max_iteration=ITERATIONS),
+        )
+        if np.isfinite(result.transformation).all():
+            model_from_crate = np.asarray(result.transformation)
+    return np.asarray(np.linalg.inv(model_from_crate))
+
+
+class _Judge:
+    """Compares the model, rendered at a pose, with what is seen of one cluster."""
+
+    def __init__(self, crate: Crate, pixels: Pixels, model: Model, camera: Floats, rays: Any, tolerance: float) -> None:
+        rows, columns = np.nonzero(pixels)
+        self._bounds = (int(rows.min()), int(rows.max()), int(columns.min()), int(columns.max()))
+        self._count = len(rows)
+        self._crate, self._pixels, self._model, self._rays = crate, pixels, model, rays
+        self._camera, self._camera_from_crate = camera, np.linalg.inv(camera)
+        self._tolerance = tolerance
+        # Where the rays of the picture's middle row and column pass; distortion is within the margin.
+        self._across, self._down = rays[rays.shape[0] // 2, :, 0], rays[:, rays.shape[1] // 2, 1]
+
+    def __call__(self, pose: Floats) -> Fit:
+        """Give the model at a pose with its quality."""
+        where = self._about(pose)
+        reach = self._rendered(pose, where)
+        towards = self._camera_from_crate[2]
+        with np.errstate(invalid="ignore"):
+            depth = self._crate.points[where] @ towards[:3].astype(np.float32) + np.float32(towards[3])
+            expected = np.isfinite(reach)
+            measured = expected & self._crate.inside[where]
+            difference = np.where(measured, np.abs(depth - np.where(expected, reach, 0.0)), np.inf)
+            on = difference < self._tolerance
+        seen, agreed = int(measured.sum()), int(on.sum())
+        explained = int((on & self._pixels[where]).sum()) / self._count
+        covered = agreed / max(seen, 1) if seen >= LEAST_SEEN * int(expected.sum()) else 0.0
+        error = float(difference[on].mean()) if agreed else float("inf")
+        return Fit(pose, explained * covered, explained, covered, self._count / max(seen, 1), error)
+
+    def _rendered(self, pose: Floats, where: tuple[slice, slice]) -> Any:
+        """Give the depth at which each pixel of a rectangle should see the model, m; infinite where it should not."""
+        part_from_camera = (np.linalg.inv(pose) @ self._camera).astype(np.float32)
+        beams = self._rays[where]
+        both = np.empty((*beams.shape[:2], 6), np.float32)
+        both[..., :3] = part_from_camera[:3, 3]
+        both[..., 3:] = beams @ part_from_camera[:3, :2].T + part_from_camera[:3, 2]
+        return self._model.scene.cast_rays(o3d.core.Tensor.from_numpy(both))["t_hit"].numpy()
+
+    def _about(self, pose: Floats) -> tuple[slice, slice]:
+        """Give the rectangle about the cluster and about where the model should be seen."""
+        top, bottom, left, right = self._bounds
+        in_crate = self._model.vertices @ pose[:3, :3].T + pose[:3, 3]
+        seen = (in_crate - self._camera[:3, 3]) @ self._camera[:3, :3]
+        seen = seen[seen[:, 2] > NEAREST]
+        if len(seen):
+            x, y = seen[:, 0] / seen[:, 2], seen[:, 1] / seen[:, 2]
+            left = min(left, int(np.searchsorted(self._across, x.min())))
+            right = max(right, int(np.searchsorted(self._across, x.max())))
+            top = min(top, int(np.searchsorted(self._down, y.min())))
+            bottom = max(bottom, int(np.searchsorted(self._down, y.max())))
+        height, width = self._pixels.shape
+        return (
+            slice(max(0, top - MARGIN), min(height, bottom + MARGIN)),
+            slice(max(0, left - MARGIN), min(width, right + MARGIN)),
+        )
