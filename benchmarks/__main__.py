@@ -5,7 +5,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from benchmarks import building, buses, hung, operation, requests, robot
+from benchmarks import building, buses, camera, hung, operation, requests, robot
 from benchmarks.figures import Report
 
 
@@ -24,6 +24,8 @@ async def main(rooms: list[str]) -> None:
             await robot.run(report, directory)
         if not rooms or "buses" in rooms:
             await buses.run(report, directory)
+        if not rooms or "camera" in rooms:
+            await camera.run(report, directory)
         if not rooms or "hung" in rooms:
             await hung.run(report, directory)
     report.table()

@@ -89,6 +89,16 @@ class OakD(Camera):
         """Give who the camera said it is."""
         return self._observed.feed.identity
 
+    @property
+    def pictures_taken(self) -> int:
+        """Give how many pictures have come since the object was made."""
+        return self._observed.taken
+
+    @property
+    def latency(self) -> float:
+        """Give how old the newest picture was when it came, s. Raises NotConnected, ConnectionLost."""
+        return self._observed.latency
+
     # -------------------------------------------------------------------------------- camera
     def capture(self) -> Frame:
         """Give the newest colour and depth. Raises Stale when they are older than `max_age` of the settings."""

@@ -37,6 +37,8 @@ class Observed:
         self._feed: Feed | None = None
         self._newest: Shot | None = None
         self._came = 0.0
+        self.taken = 0
+        """Pictures that have come since the object was made."""
         self._news = threading.Condition()
         self._alarms: dict[str, Alarm] = {}
         self._exposure: float | None = None
@@ -73,6 +75,13 @@ class Observed:
                 self._news.wait(left)
         age = "never" if newest is None else f"{time.monotonic() - newest.monotonic:.2f} s ago"
         raise Stale(f"{self.who} gave no new picture within {timeout:g} s; the last was taken {age}")
+
+    @property
+    def latency(self) -> float:
+        """Give how old the newest picture was when it came, s. Raises NotConnected, ConnectionLost."""
+        self.observing.check()
+        newest = self._newest
+        return float("inf") if newest is None else self._came - newest.monotonic
 
     def _fresh(self, shot: "Shot | None", max_age: float) -> "Shot":
         age = float("inf") if shot is None else time.monotonic() - shot.monotonic
@@ -148,6 +157,7 @@ class Observed:
         self._came = time.monotonic()
         with self._news:
             self._newest = shot
+            self.taken += 1
             self._news.notify_all()
 
     def _look(self, feed: "Feed") -> None:

@@ -1,0 +1,31 @@
+"""The camera: what 30 frames a second of colour and depth cost the process that holds it."""
+
+import asyncio
+import sys
+from pathlib import Path
+
+import msgspec
+
+from arcor2_server.demo.processes import Child, python_module
+from benchmarks.figures import Figure, Report
+
+SECONDS = 20.0
+
+
+async def run(report: Report, directory: Path) -> None:
+    """Take 1280 x 720 colour and depth from the fake in a process of its own, as the cell host does."""
+    command = python_module("arcor2_fakes.oak_d", "--listen", "127.0.0.1:0", "--control", "127.0.0.1:0")
+    fake = Child("camera", command, directory / "camera.log")
+    try:
+        addresses = await fake.start_json()
+        process = await asyncio.create_subprocess_exec(
+            sys.executable, "-m", "benchmarks.watch", addresses["stream"], str(SECONDS), stdout=asyncio.subprocess.PIPE
+        )
+        assert process.stdout is not None
+        result = msgspec.json.decode(await process.stdout.read())
+        await process.wait()
+    finally:
+        await fake.stop()
+    seconds = result["seconds"]
+    note = f"{result['frames'] / seconds:.1f} frames/s, a picture is {result['age'] * 1e3:.1f} ms old when it is here"
+    report.add(Figure("oak_core_percent", 100.0 * result["cpu"] / seconds, result["frames"], note))
