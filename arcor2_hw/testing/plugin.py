@@ -2,45 +2,183 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+import random
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 if TYPE_CHECKING:
     from arcor2_hw.testing.bench import Bench
+    from arcor2_hw.testing.outcomes import Outcomes, Ran, Verdict
+    from arcor2_hw.testing.quality import Quality
 
-pytest.register_assert_rewrite("arcor2_hw.testing.conformance", "arcor2_hw.testing.life")
+_REWRITTEN = ("acting_cases", "acts", "conformance", "connecting_cases", "life", "loss_cases", "written_cases")
+pytest.register_assert_rewrite(*(f"arcor2_hw.testing.{each}" for each in _REWRITTEN))
 
 PENDING = pytest.StashKey[list[str]]()
 """What the terminal summary has to tell of drivers that the suite does not cover yet."""
+OUTCOMES: pytest.StashKey[Outcomes] = pytest.StashKey()
+COLLECTED: pytest.StashKey[Mapping[str, frozenset[str]]] = pytest.StashKey()
+"""By path of a collected file, the names of its tests."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options."""
-    parser.getgroup("arcor2_hw", "ARCOR2-HW drivers").addoption(
+    group = parser.getgroup("arcor2_hw", "ARCOR2-HW drivers")
+    group.addoption(
+        "--device",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="run the conformance suite on every device of this cell.yaml, with `--pyargs arcor2_hw.testing`; "
+        "repeatable",
+    )
+    group.addoption(
+        "--real",
+        action="store_true",
+        help="touch real devices: those, and only those, that --real-device names",
+    )
+    group.addoption(
         "--real-device",
         action="append",
         default=[],
-        metavar="TYPE",
-        help="run the conformance suite on the real device of this object type too; repeatable",
+        metavar="NAME",
+        help="with --real, run the conformance suite on this real device: its name in the cell.yaml, or the object "
+        "type of its bench; repeatable",
+    )
+    group.addoption(
+        "--report",
+        metavar="FILE",
+        help="write what the conformance suite found, as evidence for level gold",
+    )
+    group.addoption(
+        "--phases",
+        type=int,
+        metavar="SEED",
+        help="stop at the moments of an earlier run, whose seed was printed",
     )
 
 
+# ---------------------------------------------------------------------------------------------------- what ran
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Note what was collected, before anything of it is deselected."""
+    found: dict[str, set[str]] = {}
+    for item in items:
+        found.setdefault(str(item.path), set()).add(getattr(item, "originalname", None) or item.name)
+    config.stash[COLLECTED] = {path: frozenset(names) for path, names in found.items()}
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """With `--dist loadgroup`, run the cases of a bench in one process: they share a fake, or a device."""
+    if config.getvalue("dist") != "loadgroup":
+        return None
+    from xdist.scheduler import LoadGroupScheduling  # type: ignore[import-untyped]
+
+    from arcor2_hw.testing.conformance import Conformance
+    from arcor2_hw.testing.outcomes import LEVEL_CASE
+
+    cases = {f"test_{case}" for case in (*Conformance.cases(), LEVEL_CASE)}
+
+    class TogetherOnOneBench(LoadGroupScheduling):  # type: ignore[misc] # no hints there
+        def _split_scope(self, nodeid: str) -> str:
+            place, _, test = nodeid.rpartition("::")
+            case, _, bench = test.partition("[")
+            return f"{place}[{bench}" if bench and case in cases else str(super()._split_scope(nodeid))
+
+    return TogetherOnOneBench(config, log)
+
+
+def _bench_of(item: pytest.Item) -> type[Bench] | None:
+    callspec = getattr(item, "callspec", None)
+    return callspec.params.get("arcor2_running_bench") if callspec is not None else None
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Let the reports of a case say of which bench they are; that travels between the processes of xdist too."""
+    from arcor2_hw.testing.outcomes import PROPERTY
+
+    kind = _bench_of(item)
+    if kind is not None:
+        case = getattr(item, "originalname", item.name).removeprefix("test_")
+        told = {"bench": kind.name(), "type": kind.type_name(), "real": kind.real, "case": case}
+        item.user_properties.append((PROPERTY, told))
+
+
+def _told(item: pytest.Item) -> dict[str, Any]:
+    from arcor2_hw.testing.outcomes import PROPERTY
+
+    told = next(value for key, value in item.user_properties if key == PROPERTY)
+    assert isinstance(told, dict)
+    return told
+
+
+class _Listening:
+    """Notes the reports of the suite; in the process that tells the user, and in those that run the cases."""
+
+    def __init__(self, config: pytest.Config) -> None:
+        self._config = config
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Note one report."""
+        if any(key == "arcor2_case" for key, _ in report.user_properties):
+            from arcor2_hw.testing.outcomes import Outcomes
+
+            kept = self._config.stash.setdefault(OUTCOMES, Outcomes())
+            text = str(report.longrepr).strip().rpartition("\n")[2][:200] if report.failed else ""
+            kept.add(report.user_properties, report.passed, report.failed, report.when, text)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Begin to listen."""
+    config.pluginmanager.register(_Listening(config), "arcor2_hw_outcomes")
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Write the report that was asked for; with xdist, in the process that has all outcomes."""
+    file = session.config.getoption("--report")
+    if file and not hasattr(session.config, "workerinput"):
+        from arcor2_hw.testing import report
+        from arcor2_hw.testing.outcomes import Outcomes
+
+        report.write(Path(file), session.config.stash.get(OUTCOMES, Outcomes()))
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    """Name the drivers that are not covered."""
+    """Tell the level of each driver, and name those that are not covered."""
+    outcomes = config.stash.get(OUTCOMES, None)
+    judged = {} if outcomes is None else {name: ran for name, ran in outcomes.items() if ran.reached is not None}
+    if judged:
+        terminalreporter.section("levels of the drivers", sep="-")
+        for name, ran in sorted(judged.items()):
+            terminalreporter.write_line(_line(name, ran))
     if lines := config.stash.get(PENDING, []):
         terminalreporter.section("drivers without conformance", sep="-", yellow=True)
         for line in lines:
             terminalreporter.write_line(line)
 
 
+def _line(name: str, ran: Ran) -> str:
+    from arcor2_hw.testing.outcomes import Kind
+
+    assert ran.reached is not None
+    counts = ", ".join(f"{number} {kind}" for kind in Kind if (number := ran.count(kind)))
+    lacks = f"; next: {'; '.join(ran.missing[:3])}" + (" …" if len(ran.missing) > 3 else "") if ran.missing else ""
+    return f"{name}: {ran.reached.name.lower()} (claimed {ran.claimed.name.lower()}), {counts}{lacks}"
+
+
+# ---------------------------------------------------------------------------------------------------- fixtures
 @pytest.fixture(scope="class")
 def arcor2_running_bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
     """Give the bench with its fake running, one for all cases of a class."""
     kind: type[Bench] = request.param
-    if kind.real and kind.type_name() not in request.config.getoption("--real-device"):
-        pytest.skip(f"the bench of {kind.type_name()} is a real device: name it by --real-device {kind.type_name()}")
+    option = request.config.getoption
+    if kind.real and not (option("--real") and kind.name() in option("--real-device")):
+        pytest.skip(f"{kind.name()} is a real device: name it by --real --real-device {kind.name()}")
     bench = kind()
     try:
         bench.start()
@@ -49,32 +187,121 @@ def arcor2_running_bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
         bench.end()
 
 
-@pytest.fixture
-def arcor2_bench(request: pytest.FixtureRequest, arcor2_running_bench: Bench) -> Iterator[Bench]:
-    """Give the bench, reset, for one case that it has the hooks for; otherwise a written reason is asked for."""
+@pytest.fixture(scope="class")
+def arcor2_identity(request: pytest.FixtureRequest, arcor2_running_bench: Bench) -> dict[str, str]:
+    """Give who the device says it is, asked once when a report is written."""
     from arcor2_hw.exceptions import Arcor2Error
-    from arcor2_hw.testing import quality
 
-    bench = arcor2_running_bench
-    case = request.function.__name__.removeprefix("test_")
-    lacking = [hook for hook in getattr(request.function, "needs", ()) if not bench.has(hook)]
+    if not request.config.getoption("--report"):
+        return {}
     try:
-        reason = quality.read(bench.quality_file()).reason(bench.type_name(), case)
-    except Arcor2Error as error:
-        pytest.fail(str(error), pytrace=False)
-    if lacking and reason is None:
-        pytest.fail(
-            f"the bench of {bench.type_name()} lacks {', '.join(lacking)}: implement it, or give the reason in "
-            f"quality.yaml under not_run, as {case}",
-            pytrace=False,
-        )
-    if lacking:
-        pytest.skip(f"{bench.type_name()}: {reason}")
-    if reason is not None:
-        pytest.fail(f"quality.yaml says that {case} is not run, but the bench can run it", pytrace=False)
+        who = arcor2_running_bench.connected().identify()
+    except Arcor2Error:
+        return {}
+    finally:
+        arcor2_running_bench.release()
+    return {"vendor": who.vendor, "model": who.model, "serial": who.serial, "firmware": who.firmware}
+
+
+@pytest.fixture
+def arcor2_bench(
+    request: pytest.FixtureRequest, arcor2_running_bench: Bench, arcor2_identity: dict[str, str]
+) -> Iterator[Bench]:
+    """Give the bench, reset, for one case that it has the hooks for; otherwise a written reason is asked for."""
+    bench = arcor2_running_bench
+    told = _told(request.node)
+    told |= {"address": bench.address, "identity": arcor2_identity}
+    _fit(request, bench, told)
     try:
         bench.reset()
         yield bench
     finally:
         bench.release()
         bench.reset()
+
+
+def _fit(request: pytest.FixtureRequest, bench: Bench, told: dict[str, Any]) -> None:
+    """Skip or fail a case that the bench lacks hooks for, or that quality.yaml says is not run."""
+    from arcor2_hw.exceptions import Arcor2Error
+    from arcor2_hw.testing.outcomes import Kind
+
+    case = told["case"]
+    lacking = [hook for hook in getattr(request.function, "needs", ()) if not bench.has(hook)]
+    try:
+        claims = _claims(bench)
+        reason = claims.reason(bench.type_name(), case)
+        if reason is None and lacking and (like := getattr(request.function, "like", "")):
+            reason = claims.reason(bench.type_name(), like)
+    except Arcor2Error as error:
+        if not bench.guessed:
+            pytest.fail(str(error), pytrace=False)
+        reason = None  # what a cell holds need not be in order to be tried; the case `described` tells it
+
+    def skip(kind: Kind, why: str) -> None:
+        told.update(kind=kind.value, reason=why)
+        pytest.skip(f"{bench.name()}: {why}")
+
+    if lacking and reason is not None:
+        skip(Kind.NOT_RUN, reason)
+    if lacking and all(bench.why_not(hook) for hook in lacking):
+        skip(Kind.LACKING, "; ".join(str(bench.why_not(hook)) for hook in lacking))
+    if lacking and getattr(request.function, "for_silver", False):
+        skip(Kind.LACKING, f"the bench has no hook {', '.join(lacking)}")
+    if lacking:
+        pytest.fail(
+            f"the bench of {bench.type_name()} lacks {', '.join(lacking)}: implement it, or give the reason in "
+            f"quality.yaml under not_run, as {case}",
+            pytrace=False,
+        )
+    if reason is not None and bench.guessed:
+        skip(Kind.NOT_RUN, reason)
+    if reason is not None:
+        pytest.fail(f"quality.yaml says that {case} is not run, but the bench can run it", pytrace=False)
+
+
+def _claims(bench: Bench) -> Quality:
+    from arcor2_hw.testing import quality
+
+    return quality.read(bench.quality_file())
+
+
+@pytest.fixture
+def arcor2_phases(request: pytest.FixtureRequest) -> random.Random:
+    """Give the moments at which a case stops, from a seed that is printed."""
+    seed = request.config.getoption("--phases")
+    seed = random.SystemRandom().randrange(1 << 32) if seed is None else seed
+    print(f"the moments of this case again: --phases {seed}")  # noqa: T201 - pytest shows it where the case fails
+    return random.Random(seed)
+
+
+@pytest.fixture
+def arcor2_verdict(request: pytest.FixtureRequest, arcor2_running_bench: Bench) -> Verdict:
+    """Give the level that the bench's cases have reached, of which each must have run in this process."""
+    from arcor2_hw.exceptions import Arcor2Error
+    from arcor2_hw.testing import outcomes, report, rules
+    from arcor2_hw.testing.quality import Level
+
+    bench, config = arcor2_running_bench, request.config
+    if bench.guessed:
+        return outcomes.Verdict(not_judged="a bench made from settings alone cannot judge a level")
+    ran = config.stash.get(OUTCOMES, outcomes.Outcomes()).get(bench.name())
+    there = {} if ran is None else ran.outcomes
+    if lacking := request.cls.cases() - set(there):
+        return outcomes.Verdict(not_judged=f"{len(lacking)} cases did not run in this process")
+    try:
+        claims = _claims(bench)
+    except Arcor2Error as error:
+        return outcomes.Verdict(Level.BRONZE, Level.NONE, [str(error)])
+    folder = bench.quality_file().parent
+    tests = rules.missing_tests(
+        claims.rules, _test_folders(config, claims), folder.name, config.stash.get(COLLECTED, {})
+    )
+    lacks = report.unmatched(folder, claims, bench.type_name(), there)
+    reached, missing = outcomes.judge(there, tests, lacks)
+    _told(request.node).update(claimed=int(claims.claimed), reached=int(reached), missing=missing)
+    return outcomes.Verdict(claims.claimed, reached, missing)
+
+
+def _test_folders(config: pytest.Config, claims: Quality) -> Sequence[Path]:
+    named = [claims.tests] if isinstance(claims.tests, str) else config.getini("testpaths")
+    return [config.rootpath / each for each in named] or [config.invocation_params.dir]

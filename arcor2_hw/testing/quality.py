@@ -2,13 +2,14 @@
 
 import enum
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal
 
 import msgspec
 from msgspec import field
 
-from arcor2_hw.data.base import Data
+from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.exceptions import InvalidData, NotFound
+from arcor2_hw.testing.frames import KINDS
 
 FILE: Final = "quality.yaml"
 
@@ -18,6 +19,15 @@ class Conformance(enum.StrEnum):
 
     BENCH = "bench"
     PENDING = "pending"
+
+
+class Level(enum.IntEnum):
+    """What is shown of a driver: bronze, the cases on its fake; silver, recovery and faults; gold, a real device."""
+
+    NONE = 0
+    BRONZE = 1
+    SILVER = 2
+    GOLD = 3
 
 
 class OutputsOnLoss(enum.StrEnum):
@@ -43,7 +53,11 @@ class Quality(Data, frozen=True, forbid_unknown_fields=True):
 
     rules: by rule, numbered as in docs/reference/object-types.md, the tests that show it. not_run: by case of the
     suite, or by `Type.case`, why it cannot be run; a whole type by its name. actions: of all types, or by type.
-    outputs_on_loss: YAML reads off and on as false and true, which are taken too.
+    outputs_on_loss: YAML reads off and on as false and true, which are taken too. level: what is claimed; the suite
+    checks it. tests: the folder of the tests that `rules` names, from the project's root; where it is not given they
+    are looked for in all test folders. report: beside this file, what `--report` wrote in a run on the real device.
+    frames: how the driver's frames are read, by kind (`arcor2_hw.testing.frames`), with the beginnings of lines that
+    act, or the objects that may be written only to observe.
     """
 
     types: list[str]
@@ -56,6 +70,15 @@ class Quality(Data, frozen=True, forbid_unknown_fields=True):
     limits: list[str]
     conformance: Conformance = Conformance.PENDING
     not_run: dict[str, str] = field(default_factory=dict)
+    level: Literal["none", "bronze", "silver", "gold"] = "none"
+    tests: str | Unset = UNSET
+    report: str | Unset = UNSET
+    frames: dict[str, list[str]] = field(default_factory=dict)
+
+    @property
+    def claimed(self) -> Level:
+        """Give the level that is claimed."""
+        return Level[self.level.upper()]
 
     def __post_init__(self) -> None:
         if not self.types:
@@ -63,6 +86,8 @@ class Quality(Data, frozen=True, forbid_unknown_fields=True):
         for what, reason in self.not_run.items():
             if len(reason.split()) < 3:
                 raise ValueError(f"not_run: {what} needs a reason that a reader understands, not {reason!r}")
+        if unknown := set(self.frames) - set(KINDS):
+            raise ValueError(f"frames: there is no kind {', '.join(sorted(unknown))}; there are {', '.join(KINDS)}")
 
     def actions_of(self, type_name: str) -> list[str]:
         """Give the actions that are claimed for a type."""

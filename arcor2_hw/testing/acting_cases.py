@@ -1,0 +1,134 @@
+"""Cases of acting: control, stop, cancelling, one act at a time."""
+
+import contextlib
+import random
+import time
+from typing import Final
+
+from arcor2_hw.exceptions import Cancelled, DeviceError, DeviceFault, NotInControl, Refused
+from arcor2_hw.runtime.device import OVERTAKES_WITHIN
+from arcor2_hw.runtime.lane import Job
+from arcor2_hw.testing.acts import STARTS_WITHIN, WATCHED, on_lanes, stop_of, under_way
+from arcor2_hw.testing.bench import Bench, needs
+from arcor2_hw.testing.connecting_cases import DISCONNECTS_WITHIN
+from arcor2_hw.testing.life import SLACK, raised, stays, timed, wait_until
+
+WITH_THE_ACT: Final = 20.0
+"""s that a bench's `ask` may take on a device that is sound: with some it is a motion."""
+
+
+class ActingCases:
+    """Who acts, and how it is stopped."""
+
+    @needs("foreign", "writes")
+    def test_control_is_refused(self, arcor2_bench: Bench) -> None:
+        """Control that somebody else has is refused, naming who, and nothing is written (rule 1)."""
+        device = arcor2_bench.connected()
+        with arcor2_bench.foreign():
+            wait_until(lambda: device.control_owner() not in (None, "us"), 2.0, "seeing that somebody else has control")
+            owner = device.control_owner()
+            before = arcor2_bench.writes()
+            error = raised(
+                device.take_control, NotInControl, within=arcor2_bench.call_within, what="taking another's control"
+            )
+            assert str(owner) in str(error), f"the refusal does not name {owner!r}: {error}"
+            assert arcor2_bench.writes() == before, "refused control acted on the device"
+
+    @needs("command", "writes")
+    def test_command_needs_control(self, arcor2_bench: Bench) -> None:
+        """A command without control is refused and does nothing; with control it acts."""
+        device = arcor2_bench.connected()
+        before = arcor2_bench.writes()
+        raised(
+            lambda: arcor2_bench.command(device),
+            NotInControl,
+            within=arcor2_bench.call_within,
+            what="a command without control",
+        )
+        assert arcor2_bench.writes() == before, "a command acted without control"
+        device.take_control()
+        arcor2_bench.command(device)
+        assert arcor2_bench.writes() != before, "the bench's command does not act, or `writes` does not see it"
+
+    @needs("run_long", "running")
+    def test_stop_passes(self, arcor2_bench: Bench) -> None:
+        """stop() comes past a running act, which ends as cancelled; the device stands and stays (rule 5)."""
+        device = arcor2_bench.controlled()
+        stop = stop_of(device)
+        for pause in (0.0, 0.13):
+            act = under_way(arcor2_bench, device)
+            time.sleep(pause)
+            timed(stop, arcor2_bench.stops_within, "stop")
+            assert not arcor2_bench.running(), "stop returned before the device stood"
+            error = act.outcome(arcor2_bench.stops_within, "the act that was stopped")
+            assert isinstance(error, Cancelled), f"the act that was stopped gave {error!r}, not Cancelled"
+        stays(lambda: not arcor2_bench.running(), WATCHED, "it began again after the stop")
+
+    @needs("run_long", "running")
+    def test_one_act_at_a_time(self, arcor2_bench: Bench) -> None:
+        """A second act beside the first is refused, and the first goes on (rule 8)."""
+        device = arcor2_bench.controlled()
+        act = under_way(arcor2_bench, device)
+        raised(
+            lambda: arcor2_bench.run_long(device), Refused, within=arcor2_bench.call_within, what="a second act beside"
+        )
+        assert not act.over, f"the first act ended by that: {act.error!r}"
+        stop_of(device)()
+        act.outcome(arcor2_bench.stops_within, "the first act")
+
+    @needs("run_long", "running")
+    def test_disconnecting_ends_an_act(self, arcor2_bench: Bench) -> None:
+        """disconnect in the middle of an act takes 1 s at most; the act ends, typed, and nobody waits for ever."""
+        device = arcor2_bench.controlled()
+        act = under_way(arcor2_bench, device)
+        timed(device.disconnect, DISCONNECTS_WITHIN, "disconnecting in an act")
+        error = act.outcome(arcor2_bench.call_within, "the act whose connection was closed")
+        assert isinstance(error, DeviceError), f"the act whose connection was closed gave {error!r}"
+
+    @needs("run_long", "running", like="stop_passes")
+    def test_stop_at_random_phases(self, arcor2_bench: Bench, arcor2_phases: random.Random) -> None:
+        """At whatever moment of an act the stop comes: the act ends as cancelled, and the device stands and stays."""
+        device = arcor2_bench.controlled()
+        held = on_lanes(device)
+        try:
+            for phase in (arcor2_phases.uniform(OVERTAKES_WITHIN, 0.6) for _ in range(3)):
+                act = Job("act", lambda: arcor2_bench.run_long(device))
+                held.lane.submit(act)
+                time.sleep(phase)
+                when = f"{phase:.3f} s after the act began"
+                assert not act.ended, f"the act was over {when}: {act.error!r}"
+                stop, _ = held.begin_stop() or (None, None)
+                assert stop is not None, "what runs for long needs a stop()"
+                assert stop.wait(arcor2_bench.stops_within + SLACK), f"stop {when} did not return"
+                stop.outcome()
+                assert act.wait(arcor2_bench.stops_within + SLACK), f"the act did not end by a stop {when}"
+                assert isinstance(act.error, Cancelled), f"stopped {when}, the act gave {act.error!r}, not Cancelled"
+                assert not arcor2_bench.running(), f"stopped {when}, the device runs on"
+        finally:
+            held.release_lanes()
+        stays(lambda: not arcor2_bench.running(), WATCHED / 2, "it began again after the stop")
+
+    @needs("run_long", "running", "observe", like="stop_passes")
+    def test_cancelling_leaves_the_line_usable(self, arcor2_bench: Bench) -> None:
+        """After a call was cancelled on its lane, the next calls get answers, and their own (rule 8)."""
+        device = arcor2_bench.controlled()
+        kinds = type(arcor2_bench.observe(device))
+        held = on_lanes(device)
+        try:
+            act = Job("act", lambda: arcor2_bench.run_long(device))
+            held.lane.submit(act)
+            wait_until(lambda: arcor2_bench.running() or act.ended, STARTS_WITHIN, "the act of run_long")
+            stop, _ = held.begin_stop() or (None, None)
+            assert stop is not None, "what runs for long needs a stop()"
+            assert stop.wait(arcor2_bench.stops_within + SLACK), "stop did not return"
+            assert act.wait(arcor2_bench.stops_within + SLACK), "the act did not end by the stop"
+            for _ in range(3):
+                given = held.lane.call(
+                    "observe", lambda: arcor2_bench.observe(device), deadline=arcor2_bench.call_within + SLACK
+                )
+                assert type(given) is kinds, f"after the cancelled call a reading gave {given!r}, which is another's"
+            if arcor2_bench.has("ask"):
+                with contextlib.suppress(Refused, DeviceFault):  # which is an answer
+                    held.lane.call("ask", lambda: arcor2_bench.ask(device), deadline=WITH_THE_ACT)
+        finally:
+            held.release_lanes()

@@ -1,0 +1,141 @@
+"""What a type says it can do, what it really has, and what is asked of it without any argument."""
+
+import inspect
+from functools import lru_cache
+from typing import Any, Final
+
+from arcor2_hw.analysis import Library
+from arcor2_hw.exceptions import Arcor2NotImplemented
+from arcor2_hw.objects import Generic
+from arcor2_hw.testing import described
+
+OURS: Final = "arcor2_hw.objects"
+READS: Final = frozenset(
+    {
+        "alarms",
+        "counters",
+        "get_arm_ids",
+        "get_end_effectors_ids",
+        "get_hand_teaching_mode",
+        "identify",
+        "is_referenced",
+        "joint_limits",
+        "machine_state",
+        "max_tcp_speed",
+        "permissives",
+        "points",
+        "state",
+        "status",
+        "stop_reason",
+        "unit_mode",
+        "vacuum",
+        "wrench",
+    }
+)
+"""Methods of the bases that read and need neither argument nor control, so that they can be tried on any device."""
+
+
+@lru_cache(maxsize=64)
+def declared(kind: type[Generic]) -> frozenset[str]:
+    """Give the optional methods that analysis says a type has."""
+    return Library([described.source_of(kind)]).analyse(kind.__name__).implemented
+
+
+def hooks(kind: type[Generic]) -> dict[str, Any]:
+    """Give the optional methods of our bases whose body there is nothing but the not-implemented error."""
+    found: dict[str, Any] = {}
+    for base in kind.__mro__:
+        if not base.__module__.startswith(OURS):
+            continue
+        for name, member in vars(base).items():
+            if not name.startswith("_") and inspect.isfunction(member) and _raises_only(member):
+                found.setdefault(name, member)
+    return found
+
+
+def _raises_only(function: Any) -> bool:
+    try:
+        function(*[None] * _required(function))
+    except Arcor2NotImplemented:
+        return True
+    except Exception:  # noqa: BLE001 - it does something with what it is given: it is no mere hook
+        return False
+    return False
+
+
+def _required(function: Any) -> int:
+    parameters = inspect.signature(function).parameters.values()
+    return sum(p.default is p.empty and p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD) for p in parameters)
+
+
+def contradictions(device: Generic, said: frozenset[str]) -> list[str]:
+    """Give, one sentence each, where a disconnected object does not have what analysis says, or has more."""
+    kind = type(device)
+    wrong = []
+    for name, hook in hooks(kind).items():
+        here = inspect.getattr_static(device, name, None)
+        own = here is not None and here is not hook and not _is_of_ours(kind, name, here)
+        if name in said and not own:
+            wrong.append(f"{name} is declared and is not there")
+        elif name not in said and own and not _says_not_implemented(device, name):
+            wrong.append(f"{name} is there, and analysis does not see it")
+        elif name not in said and not own and not _says_not_implemented(device, name):
+            wrong.append(f"{name} is not declared, and does not say that it is not implemented")
+    return wrong
+
+
+def _is_of_ours(kind: type, name: str, member: object) -> bool:
+    return any(vars(base).get(name) is member for base in kind.__mro__ if base.__module__.startswith(OURS))
+
+
+def _says_not_implemented(device: Generic, name: str) -> bool:
+    """Call an optional method on an object that is not connected: what is not there says so before anything else."""
+    method = getattr(device, name)
+    try:
+        method(*[None] * _required(method))
+    except Arcor2NotImplemented:
+        return True
+    except Exception:  # noqa: BLE001 - whatever it is, it is not that
+        return False
+    return False
+
+
+def readable(kind: type[Generic], said: frozenset[str]) -> list[str]:
+    """Give the methods of a type that can be tried at once on a connected device."""
+    mandatory = {name for base in kind.__mro__ for name in getattr(base, "__abstractmethods__", ())}
+    return sorted(
+        name
+        for name in READS & (said | mandatory)
+        if callable(getattr(kind, name, None)) and not _required_beyond_self(getattr(kind, name))
+    )
+
+
+def _required_beyond_self(function: Any) -> bool:
+    return _required(function) > 1
+
+
+def unhinted(kind: type[Generic]) -> list[str]:
+    """Give the public methods and properties of a type and its bases, ours excepted, that lack a hint."""
+    lacking = []
+    for base in kind.__mro__:
+        if base.__module__.startswith("arcor2_hw.") or base.__module__ in ("builtins", "abc", "typing"):
+            continue
+        for name, member in vars(base).items():
+            plain = _function(member)
+            if plain is None or (name.startswith("_") and name != "__init__"):
+                continue
+            hints = plain.__annotations__
+            parameters = list(inspect.signature(plain).parameters)[0 if isinstance(member, staticmethod) else 1 :]
+            missing = [each for each in parameters if each not in hints]
+            missing += [] if "return" in hints or name == "__init__" else ["what it returns"]
+            lacking += [f"{base.__name__}.{name}: {each}" for each in missing]
+    return sorted(set(lacking))
+
+
+def _function(member: Any) -> Any:
+    if isinstance(member, property):
+        member = member.fget
+    if isinstance(member, staticmethod | classmethod):
+        member = member.__func__
+    member = inspect.unwrap(member) if callable(member) else member
+    return member if inspect.isfunction(member) else None

@@ -1,0 +1,95 @@
+"""Cases of connecting: nothing is opened, acted on or left behind; a device that is not there."""
+
+from typing import Final
+
+from arcor2_hw.data.device import Connection
+from arcor2_hw.exceptions import DeviceTimeout, NotConnected
+from arcor2_hw.testing.acts import GONE
+from arcor2_hw.testing.bench import Bench, knows_control, needs
+from arcor2_hw.testing.life import held, left_behind, named, raised, timed
+
+DISCONNECTS_WITHIN: Final = 1.0
+"""s that disconnect may take, whatever the wire does."""
+
+
+class ConnectingCases:
+    """From the constructor to disconnect."""
+
+    def test_constructor_opens_nothing(self, arcor2_bench: Bench) -> None:
+        """The constructor stores; there is no thread, no socket and no connection after it."""
+        before = held()
+        device = timed(arcor2_bench.new, 0.5, "the constructor")
+        assert not (new := held() - before), f"the constructor opened {', '.join(sorted(new))}"
+        assert device.connection is Connection.OFFLINE, f"it is {device.connection} before it was connected"
+
+    def test_connect_is_idempotent(self, arcor2_bench: Bench) -> None:
+        """Connecting twice is once, within the time-out."""
+        device = arcor2_bench.new()
+        for what in ("connect", "a second connect"):
+            timed(lambda: device.connect(arcor2_bench.connect_timeout), arcor2_bench.connect_timeout, what)
+            assert device.connection is Connection.ONLINE, f"after {what} it is {device.connection}"
+            now = held()
+            if what == "connect":
+                before = now
+        assert not (new := now - before), f"a second connect opened {', '.join(sorted(new))}"
+
+    def test_disconnect_is_idempotent(self, arcor2_bench: Bench) -> None:
+        """Disconnecting is harmless at any time, takes 1 s at most, and the object can be connected again."""
+        device = arcor2_bench.new()
+        device.disconnect()
+        for _ in range(2):
+            device.connect(arcor2_bench.connect_timeout)
+            for what in ("disconnect", "a second disconnect"):
+                timed(device.disconnect, DISCONNECTS_WITHIN, what)
+                assert device.connection is Connection.OFFLINE, f"after {what} it is {device.connection}"
+
+    def test_nothing_is_left_behind(self, arcor2_bench: Bench) -> None:
+        """After disconnect there is no thread, socket or port left of three connections."""
+        before = held()
+        for _ in range(3):
+            device = arcor2_bench.controlled()
+            device.disconnect()
+        left = left_behind(before)
+        assert not left, f"after disconnect there is still {', '.join(sorted(left))}"
+
+    @needs("writes")
+    def test_connecting_observes(self, arcor2_bench: Bench) -> None:
+        """Connecting, reading and disconnecting write, switch and move nothing (rule 1)."""
+        before = arcor2_bench.writes()
+        device = arcor2_bench.connected()
+        if arcor2_bench.has("observe"):
+            arcor2_bench.observe(device)
+        assert arcor2_bench.writes() == before, "connecting acted on the device"
+        if knows_control(type(device)):
+            assert device.control_owner() != "us", "connecting took control"
+        device.disconnect()
+        assert arcor2_bench.writes() == before, "disconnecting acted on a device that was only observed"
+        if arcor2_bench.has("actuating"):
+            acted = list(arcor2_bench.actuating())
+            assert not acted, f"only to observe, the driver sent {'; '.join(acted[:5])}"
+
+    @needs("absent")
+    def test_absent_device(self, arcor2_bench: Bench) -> None:
+        """Where there is no device, connect says so within the time-out, naming object and address."""
+        device, address = arcor2_bench.absent()
+        arcor2_bench.keep(device)
+        before = held()
+        error = raised(
+            lambda: device.connect(1.0), NotConnected, DeviceTimeout, within=1.0, what="connecting to nothing"
+        )
+        named(error, device.name, address, "connecting to nothing")
+        assert device.connection is Connection.FAILED, f"it is {device.connection} after that"
+        device.disconnect()
+        left = left_behind(before)
+        assert not left, f"an attempt that failed left {', '.join(sorted(left))}"
+
+    @needs("cut", "heal")
+    def test_connecting_to_a_silent_device(self, arcor2_bench: Bench) -> None:
+        """A device that does not answer is a typed error within the time-out; once it answers, connect works."""
+        device = arcor2_bench.new()
+        arcor2_bench.cut()
+        error = raised(lambda: device.connect(1.0), *GONE, within=1.0, what="connecting to a silent device")
+        named(error, device.name, arcor2_bench.address, "connecting to a silent device")
+        arcor2_bench.heal()
+        device.connect(arcor2_bench.connect_timeout)
+        assert device.connection is Connection.ONLINE

@@ -1,0 +1,146 @@
+"""Frames: where a driver's frames begin and end on a recorded wire, and which of them act on the device."""
+
+import re
+import struct
+from collections.abc import Sequence
+from typing import Final, Protocol
+
+from arcor2_hw.exceptions import InvalidData
+
+
+class Frames(Protocol):
+    """How a protocol is read, in the direction from the driver to the device."""
+
+    def split(self, stream: bytes) -> list[bytes]:
+        """Give the frames of a stream; what is incomplete or no frame at all is the last one."""
+        ...
+
+    def acting(self, frame: bytes) -> str:
+        """Give what a frame does to the device, in words; empty when it only asks."""
+        ...
+
+
+WRITES: Final = {
+    5: "write single coil",
+    6: "write single register",
+    15: "write multiple coils",
+    16: "write multiple registers",
+    22: "mask write register",
+    23: "read/write multiple registers",
+}
+"""Modbus functions that write (MODBUS Application Protocol Specification V1.1b3, section 6)."""
+
+
+class ModbusTcp:
+    """Modbus TCP: a header of transaction, protocol 0, length, unit; then the function (MBAP)."""
+
+    def split(self, stream: bytes) -> list[bytes]:
+        """Split by the length of the header."""
+        frames = []
+        while len(stream) >= 8 and len(stream) >= (end := 6 + struct.unpack_from(">H", stream, 4)[0]) >= 8:
+            frames.append(stream[:end])
+            stream = stream[end:]
+        return [*frames, stream] if stream else frames
+
+    def acting(self, frame: bytes) -> str:
+        """Name the functions that write; what is no frame acts too, for nobody knows what it does."""
+        if len(frame) < 8 or frame[2:4] != b"\0\0":
+            return f"no Modbus TCP frame: {frame.hex(' ')}"
+        return _modbus(frame[7], frame[8:])
+
+
+class ModbusRtu:
+    """Modbus RTU: unit, function, data, CRC; requests are told apart by their functions' lengths."""
+
+    _LENGTHS: Final = {1: 8, 2: 8, 3: 8, 4: 8, 5: 8, 6: 8, 7: 4, 8: 8, 11: 4, 12: 4, 17: 4, 22: 10, 43: 7}
+    _COUNTED: Final = {15: 6, 16: 6, 23: 10}  # where the number of bytes that follow stands
+
+    def _length(self, stream: bytes) -> int:
+        function = stream[1] if len(stream) > 1 else 0
+        if function in self._LENGTHS:
+            return self._LENGTHS[function]
+        place = self._COUNTED.get(function)
+        return 0 if place is None or len(stream) <= place else place + 1 + stream[place] + 2
+
+    def split(self, stream: bytes) -> list[bytes]:
+        """Split by the lengths of the requests."""
+        frames = []
+        while 0 < (end := self._length(stream)) <= len(stream):
+            frames.append(stream[:end])
+            stream = stream[end:]
+        return [*frames, stream] if stream else frames
+
+    def acting(self, frame: bytes) -> str:
+        """Name the functions that write; what is no frame acts too."""
+        if len(frame) != self._length(frame):
+            return f"no Modbus RTU frame: {frame.hex(' ')}"
+        return _modbus(frame[1], frame[2:])
+
+
+def _modbus(function: int, data: bytes) -> str:
+    if function not in WRITES:
+        return ""
+    place = 4 if function == 23 else 0
+    register = struct.unpack_from(">H", data, place)[0] if len(data) >= place + 2 else -1
+    return f"function {function} ({WRITES[function]}) at {register}"
+
+
+class Lines:
+    """Lines of text, ended by CR, LF or both; those that begin with one of some words act."""
+
+    def __init__(self, words: Sequence[str]) -> None:
+        self._words = tuple(word.encode() for word in words)
+
+    def split(self, stream: bytes) -> list[bytes]:
+        """Split by the ends of the lines."""
+        return [line for line in re.split(rb"[\r\n]+", stream) if line]
+
+    def acting(self, frame: bytes) -> str:
+        """Give the line when it acts."""
+        return frame.decode(errors="replace") if frame.lstrip().startswith(self._words) else ""
+
+
+class CanopenSlcan:
+    """CANopen in lines of slcan: NMT, process data and SDO downloads act, but for downloads to declared objects."""
+
+    def __init__(self, declared: Sequence[str] = ()) -> None:
+        self._declared = {int(each, 16) for each in declared}
+
+    def split(self, stream: bytes) -> list[bytes]:
+        """Split by CR."""
+        return [line for line in stream.split(b"\r") if line]
+
+    def acting(self, frame: bytes) -> str:
+        """Tell what a frame with an 11 bit identifier does (CiA 301); other lines speak with the adapter."""
+        if not re.fullmatch(rb"t[0-7][0-9A-Fa-f]{2}[0-8]([0-9A-Fa-f]{2})*", frame):
+            return ""
+        cob, data = int(frame[1:4], 16), bytes.fromhex(frame[5:].decode())
+        if cob == 0:
+            return f"NMT {data.hex(' ')}"
+        if cob & 0x780 in (0x200, 0x300, 0x400, 0x500):
+            return f"process data {cob:03x}h"
+        if cob & 0x780 == 0x600 and len(data) == 8 and data[0] >> 5 in (0, 1, 6):
+            index = data[1] | data[2] << 8
+            if data[0] >> 5 == 0 or index not in self._declared:  # a segment says not what it belongs to
+                return f"SDO download to {index:04x}h"
+        return ""
+
+
+KINDS: Final = ("modbus-tcp", "modbus-rtu", "lines", "canopen-slcan")
+"""What quality.yaml may name under `frames`."""
+
+
+def reader(kind: str, words: Sequence[str]) -> Frames:
+    """Give how a kind of protocol is read. words: the beginnings of lines that act, or objects that may be written.
+
+    Raises InvalidData for a kind that is not known.
+    """
+    if kind == "modbus-tcp":
+        return ModbusTcp()
+    if kind == "modbus-rtu":
+        return ModbusRtu()
+    if kind == "lines":
+        return Lines(words)
+    if kind == "canopen-slcan":
+        return CanopenSlcan(words)
+    raise InvalidData(f"frames of the kind {kind} cannot be read; there are {', '.join(KINDS)}")

@@ -1,0 +1,82 @@
+"""Cases that read what is written: metadata, capabilities, types."""
+
+from arcor2_hw.exceptions import KinematicsError, OutOfRange, Refused
+from arcor2_hw.testing import capabilities, described
+from arcor2_hw.testing.bench import Bench, needs
+from arcor2_hw.testing.life import raised
+
+
+class WrittenCases:
+    """What a driver says of itself."""
+
+    def test_described(self, arcor2_bench: Bench) -> None:
+        """Metadata, docstrings, stop and state, loss_reaction and quality.yaml are in order; nothing is abstract."""
+        wrong = described.faults(described.source_of(arcor2_bench.object_type))
+        assert not wrong, "; ".join(wrong)
+        assert not arcor2_bench.object_type.abstract()
+
+    def test_types_complete(self, arcor2_bench: Bench) -> None:
+        """Every public method has a hint for each parameter and for what it returns."""
+        lacking = capabilities.unhinted(arcor2_bench.object_type)
+        assert not lacking, f"there is no hint at {', '.join(lacking)}"
+
+    def test_capabilities_declared(self, arcor2_bench: Bench) -> None:
+        """An optional method is there where analysis sees it, and says not-implemented where it does not."""
+        said = capabilities.declared(arcor2_bench.object_type)
+        wrong = capabilities.contradictions(arcor2_bench.new(), said)
+        assert not wrong, "; ".join(wrong)
+
+    def test_readings_can_be_read(self, arcor2_bench: Bench) -> None:
+        """What needs neither argument nor control is given, or refused by a typed error, on a connected device."""
+        device = arcor2_bench.connected()
+        said = capabilities.declared(arcor2_bench.object_type)
+        for name in capabilities.readable(type(device), said):
+            try:
+                getattr(device, name)()
+            except Refused:
+                continue  # not in this state
+            except Exception as error:
+                raise AssertionError(f"{name}() raised {type(error).__name__}: {error}") from error
+
+    @needs("works", for_silver=True)
+    def test_capabilities_work(self, arcor2_bench: Bench) -> None:
+        """Every optional method that is declared and acts is shown to work; what only reads is tried elsewhere."""
+        device = arcor2_bench.controlled()
+        kind = type(device)
+        said = capabilities.declared(arcor2_bench.object_type)
+        shown = dict(arcor2_bench.works(device))
+        wanted = (said & set(capabilities.hooks(kind))) - set(capabilities.readable(kind, said))
+        assert not (more := set(shown) - said), f"the bench shows what is not declared: {', '.join(sorted(more))}"
+        assert not (less := wanted - set(shown)), f"nothing shows that these work: {', '.join(sorted(less))}"
+        for name, call in shown.items():
+            try:
+                call()
+            except Exception as error:
+                raise AssertionError(f"{name} is declared and raised {type(error).__name__}: {error}") from error
+
+    @needs("readings", for_silver=True)
+    def test_units_and_frames(self, arcor2_bench: Bench) -> None:
+        """Readings are what the device itself says, in SI units, with its signs and in the stated frame."""
+        checks = list(arcor2_bench.readings(arcor2_bench.connected()))
+        assert checks, "the bench compares no reading"
+        for each in checks:
+            apart = abs(each.by_driver - each.by_device)
+            assert apart <= each.within, (
+                f"{each.what}: the driver says {each.by_driver:g}, the device {each.by_device:g}: more than "
+                f"{each.within:g} apart"
+            )
+        assert any(each.by_device for each in checks), "all is zero at the device: no unit or sign could be wrong"
+
+    @needs("beyond_limits", for_silver=True)
+    def test_limits_are_refused(self, arcor2_bench: Bench) -> None:
+        """What lies beyond a limit is refused with a typed error that names the device; nothing is done."""
+        device = arcor2_bench.controlled()
+        calls = arcor2_bench.beyond_limits(device)
+        assert calls, "the bench tries no limit"
+        for what, call in calls.items():
+            before = arcor2_bench.writes() if arcor2_bench.has("writes") else None
+            error = raised(call, OutOfRange, Refused, KinematicsError, within=arcor2_bench.call_within, what=what)
+            text = f"{error} {error.detail}"
+            assert device.name in text, f"the refusal of {what} does not name {device.name!r}: {text}"
+            if before is not None:
+                assert arcor2_bench.writes() == before, f"{what} was refused and acted all the same"

@@ -1,0 +1,14 @@
+"""A silent press is waited for, however long was said."""
+
+import time
+
+from .toy_press import ToyPress
+
+
+class BrokenPress(ToyPress):
+    """A press."""
+
+    def _nobody(self, timeout: float) -> Exception:
+        if self._there:
+            time.sleep(timeout + 1.0)
+        return super()._nobody(timeout)

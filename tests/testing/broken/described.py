@@ -1,0 +1,13 @@
+"""An action without a word of what it does."""
+
+from arcor2_hw.actions import action
+
+from .toy_press import ToyPress
+
+
+class BrokenPress(ToyPress):
+    """A press."""
+
+    @action
+    def eject(self, *, an: str | None = None) -> None:
+        self._check_control()

@@ -1,0 +1,16 @@
+"""A second disconnect waits for somebody who has left."""
+
+import time
+
+from arcor2_hw.data.device import Connection
+
+from .toy_press import ToyPress
+
+
+class BrokenPress(ToyPress):
+    """A press."""
+
+    def disconnect(self) -> None:
+        if self._read_at and self.connection is Connection.OFFLINE:
+            time.sleep(2.0)
+        super().disconnect()
