@@ -123,7 +123,7 @@ class AskedLine:
         if loss is None:
             return None
         if isinstance(loss, DeviceFault):
-            return DeviceFault(str(loss), loss.detail, loss.fault_code)
+            return type(loss)(str(loss), loss.detail, loss.fault_code)
         return type(loss)(str(loss), loss.detail)
 
     def _failed(self, error: DeviceError) -> DeviceError:

@@ -70,7 +70,7 @@ class DobotArm(DobotObserved):
         sample, until = self._observer.after(time.monotonic()), time.monotonic() + 2.0 * STANDING
         while sample.moving:  # one that has just come to rest counts as moving for a moment
             if time.monotonic() > until:
-                raise NotInControl(f"{self._who} moves, and not for us; control is refused until it stands")
+                raise NotInControl(f"{self._who} moves, and not for us: somebody else has control; it is refused until it stands")
             sample = self._observer.after(sample.monotonic)
         has = self._dobot
         joint, ramp = math.degrees(has.max_joint_speed), math.degrees(has.joint_acceleration)

@@ -36,6 +36,10 @@ _COMPLAINTS: Final = {
 _BLOCKING: Final = tuple(field.name for field in dataclasses.fields(Status) if field.name in _COMPLAINTS)
 
 
+class NoReply(DeviceFault, DeviceTimeout):
+    """The printer says nothing: it is out of labels, its head is open, or the line is broken; nobody can tell which."""
+
+
 class ZplPrinter(Printer):
     """A label printer that speaks ZPL, on a serial line or TCP."""
 
@@ -229,9 +233,9 @@ class ZplPrinter(Printer):
     def _ask_counter(self) -> int:
         return self._line.ask(zpl.getvar(zpl.COUNTER), zpl.number, f"getvar {zpl.COUNTER}")
 
-    def _silent(self, error: DeviceError) -> DeviceFault:
+    def _silent(self, error: DeviceError) -> NoReply:
         self._alarm(NO_REPLY, True)
-        return DeviceFault(
+        return NoReply(
             f"{self._who} does not answer: it is out of labels, its head is open, or the line is broken; "
             f"{_COMPLAINTS[NO_REPLY][1]}",
             f"{error} {error.detail}".strip(),

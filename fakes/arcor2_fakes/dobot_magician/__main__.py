@@ -17,6 +17,8 @@ from arcor2_fakes.serial_line import PtyLine
 from arcor2_fakes.wire import register_faults
 
 _TICK = 0.005  # s
+JOINT_TO_ANGLES = 4
+"""Mode of a point-to-point motion: joint angles, in degrees."""
 
 app = App(name="arcor2_fakes.dobot_magician", help="Fake Dobot Magician on a pty.", version_flags=[])
 
@@ -41,7 +43,16 @@ def register_commands(control: ControlServer, arm: Arm, commands: Commands) -> N
         arm.as_delivered()
         commands.renew()
 
+    def drive(turn: float, percent: float = 5.0) -> None:
+        """Turn the base, as a program on another host would."""
+        arm.set.speed_ratio = float(percent)
+        first, *others = arm.joints
+        target = (first + float(turn), *others)
+        arm.enqueue(lambda: arm.point_to_point(JOINT_TO_ANGLES, target))
+        arm.running = True
+
     control.command("renew", renew)
+    control.command("drive", drive)
     control.command("alarm", alarm)
     control.command("wrong_checksum", wrong_checksum)
     control.command("mute", mute)

@@ -29,6 +29,7 @@ def truth(bus: Bus, line: PtyLine) -> dict[str, Any]:
             "angle": (servo.position - TICKS / 2) * math.tau / TICKS,
             "speed": servo.speed * math.tau / TICKS,
             "ticks": servo.position,
+            "answers": servo.answers,
             "velocity": servo.speed / VELOCITY_UNIT,
             **{name: servo[name] for name in ("torque", "goal", "watchdog", "hardware_error", "homing_offset")},
             **{name: servo[name] for name in ("profile_velocity", "profile_acceleration", "current_limit")},

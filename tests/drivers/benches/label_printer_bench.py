@@ -1,0 +1,73 @@
+"""The label printer on its fake, on TCP; a label takes 1.5 s, and is finished without us."""
+
+import sys
+from typing import Any
+
+from arcor2_drivers.label_printer.settings import ZplPrinterSettings
+from arcor2_drivers.label_printer.zpl_printer import ZplPrinter
+from arcor2_hw.objects import Generic
+from arcor2_hw.testing.bench import Bench
+from tests.fakes.conftest import FakeProcess
+
+ORPHAN = """
+import sys
+from arcor2_drivers.label_printer.settings import ZplPrinterSettings
+from arcor2_drivers.label_printer.zpl_printer import ZplPrinter
+printer = ZplPrinter("id", "orphan", ZplPrinterSettings(sys.argv[1]))
+printer.connect()
+printer.print_label("title", "text", "code")
+"""
+ASKING = ("~HS", "~HI", "getvar ")
+
+
+class ZplPrinterBench(Bench):
+    object_type = ZplPrinter
+    fake: FakeProcess
+
+    def start(self) -> None:
+        self.fake = FakeProcess("label_printer", "--tcp", "127.0.0.1:0", "--duration", "1.5")
+        self.do = self.fake.control.do
+
+    def end(self) -> None:
+        self.fake.end()
+
+    def reset(self) -> None:
+        self.do("heal")
+        self.do("power_cycle")
+
+    @property
+    def address(self) -> str:
+        return str(self.fake.ready["port"])
+
+    def _build(self, port: str) -> ZplPrinter:
+        return ZplPrinter("printer_id", "printer", settings=ZplPrinterSettings(port, answer_timeout=0.4))
+
+    def make(self) -> ZplPrinter:
+        return self._build(self.address)
+
+    def absent(self) -> tuple[Generic, str]:
+        return self._build("socket://127.0.0.1:1"), "127.0.0.1:1"
+
+    def writes(self) -> Any:
+        truth = self.fake.truth()
+        return [each for each in truth["received"] if not each.startswith(ASKING)], truth["counter"], truth["paused"]
+
+    def cut(self) -> None:
+        self.do("silence")
+
+    def heal(self) -> None:
+        self.do("heal")
+
+    def observe(self, device: Generic) -> object:
+        assert isinstance(device, ZplPrinter)
+        return device.status()
+
+    def ask(self, device: Generic) -> object:
+        assert isinstance(device, ZplPrinter)
+        return device.labels_printed()
+
+    def running(self) -> bool:
+        return bool(self.fake.truth()["waiting"])
+
+    def orphan(self) -> list[str]:
+        return [sys.executable, "-c", ORPHAN, self.address]
