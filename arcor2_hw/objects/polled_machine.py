@@ -30,17 +30,6 @@ class PolledMachine(PolledControl[T], Machine):
         """Give a command. Raises Refused naming command and state, NotInControl."""
         self._command(command)
 
-    def wait_for(self, state: MachineState, timeout: float) -> None:
-        """Return when the unit is in `state`. Raises DeviceTimeout after `timeout` s, DeviceFault when it aborts."""
-
-        def there(read: T) -> bool:
-            found = self.state_of(read)
-            if found is MachineState.ABORTED and state is not found:
-                raise DeviceFault(f"{self._link.who} has aborted", fault_code=self.fault_of(read))
-            return found is state
-
-        self._polled.wait(there, timeout, f"becoming {state.name}")
-
     def run(self, timeout: float, go_on: GoOn, *arguments: int) -> T:
         """Start, from wherever a reset leads to, and give what is read when it is complete. Within an `act`.
 

@@ -10,7 +10,9 @@ import argparse
 import asyncio
 import json
 import sys
+import tempfile
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Protocol
 
 from arcor2_fakes.control import ControlServer, parse_address
@@ -188,10 +190,10 @@ def http_wire(device: Registers, answer: Answer, host: str, port: int) -> TcpWir
     return TcpWire("wire", host, port, opened)
 
 
-def text_line(device: Registers, answer: Answer, host: str, port: int, serial: bool) -> Line:
-    """Give a text line: a pty, or a TCP port."""
+def text_line(device: Registers, answer: Answer, host: str, port: int, link: Path | None) -> Line:
+    """Give a text line: a pty that `link` points to, whose own path changes when it is unplugged, or a TCP port."""
     received = cut(device, answer, line_length, lambda frame: line.send(frame), b"\r")
-    line: Line = PtyLine(received) if serial else TcpLine(received, host, port)
+    line: Line = TcpLine(received, host, port) if link is None else PtyLine(received, link)
     return line
 
 
@@ -222,10 +224,12 @@ def serve(
     async def body() -> None:
         device = make()
         channel = ControlServer(control_host, control_port)
+        folder = tempfile.TemporaryDirectory(prefix="arcor2-fake-")
         line: Line | None = None
         wire: TcpWire | None = None
         if bus in ("serial", "tcp"):
-            line = text_line(device, answer or answer_line, options.host, options.port, bus == "serial")
+            link = Path(folder.name) / f"tty-{name}" if bus == "serial" else None
+            line = text_line(device, answer or answer_line, options.host, options.port, link)
             await line.plug()
             register_faults(channel, {"wire": line})
         else:
@@ -251,5 +255,6 @@ def serve(
             if wire is not None:
                 wire.close()
             await channel.close()
+            folder.cleanup()
 
     return run(body, name)

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-TUTORIALS = sorted((Path(__file__).parents[2] / "docs" / "tutorials").glob("*.md"))
+DOCS = Path(__file__).parents[2] / "docs"
+TUTORIALS = sorted([*(DOCS / "tutorials").glob("*.md"), *(DOCS / "how-to").glob("*.md")])
 BLOCK = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 TIMEOUT = 60
 
@@ -78,7 +79,7 @@ def test_tutorial(tutorial: Path, tmp_path: Path) -> None:
     ran = 0
     try:
         for kind, info, text in BLOCK.findall(tutorial.read_text()):
-            if title := re.search(r'title="([\w.]+)"', info):
+            if title := re.search(r'title="([\w./-]+)"', info):
                 (tmp_path / title.group(1)).write_text(text)
             elif kind == "console" and "background" in info:
                 for command, printed in commands(text):
@@ -105,3 +106,14 @@ def test_tutorial(tutorial: Path, tmp_path: Path) -> None:
         for started in reversed(background):
             started.stop()
     assert ran > 0, "the tutorial runs nothing"
+
+
+def test_a_device_of_ones_own_takes_sixty_lines_of_driver_and_of_fake() -> None:
+    text = (DOCS / "how-to" / "add-a-device.md").read_text()
+    written = {
+        title.group(1): sum(bool(line.strip()) for line in block.splitlines())
+        for _, info, block in BLOCK.findall(text)
+        if (title := re.search(r'title="([\w./-]+)"', info))
+    }
+    assert set(written) == {"sealer/sealer/sealer.py", "sealer/sealer/sealer_fake.py"}
+    assert max(written.values()) <= 60, written

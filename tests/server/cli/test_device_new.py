@@ -21,6 +21,8 @@ RUN = [
     (Base.MACHINE, Bus.HTTP),
 ]
 """What is run here in full; every other combination is linted and analysed."""
+OF_THE_AUTHOR = ("hook works", "hook readings", "hook beyond_limits")
+"""Hooks of the bench that only somebody who knows the device can fill."""
 ALL = [(base, bus) for base in KINDS for bus in WIRES]
 
 
@@ -56,7 +58,9 @@ def test_the_suite_passes_at_once(tmp_path: Path, base: Base, bus: Bus) -> None:
     found = re.search(r"(\d+) passed", done.stdout)
     assert found is not None
     assert int(found.group(1)) >= 19, "the cases of the suite, and the driver's own"
-    assert "skipped" not in done.stdout, "everything that the suite knows is shown"
+    for line in done.stdout.splitlines():
+        if line.startswith("SKIPPED"):
+            assert line.endswith(OF_THE_AUTHOR), line
 
 
 @pytest.mark.parametrize(("base", "bus"), ALL, ids=lambda each: each.value)
