@@ -63,7 +63,7 @@ class OakD(Camera):
         Raises NotConnected when it is not there, is used by another, or depthai is not installed; DeviceTimeout;
         DeviceFault for a calibration or a stream that makes no sense.
         """
-        self._observed.observing.start(timeout)
+        self._observed.connect(timeout)
         self.color_camera_params = self._observed.feed.parameters
 
     def disconnect(self) -> None:

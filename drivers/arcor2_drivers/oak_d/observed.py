@@ -1,5 +1,6 @@
 """The observed camera: one thread takes every picture from the feed and keeps the newest."""
 
+import atexit
 import threading
 import time
 from typing import TYPE_CHECKING, Final
@@ -104,8 +105,16 @@ class Observed:
             return Health.FAILURE
         return Health.OFF_SPEC if self._alarms else Health.NORMAL
 
+    def connect(self, timeout: float) -> None:
+        """Begin to observe within `timeout` s. Raises NotConnected, DeviceTimeout, DeviceFault."""
+        self.observing.start(timeout)
+        # A pipeline that is still there when the interpreter ends takes the process down with it.
+        atexit.unregister(self.disconnect)
+        atexit.register(self.disconnect)
+
     def disconnect(self) -> None:
         """Stop observing; harmless when it was not."""
+        atexit.unregister(self.disconnect)
         self.observing.stop()
         self._newest = None
         self._exposure = None

@@ -1,10 +1,12 @@
 """The OAK-D's driver on bad days: each fault is a typed error that names the camera, and afterwards it works again."""
 
+import subprocess
 import sys
 import time
 from collections.abc import Callable
 from typing import Any
 
+import psutil
 import pytest
 
 from arcor2_drivers.oak_d.oak_d import OakD
@@ -134,6 +136,36 @@ def test_a_stream_of_something_else(fake: FakeProcess, make: Callable[..., OakD]
     fake.control.do("wrong_checksum")
     with pytest.raises(DeviceFault, match="the checksum of a message of kind hello is wrong"):
         make(fake.ready["stream"]).connect(2.0)
+
+
+FORGETFUL = """
+import sys
+from arcor2_drivers.oak_d.oak_d import OakD
+from arcor2_drivers.oak_d.settings import OakDSettings
+from arcor2_hw.data.geometry import Pose
+camera = OakD("id", "camera", Pose(), None, OakDSettings(sys.argv[1]))
+camera.connect(20.0)
+kept = camera.trigger(), camera._observed.newest(1.0)
+"""
+
+
+def test_a_program_that_forgets_to_disconnect_ends_well(fake: FakeProcess) -> None:
+    """depthai takes the process down when a pipeline is still there at the interpreter's end."""
+    ended = subprocess.run(
+        [sys.executable, "-c", FORGETFUL, fake.ready["stream"]], capture_output=True, text=True, timeout=60
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")
+
+
+def test_connecting_often_leaves_nothing(fake: FakeProcess, camera: OakD) -> None:
+    process = psutil.Process()
+    counts = []
+    for _ in range(6):
+        camera.disconnect()
+        camera.connect(PATIENCE)
+        counts.append((process.num_threads(), process.num_fds()))
+    for held in zip(*counts, strict=True):
+        assert max(held[3:]) <= max(held[:3]) + 1
 
 
 def test_no_camera_is_found_at_once(make: Callable[..., OakD], monkeypatch: pytest.MonkeyPatch) -> None:
