@@ -29,11 +29,15 @@ class GripResult(NamedTuple):
 
 
 class Gripper(Generic):
-    """A gripper with fingers; it holds on when it loses us."""
+    """A gripper with fingers; it holds on when it loses us.
+
+    tcp: its tool centre point, closed, in the flange. mass: kg. Both of the class, or of an object whose settings say
+    which model it is.
+    """
 
     loss_reaction: ClassVar[LossReaction] = LossReaction.holds()
-    tcp: ClassVar[Pose]
-    mass: ClassVar[float]
+    tcp: Pose
+    mass: float
 
     @abc.abstractmethod
     def activate(self) -> None:

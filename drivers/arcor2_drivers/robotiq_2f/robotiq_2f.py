@@ -42,13 +42,13 @@ class Robotiq2F(Gripper):
     _ABSTRACT = False
     # A closing under way is finished, then it holds; spindle and spring are self-locking.
     loss_reaction: ClassVar[LossReaction] = LossReaction.holds()
-    tcp: ClassVar[Pose] = Pose(Position(0.0, 0.0, 0.163))
-    mass: ClassVar[float] = 0.925
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"activate": "stop", "grip": "stop", "release": "stop"}
 
     def __init__(self, obj_id: str, name: str, settings: Robotiq2FSettings) -> None:
         super().__init__(obj_id, name, settings)
         self._s = settings
+        self.tcp = Pose(Position(0.0, 0.0, settings.tcp_z))
+        self.mass = settings.mass
         self._observer = Observer(link_of(name, settings), self._seen, self._drop_control)
         self._who = self._observer.who
         self._one_motion = threading.Lock()

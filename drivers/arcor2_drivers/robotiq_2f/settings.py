@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from typing import Final
 
 from arcor2_hw.actions import StrEnum
 from arcor2_hw.exceptions import OutOfRange
@@ -15,6 +16,32 @@ class Wire(StrEnum):
     MODBUS_RTU = "modbus_rtu"
 
 
+class Model(StrEnum):
+    """Which gripper it is."""
+
+    TWO_F_85 = "2F-85"
+    TWO_F_140 = "2F-140"
+
+
+@dataclasses.dataclass(frozen=True)
+class ModelData:
+    """What the vendor's data sheet says of a model; m, kg, N, m/s. A tcp_z of 0 is one that we do not know for sure."""
+
+    tcp_z: float
+    mass: float
+    stroke: float
+    min_force: float
+    max_force: float
+    min_speed: float
+    max_speed: float
+
+
+MODELS: Final = {
+    Model.TWO_F_85: ModelData(0.163, 0.925, 0.085, 20.0, 235.0, 0.020, 0.150),
+    Model.TWO_F_140: ModelData(0.0, 1.025, 0.140, 10.0, 125.0, 0.030, 0.250),
+}
+
+
 def within(name: str, value: float, low: float, high: float, unit: str = "") -> None:
     """Raise OutOfRange, naming the parameter, unless the value lies in the range."""
     if not (math.isfinite(value) and low <= value <= high):
@@ -23,8 +50,9 @@ def within(name: str, value: float, low: float, high: float, unit: str = "") -> 
 
 @dataclasses.dataclass
 class Robotiq2FSettings(Settings):
-    """Where the gripper is, and the limits of its model; as delivered those of a 2F-85.
+    """Where the gripper is, and the limits of its model. Where a number is 0, it is that of the model.
 
+    :param model: which gripper it is
     :param wire: urcap for the ASCII port of the URCap on a robot, modbus_rtu for a serial port
     :param host: address of the robot controller whose URCap has the gripper; for urcap
     :param port: TCP port of the URCap
@@ -33,6 +61,8 @@ class Robotiq2FSettings(Settings):
     :param unit_id: Modbus unit id
     :param request_timeout: seconds the gripper has to answer one request
     :param activation_timeout: seconds an activation may take
+    :param tcp_z: from the flange to the tool centre point of the closed fingers, m; to be given for a 2F-140
+    :param mass: mass with fingers, kg
     :param stroke: width between the open fingers, m
     :param open_position: the gripper's own position when open, 0 to 255
     :param closed_position: the gripper's own position when closed, 0 to 255
@@ -42,6 +72,7 @@ class Robotiq2FSettings(Settings):
     :param max_speed: speed for the value 255, m/s
     """
 
+    model: Model = Model.TWO_F_85
     wire: Wire = Wire.URCAP
     host: str = ""
     port: int = 63352
@@ -50,15 +81,23 @@ class Robotiq2FSettings(Settings):
     unit_id: int = 9
     request_timeout: float = 0.5
     activation_timeout: float = 10.0
-    stroke: float = 0.085
+    tcp_z: float = 0.0
+    mass: float = 0.0
+    stroke: float = 0.0
     open_position: int = 3
     closed_position: int = 230
-    min_force: float = 20.0
-    max_force: float = 235.0
-    min_speed: float = 0.020
-    max_speed: float = 0.150
+    min_force: float = 0.0
+    max_force: float = 0.0
+    min_speed: float = 0.0
+    max_speed: float = 0.0
 
     def __post_init__(self) -> None:
+        data = MODELS[self.model]
+        for field in dataclasses.fields(data):
+            if getattr(self, field.name) == 0.0:
+                setattr(self, field.name, getattr(data, field.name))
+        within("tcp_z", self.tcp_z, 0.05, 0.5, f"m; that of a {self.model} is not known here and has to be given")
+        within("mass", self.mass, 0.1, 5.0, "kg")
         if self.wire is Wire.URCAP and not self.host.strip():
             raise OutOfRange("host must be the address of the robot controller, as wire is urcap")
         if self.wire is Wire.MODBUS_RTU and not self.serial_port.strip():

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from arcor2_drivers.robotiq_2f import scaling
 from arcor2_drivers.robotiq_2f.robotiq_2f import Robotiq2F
-from arcor2_drivers.robotiq_2f.settings import Robotiq2FSettings, Wire
+from arcor2_drivers.robotiq_2f.settings import Model, Robotiq2FSettings, Wire
 from arcor2_drivers.robotiq_2f.status import FAULTS
 from arcor2_hw.data.device import Connection, Health
 from arcor2_hw.exceptions import (
@@ -261,11 +261,19 @@ def test_width_survives_scaling(width: float) -> None:
 
 
 def test_scaling_by_the_limits_of_the_model() -> None:
-    settings = Robotiq2FSettings(host="h", stroke=0.14, min_force=10.0, max_force=125.0, max_speed=0.25, min_speed=0.03)
+    settings = Robotiq2FSettings(host="h", model=Model.TWO_F_140, tcp_z=0.23)
     assert (scaling.position(settings, 0.14), scaling.position(settings, 0.0)) == (3, 230)
     assert (scaling.force(settings, 10.0), scaling.force(settings, 125.0)) == (0, 255)
     assert (scaling.speed(settings, 0.03), scaling.speed(settings, 0.25)) == (0, 255)
     assert (scaling.width(settings, 0), scaling.width(settings, 255)) == (0.14, 0.0)
+
+
+def test_tool_and_limits_are_those_of_the_model_unless_given() -> None:
+    small = Robotiq2F("id", "small", Robotiq2FSettings(host="h"))
+    large = Robotiq2F("id", "large", Robotiq2FSettings(host="h", model=Model.TWO_F_140, tcp_z=0.23, max_force=100.0))
+    assert (small.mass, small.tcp.position.z) == (0.925, 0.163)
+    assert (large.mass, large.tcp.position.z) == (1.025, 0.23)
+    assert (large._s.stroke, large._s.min_force, large._s.max_force) == (0.14, 10.0, 100.0)
 
 
 @pytest.mark.parametrize(
@@ -282,7 +290,9 @@ def test_scaling_by_the_limits_of_the_model() -> None:
         ({"open_position": -1}, "open_position"),
         ({"closed_position": 3}, "closed_position"),
         ({"max_force": 20.0}, "max_force"),
-        ({"min_speed": 0.0}, "min_speed"),
+        ({"min_speed": -0.1}, "min_speed"),
+        ({"model": Model.TWO_F_140}, "tcp_z"),
+        ({"mass": 50.0}, "mass"),
         ({"max_speed": 0.01}, "max_speed"),
     ],
 )

@@ -26,7 +26,27 @@ QUOTED = [
     ("read, status", status(1, 0, bytes.fromhex("A6 00 00 00")), "FF FF FD 00 01 08 00 55 00 A6 00 00 00 8C C0"),
     ("write", packet(1, 0x03, bytes.fromhex("74 00 00 02 00 00")), "FF FF FD 00 01 09 00 03 74 00 00 02 00 00 CA 89"),
     ("write, status", status(1, 0), "FF FF FD 00 01 04 00 55 00 A1 0C"),
+    ("ping to all", packet(0xFE, 0x01, b""), "FF FF FD 00 FE 03 00 01 31 42"),
+    ("ping, second status", status(2, 0, bytes.fromhex("06 04 26")), "FF FF FD 00 02 07 00 55 00 06 04 26 6F 6D"),
+    (
+        "reg write",
+        packet(1, 0x04, bytes.fromhex("68 00 C8 00 00 00")),
+        "FF FF FD 00 01 09 00 04 68 00 C8 00 00 00 AE 8E",
+    ),
+    ("action", packet(1, 0x05, b""), "FF FF FD 00 01 03 00 05 02 CE"),
+    ("factory reset", packet(1, 0x06, b"\x01"), "FF FF FD 00 01 04 00 06 01 A1 E6"),
     ("reboot", packet(1, 0x08, b""), "FF FF FD 00 01 03 00 08 2F 4E"),
+    ("clear", packet(1, 0x10, bytes.fromhex("01 44 58 4C 22")), "FF FF FD 00 01 08 00 10 01 44 58 4C 22 B1 DC"),
+    (
+        "sync write",
+        packet(0xFE, 0x83, bytes.fromhex("74 00 04 00 01 96 00 00 00 02 AA 00 00 00")),
+        "FF FF FD 00 FE 11 00 83 74 00 04 00 01 96 00 00 00 02 AA 00 00 00 82 87",
+    ),
+    (
+        "sync read, second status",
+        status(2, 0, bytes.fromhex("1F 08 00 00")),
+        "FF FF FD 00 02 08 00 55 00 1F 08 00 00 BA BE",
+    ),
     (
         "sync read",
         packet(0xFE, 0x82, bytes.fromhex("84 00 04 00 01 02")),
