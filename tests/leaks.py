@@ -1,7 +1,7 @@
 """Fails a test that leaves a task, a thread, a process or a socket behind.
 
-What a fixture of wider scope than one test brings up is allowed to live on; everything else must be gone, at the latest
-GRACE seconds after the test's own fixtures are torn down.
+What a fixture of wider scope than one test brings up is allowed to live on, and may start processes of its own
+meanwhile; everything else must be gone, at the latest GRACE seconds after the test's own fixtures are torn down.
 """
 
 import asyncio
@@ -51,7 +51,10 @@ class Holdings:
     def beyond(self, other: "Holdings") -> list[str]:
         """Name what is here and not in `other`."""
         found = [f"thread {name}" for ident, name in self.threads.items() if ident not in other.threads]
-        found += [f"process {key[0]}: {cmd}" for key, cmd in self.children.items() if key not in other.children]
+        started = {pid for pid, _ in other.children}
+        for key, cmd in self.children.items():
+            if key not in other.children and not started & _ancestors(key[0]):
+                found.append(f"process {key[0]}: {cmd}")
         found += [f"socket {s}" for s in sorted(self.sockets - other.sockets)]
         return found
 
@@ -59,6 +62,13 @@ class Holdings:
         self.threads |= other.threads
         self.children |= other.children
         self.sockets |= other.sockets
+
+
+def _ancestors(pid: int) -> set[int]:
+    try:
+        return {parent.pid for parent in psutil.Process(pid).parents()}
+    except psutil.NoSuchProcess:
+        return set()
 
 
 _before = pytest.StashKey[Holdings]()

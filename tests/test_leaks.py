@@ -50,6 +50,17 @@ def test_what_is_tidied_up_or_of_wider_scope_passes(pytester: pytest.Pytester) -
             with socket.socket() as opened:
                 yield opened
 
+        @pytest.fixture(scope="module")
+        def shell():
+            with subprocess.Popen(["sh"], stdin=subprocess.PIPE, text=True) as process:
+                yield process
+                process.stdin.close()
+                process.terminate()
+
+        def test_a_process_that_starts_one(shell):
+            shell.stdin.write("sleep 2 & wait\\n")
+            shell.stdin.flush()
+
         def test_thread(lasting):
             thread = threading.Thread(target=lambda: None)
             thread.start()
@@ -64,4 +75,4 @@ def test_what_is_tidied_up_or_of_wider_scope_passes(pytester: pytest.Pytester) -
         """
     )
     result = pytester.runpytest_subprocess("-p", "asyncio", "--asyncio-mode=auto")
-    result.assert_outcomes(passed=3)
+    result.assert_outcomes(passed=4)
