@@ -178,12 +178,12 @@ async def test_each_sabotage_is_told_and_the_cell_starts_again(cell: Cell) -> No
 
         # The printer is out of labels.
         await cell.renew()
-        await tell("printer", "media", labels=0)
-        problem = await cell.program(client)
+        problem = await cell.program(client, {"label": lambda: tell("printer", "media", labels=0)})
         assert "printer" in problem
         assert "out of labels" in problem
         await tell("printer", "media", labels=100)
-        assert (await tell("world", "truth"))["counts"]["label"] == 1
+        (board,) = (await tell("world", "truth"))["boards"]
+        assert (board["place"], board["label"]) == ("label", None)
         assert [result for result in (await tell("erp", "truth"))["results"] if result["order"] == "AGAIN"] == []
 
         # After all that the cell starts again. The planning service goes down meanwhile: production goes on.
