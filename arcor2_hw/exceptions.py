@@ -122,6 +122,12 @@ class NotFound(Arcor2Error):
     code = "not_found"
 
 
+class Conflict(Arcor2Error):
+    """What was given stands against what is there."""
+
+    code = "conflict"
+
+
 class InvalidProject(Arcor2Error):
     """A project cannot be turned into a program."""
 

@@ -12,6 +12,7 @@ from litestar.openapi import OpenAPIConfig
 from litestar.openapi.plugins import JsonRenderPlugin
 
 from arcor2_hw.data.role import Role
+from arcor2_server.access import Access, role_needed
 from arcor2_server.build.service import BuildService
 from arcor2_server.cell.online import OnlineCell
 from arcor2_server.endpoint import Endpoint
@@ -21,7 +22,7 @@ from arcor2_server.locks import Locks
 from arcor2_server.object_types import ObjectTypes
 from arcor2_server.origin import own_pages_only
 from arcor2_server.rest import ROUTES
-from arcor2_server.rest.answers import ROLE
+from arcor2_server.rest.answers import OPEN, ROLE
 
 # Imported for their handlers.
 from arcor2_server.rpc import (  # noqa: F401
@@ -64,6 +65,7 @@ async def running_services(settings: ServerSettings) -> AsyncIterator[Services]:
         await types.load()
         services = Services(
             settings=settings,
+            access=Access(settings),
             hub=hub,
             users=users,
             locks=locks,
@@ -96,7 +98,7 @@ def _is_known(services: Services) -> Callable[[str], Awaitable[bool]]:
     return known
 
 
-@get("/healthz/ready", opt={ROLE: Role.OPERATOR}, status_code=200, media_type="text/plain")
+@get("/healthz/ready", opt={ROLE: Role.OPERATOR, OPEN: True}, status_code=200, media_type="text/plain")
 async def ready() -> Response[str]:
     """Answer 200 as soon as requests are served."""
     return Response("")
@@ -121,7 +123,7 @@ def create_app(services: Services) -> Litestar:
     endpoint = Endpoint(services)
     app = Litestar(
         route_handlers=[ready, arserver, *ROUTES],
-        guards=[own_pages_only],
+        guards=[own_pages_only, role_needed],
         openapi_config=OpenAPIConfig(
             title="ARCOR2-HW",
             version=version("arcor2-hw"),
@@ -132,6 +134,7 @@ def create_app(services: Services) -> Litestar:
         on_shutdown=[endpoint.close],
         logging_config=None,
     )
+    app.state.access = services.access
     app.state.endpoint = endpoint
     app.state.services = services
     return app

@@ -11,6 +11,7 @@ import structlog
 
 from arcor2_hw.data.role import Role
 from arcor2_server.settings import ServerSettings
+from arcor2_server.tokens import Token
 
 log = structlog.get_logger(__name__)
 _numbers = itertools.count(1)
@@ -23,6 +24,8 @@ class CloseCode(enum.IntEnum):
     """The server ends."""
     TOO_BIG = 1009
     """A message was longer than can be drained."""
+    NOT_ADMITTED = 4401
+    """The token was wrong, was revoked, ran out, or did not come in time."""
     TOO_SLOW = 4008
     """The client did not take what was sent to it."""
 
@@ -56,7 +59,12 @@ class Client:
     def __init__(self, wire: Wire, settings: ServerSettings) -> None:
         self.number = next(_numbers)
         self.user: str | None = None
-        self.role: Role = settings.default_role
+        self.address = ""
+        self.role: Role = Role.OPERATOR
+        self.token: Token | None = None
+        """What let it in, where a token did."""
+        self.admitted = False
+        """Until then it is sent no event, and only Authenticate is served."""
         self._wire = wire
         self._settings = settings
         self._waiting: deque[bytes | str] = deque()  # a str stands for the newest message of that stream
@@ -68,6 +76,12 @@ class Client:
 
     def __repr__(self) -> str:
         return f"<Client {self.number} {self.user or 'not logged in'}>"
+
+    def admit(self, role: Role, token: Token | None = None) -> None:
+        """Let the client in."""
+        self.role, self.token, self.admitted = role, token, True
+        if token is not None:
+            log.info("client admitted", client=self.number, token=token.id, name=token.name, role=role.name.lower())
 
     @property
     def closed(self) -> bool:

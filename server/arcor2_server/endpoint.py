@@ -11,11 +11,11 @@ import structlog
 from litestar import WebSocket
 from msgspec import UNSET, Raw, Struct
 
-from arcor2_hw.data.events import Event
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import RPCS, Request, Response, Rpc
-from arcor2_hw.exceptions import Arcor2Error
-from arcor2_server.client import Client
+from arcor2_hw.exceptions import Arcor2Error, StorageError
+from arcor2_server.access import AccessRefused, address_of
+from arcor2_server.client import Client, CloseCode
 from arcor2_server.hub import encode
 from arcor2_server.rpc.registry import AT_ONCE, HANDLERS, Context, Handler, RequestRefused
 from arcor2_server.services import Services
@@ -23,6 +23,14 @@ from arcor2_server.wire import EXTENSION, WireProtocol
 
 log = structlog.get_logger(__name__)
 
+AUTHENTICATE: Final = "Authenticate"
+"""The one request that is served before a client is admitted."""
+AUTHENTICATE_WITHIN: Final = 10.0
+"""Seconds in which a client has to show its token."""
+LONGEST_AUTHENTICATION: Final = 4096
+"""Characters that are looked at of somebody who is not admitted."""
+TOKENS_PERIOD: Final = 2.0
+"""Seconds after which a token that was revoked, or has run out, ends its connections."""
 UNREADABLE: Final = "Error"
 """What stands as the answered request when that could not be read."""
 LONGEST_NAME: Final = 200
@@ -101,20 +109,39 @@ class Endpoint:
         self._hub = services.hub
         self._routes = routes()
         self._tasks: set[asyncio.Task[None]] = set()
+        self._watch: asyncio.Task[None] | None = None
 
     async def serve(self, socket: WebSocket[Any, Any, Any]) -> None:
         """Serve one connection until it ends."""
         await socket.accept()
+        if self._watch is None:
+            self._watch = asyncio.create_task(self._watch_tokens(), name="tokens")
         protocol: Any = (socket.scope["extensions"] or {})[EXTENSION]
         client = Client(_SocketWire(socket, protocol), self._settings)
         writer = asyncio.create_task(client.write(), name=f"client {client.number} writes")
-        log.info("client connected", client=client.number, address=socket.client)
+        address = address_of(socket)
+        log.info("client connected", client=client.number, address=address)
+        deadline: asyncio.TimerHandle | None = None
         try:
-            for event in self._greeting():
-                self._hub.send(client, event)
-            self._hub.add(client)
+            try:
+                admission = self._services.access.admit(socket)
+            except AccessRefused as error:
+                client.close(CloseCode.NOT_ADMITTED, str(error))
+                await writer
+                return
+            client.address = address
+            if admission.role is not None:
+                client.admit(admission.role, admission.token)
+                for event in self._services.greeting():
+                    self._hub.send(client, event)
+                self._hub.add(client)
+            else:
+                loop = asyncio.get_running_loop()
+                deadline = loop.call_later(AUTHENTICATE_WITHIN, self._expect_admitted, client)
             await self._read(socket, client)
         finally:
+            if deadline is not None:
+                deadline.cancel()
             self._hub.remove(client)
             self._services.users.disconnected(client)
             client.lost()
@@ -122,15 +149,32 @@ class Endpoint:
             await asyncio.gather(writer, return_exceptions=True)
             log.info("client disconnected", client=client.number, user=client.user)
 
+    async def _watch_tokens(self) -> None:
+        """End the connections whose token is not valid any more."""
+        while True:
+            await asyncio.sleep(TOKENS_PERIOD)
+            for client in tuple(self._hub.clients):
+                try:
+                    valid = client.token is None or self._services.access.valid(client.token)
+                except StorageError as error:
+                    log.error("tokens cannot be read", error=str(error))
+                    break
+                if not valid:
+                    client.close(CloseCode.NOT_ADMITTED, "the token is not valid any more")
+
     async def close(self) -> None:
         """Cancel the requests that are still being worked on."""
+        if self._watch is not None:
+            self._watch.cancel()
+            await asyncio.gather(self._watch, return_exceptions=True)
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
-    def _greeting(self) -> list[Event]:
-        services = self._services
-        return services.session.greeting() or services.execution.greeting() or [self._hub.main_screen]
+    @staticmethod
+    def _expect_admitted(client: Client) -> None:
+        if not client.admitted:
+            client.close(CloseCode.NOT_ADMITTED, f"no token came within {AUTHENTICATE_WITHIN:g} s")
 
     async def _read(self, socket: WebSocket[Any, Any, Any], client: Client) -> None:
         receive = socket.receive
@@ -148,6 +192,9 @@ class Endpoint:
             if len(text) > served:
                 self._refuse(client, _read_head(text), f"The message is longer than {served} bytes: it was not read.")
                 continue
+            if not client.admitted and len(text) > LONGEST_AUTHENTICATION:
+                self._refuse(client, _Head(), f"A token is needed: send {AUTHENTICATE} first.")
+                continue
             try:
                 request = _decode_request(text)
             except (msgspec.DecodeError, RecursionError) as error:
@@ -156,6 +203,9 @@ class Endpoint:
             route = self._routes.get(request.request)
             if route is None:
                 self._refuse(client, request, f"There is no request {request.request!r}.")
+                continue
+            if not client.admitted and request.request != AUTHENTICATE:
+                self._refuse(client, request, f"A token is needed: send {AUTHENTICATE} first.")
                 continue
             if route.at_once is not None and self._answer_at_once(client, request, route):
                 continue

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 from arcor2_server.kept import KeptAnswers
 
 if TYPE_CHECKING:
+    from arcor2_hw.data.events import Event
+    from arcor2_server.access import Access
     from arcor2_server.build.service import BuildService
     from arcor2_server.cell.online import OnlineCell
     from arcor2_server.execution import Execution
@@ -22,12 +24,14 @@ if TYPE_CHECKING:
 class Services:
     """What handlers work with.
 
-    hub: the connected clients. users: who is logged in. locks: who holds what. storage: saved documents.
-    types: what is known of object types. session: the open scene or project. cell: the scene when online.
-    execution: packages and the running program. build: project to package. kept: encoded answers.
+    access: who gets in. hub: the connected clients. users: who is logged in. locks: who holds what.
+    storage: saved documents. types: what is known of object types. session: the open scene or project.
+    cell: the scene when online. execution: packages and the running program. build: project to package.
+    kept: encoded answers.
     """
 
     settings: "ServerSettings"
+    access: "Access"
     hub: "Hub"
     users: "Users"
     locks: "Locks"
@@ -38,3 +42,7 @@ class Services:
     execution: "Execution"
     build: "BuildService"
     kept: KeptAnswers = field(default_factory=KeptAnswers)
+
+    def greeting(self) -> list["Event"]:
+        """Give what a client is sent when it is let in: what is open, what runs, or the main screen."""
+        return self.session.greeting() or self.execution.greeting() or [self.hub.main_screen]

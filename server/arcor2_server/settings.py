@@ -14,12 +14,28 @@ from arcor2_hw.exceptions import InvalidData
 MIB: Final = 1024 * 1024
 
 
+class LegacyListener(msgspec.Struct, frozen=True):
+    """A second port, without tokens and TLS; whoever connects there has this role, which is never programmer."""
+
+    host: str
+    port: int
+    role: Role = Role.OPERATOR
+
+    def __post_init__(self) -> None:
+        if self.role >= Role.PROGRAMMER:
+            raise ValueError("clients without a token never get the role programmer")
+
+
 class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     """Everything that can be set; times in seconds, sizes in bytes."""
 
     data_dir: Path
     host: str = "127.0.0.1"
     port: int = 6789
+    insecure: bool = False
+    """Ask nobody for a token, wherever the server listens."""
+    legacy: "LegacyListener | None" = None
+    """Where clients connect that can send no token, nor speak TLS."""
     database_url: str = ""
     """SQLAlchemy URL of an asynchronous driver; empty: SQLite in the data directory."""
     cell: Cell | None = None
@@ -34,7 +50,7 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     allowed_hosts: frozenset[str] = frozenset()
     """Names, beside addresses and this machine's own name, under which browsers may reach the server."""
     default_role: Role = Role.PROGRAMMER
-    """Role of a client that has not shown another one (nobody can show one before there are accounts)."""
+    """Role of whoever connects where no token is asked for."""
     served_size: int = 16 * MIB
     drained_size: int = 32 * MIB
     requests_in_flight: int = 256

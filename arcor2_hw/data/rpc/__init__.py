@@ -43,6 +43,8 @@ from arcor2_hw.data.rpc.execution import RenamePackageArgs as RenamePackageArgs
 from arcor2_hw.data.rpc.execution import RunPackageArgs as RunPackageArgs
 from arcor2_hw.data.rpc.execution import TemporaryPackageArgs as TemporaryPackageArgs
 from arcor2_hw.data.rpc.execution import UploadPackageArgs as UploadPackageArgs
+from arcor2_hw.data.rpc.general import AuthenticateArgs as AuthenticateArgs
+from arcor2_hw.data.rpc.general import AuthenticateData as AuthenticateData
 from arcor2_hw.data.rpc.general import GetCameraPoseArgs as GetCameraPoseArgs
 from arcor2_hw.data.rpc.general import IdArgs as IdArgs
 from arcor2_hw.data.rpc.general import MarkersCornersArgs as MarkersCornersArgs
@@ -149,6 +151,7 @@ RPCS: Final = {
             Role.TECHNICIAN,
             dry_run=True,
         ),
+        Rpc("Authenticate", AuthenticateArgs, AuthenticateData, Role.OPERATOR, additional=True),
         Rpc("BuildProject", BuildProjectArgs, BuildProjectData, Role.STANDARD_USER),
         Rpc("CalibrateCamera", CalibrateCameraArgs, None, Role.TECHNICIAN),
         Rpc("CalibrateRobot", CalibrateRobotArgs, None, Role.TECHNICIAN),
@@ -265,7 +268,7 @@ RPCS: Final = {
         Rpc("UpdateProjectHasLogic", UpdateProjectHasLogicArgs, None, Role.ADVANCED_USER),
         Rpc("UpdateProjectParameter", UpdateProjectParameterArgs, None, Role.STANDARD_USER, dry_run=True),
         Rpc("UpdateSceneDescription", UpdateSceneDescriptionArgs, None, Role.TECHNICIAN),
-        Rpc("UploadPackage", UploadPackageArgs, None, Role.TECHNICIAN),
+        Rpc("UploadPackage", UploadPackageArgs, None, Role.PROGRAMMER),
         Rpc("WriteLock", WriteLockArgs, None, Role.STANDARD_USER),
         Rpc("WriteUnlock", WriteUnlockArgs, None, Role.STANDARD_USER),
     )

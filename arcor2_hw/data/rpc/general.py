@@ -6,6 +6,19 @@ from arcor2_hw.data.base import Data
 from arcor2_hw.data.camera import CameraParameters
 
 
+class AuthenticateArgs(Data, frozen=True):
+    """Arguments of Authenticate."""
+
+    token: str
+
+
+class AuthenticateData(Data, frozen=True):
+    """What Authenticate answers: whose token it is, and the role that it gives."""
+
+    name: str
+    role: str
+
+
 class IdArgs(Data, frozen=True):
     """Arguments of every RPC that takes one id."""
 

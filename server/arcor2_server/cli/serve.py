@@ -11,17 +11,27 @@ import socket
 import sys
 from collections.abc import Callable, Generator
 from pathlib import Path
-from typing import IO, Annotated
+from typing import IO, Annotated, Literal
 
+import msgspec
+import structlog
 import uvicorn
 import uvloop
 from cyclopts import Parameter, validators
 
 from arcor2_hw.data.cell import read_cell
+from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound, StorageError
 from arcor2_server import logging as server_logging
+from arcor2_server.access import is_loopback
 from arcor2_server.cli.status import ExitStatus
-from arcor2_server.settings import ServerSettings
+from arcor2_server.settings import LegacyListener, ServerSettings
+from arcor2_server.tokens import TokenFile
+
+log = structlog.get_logger(__name__)
+
+LegacyRole = Literal["operator", "standard_user", "advanced_user", "technician"]
+"""Never programmer."""
 
 GRACE = 2
 """Seconds that open requests get to end; the contract allows 5 for everything."""
@@ -41,6 +51,11 @@ def serve(
     port: Annotated[int | None, Parameter(validator=validators.Number(gte=0, lte=65535))] = None,
     data_dir: Path | None = None,
     cell: Path | None = None,
+    tls: tuple[Path, Path] | None = None,
+    self_signed: bool = False,
+    insecure: bool = False,
+    legacy_listen: str | None = None,
+    legacy_role: LegacyRole = "operator",
     log_level: str = "info",
 ) -> int:
     """Serve the websocket and REST interfaces until SIGTERM or Ctrl-C.
@@ -57,6 +72,17 @@ def serve(
         Where scenes, projects and packages are kept ($XDG_DATA_HOME/arcor2-hw); created when missing.
     cell
         A cell.yaml whose settings of devices win over those of scenes and packages, by the objects' names.
+    tls
+        Files of a certificate chain and its key, in PEM, to speak TLS with.
+    self_signed
+        Speak TLS with a certificate made here, whose fingerprint is shown; other machines are always served so unless
+        --tls gives a certificate.
+    insecure
+        Ask nobody for a token and speak no TLS unless told to: for a network that nobody else reaches.
+    legacy_listen
+        A second HOST:PORT, without TLS, for clients that can send no token.
+    legacy_role
+        What those clients may do.
     log_level
         What is logged on standard error: debug, info, warning or error.
     """
@@ -68,7 +94,10 @@ def serve(
         sys.stderr.write(f"arcor2-hw serve: {' '.join(str(error).split())}\n")
         return ExitStatus.NOT_FOUND if isinstance(error, NotFound) else ExitStatus.CELL_UNUSABLE
     try:
-        settings = ServerSettings.from_environment(host=host, port=port, data_dir=data_dir, cell=here)
+        legacy = None if legacy_listen is None else _legacy(legacy_listen, legacy_role)
+        settings = ServerSettings.from_environment(
+            host=host, port=port, data_dir=data_dir, cell=here, insecure=insecure or None, legacy=legacy
+        )
         server_logging.set_up(log_level)
     except (InvalidData, KeyError) as error:
         sys.stderr.write(f"arcor2-hw serve: {error}\n")
@@ -76,10 +105,14 @@ def serve(
     try:
         with (
             data_directory(settings.data_dir),
-            contextlib.closing(listen(settings.host, settings.port)) as listener,
-            asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner,
+            contextlib.ExitStack() as sockets,
         ):
-            runner.run(run(settings, listener))
+            check_access(settings)
+            listener = sockets.enter_context(contextlib.closing(listen(settings.host, settings.port)))
+            settings, legacy_listener = _bind_legacy(settings, sockets)
+            certificate = _certificate(settings, tls, self_signed)
+            with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
+                runner.run(run(settings, listener, legacy_listener, certificate))
     except CannotServe as error:
         sys.stderr.write(f"arcor2-hw serve: {error}\n")
         return error.status
@@ -89,8 +122,63 @@ def serve(
     return ExitStatus.OK
 
 
-async def run(settings: ServerSettings, listener: socket.socket) -> None:
-    """Serve at a socket that is bound. StorageError when the data cannot be used."""
+def check_access(settings: ServerSettings) -> None:
+    """Refuse to be reached by other machines while nobody needs a token. CannotServe, StorageError."""
+    if is_loopback(settings.host) or settings.insecure or TokenFile(settings.data_dir).all():
+        return
+    raise CannotServe(
+        ExitStatus.NO_TOKENS,
+        f"other machines reach {settings.host}, and there is no token yet: "
+        "make one with `arcor2-hw token add NAME --role programmer`, or say --insecure",
+    )
+
+
+def _legacy(address: str, role: LegacyRole) -> LegacyListener:
+    host, _, port = address.rpartition(":")
+    if not host or not port.isdigit() or int(port) > 0xFFFF:
+        raise InvalidData(f"--legacy-listen {address!r} is not HOST:PORT")
+    return LegacyListener(host.strip("[]"), int(port), Role[role.upper()])
+
+
+def _bind_legacy(
+    settings: ServerSettings, sockets: contextlib.ExitStack
+) -> tuple[ServerSettings, socket.socket | None]:
+    """Bind the second listener, and have its real port in the settings."""
+    if settings.legacy is None:
+        return settings, None
+    listener = sockets.enter_context(contextlib.closing(listen(settings.legacy.host, settings.legacy.port)))
+    legacy = msgspec.structs.replace(settings.legacy, port=listener.getsockname()[1])
+    role = legacy.role.name.lower()
+    log.warning("clients without a token are let in", host=legacy.host, port=legacy.port, role=role)
+    return msgspec.structs.replace(settings, legacy=legacy), listener
+
+
+def _certificate(
+    settings: ServerSettings, given: tuple[Path, Path] | None, self_signed: bool
+) -> tuple[Path, Path] | None:
+    """Give the files of certificate and key, None for no TLS. CannotServe when they cannot be used."""
+    if given is None and not self_signed and (settings.insecure or is_loopback(settings.host)):
+        return None
+    from arcor2_server import certificate  # only here: it costs time that a server without TLS does not have
+
+    try:
+        files = given or certificate.self_signed(settings.data_dir, settings.host)
+        log.info("certificate", sha256=certificate.fingerprint(files), file=str(files[0]))
+    except certificate.CertificateProblem as error:
+        raise CannotServe(ExitStatus.CERTIFICATE_UNUSABLE, str(error)) from error
+    return files
+
+
+async def run(
+    settings: ServerSettings,
+    listener: socket.socket,
+    legacy: socket.socket | None = None,
+    certificate: tuple[Path, Path] | None = None,
+) -> None:
+    """Serve at sockets that are bound, by TLS on the first where there is a certificate.
+
+    StorageError when the data cannot be used.
+    """
     from arcor2_server.app import create_app, running_services
 
     async with running_services(settings) as services:
@@ -102,7 +190,8 @@ async def run(settings: ServerSettings, listener: socket.socket) -> None:
             loop.run_in_executor(None, importlib.import_module, "transforms3d.quaternions")
 
         loop = asyncio.get_running_loop()
-        server = Server(configuration(create_app(services), settings), settings.host, when_ready)
+        config = configuration(create_app(services), settings, certificate)
+        server = Server(config, settings.host, legacy, when_ready)
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, server.end)
         try:
@@ -114,7 +203,9 @@ async def run(settings: ServerSettings, listener: socket.socket) -> None:
             raise _no_port(settings.host, listener.getsockname()[1], error) from error
 
 
-def configuration(app: object, settings: ServerSettings) -> uvicorn.Config:
+def configuration(
+    app: object, settings: ServerSettings, certificate: tuple[Path, Path] | None = None
+) -> uvicorn.Config:
     """Give uvicorn's configuration: one process, no compression, our websocket."""
     from arcor2_server.wire import WireProtocol
 
@@ -130,25 +221,43 @@ def configuration(app: object, settings: ServerSettings) -> uvicorn.Config:
         ws_ping_timeout=settings.ping_interval,
         ws_per_message_deflate=False,
         timeout_graceful_shutdown=GRACE,
+        ssl_certfile=certificate[0] if certificate else None,
+        ssl_keyfile=certificate[1] if certificate else None,
     )
 
 
 class Server(uvicorn.Server):
     """uvicorn's server, which says when it is ready and leaves signals to us."""
 
-    def __init__(self, config: uvicorn.Config, host: str, when_ready: Callable[[], None]) -> None:
+    def __init__(
+        self, config: uvicorn.Config, host: str, legacy: socket.socket | None, when_ready: Callable[[], None]
+    ) -> None:
         super().__init__(config)
         self._host = host
+        self._legacy = legacy
         self._when_ready = when_ready
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Start, then say where."""
         await super().startup(sockets=sockets)
         if self.started and sockets:
+            if self._legacy is not None:
+                self.servers.append(await self._listen_without_tls(self._legacy))
+            scheme = "wss" if self.config.is_ssl else "ws"
             host = f"[{self._host}]" if ":" in self._host else self._host
-            sys.stdout.write(f"ready ws://{host}:{sockets[0].getsockname()[1]}\n")
+            sys.stdout.write(f"ready {scheme}://{host}:{sockets[0].getsockname()[1]}\n")
             sys.stdout.flush()
             self._when_ready()
+
+    async def _listen_without_tls(self, listener: socket.socket) -> asyncio.Server:
+        """Serve at one more socket; uvicorn itself gives all of them the same TLS."""
+
+        def connected() -> asyncio.Protocol:
+            return self.config.http_protocol_class(  # type: ignore[call-arg]
+                config=self.config, server_state=self.server_state, app_state=self.lifespan.state
+            )
+
+        return await asyncio.get_running_loop().create_server(connected, sock=listener, backlog=self.config.backlog)
 
     @contextlib.contextmanager
     def capture_signals(self) -> Generator[None, None, None]:

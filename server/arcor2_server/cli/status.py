@@ -31,5 +31,9 @@ class ExitStatus(enum.IntEnum):
     """A cell file is damaged, or says what cannot be."""
     DEVICE_UNREACHABLE = 12
     """A device did not connect, or is not fit for work."""
+    NO_TOKENS = 13
+    """Other machines would reach a server that asks nobody for a token."""
+    CERTIFICATE_UNUSABLE = 14
+    """The certificate or its key cannot be read, or do not belong together."""
     INTERRUPTED = 130
     """Ctrl-C (128 + SIGINT)."""

@@ -11,6 +11,8 @@ from arcor2_server.services import Services
 
 ROLE: Final = "role"
 """The key of a route's `opt` under which it declares the least role that may use it."""
+OPEN: Final = "open"
+"""The key of a route's `opt` that says that it asks nobody for a token: it tells nothing."""
 
 _encode = msgspec.json.Encoder().encode
 

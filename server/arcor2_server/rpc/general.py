@@ -6,7 +6,15 @@ from typing import Any, Final
 from msgspec import Raw
 
 from arcor2_hw.data.events import EVENTS
-from arcor2_hw.data.rpc import RegisterUserArgs, SubscribeEventsArgs, SystemInfoData
+from arcor2_hw.data.rpc import (
+    AuthenticateArgs,
+    AuthenticateData,
+    RegisterUserArgs,
+    SubscribeEventsArgs,
+    SystemInfoData,
+)
+from arcor2_server.access import TooManyAttempts
+from arcor2_server.client import CloseCode
 from arcor2_server.hub import encode
 from arcor2_server.rpc.registry import HANDLERS, Context, RequestRefused, at_once, make_event, rpc
 from arcor2_server.services import Services
@@ -44,6 +52,25 @@ def _system_info(_handlers: int) -> Raw:
 @at_once("SystemInfo")
 def _kept_system_info(services: Services) -> Raw:  # noqa: ARG001
     return _system_info(len(HANDLERS))
+
+
+@rpc("Authenticate")
+async def authenticate(context: Context, args: AuthenticateArgs) -> AuthenticateData:
+    """Show a token at a connection that could send none when it was made; the greeting follows the answer."""
+    services, client = context.services, context.client
+    try:
+        admission = services.access.by_token(args.token, client.address)
+    except TooManyAttempts:
+        client.close(CloseCode.NOT_ADMITTED, "too many wrong tokens")
+        raise
+    token = admission.token
+    assert token is not None
+    was_in = client.admitted
+    client.admit(token.role, token)
+    if not was_in:
+        context.events_to_caller += services.greeting()
+        services.hub.add(client)
+    return AuthenticateData(token.name, token.role.name.lower())
 
 
 @rpc("RegisterUser")

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 import structlog
+from litestar.datastructures import Address
 
 from arcor2_hw.exceptions import DeviceTimeout
 from arcor2_server.app import running_services
@@ -42,8 +43,10 @@ class Socket:
 
     def __init__(self) -> None:
         self.protocol = Protocol()
-        self.scope = {"extensions": {EXTENSION: self.protocol}}
-        self.client = ("127.0.0.1", 1)
+        self.scope: dict[str, Any] = {"extensions": {EXTENSION: self.protocol}, "server": ("127.0.0.1", 6789)}
+        self.client = Address("127.0.0.1", 1)
+        self.headers: dict[str, str] = {}
+        self.query_params: dict[str, str] = {}
         self.incoming: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
 
     async def accept(self) -> None: ...

@@ -13,6 +13,7 @@ from arcor2_server.app import create_app, running_services
 from arcor2_server.client import Client, Wire
 from arcor2_server.hub import Hub
 from arcor2_server.rest.answers import ROLE
+from arcor2_server.role_table import page
 from arcor2_server.rpc.registry import HANDLERS, make_event
 from arcor2_server.settings import ServerSettings
 from tests.server.core.serving import running, talking
@@ -77,3 +78,10 @@ async def test_event_needs_its_role(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     hub.broadcast(make_event("SceneSaved"))
     hub.stream("SceneSaved", "x", b"{}")
     assert [len(wire.sent) for wire in wires] == [0, 3]
+
+
+async def test_the_page_of_roles_is_what_is_declared(tmp_path: Path) -> None:
+    async with running_services(ServerSettings(data_dir=tmp_path)) as services:
+        made = page(create_app(services))
+    text = (Path(__file__).resolve().parents[3] / "docs/reference/roles.md").read_text()
+    assert text == made, "run: python -m arcor2_server.role_table > docs/reference/roles.md"

@@ -64,7 +64,8 @@ async def test_port_taken(tmp_path: Path) -> None:
 
 
 async def test_address_of_another_machine(tmp_path: Path) -> None:
-    status, line = await refused_start("--host", "192.0.2.1", "--port", "0", "--data-dir", str(tmp_path / "data"))
+    arguments = ("--host", "192.0.2.1", "--insecure", "--port", "0", "--data-dir", str(tmp_path / "data"))
+    status, line = await refused_start(*arguments)
     assert status == ExitStatus.PORT_TAKEN
     assert "192.0.2.1" in line
 

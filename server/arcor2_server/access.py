@@ -1,0 +1,147 @@
+"""Who gets in, and in which role: by a token, by the listener, or because the server is for this machine alone."""
+
+import ipaddress
+import time
+from collections import OrderedDict, deque
+from typing import Any, Final
+
+import structlog
+from litestar.connection import ASGIConnection
+from litestar.exceptions import NotAuthorizedException, PermissionDeniedException, TooManyRequestsException
+from litestar.handlers import BaseRouteHandler, WebsocketRouteHandler
+
+from arcor2_hw.data.base import Data
+from arcor2_hw.data.role import Role
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.rest.answers import OPEN, ROLE
+from arcor2_server.settings import ServerSettings
+from arcor2_server.tokens import Token, TokenFile
+
+log = structlog.get_logger(__name__)
+
+WRONG_TOKENS: Final = 10
+"""Wrong tokens from one address within `WRONG_TOKENS_WITHIN` s, after which it has to wait."""
+WRONG_TOKENS_WITHIN: Final = 60.0
+REMEMBERED: Final = 1000
+"""Addresses of which wrong tokens are counted."""
+PARAMETER: Final = "token"
+"""The query parameter that may carry the token, for clients that cannot set headers, such as browsers."""
+
+
+class AccessRefused(Arcor2Error):
+    """The token is not valid: unknown, revoked or expired."""
+
+    code = "access_refused"
+
+
+class TooManyAttempts(AccessRefused):
+    """Too many wrong tokens came from one address."""
+
+    code = "too_many_attempts"
+
+
+class Admission(Data, frozen=True):
+    """In which role somebody is let in; `role` is None for one who still has to show a token."""
+
+    role: Role | None
+    token: Token | None = None
+
+
+def is_loopback(host: str) -> bool:
+    """Tell whether only this machine can reach an address."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return False
+
+
+class Access:
+    """Decides for each connection."""
+
+    def __init__(self, settings: ServerSettings) -> None:
+        self._settings = settings
+        self._tokens = TokenFile(settings.data_dir)
+        self._wrong: OrderedDict[str, deque[float]] = OrderedDict()
+
+    @property
+    def open_to_all(self) -> bool:
+        """Tell whether no token is asked for: so it is told, or only this machine reaches us and there is none."""
+        return self._settings.insecure or (is_loopback(self._settings.host) and not self._tokens.all())
+
+    def by_token(self, secret: str, address: str) -> Admission:
+        """Let in by a token. AccessRefused; TooManyAttempts before the token is even looked at."""
+        attempts = self._attempts(address)
+        if len(attempts) >= WRONG_TOKENS:
+            raise TooManyAttempts(f"Too many wrong tokens came from {address}: wait a minute.")
+        token = self._tokens.find(secret)
+        if token is None:
+            attempts.append(time.monotonic())
+            self._wrong[address] = attempts
+            while len(self._wrong) > REMEMBERED:
+                self._wrong.popitem(last=False)
+            log.warning("wrong token", address=address)
+            raise AccessRefused("The token is not valid: it is unknown, was revoked, or its time is over.")
+        return Admission(token.role, token)
+
+    def admit(self, connection: ASGIConnection[Any, Any, Any, Any]) -> Admission:
+        """Decide by the listener and by the token in header or query. AccessRefused."""
+        secret = _secret(connection)
+        if secret is not None:
+            return self.by_token(secret, address_of(connection))
+        if self._by_legacy_listener(connection) and self._settings.legacy is not None:
+            return Admission(self._settings.legacy.role)
+        return Admission(self._settings.default_role if self.open_to_all else None)
+
+    def valid(self, token: Token) -> bool:
+        """Tell whether a token that let somebody in still would."""
+        return self._tokens.valid(token)
+
+    def _by_legacy_listener(self, connection: ASGIConnection[Any, Any, Any, Any]) -> bool:
+        legacy, local = self._settings.legacy, connection.scope.get("server")
+        if legacy is None or local is None or local[1] != legacy.port:
+            return False
+        return legacy.port != self._settings.port or local[0] == legacy.host
+
+    def _attempts(self, address: str) -> deque[float]:
+        attempts = self._wrong.get(address, deque())
+        while attempts and time.monotonic() - attempts[0] > WRONG_TOKENS_WITHIN:
+            attempts.popleft()
+        return attempts
+
+
+def address_of(connection: ASGIConnection[Any, Any, Any, Any]) -> str:
+    """Give the other side's address."""
+    return connection.client.host if connection.client else ""
+
+
+def _secret(connection: ASGIConnection[Any, Any, Any, Any]) -> str | None:
+    kind, _, value = connection.headers.get("authorization", "").partition(" ")
+    if kind.lower() == "bearer" and value.strip():
+        return value.strip()
+    found: str | None = connection.query_params.get(PARAMETER)
+    return found
+
+
+def role_needed(connection: ASGIConnection[Any, Any, Any, Any], handler: BaseRouteHandler) -> None:
+    """Refuse a REST request whose sender has not the route's role (a guard of Litestar).
+
+    The websocket's requests have roles of their own, and its client may show the token later.
+    """
+    if isinstance(handler, WebsocketRouteHandler) or handler.opt.get(OPEN):
+        return
+    access: Access = connection.app.state.access
+    try:
+        role = access.admit(connection).role
+    except TooManyAttempts as error:
+        raise TooManyRequestsException(str(error)) from None
+    except AccessRefused as error:
+        raise NotAuthorizedException(str(error), headers={"WWW-Authenticate": "Bearer"}) from None
+    if role is None:
+        raise NotAuthorizedException(
+            "A token is needed: Authorization: Bearer ...", headers={"WWW-Authenticate": "Bearer"}
+        )
+    needed = handler.opt.get(ROLE, Role.PROGRAMMER)
+    if role < needed:
+        raise PermissionDeniedException(f"This needs the role {needed.name.lower()} or a higher one.")

@@ -1,0 +1,66 @@
+"""The table of docs/reference/roles.md: which request, event and route needs which role."""
+
+from collections.abc import Iterable
+from typing import Any, cast
+
+from litestar import Litestar
+
+from arcor2_hw.data.events import EVENTS
+from arcor2_hw.data.role import Role
+from arcor2_hw.data.rpc import RPCS
+from arcor2_server.rest.answers import OPEN, ROLE
+
+_HEAD = """# Roles
+
+The least role that each request, event and route needs; whoever has a role may do what the ones before it may.
+This page is made from the declarations in the source: `python -m arcor2_server.role_table > docs/reference/roles.md`.
+"""
+
+
+def _table(title: str, rows: Iterable[tuple[str, Role]]) -> list[str]:
+    lines = ["", f"## {title}", "", "| role | |", "|---|---|"]
+    by_role: dict[Role, list[str]] = {role: [] for role in Role}
+    for name, role in rows:
+        by_role[role].append(name)
+    return lines + [
+        f"| {role.name.lower().replace('_', ' ')} | {', '.join(sorted(names))} |"
+        for role, names in by_role.items()
+        if names
+    ]
+
+
+def _routes(app: Litestar) -> Iterable[tuple[str, Role]]:
+    for route in app.routes:
+        for handler in cast("Any", route).route_handlers if hasattr(route, "route_handlers") else ():
+            role = handler.opt.get(ROLE)
+            for method in sorted(handler.http_methods - {"OPTIONS", "HEAD"}):
+                if isinstance(role, Role):
+                    yield f"`{method} {route.path}`{' (no token)' if handler.opt.get(OPEN) else ''}", role
+
+
+def page(app: Litestar) -> str:
+    """Give the page."""
+    lines = _HEAD.splitlines()
+    lines += _table("Requests", ((name, rpc.role) for name, rpc in RPCS.items()))
+    lines += _table("Events", ((name, event.role) for name, event in EVENTS.items()))
+    lines += _table("REST", _routes(app))
+    return "\n".join(lines) + "\n"
+
+
+async def _main() -> None:
+    import sys
+    import tempfile
+    from pathlib import Path
+
+    from arcor2_server.app import create_app, running_services
+    from arcor2_server.settings import ServerSettings
+
+    with tempfile.TemporaryDirectory() as directory:
+        async with running_services(ServerSettings(data_dir=Path(directory))) as services:
+            sys.stdout.write(page(create_app(services)))
+
+
+if __name__ == "__main__":
+    import asyncio
+
+    asyncio.run(_main())

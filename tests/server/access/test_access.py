@@ -1,0 +1,284 @@
+"""Who gets in, in which role, by which door; and how one who was let in is put out again."""
+
+import asyncio
+import contextlib
+import json
+import ssl
+import stat
+import subprocess
+import sys
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosedError
+
+from arcor2_hw.data.role import Role
+from arcor2_hw.exceptions import InvalidData, NotFound, StorageError
+from arcor2_server import certificate
+from arcor2_server.cli.status import ExitStatus
+from arcor2_server.settings import LegacyListener
+from arcor2_server.tokens import FILE, TokenFile
+from tests.server.core.serving import COMMAND, ServerProcess, Talker, running, talking
+
+
+def bearer(secret: str) -> dict[str, str]:
+    return {"Authorization": f"Bearer {secret}"}
+
+
+@pytest.fixture
+async def server(tmp_path: Path) -> AsyncIterator[ServerProcess]:
+    """A server that asks for a token; `secret` of an operator and of a programmer are in its data directory."""
+    TokenFile(tmp_path / "data").add("first", Role.TECHNICIAN)
+    async with running(tmp_path / "data") as process:
+        yield process
+
+
+def token(server: ServerProcess, name: str, role: Role, days: int | None = None) -> str:
+    return TokenFile(server.data_dir).add(name, role, days)[1]
+
+
+def rest(server: ServerProcess, **options: Any) -> httpx.AsyncClient:
+    return httpx.AsyncClient(base_url=server.url.replace("ws", "http", 1), **options)
+
+
+async def closed_with(socket: ClientConnection) -> int | None:
+    """Give the code with which the server closes."""
+    async with asyncio.timeout(15):
+        with contextlib.suppress(ConnectionClosedError):
+            async for _ in socket:
+                pass
+    return socket.close_code
+
+
+# ------------------------------------------------------------------------------------------------ the file
+def test_a_secret_is_nowhere_kept(tmp_path: Path) -> None:
+    made, secret = TokenFile(tmp_path).add("tablet 1", Role.OPERATOR, days=2)
+    assert len(secret) >= 43
+    assert secret not in (tmp_path / FILE).read_text()
+    assert stat.S_IMODE((tmp_path / FILE).stat().st_mode) == 0o600
+    other = TokenFile(tmp_path)
+    assert other.find(secret) == made
+    assert other.find(secret[:-1]) is None
+    assert other.find("") is None
+
+
+def test_a_token_ends(tmp_path: Path) -> None:
+    tokens = TokenFile(tmp_path)
+    made, secret = tokens.add("tablet", Role.OPERATOR)
+    with pytest.raises(Exception, match="already"):
+        tokens.add("tablet", Role.OPERATOR)
+    with pytest.raises(NotFound, match="nobody"):
+        tokens.revoke("nobody")
+    assert TokenFile(tmp_path).revoke("tablet") == [made]  # as by another process
+    assert tokens.find(secret) is None
+    _, secret = tokens.add("tablet", Role.OPERATOR, days=1)
+    stored = json.loads((tmp_path / FILE).read_text())
+    stored[0]["expires"] = "2020-01-01T00:00:00+00:00"
+    (tmp_path / FILE).write_text(json.dumps(stored))
+    assert tokens.find(secret) is None
+    tokens.add("tablet", Role.OPERATOR)  # the one whose time is over is in nobody's way
+
+
+@pytest.mark.parametrize("name", ["", "  ", "x" * 101, "line\nbreak"])
+def test_a_token_needs_a_name(tmp_path: Path, name: str) -> None:
+    with pytest.raises(InvalidData):
+        TokenFile(tmp_path).add(name, Role.OPERATOR)
+
+
+def test_a_damaged_file_is_named(tmp_path: Path) -> None:
+    (tmp_path / FILE).write_text("{")
+    with pytest.raises(StorageError, match=FILE):
+        TokenFile(tmp_path).all()
+
+
+# ------------------------------------------------------------------------------------------------ the websocket
+@pytest.mark.parametrize("way", ["header", "query", "message"])
+async def test_a_token_lets_in_with_its_role(server: ServerProcess, way: str) -> None:
+    secret = token(server, "Operator 1", Role.OPERATOR)
+    url = f"{server.url}/?token={secret}" if way == "query" else server.url
+    headers = bearer(secret) if way == "header" else {}
+    async with connect(url, additional_headers=headers) as socket:
+        talker = Talker(socket)
+        if way == "message":
+            assert "Authenticate" in await talker.refused("ListScenes")
+            assert await talker.granted("Authenticate", {"token": secret}) == {"name": "Operator 1", "role": "operator"}
+        await talker.event("ShowMainScreen")
+        await talker.granted("RegisterUser", {"user_name": "x"})
+        await talker.granted("ListScenes")
+        assert "technician" in await talker.refused("NewScene", {"name": "scene"})
+
+
+async def test_who_is_not_let_in_is_told_nothing(server: ServerProcess) -> None:
+    async with (
+        connect(server.url) as stranger,
+        connect(server.url, additional_headers=bearer(token(server, "technician", Role.TECHNICIAN))) as known,
+    ):
+        talker, other = Talker(stranger), Talker(known)
+        await other.event("ShowMainScreen")
+        await other.granted("RegisterUser", {"user_name": "x"})
+        await other.granted("NewScene", {"name": "secret scene"})
+        for name in ("SystemInfo", "RegisterUser", "SubscribeEvents", "ListPackages"):
+            assert "token" in await talker.refused(name)
+        answer = await talker.raw(json.dumps({"id": 1, "request": "x" * 5000}))
+        assert "token" in answer["messages"][0]
+        assert talker.events == []
+
+
+async def test_a_wrong_token_is_refused(server: ServerProcess) -> None:
+    async with connect(f"{server.url}/?token=wrong") as socket:
+        assert await closed_with(socket) == 4401
+    async with connect(server.url) as socket:
+        talker = Talker(socket)
+        assert "not valid" in await talker.refused("Authenticate", {"token": "wrong"})
+        secret = token(server, "late", Role.OPERATOR)
+        await talker.granted("Authenticate", {"token": secret})
+
+
+async def test_guessing_has_an_end(server: ServerProcess) -> None:
+    right = token(server, "right", Role.OPERATOR)
+    async with rest(server) as http:
+        statuses = [(await http.get("/api/devices", headers=bearer("wrong"))).status_code for _ in range(12)]
+        assert statuses == [401] * 10 + [429] * 2
+        assert (await http.get("/api/devices", headers=bearer(right))).status_code == 429
+    async with connect(server.url) as socket:
+        await socket.send(json.dumps({"id": 1, "request": "Authenticate", "args": {"token": right}}))
+        assert await closed_with(socket) == 4401
+
+
+async def test_a_revoked_token_ends_its_connections(server: ServerProcess) -> None:
+    gone, stays = token(server, "gone", Role.OPERATOR), token(server, "stays", Role.OPERATOR)
+    async with (
+        connect(server.url, additional_headers=bearer(gone)) as first,
+        connect(server.url, additional_headers=bearer(stays)) as second,
+    ):
+        TokenFile(server.data_dir).revoke("gone")
+        assert await closed_with(first) == 4401
+        talker = Talker(second)
+        await talker.event("ShowMainScreen")
+        await talker.granted("ListScenes")
+    log = server.log.read_text()
+    assert gone not in log
+    assert stays not in log
+
+
+# ------------------------------------------------------------------------------------------------ REST
+async def test_rest_asks_for_token_and_role(server: ServerProcess) -> None:
+    operator, programmer = token(server, "o", Role.OPERATOR), token(server, "p", Role.PROGRAMMER)
+    async with rest(server) as http:
+        assert (await http.get("/healthz/ready")).status_code == 200
+        answer = await http.get("/api/devices")
+        assert (answer.status_code, answer.headers["WWW-Authenticate"]) == (401, "Bearer")
+        assert (await http.get("/api/devices", headers=bearer(operator))).json() == []
+        body = {"id": "Crate", "name": "Crate", "source": "class Crate: ..."}
+        refused = await http.put("/object-types", json=body, headers=bearer(operator))
+        assert refused.status_code == 403
+        assert "programmer" in refused.text
+        assert (await http.put("/object-types", json=body, headers=bearer(programmer))).status_code != 403
+
+
+async def test_without_tokens_this_machine_may_do_everything(tmp_path: Path) -> None:
+    async with running(tmp_path / "data") as server:
+        async with talking(server.url, "anybody") as talker:
+            await talker.granted("NewScene", {"name": "scene"})
+        TokenFile(server.data_dir).add("somebody", Role.OPERATOR)  # from now on a token is needed
+        async with connect(server.url) as socket:
+            assert "token" in await Talker(socket).refused("ListScenes")
+
+
+# ------------------------------------------------------------------------------------------------ other machines
+def start(tmp_path: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [*COMMAND, "serve", "--port", "0", "--data-dir", str(tmp_path / "data"), *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+
+
+def test_other_machines_are_not_served_without_tokens(tmp_path: Path) -> None:
+    ended = start(tmp_path, "--host", "0.0.0.0")
+    assert ended.returncode == ExitStatus.NO_TOKENS
+    assert "token add" in ended.stderr
+    assert len(ended.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize("address", ["nowhere", "127.0.0.1:", "127.0.0.1:99999"])
+def test_an_address_that_is_none_is_a_usage_error(tmp_path: Path, address: str) -> None:
+    ended = start(tmp_path, "--legacy-listen", address)
+    assert ended.returncode == ExitStatus.USAGE
+    assert len(ended.stderr.splitlines()) == 1
+
+
+def test_clients_without_token_are_never_programmers(tmp_path: Path) -> None:
+    assert start(tmp_path, "--legacy-listen", "127.0.0.1:0", "--legacy-role", "programmer").returncode == 2
+    with pytest.raises(ValueError, match="programmer"):
+        LegacyListener("127.0.0.1", 1, Role.PROGRAMMER)
+
+
+def test_a_certificate_that_cannot_be_used_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "c.pem"
+    file.write_text("nothing")
+    ended = start(tmp_path, "--tls", str(file), str(file))
+    assert ended.returncode == ExitStatus.CERTIFICATE_UNUSABLE
+    assert str(file) in ended.stderr
+    assert "Traceback" not in ended.stderr
+
+
+def trusting(file: Path) -> ssl.SSLContext:
+    return ssl.create_default_context(cafile=str(file))
+
+
+async def test_tls_by_a_certificate_made_here(tmp_path: Path) -> None:
+    secret = TokenFile(tmp_path / "data").add("first", Role.OPERATOR)[1]
+    async with running(tmp_path / "data", "--self-signed") as server:
+        assert server.url.startswith("wss://")
+        file = server.data_dir / certificate.CERTIFICATE
+        assert stat.S_IMODE((server.data_dir / certificate.KEY).stat().st_mode) == 0o600
+        assert certificate.fingerprint((file, server.data_dir / certificate.KEY)) in server.log.read_text()
+        async with connect(server.url, additional_headers=bearer(secret), ssl=trusting(file)) as socket:
+            talker = Talker(socket)
+            await talker.event("ShowMainScreen")
+            await talker.granted("ListScenes")
+        async with rest(server, verify=trusting(file)) as http:
+            assert (await http.get("/api/devices", headers=bearer(secret))).status_code == 200
+        made = file.read_bytes()
+    async with running(tmp_path / "data", "--self-signed"):
+        assert file.read_bytes() == made  # whoever has trusted it goes on doing so
+
+
+async def test_old_clients_have_a_door_of_their_own(tmp_path: Path) -> None:
+    TokenFile(tmp_path / "data").add("first", Role.PROGRAMMER)
+    arguments = ("--self-signed", "--legacy-listen", "127.0.0.2:0", "--legacy-role", "standard_user")
+    async with running(tmp_path / "data", *arguments) as server:
+        (line,) = [line for line in server.log.read_text().splitlines() if "clients without a token" in line]
+        assert "standard_user" in line
+        port = json.loads(line)["port"]
+        async with talking(f"ws://127.0.0.2:{port}", "old tablet") as talker:
+            await talker.granted("ListScenes")
+            assert "technician" in await talker.refused("NewScene", {"name": "scene"})
+            assert "programmer" in await talker.refused("UploadPackage", {"id": "x", "data": ""})
+        assert await server.stop() == 0
+
+
+# ------------------------------------------------------------------------------------------------ the command line
+def test_tokens_by_the_command_line(tmp_path: Path) -> None:
+    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "arcor2_server.cli.main", "token", *arguments, "--data-dir", str(tmp_path)]
+        return subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+
+    assert "no token" in run("list").stdout
+    added = run("add", "line 3", "--role", "technician", "--days", "30")
+    assert added.returncode == 0
+    found = TokenFile(tmp_path).find(added.stdout.strip())
+    assert found is not None
+    assert (found.name, found.role) == ("line 3", Role.TECHNICIAN)
+    listed = run("list").stdout
+    assert found.id in listed
+    assert "technician" in listed
+    assert added.stdout.strip() not in listed
+    again = run("add", "line 3", "--role", "operator")
+    assert again.returncode == ExitStatus.USAGE
+    assert len(again.stderr.splitlines()) == 1
+    assert run("revoke", "line 3").returncode == 0
+    assert run("revoke", "line 3").returncode == ExitStatus.NOT_FOUND
+    assert TokenFile(tmp_path).all() == []
