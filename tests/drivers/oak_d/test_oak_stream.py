@@ -1,0 +1,133 @@
+"""The stream's codec: messages byte for byte as docs/devices/oak-d.md says, and bytes that are none."""
+
+import zlib
+from typing import Any
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from arcor2_drivers.oak_d import stream
+from arcor2_drivers.oak_d.stream import BadStream, Clock, FrameHeader, Hello, Kind, Refusal, Status
+
+# magic, version, kind, length of the header, length of the payload, checksum; then the header and the payload
+HELLO = (
+    bytes.fromhex("4f414b53 01 01 0073 0000000d 523ba162")
+    + b'{"vendor":"V","model":"M","serial":"S","firmware":"F","width":320,'
+    + b'"height":180,"fps":30.0,"depth_range":[0.2,10.0]}'
+    + b'{"version":7}'
+)
+START = bytes.fromhex("4f414b53 01 02 001c 00000000 4ca8d977") + b'{"client":"c","color":"bgr"}'
+START_JPEG = bytes.fromhex("4f414b53 01 02 001d 00000000 ae365715") + b'{"client":"c","color":"jpeg"}'
+FRAME = (
+    bytes.fromhex("4f414b53 01 03 0056 00000005 0ae3e2c6")
+    + b'{"number":5,"stamp":1.5,"exposure":0.01,"color":"bgr","color_bytes":3,'
+    + b'"depth_bytes":2}'
+    + b"\x01\x02\x03 \x03"
+)
+FRAME_NO_DEPTH = (
+    bytes.fromhex("4f414b53 01 03 0048 00000004 fded9948")
+    + b'{"number":6,"stamp":1.53,"color":"jpeg","color_bytes":4,'
+    + b'"depth_bytes":0}'
+    + b"\xff\xd8\xff\xd9"
+)
+ASK = bytes.fromhex("4f414b53 01 04 000e 00000000 fba2c5e2") + b'{"asked":12.5}'
+CLOCK = bytes.fromhex("4f414b53 01 04 0018 00000000 da2a131b") + b'{"asked":12.5,"at":3.25}'
+CONTROL = bytes.fromhex("4f414b53 01 05 0012 00000000 cb585d31") + b'{"exposure":0.004}'
+AUTO = bytes.fromhex("4f414b53 01 05 0011 00000000 e87ba51a") + b'{"exposure":null}'
+STATUS = bytes.fromhex("4f414b53 01 06 0024 00000000 f6354a75") + b'{"temperature":48.0,"exposure":null}'
+REFUSED = bytes.fromhex("4f414b53 01 07 000f 00000000 a9cc30ef") + b'{"reason":"no"}'
+
+
+@pytest.mark.parametrize(
+    ("data", "kind", "header", "payload"),
+    [
+        (HELLO, Kind.HELLO, Hello("V", "M", "S", "F", 320, 180, 30.0, (0.2, 10.0)), b'{"version":7}'),
+        (FRAME, Kind.FRAME, FrameHeader(5, 1.5, "bgr", 3, 2, 0.01), b"\x01\x02\x03\x20\x03"),
+        (FRAME_NO_DEPTH, Kind.FRAME, FrameHeader(6, 1.53, "jpeg", 4, 0), b"\xff\xd8\xff\xd9"),
+        (CLOCK, Kind.CLOCK, Clock(12.5, 3.25), b""),
+        (STATUS, Kind.STATUS, Status(48.0, None), b""),
+        (REFUSED, Kind.REFUSED, Refusal("no"), b""),
+    ],
+)
+def test_what_the_source_sends(data: bytes, kind: Kind, header: Any, payload: bytes) -> None:
+    head = stream.front(data[:16])
+    assert (head.kind, head.payload) == (kind, len(payload))
+    text = data[16 : 16 + head.header]
+    stream.check(head, text)
+    assert stream.read(text, type(header)) == header
+    assert data[16 + head.header :] == payload
+
+
+@pytest.mark.parametrize(
+    ("data", "kind", "header"),
+    [
+        (START, Kind.START, {"client": "c", "color": "bgr"}),
+        (START_JPEG, Kind.START, {"client": "c", "color": "jpeg"}),
+        (ASK, Kind.CLOCK, {"asked": 12.5}),
+        (CONTROL, Kind.CONTROL, {"exposure": 0.004}),
+        (AUTO, Kind.CONTROL, {"exposure": None}),
+    ],
+)
+def test_what_the_driver_sends(data: bytes, kind: Kind, header: dict[str, object]) -> None:
+    assert stream.message(kind, header) == data
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (b"HTTP" + FRAME[4:], "it does not speak this protocol: a message begins with b'HTTP'"),
+        (FRAME[:4] + b"\x02" + FRAME[5:], "it speaks version 2 of the protocol, not 1"),
+        (FRAME[:5] + b"\x08" + FRAME[6:], "there is no message of kind 8"),
+        (FRAME[:6] + b"\x10\x01" + FRAME[8:], "a message of 4097 and 5 bytes is too long"),
+        (FRAME[:8] + b"\x04\x00\x00\x01" + FRAME[12:], "a message of 86 and 67108865 bytes is too long"),
+    ],
+)
+def test_what_is_no_message(data: bytes, said: str) -> None:
+    with pytest.raises(BadStream, match=f"^{said}"):
+        stream.front(data[:16])
+
+
+def test_every_wrong_bit_of_the_framing_is_noticed() -> None:
+    framing = FRAME[: 16 + stream.front(FRAME[:16]).header]
+    for bit in range(8 * len(framing)):
+        wrong = bytearray(framing)
+        wrong[bit // 8] ^= 1 << bit % 8
+        with pytest.raises(BadStream):
+            stream.check(stream.front(wrong[:16]), bytes(wrong[16:]))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"",
+        b"{",
+        b"[]",
+        b'{"number":1}',
+        b"\xff",
+        FRAME[16:102].replace(b"1.5", b'"a"'),
+        b'{"number":' + b"9" * 40 + b"}",
+    ],
+)
+def test_headers_that_are_none(text: bytes) -> None:
+    with pytest.raises(BadStream, match=r"^a header is not readable"):
+        stream.read(text, FrameHeader)
+
+
+def test_a_hello_that_makes_no_sense() -> None:
+    for wrong in ({"width": 0}, {"height": 10**6}, {"fps": 0.0}):
+        text = msgspec.json.encode({**msgspec.json.decode(HELLO[16:-13]), **wrong})
+        with pytest.raises(BadStream, match="is no camera's mode"):
+            stream.read(text, Hello)
+
+
+@given(st.binary(min_size=16, max_size=16))
+def test_foreign_bytes_raise_nothing_else(data: bytes) -> None:
+    for each in (data, b"OAKS" + data[4:], b"OAKS\x01" + data[5:]):
+        try:
+            head = stream.front(each)
+            stream.check(head, data)
+        except BadStream:
+            continue
+        assert zlib.crc32(each[:12] + data) == int.from_bytes(each[12:16], "big")
