@@ -58,6 +58,7 @@ def register_commands(control: ControlServer, printer: LabelPrinter) -> None:
         control.command(name, switch(name))
     control.command("pause", lambda on=True: printer.pause(bool(on)))
     control.command("media", media)
+    control.command("renew", lambda: printer.renew(FULL_ROLL))
     control.command("power_cycle", printer.power_cycle)
 
 

@@ -145,6 +145,14 @@ class LabelPrinter:
         self.hold()
         self.go_on()
 
+    def renew(self, labels: int) -> None:
+        """Be as delivered, with so many labels on the roll."""
+        self.power_cycle()
+        self.media, self.counter = labels, 0
+        self.head_open = self.ribbon_out = self.hot = self.forgetful = False
+        self.labels.clear()
+        self.received.clear()
+
     def power_cycle(self) -> None:
         """Switch off and on: what waits is gone, the odometer stays."""
         self.close()

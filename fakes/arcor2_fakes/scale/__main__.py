@@ -55,6 +55,7 @@ def register_commands(control: ControlServer, balance: Balance) -> None:
     control.command("busy", busy)
     control.command("unit", unit)
     control.command("error", error)
+    control.command("renew", balance.renew)
     control.command("power_cycle", balance.power_cycle)
 
 

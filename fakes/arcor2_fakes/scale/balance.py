@@ -184,6 +184,16 @@ class Balance:
             raise ValueError("kg is a finite number")
         self._from, self._changed, self.load = self.shown(), self._loop.time(), kilograms
 
+    def renew(self) -> None:
+        """Be as delivered: nothing on the pan, nothing asked, nothing wrong."""
+        self.cancel()
+        self.drop_input()
+        self.received.clear()
+        self.vibrating = self.busy = False
+        self.unit, self.next_error = "g", None
+        self.load = self.zero = self.tare = self._from = 0.0
+        self._changed = -math.inf
+
     def power_cycle(self) -> None:
         """Switch off and on: the tare is gone, the load is the new zero if it is small, and the balance says hello."""
         self.cancel()

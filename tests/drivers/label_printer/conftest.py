@@ -1,7 +1,6 @@
 """A fake label printer in a process of its own, and the driver on its line."""
 
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -27,12 +26,29 @@ def make() -> Iterator[Callable[..., ZplPrinter]]:
         printer.disconnect()
 
 
+@pytest.fixture(scope="module")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, FakeProcess]]:
+    """One fake per kind for a file's tests: starting one takes longer than most of them."""
+    kinds = {
+        "tcp": ("--tcp", "127.0.0.1:0"),
+        "pty": ("--link", str(tmp_path_factory.mktemp("dev") / "ttyPRINTER")),
+        "flags": ("--tcp", "127.0.0.1:0", "--no-mute"),
+    }
+    fakes = {kind: FakeProcess("label_printer", *options, "--duration", "0.15") for kind, options in kinds.items()}
+    for fake in fakes.values():
+        fake.truth()  # opens the control channel, which lives as long
+    yield fakes
+    for fake in fakes.values():
+        fake.end()
+
+
 @pytest.fixture
-def fake(request: pytest.FixtureRequest, start_fake: Callable[..., FakeProcess], tmp_path: Path) -> FakeProcess:
-    """On TCP and silent while it cannot print; on a pty, or with flags, for a test that is parametrized with that."""
-    kind = getattr(request, "param", "tcp")
-    line = ("--link", str(tmp_path / "ttyPRINTER")) if kind == "pty" else ("--tcp", "127.0.0.1:0")
-    return start_fake("label_printer", *line, "--duration", "0.15", *(["--no-mute"] if kind == "flags" else []))
+def fake(request: pytest.FixtureRequest, running: dict[str, FakeProcess]) -> FakeProcess:
+    """As delivered; on TCP and silent while it cannot print, or as a test is parametrized: on a pty, or with flags."""
+    fake = running[getattr(request, "param", "tcp")]
+    for command in ("unplug", "heal", "plug", "renew"):
+        fake.control.do(command)
+    return fake
 
 
 @pytest.fixture

@@ -83,11 +83,14 @@ def test_the_fake_answers_the_example_as_the_manual_does(fake: FakeProcess, wait
         return came.hex(" ").upper()
 
     try:
-        fake.control.do("put_part", width=0.0153)  # BDh
         assert ask(CLEAR, 8) == WRITTEN
         assert ask(ACTIVATE, 8) == WRITTEN
         wait_for(lambda: ask(ASK_ACTIVATION, 7), lambda answer: answer == ACTIVATING)
-        wait_for(lambda: ask(ASK_ACTIVATION, 7), lambda answer: answer == ACTIVATED)
+        # gOBJ, the upper two bits, counts only when the gripper was told to go somewhere.
+        wait_for(
+            lambda: int(ask(ASK_ACTIVATION, 7)[9:11], 16) & 0x3F, lambda status: status == int(ACTIVATED[9:11], 16)
+        )
+        fake.control.do("put_part", width=0.0153)  # BDh
         assert ask(CLOSE, 8) == WRITTEN
         fake.control.wait_until(lambda truth: truth["registers"]["OBJ"] == 2)
         answer = bytes.fromhex(ask(ASK_STATUS, 11))

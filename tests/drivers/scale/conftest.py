@@ -1,7 +1,6 @@
 """A fake scale in a process of its own, and the driver on its line."""
 
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -27,12 +26,26 @@ def make() -> Iterator[Callable[..., MtSicsScale]]:
         scale.disconnect()
 
 
+@pytest.fixture(scope="module")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, FakeProcess]]:
+    """One fake per kind of line for a file's tests: starting one takes longer than most of them."""
+    lines = {"pty": ("--link", str(tmp_path_factory.mktemp("dev") / "ttySCALE")), "tcp": ("--tcp", "127.0.0.1:0")}
+    common = ("--settling", "0.2", "--stability-timeout", "0.6")
+    fakes = {kind: FakeProcess("scale", *line, *common) for kind, line in lines.items()}
+    for fake in fakes.values():
+        fake.truth()  # opens the control channel, which lives as long
+    yield fakes
+    for fake in fakes.values():
+        fake.end()
+
+
 @pytest.fixture
-def fake(request: pytest.FixtureRequest, start_fake: Callable[..., FakeProcess], tmp_path: Path) -> FakeProcess:
-    """On a pty; on TCP for a test that is parametrized with it."""
-    tcp = getattr(request, "param", "pty") == "tcp"
-    line = ("--tcp", "127.0.0.1:0") if tcp else ("--link", str(tmp_path / "ttySCALE"))
-    return start_fake("scale", *line, "--settling", "0.3", "--stability-timeout", "0.6")
+def fake(request: pytest.FixtureRequest, running: dict[str, FakeProcess]) -> FakeProcess:
+    """As delivered, on a pty; on TCP for a test that is parametrized with it."""
+    fake = running[getattr(request, "param", "pty")]
+    for command in ("unplug", "heal", "plug", "renew"):
+        fake.control.do(command)
+    return fake
 
 
 @pytest.fixture
