@@ -17,8 +17,8 @@ TASKS: Final = {"left": "T_ROB_L", "right": "T_ROB_R"}
 UNITS: Final = {"left": "ROB_L", "right": "ROB_R"}
 PROGRAMS: Final = {"left": "Arcor2Left", "right": "Arcor2Right"}
 """Names of the programs as they are loaded from the .pgf files."""
-SLOW: Final = 0.5
-"""Seconds between two looks at what a person changes: mode, speed, programs, mastership."""
+FRESH: Final = 0.8
+"""Seconds: how old a position may be. A look takes six requests, each of which may take ten ms and more."""
 FIRST_WITHIN: Final = 1.0
 """Seconds the first answer of a session may take: it costs two requests, by digest authentication."""
 AT_REST: Final = 2e-3
@@ -78,17 +78,42 @@ class Sample(NamedTuple):
 
 def read_panel(rws: Rws) -> Panel:
     """Ask for what a person changes."""
-    began = time.monotonic()
-    mode = rws.value("/rw/panel/opmode", "opmode")
+    panel = Panel(0.0, "", 0.0, "", {}, None, {})
+    for part in PARTS:
+        panel = part(rws, panel)
+    return panel._replace(monotonic=time.monotonic())
+
+
+def _mode(rws: Rws, panel: Panel) -> Panel:
+    return panel._replace(operation_mode=rws.value("/rw/panel/opmode", "opmode"))
+
+
+def _speed(rws: Rws, panel: Panel) -> Panel:
     ratio = rws.value("/rw/panel/speedratio", "speedratio")
-    collision = rws.value("/rw/panel/coldetstate", "coldetstate")
-    programs = {arm: _program(rws, task) for arm, task in TASKS.items()}
     try:
-        speed_ratio = float(ratio) / 100.0
+        return panel._replace(speed_ratio=float(ratio) / 100.0)
     except ValueError:
         raise ConnectionLost(f"{rws.who} gave a speed ratio that is none", ratio) from None
-    lead_through = {arm: _lead_through(rws, unit) for arm, unit in UNITS.items()}
-    return Panel(began, mode, speed_ratio, collision, programs, holder(rws), lead_through)
+
+
+def _collision(rws: Rws, panel: Panel) -> Panel:
+    return panel._replace(collision=rws.value("/rw/panel/coldetstate", "coldetstate"))
+
+
+def _programs(rws: Rws, panel: Panel) -> Panel:
+    return panel._replace(programs={arm: _program(rws, task) for arm, task in TASKS.items()})
+
+
+def _holder(rws: Rws, panel: Panel) -> Panel:
+    return panel._replace(holder=holder(rws))
+
+
+def _lead_throughs(rws: Rws, panel: Panel) -> Panel:
+    return panel._replace(lead_through={arm: _lead_through(rws, unit) for arm, unit in UNITS.items()})
+
+
+PARTS: Final = (_mode, _speed, _collision, _programs, _holder, _lead_throughs)
+"""What the panel is asked for in, one part beside each look: a burst of all would let the positions grow old."""
 
 
 def holder(rws: Rws) -> Holder | None:
@@ -150,7 +175,7 @@ class Observer:
     ) -> None:
         self.rws = Rws(name, settings.host, settings.rws_port, settings.user, settings.password)
         self.who = self.rws.who
-        self.fresh = max(0.5, 3.0 * settings.poll_period)
+        self.fresh = max(FRESH, 3.0 * settings.poll_period)
         self.version = ""
         self._period = settings.poll_period
         self._seen = seen
@@ -158,15 +183,19 @@ class Observer:
         self._panel: Panel | None = None
         self._news = threading.Condition()
         self._hurry = threading.Event()
+        self._ending = False
+        self._part = 0
         self.observing = Observing(self.who, self._open, self._watch, self._close, lost)
 
     def connect(self, timeout: float) -> None:
         """Begin to observe. Raises NotConnected, DeviceTimeout, ConnectionLost, each naming host and port."""
+        self._ending = False
         self.observing.start(timeout)
 
     def disconnect(self) -> None:
         """Stop observing and end the session; harmless when it was not observed."""
         healthy = self.observing.online
+        self._ending = True
         self._hurry.set()
         self.observing.stop()
         if healthy:
@@ -233,11 +262,16 @@ class Observer:
         while not stopping.is_set():
             self._hurry.wait(self._period)
             self._hurry.clear()
-            if stopping.is_set():
+            if self._ending:
+                stopping.wait(1.0)
                 return
             self._look()
-            if self._panel is None or time.monotonic() - self._panel.monotonic > SLOW:
-                self._panel = read_panel(self.rws)
+            self._part = (self._part + 1) % len(PARTS)
+            assert self._panel is not None
+            noted = self._panel
+            found = PARTS[self._part](self.rws, noted)
+            if self._panel is noted:  # else it was asked elsewhere in between
+                self._panel = found._replace(monotonic=time.monotonic())
 
     def _look(self) -> None:
         began, rws = time.monotonic(), self.rws

@@ -115,7 +115,7 @@ class YumiSettings(Settings):
             raise OutOfRange(f"right_port must be 2 or more away from left_port {self.left_port}: each arm takes two")
         within("max_tcp_speed", self.max_tcp_speed, 0.01, 1.5)
         within("max_joint_speed", self.max_joint_speed, 0.01, math.pi)
-        within("clearance", self.clearance, 0.0, 0.2)
+        within("clearance", self.clearance, 0.0, 0.08)  # the shoulders themselves are 0.1 m apart
         # Above 0.6 s an arm could not rest within the second that the type declares.
         within("watchdog", self.watchdog, 0.2, 0.6)
         within("poll_period", self.poll_period, 0.02, 0.5)

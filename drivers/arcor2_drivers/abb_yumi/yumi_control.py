@@ -116,6 +116,7 @@ class YumiControl(YumiObserved):
             raise
         self._controlled_since = time.monotonic()
         self._session = session
+        self._collision_acknowledged = False  # the next one is not acknowledged by this
 
     def release_control(self) -> None:
         """Stop both arms and give control back; harmless when it is not ours. Motors and servers stay on."""
@@ -203,6 +204,9 @@ class YumiControl(YumiObserved):
             return
         if self._observer.observing.online:
             release_mastership(rws, "rapid")
+            known = self._observer.known_panel
+            if known is not None:
+                self._observer.note(known._replace(holder=None))
         self._mastership = False
 
     # -------------------------------------------------------------------------------- how it ends by itself

@@ -145,7 +145,7 @@ class YumiObserved(MultiArmRobot):
     def _safety(self, sample: Sample) -> Safety:
         panel = self._observer.known_panel
         collided = panel is not None and panel.collision == COLLISION and not self._collision_acknowledged
-        return safety_of(sample.control_state, collided)
+        return safety_of(sample.control_state, collided and not sample.running)  # one that was overcome may still stand
 
     def _program(self, sample: Sample, panel: Panel) -> ProgramState:
         if not sample.running:

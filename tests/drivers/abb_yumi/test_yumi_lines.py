@@ -1,5 +1,6 @@
 """Lines of the motion server, settings, and a late answer; no controller."""
 
+import contextlib
 import socket
 import threading
 from collections.abc import Iterator
@@ -142,7 +143,8 @@ def pair() -> Iterator[tuple[ArmLine, socket.socket]]:
             *lines, rest = (rest + data).split(b"\n")
             for each in lines:
                 sequence, code, _ = motion_server.parsed(each.decode())
-                kept.sendall(motion_server.framed(f"{sequence} {code} 0 0 1"))
+                with contextlib.suppress(OSError):
+                    kept.sendall(motion_server.framed(f"{sequence} {code} 0 0 1"))
 
     answering = threading.Thread(target=keep_answering)
     answering.start()

@@ -1,0 +1,268 @@
+"""A YuMi on bad days: cut cables, stops of the controller, collisions, a key turned, lines that hang."""
+
+import time
+
+import pytest
+
+from arcor2_drivers.abb_yumi.yumi import YuMi
+from arcor2_hw.data.device import Connection
+from arcor2_hw.data.robot import Joint, MoveEnd, Safety
+from arcor2_hw.exceptions import (
+    Cancelled,
+    ConnectionLost,
+    DeviceError,
+    DeviceFault,
+    DeviceTimeout,
+    InvalidData,
+    NotInControl,
+    Refused,
+    SafetyStop,
+    Stale,
+)
+
+from .conftest import Doing, FakeYumi, make, under_way, wait
+from .test_yumi_motion import turned
+
+BUSY = 0.5
+"""s that a busy machine may add to a time of the device's own."""
+
+
+def far(robot: YuMi, arm: str = "left") -> list[Joint]:
+    joints = robot.robot_joints(arm_id=arm)
+    joints[5].value += 2.5 if joints[5].value < 0.5 else -2.5
+    return joints
+
+
+def moving_far(fake: FakeYumi, robot: YuMi, arm: str = "left") -> Doing:
+    doing = Doing(robot.move_to_joints, far(robot, arm), 0.5, arm_id=arm)
+    under_way(fake, arm)
+    return doing
+
+
+def stands_still(fake: FakeYumi, seconds: float = 0.5) -> None:
+    before = fake.truth()["arms"]
+    time.sleep(seconds)
+    after = fake.truth()["arms"]
+    assert {arm: each["joints"] for arm, each in before.items()} == {arm: each["joints"] for arm, each in after.items()}
+
+
+def test_the_watchdog_stops_the_arms(fake: FakeYumi, ready: YuMi) -> None:
+    left, right = moving_far(fake, ready), moving_far(fake, ready, "right")
+    began = time.monotonic()
+    fake.do("silence")
+    fake.control.wait_until(lambda t: not any(arm["moving"] for arm in t["arms"].values()), 1.0 + BUSY)
+    assert time.monotonic() - began > 0.2  # the watchdog's time, and not the closing of a socket
+    for doing in (left, right):
+        with pytest.raises(ConnectionLost) as error:
+            doing.result()
+        assert "yumi" in str(error.value)
+        assert fake.host in f"{error.value} {error.value.detail}"
+    wait(lambda: ready.connection is Connection.LOST)
+    fake.do("heal")
+    wait(lambda: ready.connection in (Connection.BACK, Connection.ONLINE), 8.0)
+    stands_still(fake)
+    assert ready.control_owner() != "us"
+    with pytest.raises(NotInControl):
+        ready.move_to_joints(far(ready), 0.5, arm_id="left")
+    ready.take_control()
+    ready.move_to_joints(turned(ready, "left", 1, 0.1), 0.8, arm_id="left")
+
+
+@pytest.mark.parametrize("wire", ["left", "left_watch"])
+def test_a_cut_line_stops_its_arm(fake: FakeYumi, ready: YuMi, wire: str) -> None:
+    doing, other = moving_far(fake, ready), moving_far(fake, ready, "right")
+    fake.do("reset", wire=wire)
+    for each in (doing, other):
+        with pytest.raises(ConnectionLost):
+            each.result()
+    fake.control.wait_until(lambda t: not any(arm["moving"] for arm in t["arms"].values()), 1.0 + BUSY)
+    assert ready.connection is Connection.ONLINE
+    assert ready.control_owner() is None
+    ready.take_control()
+    ready.move_to_joints(turned(ready, "left", 1, 0.1), 0.8, arm_id="left")
+
+
+def test_rapid_is_stopped_when_the_watch_line_hangs(fake: FakeYumi, ready: YuMi) -> None:
+    doing = moving_far(fake, ready)
+    fake.do("slow", wire="left_watch", seconds=30.0)
+    ready.stop("left")
+    with pytest.raises((Cancelled, ConnectionLost)):
+        doing.result()
+    fake.control.wait_until(lambda t: not t["arms"]["left"]["moving"], 1.0 + BUSY)
+    fake.do("heal")
+    stands_still(fake)
+    ready.take_control()
+    ready.move_to_joints(turned(ready, "left", 1, 0.1), 0.8, arm_id="left")
+
+
+def test_garbage_on_a_line_is_a_typed_error(fake: FakeYumi, ready: YuMi) -> None:
+    fake.do("garbage", wire="left")
+    with pytest.raises(DeviceError) as error:
+        ready.move_to_joints(far(ready), 0.5, arm_id="left")
+    assert isinstance(error.value, (DeviceFault, ConnectionLost, DeviceTimeout, NotInControl))
+    assert not fake.moving()
+
+
+@pytest.mark.parametrize("fault", ["garbage", "half_frame", "reset", "refuse"])
+def test_rws_that_fails_is_lost_and_back(fake: FakeYumi, robot: YuMi, fault: str) -> None:
+    fake.do(fault, wire="rws")
+    if fault == "refuse":
+        fake.do("reset", wire="rws")
+    if fault != "reset":
+        wait(lambda: robot.connection is Connection.LOST)
+        with pytest.raises((ConnectionLost, Stale)):
+            wait(lambda: not robot.robot_joints(), 1.0)
+    fake.do("heal")
+    wait(lambda: robot.connection in (Connection.BACK, Connection.ONLINE), 8.0)
+    wait(lambda: len(robot.robot_joints()) == 14)
+
+
+def test_stale_is_an_error_and_names_the_address(fake: FakeYumi, robot: YuMi) -> None:
+    robot.get_end_effector_pose("tcp", "left")
+    fake.do("silence", wire="rws")
+    time.sleep(0.9)
+    for call in (
+        lambda: robot.get_end_effector_pose("tcp", "left"),
+        lambda: robot.robot_joints(arm_id="right"),
+        robot.state,
+    ):
+        with pytest.raises((Stale, ConnectionLost)) as error:
+            call()
+        assert "yumi" in str(error.value)
+        assert fake.host in str(error.value)
+
+
+STOPS = [
+    ("emergencystop", Safety.EMERGENCY_STOP),
+    ("guardstop", Safety.SAFEGUARD_STOP),
+    ("sysfail", Safety.FAULT),
+]
+
+
+@pytest.mark.parametrize(("state", "kind"), STOPS)
+def test_a_safety_stop_is_told_by_its_kind(fake: FakeYumi, ready: YuMi, state: str, kind: Safety) -> None:
+    doing = moving_far(fake, ready)
+    fake.do("control_state", state=state)
+    with pytest.raises(SafetyStop) as error:
+        doing.result()
+    assert error.value.kind == kind.value
+    assert "yumi" in str(error.value)
+    assert fake.host in str(error.value)
+    assert ready.last_moves["left"].end is MoveEnd.SAFETY
+    assert ready.state().safety is kind
+    assert [alarm.code for alarm in ready.alarms()] == [kind.value]
+    with pytest.raises(Refused):
+        ready.acknowledge(kind.value)
+
+
+def test_after_an_emergency_stop_nothing_moves_until_a_new_command(fake: FakeYumi, ready: YuMi) -> None:
+    doing = moving_far(fake, ready)
+    fake.do("control_state", state="emergencystop")
+    with pytest.raises(SafetyStop):
+        doing.result()
+    fake.do("control_state", state="emergencystopreset")
+    with pytest.raises(SafetyStop):
+        ready.take_control()
+    fake.do("control_state", state="motoroff")
+    wait(lambda: ready.state().safety is Safety.NORMAL)
+    stands_still(fake)
+    begun = fake.arm("left")["moves_begun"]
+    ready.take_control()
+    stands_still(fake)
+    assert fake.arm("left")["moves_begun"] == begun
+    ready.move_to_joints(turned(ready, "left", 1, 0.1), 0.8, arm_id="left")
+
+
+def test_motors_off_in_mid_move(fake: FakeYumi, ready: YuMi) -> None:
+    doing = moving_far(fake, ready)
+    fake.do("control_state", state="motoroff")
+    with pytest.raises(NotInControl) as error:
+        doing.result()
+    assert "motors" in str(error.value)
+    assert not fake.moving()
+
+
+def test_turning_the_key_ends_control(fake: FakeYumi, ready: YuMi) -> None:
+    doing = moving_far(fake, ready)
+    fake.do("operation_mode", mode="MANR")
+    with pytest.raises((SafetyStop, NotInControl)):
+        doing.result()
+    wait(lambda: ready.control_owner() == "pendant")
+    with pytest.raises(DeviceError):
+        ready.move_to_joints(far(ready), 0.1, arm_id="left")
+    with pytest.raises((NotInControl, SafetyStop)):
+        ready.take_control()
+    assert not fake.moving()
+
+
+def test_a_rapid_error_is_told_in_abbs_words(fake: FakeYumi, ready: YuMi) -> None:
+    doing = moving_far(fake, ready)
+    fake.do("rapid_error", code=40512, title="Missing external axis value")
+    with pytest.raises(DeviceFault) as error:
+        doing.result()
+    assert error.value.fault_code == "40512"
+    assert "Missing external axis value" in str(error.value)
+    wait(lambda: fake.truth()["mastership"]["rapid"] is None)
+
+
+def test_the_half_done_motion_of_a_stopped_program_is_forgotten(fake: FakeYumi, ready: YuMi) -> None:
+    doing = moving_far(fake, ready)
+    fake.do("rapid_error", code=10125, title="Program stopped")
+    with pytest.raises(DeviceFault):
+        doing.result()
+    fake.control.wait_until(lambda t: not t["arms"]["left"]["moving"])
+    before = fake.truth()["writes"].get("resetpp", 0)
+    ready.take_control()
+    assert fake.truth()["writes"]["resetpp"] == before + 1
+    stands_still(fake)
+
+
+def test_a_collision_is_acknowledged_by_a_person(fake: FakeYumi, ready: YuMi) -> None:
+    doing, other = moving_far(fake, ready), moving_far(fake, ready, "right")
+    fake.do("collide", arm="left")
+    for each in (doing, other):
+        with pytest.raises(SafetyStop) as error:
+            each.result()
+        assert error.value.kind == "protective_stop"
+        assert "50204" in error.value.detail
+    with pytest.raises(SafetyStop):
+        ready.take_control()
+    with pytest.raises(Refused):
+        ready.acknowledge("protective_stop")
+    with pytest.raises(InvalidData):
+        ready.acknowledge_protective_stop(" ")
+    ready.acknowledge_protective_stop("Eva")
+    stands_still(fake)
+    with pytest.raises(Refused):
+        ready.acknowledge_protective_stop("Eva")
+    ready.take_control()
+    ready.move_to_joints(turned(ready, "left", 1, 0.1), 0.8, arm_id="left")
+    fake.do("collide", arm="right")
+    wait(lambda: ready.state().safety is Safety.PROTECTIVE_STOP)  # the next one is not acknowledged by the last
+
+
+def test_a_motion_server_that_is_silent_is_named(fake: FakeYumi, robot: YuMi) -> None:
+    fake.do("silence", wire="right")
+    with pytest.raises(DeviceTimeout) as error:
+        robot.take_control()
+    assert "right arm of yumi" in str(error.value)
+    assert f"{fake.host}:6111" in str(error.value)
+    assert fake.truth()["mastership"]["rapid"] is None
+    assert robot.control_owner() != "us"
+
+
+def test_a_motion_server_that_is_not_there_is_named(fake: FakeYumi, robot: YuMi) -> None:
+    fake.do("refuse", wire="left")
+    with pytest.raises(DeviceError) as error:
+        robot.take_control()
+    assert f"{fake.host}:6101" in str(error.value)
+    assert fake.truth()["mastership"]["rapid"] is None
+
+
+def test_ports_of_the_other_arm_are_noticed(fake: FakeYumi) -> None:
+    robot = make(fake.host, left_port=6111, right_port=6101)
+    robot.connect(3.0)
+    with pytest.raises(Refused) as error:
+        robot.take_control()
+    assert "other arm" in str(error.value)
+    robot.disconnect()
