@@ -68,6 +68,13 @@ def _required(function: Any) -> int:
     return sum(p.default is p.empty and p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD) for p in parameters)
 
 
+@lru_cache(maxsize=64)
+def to_be_shown(kind: type[Generic]) -> frozenset[str]:
+    """Give the optional methods that are declared and act, so that somebody has to show that they work."""
+    said = declared(kind)
+    return (said & set(hooks(kind))) - set(readable(kind, said))
+
+
 def contradictions(device: Generic, said: frozenset[str]) -> list[str]:
     """Give, one sentence each, where a disconnected object does not have what analysis says, or has more."""
     kind = type(device)

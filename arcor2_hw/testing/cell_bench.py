@@ -164,8 +164,8 @@ class CellBench(Bench):
             return "how its frames are read is not said: quality.yaml has no `frames` for this wire"
         if hook in ("observe", "ask") and not self._read:
             return "it has nothing that is read without an argument"
-        if hook in _UNKNOWN:
-            return f"{hook} cannot be guessed from settings: name a bench by `bench: module:Class`"
+        if hook in _UNKNOWN and not (hook == "works" and super().has(hook)):
+            return "how it is made to act cannot be guessed from settings: name a bench by `bench: module:Class`"
         return None
 
 

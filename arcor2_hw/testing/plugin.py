@@ -244,7 +244,7 @@ def _fit(request: pytest.FixtureRequest, bench: Bench, told: dict[str, Any]) -> 
     if lacking and reason is not None:
         skip(Kind.NOT_RUN, reason)
     if lacking and all(bench.why_not(hook) for hook in lacking):
-        skip(Kind.LACKING, "; ".join(str(bench.why_not(hook)) for hook in lacking))
+        skip(Kind.LACKING, "; ".join(dict.fromkeys(str(bench.why_not(hook)) for hook in lacking)))
     if lacking and getattr(request.function, "for_silver", False):
         skip(Kind.LACKING, f"the bench has no hook {', '.join(lacking)}")
     if lacking:

@@ -1,7 +1,8 @@
-"""The barcode reader on its fake, on a pty; a reading of a code that is not there is its long act."""
+"""The barcode reader on its fake, on a pty behind a wire; a reading of a code that is not there is its long act."""
 
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,8 @@ from arcor2_drivers.barcode_reader.barcode_reader import BarcodeReader
 from arcor2_drivers.barcode_reader.settings import BarcodeReaderSettings
 from arcor2_hw.objects import Generic
 from arcor2_hw.testing.bench import Bench
+from arcor2_hw.testing.frames import Lines
+from arcor2_hw.testing.serial_wire import SerialWire
 from tests.fakes.conftest import FakeProcess
 
 ORPHAN = """
@@ -32,19 +35,25 @@ class BarcodeReaderBench(Bench):
             "barcode_reader", "--link", str(Path(self.folder.name) / "ttyREADER"), "--timeout", "0.5"
         )
         self.do = self.fake.control.do
+        self.wire = SerialWire(self.fake.ready["port"])
+        self.wire.start()
+        self.frames = Lines(ACTING)
 
     def end(self) -> None:
+        if self.wire is not None:
+            self.wire.close()
         self.fake.end()
         self.folder.cleanup()
 
     def reset(self) -> None:
-        self.do("heal")
+        self.heal()
         self.do("present", code=None)
         self.fake.control.wait_until(lambda t: not t["reading"])
 
     @property
     def address(self) -> str:
-        return str(self.fake.ready["port"])
+        assert self.wire is not None
+        return self.wire.address
 
     def _build(self, port: str) -> BarcodeReader:
         return BarcodeReader("reader_id", "reader", settings=BarcodeReaderSettings(port, answer_timeout=0.25))
@@ -57,12 +66,6 @@ class BarcodeReaderBench(Bench):
 
     def writes(self) -> Any:
         return [line for line in self.fake.truth()["received"] if line in ACTING]
-
-    def cut(self) -> None:
-        self.do("silence")
-
-    def heal(self) -> None:
-        self.do("heal")
 
     def ask(self, device: Generic) -> object:
         assert isinstance(device, BarcodeReader)
@@ -80,3 +83,7 @@ class BarcodeReaderBench(Bench):
 
     def orphan(self) -> list[str]:
         return [sys.executable, "-c", ORPHAN, self.address]
+
+    def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
+        assert isinstance(device, BarcodeReader)
+        return {"a reading of an hour": lambda: device.trigger(3600.0), "one of no time": lambda: device.trigger(0.0)}

@@ -1,15 +1,17 @@
-"""The functional tester on its fake: 4 s a test, all else quick."""
+"""The functional tester on its fake: 4 s a test, all else quick; with a wire between that is cut and recorded."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 from arcor2_drivers.functional_tester.functional_tester import FunctionalTester
 from arcor2_drivers.functional_tester.settings import FunctionalTesterSettings
 from arcor2_hw.data.geometry import Pose
-from arcor2_hw.objects import Generic
-from arcor2_hw.testing.bench import Bench
+from arcor2_hw.objects import Generic, MachineState
+from arcor2_hw.testing.bench import Bench, Check
+from arcor2_hw.testing.frames import ModbusTcp
+from arcor2_hw.testing.tcp_wire import TcpWire
 from tests.fakes.conftest import FakeProcess
 
 ORPHAN = """
@@ -39,13 +41,19 @@ class FunctionalTesterBench(Bench):
     def start(self) -> None:
         self.fake = FakeProcess("functional_tester", "--seed", "1", "--test-time", "20", "--time-scale", "5")
         self.do = self.fake.control.do
+        host, _, port = str(self.fake.ready["modbus"]).rpartition(":")
+        self.wire = TcpWire(host, [int(port)])
+        self.wire.start()
+        self.frames = ModbusTcp()
 
     def end(self) -> None:
+        if self.wire is not None:
+            self.wire.close()
         self.fake.end()
 
     def reset(self) -> None:
         do = self.do
-        do("heal")
+        self.heal()
         do("mode", mode="produce")
         state = self.fake.truth()["state"]
         if state in ("Execute", "Starting"):
@@ -63,7 +71,8 @@ class FunctionalTesterBench(Bench):
 
     @property
     def address(self) -> str:
-        return str(self.fake.ready["modbus"])
+        assert self.wire is not None
+        return self.wire.address
 
     def make(self) -> FunctionalTester:
         return build(self.address)
@@ -74,12 +83,6 @@ class FunctionalTesterBench(Bench):
     def writes(self) -> Any:
         truth = self.fake.truth()
         return {key: truth[key] for key in ("state", "door", "watchdog_ms", "last_command")}
-
-    def cut(self) -> None:
-        self.do("silence")
-
-    def heal(self) -> None:
-        self.do("heal")
 
     def observe(self, device: Generic) -> object:
         assert isinstance(device, FunctionalTester)
@@ -110,3 +113,16 @@ class FunctionalTesterBench(Bench):
 
     def orphan(self) -> list[str]:
         return [sys.executable, "-c", ORPHAN, self.address]
+
+    def readings(self, device: Generic) -> list[Check]:
+        assert isinstance(device, FunctionalTester)
+        state, truth = MachineState[self.fake.truth()["state"].upper()], self.fake.truth()
+        return [
+            Check("state", device.machine_state(), state, 0.0),
+            Check("boards tested", device.counters()["tested"], truth["tested"], 0.0),
+            Check("board present", device.board_present(), truth["board"] is not None, 0.0),
+        ]
+
+    def works(self, device: Generic) -> dict[str, Callable[[], object]]:
+        assert isinstance(device, FunctionalTester)
+        return {"wait_for": lambda: device.wait_for(device.machine_state(), 1.0)}

@@ -1,0 +1,164 @@
+"""`pytest --pyargs arcor2_hw.testing --device my_cell.yaml`, as an integrator runs it: no test file of their own."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from arcor2_drivers.functional_tester.functional_tester import FunctionalTester
+from arcor2_drivers.functional_tester.settings import FunctionalTesterSettings
+from arcor2_hw.data.cell import CellDevice
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.testing.cell_bench import bench_of, benches_of_files
+from arcor2_hw.testing.frames import ModbusTcp
+from arcor2_hw.testing.outcomes import Kind
+from arcor2_hw.testing.report import Report
+from arcor2_hw.testing.tcp_wire import TcpWire
+from tests.fakes.conftest import FakeProcess
+
+ROOT = Path(__file__).resolve().parents[2]
+PLACES = [ROOT, *(ROOT / each for each in ("drivers", "fakes", "server"))]
+CANNOT_BE_GUESSED = {
+    "cancelling_leaves_the_line_usable",
+    "capabilities_work",
+    "command_needs_control",
+    "control_does_not_come_back",
+    "control_is_refused",
+    "disconnecting_ends_an_act",
+    "loss_reaction",
+    "nothing_resumes",
+    "one_act_at_a_time",
+    "stop_at_random_phases",
+    "stop_passes",
+    "units_and_frames",
+}
+BENCH = """
+from arcor2_hw.testing.cell_bench import CellBench
+
+
+class KnowsMore(CellBench):
+    def command(self, device):
+        return device.open_door()
+"""
+
+
+@pytest.fixture(scope="module")
+def tester() -> Iterator[FakeProcess]:
+    fake = FakeProcess("functional_tester", "--seed", "1")
+    yield fake
+    fake.end()
+
+
+@pytest.fixture(scope="module")
+def reader(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FakeProcess]:
+    link = tmp_path_factory.mktemp("reader") / "ttyREADER"
+    fake = FakeProcess("barcode_reader", "--link", str(link), "--timeout", "0.5")
+    yield fake
+    fake.end()
+
+
+def at(fake: FakeProcess) -> dict[str, object]:
+    host, _, port = str(fake.ready["modbus"]).rpartition(":")
+    return {"host": host, "port": int(port), "watchdog_ms": 600, "request_timeout": 0.2}
+
+
+def run(folder: Path, cell: list[dict[str, object]], *arguments: str) -> str:
+    (folder / "my_cell.yaml").write_bytes(msgspec.yaml.encode({"devices": cell}))
+    (folder / "pytest.ini").write_text("[pytest]\n")
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(("PYTEST_", "COV_"))}
+    environment |= {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTHONPATH": os.pathsep.join(map(str, [folder, *PLACES]))}
+    command = [sys.executable, "-m", "pytest", "-q", "-rs", "-p", "arcor2_hw.testing.plugin", "-p", "no:cacheprovider"]
+    command += ["--pyargs", "arcor2_hw.testing", *(["--device", "my_cell.yaml"] if cell else []), *arguments]
+    ended = subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=100, check=False
+    )
+    return ended.stdout + ended.stderr
+
+
+def test_every_device_of_a_cell_is_tried_and_a_report_written(
+    tmp_path: Path, tester: FakeProcess, reader: FakeProcess
+) -> None:
+    cell: list[dict[str, object]] = [
+        {"name": "tester", "type": "FunctionalTester", "settings": at(tester)},
+        {"name": "reader", "type": "BarcodeReader", "settings": {"port": reader.ready["port"], "answer_timeout": 0.25}},
+        {"name": "far", "type": "FunctionalTester", "settings": {"host": "192.0.2.7"}},
+    ]
+    output = run(tmp_path, cell, "--report", "report.json")
+    assert "failed" not in output, output
+    assert "far is a real device: name it by --real --real-device far" in output
+    report = msgspec.json.decode((tmp_path / "report.json").read_bytes(), type=Report)
+    by_name = {each.device: each for each in report.devices}
+    assert by_name["tester"].identity.firmware
+    assert not by_name["tester"].real
+    assert by_name["far"].cases == {}
+    results = {case: each.result for case, each in by_name["tester"].cases.items()}
+    assert results["connecting_observes"] is Kind.PASSED
+    assert {case for case, result in results.items() if result is Kind.LACKING} == CANNOT_BE_GUESSED
+    assert {result for case, result in results.items() if case not in CANNOT_BE_GUESSED} <= {Kind.PASSED, Kind.NOT_RUN}
+    reached = by_name["reader"].cases
+    assert {reached[case].result for case in ("half_a_frame", "reset_and_back", "connecting_observes")} == {Kind.PASSED}
+
+
+def test_a_bench_may_add_what_it_knows(tmp_path: Path, tester: FakeProcess) -> None:
+    (tmp_path / "my_bench.py").write_text(BENCH)
+    entry = {"name": "tester", "type": "FunctionalTester", "settings": at(tester), "bench": "my_bench:KnowsMore"}
+    output = run(tmp_path, [entry], "-k", "control_does_not_come_back or command_needs_control")
+    assert "2 passed" in output, output
+
+
+def test_an_entry_may_say_that_it_is_real(tmp_path: Path, tester: FakeProcess) -> None:
+    entry = {"name": "tester", "type": "FunctionalTester", "settings": at(tester), "real": True}
+    one = ("-k", "connect_is_idempotent and not disconnect")
+    assert "1 skipped" in run(tmp_path, [entry], *one, "--real-device", "tester")
+    assert "1 passed" in run(tmp_path, [entry], *one, "--real", "--real-device", "tester")
+
+
+def test_without_a_cell_it_says_what_is_missing(tmp_path: Path) -> None:
+    assert "name a cell.yaml by --device FILE" in run(tmp_path, [])
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"type": "Nonsense"}, "far: object type Nonsense is not known here"),
+        ({"settings": {"hots": "127.0.0.1"}}, "far: FunctionalTester has no setting hots"),
+        ({"settings": {"host": "127.0.0.1"}, "wire": ["gate"]}, "far: wire names 'gate'"),
+        ({"bench": "no_such_module:Bench"}, "far: the bench no_such_module:Bench cannot be imported"),
+        ({"bench": "arcor2_hw.testing.life:Beside"}, "far: arcor2_hw.testing.life:Beside is no bench"),
+    ],
+)
+def test_a_mistake_in_a_cell_names_the_device(changes: dict[str, object], told: str) -> None:
+    entry = {"name": "far", "type": "FunctionalTester", "settings": {"host": "127.0.0.1"}} | changes
+    with pytest.raises(Arcor2Error, match=told):
+        bench_of(msgspec.convert(entry, CellDevice))
+
+
+def test_one_name_in_two_cells_is_refused(tmp_path: Path) -> None:
+    for file in ("a.yaml", "b.yaml"):
+        (tmp_path / file).write_text("devices: [{name: far, type: FunctionalTester, settings: {host: 127.0.0.1}}]\n")
+    with pytest.raises(Arcor2Error, match=r"named in more than one cell\.yaml: far"):
+        benches_of_files([str(tmp_path / "a.yaml"), str(tmp_path / "b.yaml")])
+
+
+def test_the_wire_sees_what_only_the_device_could_have_counted(tester: FakeProcess) -> None:
+    """A recorded wire tells apart what observes and what acts, without asking the fake."""
+    host, _, port = str(tester.ready["modbus"]).rpartition(":")
+    wire = TcpWire(host, [int(port)])
+    wire.start()
+    settings = FunctionalTesterSettings(wire.host, wire.ports[0], watchdog_ms=600, request_timeout=0.2)
+    device = FunctionalTester("id", "tester", Pose(), None, settings=settings)
+    try:
+        device.connect()
+        device.board_present()
+        assert wire.frames(ModbusTcp())
+        assert wire.acting(ModbusTcp()) == []
+        device.take_control()
+        assert [words.partition(" (")[0] for words in wire.acting(ModbusTcp())] == ["function 16"]
+    finally:
+        device.disconnect()
+        wire.close()

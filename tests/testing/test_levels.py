@@ -1,0 +1,184 @@
+"""Levels: a claim needs its cases, its tests and its report; places and wires are found in settings."""
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from arcor2_hw.data.device import Identity
+from arcor2_hw.testing import report, rules
+from arcor2_hw.testing.conformance import Conformance
+from arcor2_hw.testing.outcomes import Kind, Outcomes, judge
+from arcor2_hw.testing.places import places
+from arcor2_hw.testing.quality import Level, Quality, VersionsTried
+from arcor2_hw.testing.report import CaseResult, DeviceRun, Report, origin
+
+ALL_PASSED = dict.fromkeys(sorted(Conformance.cases()), (Kind.PASSED, ""))
+TYPE = "FunctionalTester"
+
+
+# ------------------------------------------------------------------------------------------------ cases
+@pytest.mark.parametrize(
+    ("case", "outcome", "level", "told"),
+    [
+        ("stop_passes", (Kind.FAILED, "boom"), Level.NONE, "stop_passes failed"),
+        ("stop_passes", (Kind.NOT_RUN, "nothing moves"), Level.GOLD, ""),
+        ("reset_and_back", (Kind.NOT_RUN, "too hard"), Level.BRONZE, "reset_and_back is not run"),
+        ("units_and_frames", (Kind.LACKING, "no hook readings"), Level.BRONZE, "no hook readings"),
+    ],
+)
+def test_what_a_case_costs(case: str, outcome: tuple[Kind, str], level: Level, told: str) -> None:
+    reached, missing = judge(ALL_PASSED | {case: outcome}, [], [])
+    assert reached is level
+    assert told in "; ".join(missing)
+
+
+def test_tests_are_of_silver_and_a_report_of_gold() -> None:
+    assert judge(ALL_PASSED, ["no test"], ["no report"]) == (Level.BRONZE, ["no test"])
+    assert judge(ALL_PASSED, [], ["no report"]) == (Level.SILVER, ["no report"])
+    assert judge(ALL_PASSED, [], []) == (Level.GOLD, [])
+
+
+def test_a_later_failure_of_a_case_counts() -> None:
+    outcomes = Outcomes()
+    told = [("arcor2_case", {"bench": "press", "type": "Press", "real": False, "case": "stop_passes"})]
+    outcomes.add(told, True, False, "call", "")
+    assert outcomes["press"].outcomes["stop_passes"] == (Kind.PASSED, "")
+    outcomes.add(told, False, True, "teardown", "a thread was left")
+    assert outcomes["press"].outcomes["stop_passes"] == (Kind.FAILED, "a thread was left")
+    outcomes.add([("other", 1)], True, False, "call", "")
+    assert list(outcomes) == ["press"]
+
+
+# ------------------------------------------------------------------------------------------------ tests of rules
+@pytest.mark.parametrize(
+    ("named", "told"),
+    [
+        ("test_press.py::test_stops", ""),
+        ("test_press.py::TestPress::test_holds", ""),
+        ("test_press.py::test_gone", "does not exist"),
+        ("test_press.py::test_later", "is skipped"),
+        ("test_press.py::test_hidden", "is not collected"),
+        ("test_oven.py::test_stops", "there is no file"),
+        ("press_tests.py::test_stops", "that pytest does not collect"),
+    ],
+)
+def test_a_test_of_a_rule_has_to_be_there_and_to_run(tmp_path: Path, named: str, told: str) -> None:
+    folder = tmp_path / "press"
+    folder.mkdir()
+    file = folder / "test_press.py"
+    file.write_text(
+        "import pytest\n\n\ndef test_stops(): ...\n\n\n@pytest.mark.skip\ndef test_later(): ...\n\n\n"
+        "def test_hidden(): ...\n\n\nclass TestPress:\n    def test_holds(self): ...\n"
+    )
+    (folder / "press_tests.py").write_text("def test_stops(): ...\n")
+    collected = {str(file): frozenset({"test_stops", "test_holds", "test_later"})}
+    found = rules.missing_tests({"5 stop": [named]}, [tmp_path], "press", collected)
+    assert bool(found) == bool(told)
+    assert told in "".join(found)
+
+
+def test_no_rules_at_all_are_told(tmp_path: Path) -> None:
+    assert rules.missing_tests({"1 connecting observes": []}, [tmp_path], "press", {}) == ["rules names no test"]
+
+
+# ------------------------------------------------------------------------------------------------ the report of gold
+def claims(**changes: Any) -> Quality:
+    tried = VersionsTried("pymodbus", ["fake"], ["FT-100, firmware 2.3"])
+    given = {
+        "types": [TYPE],
+        "protocol": "Modbus TCP",
+        "page": "page.md",
+        "versions_tried": tried,
+        "actions": [],
+        "rules": {},
+        "outputs_on_loss": "hold",
+        "limits": [],
+        "report": "real.json",
+    }
+    return Quality(**(given | changes))
+
+
+def written(tmp_path: Path, **changes: Any) -> None:
+    distribution, version = origin(TYPE)
+    given = {
+        "device": "tester",
+        "type": TYPE,
+        "real": True,
+        "address": "192.0.2.7:502",
+        "identity": Identity("Maker", "FT-100", "7", "2.3"),
+        "distribution": distribution,
+        "version": version,
+        "libraries": {},
+        "cases": {case: CaseResult(Kind.PASSED) for case in ALL_PASSED},
+    }
+    run = DeviceRun(**(given | changes))
+    whole = Report("2026-01-02T03:04:05+00:00", "0.1.0", "3.11.7", "Linux x86_64", [run])
+    (tmp_path / "real.json").write_bytes(msgspec.json.encode(whole))
+
+
+def test_a_report_that_fits_is_gold(tmp_path: Path) -> None:
+    written(tmp_path)
+    assert report.unmatched(tmp_path, claims(), TYPE, ALL_PASSED) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"real": False}, "no run on a real FunctionalTester"),
+        ({"type": "Other"}, "no run on a real FunctionalTester"),
+        ({"identity": Identity("Maker", "FT-100", "7", "")}, "does not say model and firmware"),
+        ({"identity": Identity("Maker", "FT-100", "7", "9.9")}, "does not name FT-100 with firmware 9.9"),
+        ({"version": "0.0.1"}, "is of version 0.0.1 of the driver"),
+        ({"cases": {}}, "stop_passes is not in the report"),
+        (
+            {"cases": {case: CaseResult(Kind.NOT_RUN, "afraid") for case in ALL_PASSED}},
+            "stop_passes is not run there",
+        ),
+    ],
+)
+def test_a_report_that_does_not_fit_says_why(tmp_path: Path, changes: dict[str, Any], told: str) -> None:
+    written(tmp_path, **changes)
+    assert told in "; ".join(report.unmatched(tmp_path, claims(), TYPE, ALL_PASSED))
+
+
+def test_a_report_that_is_not_there_or_none_is_told(tmp_path: Path) -> None:
+    assert report.unmatched(tmp_path, claims(), TYPE, {}) == ["the report real.json is not there"]
+    (tmp_path / "real.json").write_text("{}")
+    assert "cannot be read" in report.unmatched(tmp_path, claims(), TYPE, {})[0]
+    assert "names no report" in report.unmatched(tmp_path, claims(report=msgspec.UNSET), TYPE, {})[0]
+
+
+# ------------------------------------------------------------------------------------------------ places
+@pytest.mark.parametrize(
+    ("settings", "here", "told_as"),
+    [
+        ({"host": "127.0.0.1", "port": 5020}, True, "5020"),
+        ({"host": "192.0.2.7", "port": 502}, False, "502"),
+        ({"host": "tester.example", "port": 502}, False, "502"),
+        ({"host": "localhost", "port": 502, "serial_port": ""}, True, "502"),
+        ({"port": "socket://127.0.0.1:4001"}, True, "4001"),
+        ({"port": "/dev/ttyUSB0"}, False, "/dev/ttyUSB0"),
+        ({"port": "/dev/pts/7"}, True, "/dev/pts/7"),
+        ({"url": "opc.tcp://127.0.0.1:4840/plc"}, True, "4840"),
+        ({"base_url": "http://192.0.2.9/erp"}, False, "80"),
+        ({"ip": "127.0.0.1"}, True, "127.0.0.1"),
+        ({"channel": "can0", "interface": "socketcan"}, False, "channel can0"),
+    ],
+)
+def test_where_a_device_is(settings: dict[str, Any], here: bool, told_as: str) -> None:
+    found = places(settings)
+    assert all(place.here for place in found) is here
+    assert found[0].told_as == told_as
+
+
+def test_settings_may_be_named_and_ports_given() -> None:
+    settings = {"box": "127.0.0.1", "door": 7, "port": 8}
+    assert places(settings) == []
+    (place,) = places(settings, ["box", "door"])
+    assert place.moved("127.0.0.1", 99, "") == {"box": "127.0.0.1", "door": 99}
+    (place,) = places({"ip": "127.0.0.1"}, ["ip", 29999, 30004])
+    assert place.ports == (29999, 30004)
+    with pytest.raises(KeyError):
+        places(settings, ["gate"])

@@ -1,0 +1,264 @@
+"""The wire between driver and device: what it lets pass, holds back, tears, and keeps; how frames are told apart."""
+
+import contextlib
+import os
+import select
+import socket
+import tty
+from collections.abc import Iterator
+
+import pytest
+
+from arcor2_hw.exceptions import InvalidData
+from arcor2_hw.testing.frames import CanopenSlcan, Lines, ModbusRtu, ModbusTcp, reader
+from arcor2_hw.testing.life import wait_until
+from arcor2_hw.testing.serial_wire import SerialWire
+from arcor2_hw.testing.tcp_wire import TcpWire
+
+QUIET = 0.2  # s in which nothing may come
+
+
+# ------------------------------------------------------------------------------------------------ TCP
+@pytest.fixture
+def device() -> Iterator[socket.socket]:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(5.0)
+        yield server
+
+
+@pytest.fixture
+def wire(device: socket.socket) -> Iterator[TcpWire]:
+    wire = TcpWire("127.0.0.1", [device.getsockname()[1]])
+    wire.start()
+    yield wire
+    wire.close()
+
+
+@pytest.fixture
+def ends(device: socket.socket, wire: TcpWire) -> Iterator[tuple[socket.socket, socket.socket]]:
+    """The driver's end and the device's of one connection."""
+    with dial(wire) as driver:
+        at_device, _ = device.accept()
+        at_device.settimeout(5.0)
+        with at_device:
+            yield driver, at_device
+
+
+def dial(wire: TcpWire) -> socket.socket:
+    return socket.create_connection((wire.host, wire.ports[0]), 5.0)
+
+
+def is_quiet(end: socket.socket) -> bool:
+    return not select.select([end], [], [], QUIET)[0]
+
+
+def test_bytes_pass_both_ways_and_are_kept_with_side_and_time(
+    wire: TcpWire, ends: tuple[socket.socket, socket.socket]
+) -> None:
+    driver, device = ends
+    driver.sendall(b"ask")
+    assert device.recv(9) == b"ask"
+    device.sendall(b"answer")
+    assert driver.recv(9) == b"answer"
+    first, second = wire.record()
+    assert (first.by, first.data, second.by, second.data) == ("driver", b"ask", "device", b"answer")
+    assert first.at <= second.at
+    wire.forget()
+    assert not wire.record()
+
+
+def test_much_passes_whole_though_nobody_reads_at_first(ends: tuple[socket.socket, socket.socket]) -> None:
+    driver, device = ends
+    much = os.urandom(3 << 20)
+    device.setblocking(False)
+    sent = received = b""
+    while len(received) < len(much):
+        with contextlib.suppress(BlockingIOError):
+            sent += much[len(sent) : len(sent) + device.send(much[len(sent) : len(sent) + 65536])]
+        if len(sent) == len(much) or is_quiet_now(device):
+            received += driver.recv(1 << 20)
+    assert received == much
+
+
+def is_quiet_now(end: socket.socket) -> bool:
+    return not select.select([], [end], [], 0.0)[1]
+
+
+def test_a_cut_is_silence_both_ways_and_what_was_under_way_comes_late(
+    wire: TcpWire, ends: tuple[socket.socket, socket.socket]
+) -> None:
+    driver, device = ends
+    wire.cut()
+    driver.sendall(b"lost?")
+    device.sendall(b"late")
+    assert is_quiet(device)
+    assert is_quiet(driver)
+    wire.heal()
+    assert device.recv(9) == b"lost?"
+    assert driver.recv(9) == b"late"
+
+
+def test_who_closes_while_it_is_cut_is_not_heard_afterwards(
+    wire: TcpWire, ends: tuple[socket.socket, socket.socket]
+) -> None:
+    driver, device = ends
+    wire.cut()
+    driver.sendall(b"start")
+    driver.close()
+    wait_until(lambda: len(wire.record()) == 1, 2.0, "the wire seeing what was sent")
+    assert is_quiet(device)
+    wire.heal()
+    with pytest.raises(ConnectionResetError):
+        device.recv(9)
+
+
+def test_a_connection_made_while_it_is_cut_is_half_open_and_reset_at_the_end(
+    wire: TcpWire, device: socket.socket
+) -> None:
+    wire.cut()
+    with dial(wire) as driver:
+        driver.sendall(b"hello")
+        assert is_quiet(driver)
+        assert not select.select([device], [], [], QUIET)[0], "the device heard of a connection over a cut cable"
+        wire.heal()
+        with pytest.raises(ConnectionResetError):
+            driver.recv(9)
+    with dial(wire) as driver:
+        device.accept()[0].close()
+
+
+def test_half_a_frame_passes_and_nothing_after_it(wire: TcpWire, ends: tuple[socket.socket, socket.socket]) -> None:
+    driver, device = ends
+    wire.half_frame()
+    driver.sendall(b"ask")
+    assert device.recv(9) == b"ask"
+    device.sendall(b"12345678")
+    assert driver.recv(9) == b"1234"
+    device.sendall(b"more")
+    assert is_quiet(driver)
+    wire.heal()
+    with pytest.raises(ConnectionResetError):
+        driver.recv(9)
+
+
+def test_a_reset_is_told_to_both_ends_and_a_new_connection_is_taken(
+    wire: TcpWire, device: socket.socket, ends: tuple[socket.socket, socket.socket]
+) -> None:
+    wire.reset()
+    for end in ends:
+        with pytest.raises(ConnectionResetError):
+            end.recv(9)
+    with dial(wire), device.accept()[0]:
+        pass
+
+
+def test_a_device_that_is_not_there_is_a_reset() -> None:
+    with socket.socket() as closed:
+        closed.bind(("127.0.0.1", 0))
+        wire = TcpWire("127.0.0.1", [closed.getsockname()[1]])
+        wire.start()
+        try:
+            with pytest.raises(ConnectionResetError), dial(wire) as driver:
+                driver.recv(9)
+        finally:
+            wire.close()
+
+
+# ------------------------------------------------------------------------------------------------ serial
+@pytest.fixture
+def port() -> Iterator[tuple[int, str]]:
+    """A device's end of a serial line, and the path of the other."""
+    ours, theirs = os.openpty()
+    tty.setraw(theirs)
+    yield ours, os.ttyname(theirs)
+    for end in (ours, theirs):
+        os.close(end)
+
+
+def test_a_serial_line_passes_is_cut_torn_and_pulled(port: tuple[int, str]) -> None:
+    device, path = port
+    wire = SerialWire(path)
+    wire.start()
+    driver = os.open(wire.address, os.O_RDWR | os.O_NOCTTY)
+    try:
+        os.write(driver, b"ask\r")
+        assert os.read(device, 9) == b"ask\r"
+        wire.cut()
+        os.write(device, b"lost")
+        os.write(driver, b"lost")
+        assert not select.select([device, driver], [], [], QUIET)[0]
+        wire.heal()
+        assert not select.select([device, driver], [], [], QUIET)[0], "a line keeps nothing"
+        wire.half_frame()
+        os.write(device, b"12345678")
+        assert os.read(driver, 9) == b"1234"
+        wire.heal()
+        wire.reset()
+        with contextlib.suppress(OSError):  # a port that was pulled out gives its end, or an error
+            assert os.read(driver, 9) == b""
+        again = os.open(wire.address, os.O_RDWR | os.O_NOCTTY)
+        os.write(again, b"again")
+        assert os.read(device, 9) == b"again"
+        os.close(again)
+        assert wire.frames(Lines(())) == [b"ask", b"lost", b"again"]
+    finally:
+        os.close(driver)
+        wire.close()
+
+
+# ------------------------------------------------------------------------------------------------ frames
+def hexed(text: str) -> bytes:
+    return bytes.fromhex(text)
+
+
+@pytest.mark.parametrize(
+    ("frames", "read", "acts", "words"),
+    [
+        (ModbusTcp(), "0001 0000 0006 01 03 006b 0003", "0002 0000 0006 01 06 0001 0003", "function 6"),
+        (ModbusTcp(), "0003 0000 0005 01 2b 0e 01 00", "0004 0000 0009 01 10 0001 0001 02 000a", "function 16"),
+        (ModbusTcp(), "0001 0000 0006 01 04 0008 0001", "0005 0000 0008 01 16 0004 00f2 0025", "function 22"),
+        (ModbusRtu(), "11 03 006b 0003 7687", "11 06 0001 0003 9a9b", "function 6"),
+        (ModbusRtu(), "11 01 0013 0025 0e84", "11 10 0001 0002 04 000a 0102 c6f0", "function 16"),
+    ],
+)
+def test_modbus_requests_are_told_apart_by_what_they_do(
+    frames: ModbusTcp | ModbusRtu, read: str, acts: str, words: str
+) -> None:
+    stream = hexed(read) + hexed(acts) + hexed(read)
+    assert frames.split(stream) == [hexed(read), hexed(acts), hexed(read)]
+    assert frames.acting(hexed(read)) == ""
+    assert frames.acting(hexed(acts)).startswith(words)
+
+
+def test_what_is_no_frame_is_not_taken_for_harmless() -> None:
+    for frames in (ModbusTcp(), ModbusRtu()):
+        assert frames.split(b"\xff\xfe\xfd") == [b"\xff\xfe\xfd"]
+        assert "no Modbus" in frames.acting(b"\xff\xfe\xfd")
+
+
+def test_lines_act_by_their_beginnings() -> None:
+    frames = Lines(["LON", "RST"])
+    assert frames.split(b"STAT\rLON 5\r\nVER\r") == [b"STAT", b"LON 5", b"VER"]
+    assert [frames.acting(each) for each in (b"STAT", b"LON 5", b"PLON")] == ["", "LON 5", ""]
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("t60584041600000000000", ""),  # SDO upload of 6041h
+        ("t6058234060000F000000", "SDO download to 6040h"),
+        ("t60582B17100001000000", ""),  # declared: producer heartbeat
+        ("t00020105", "NMT 01 05"),
+        ("t20520F00", "process data 205h"),
+        ("t77F105", ""),  # our own heartbeat
+        ("S6", ""),
+        ("O", ""),
+    ],
+)
+def test_canopen_acts_by_nmt_process_data_and_downloads(line: str, words: str) -> None:
+    assert CanopenSlcan(["0x1017"]).acting(line.encode()) == words
+
+
+def test_a_kind_that_is_not_known_is_named() -> None:
+    with pytest.raises(InvalidData, match="morse"):
+        reader("morse", [])
