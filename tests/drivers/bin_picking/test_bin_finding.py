@@ -101,9 +101,7 @@ def test_what_is_refused(picture: Photographer, make: Callable[..., Bin]) -> Non
         crate.next_part(both)
     assert not crate.is_empty(both)
     wrong = at(0.0, 0.0, FLAT, turned(z=20))
-    with pytest.raises(
-        BadFit, match=r"^crate: what lies there does not fit the part: quality 0\.\d\d, 0\.9 asked for"
-    ):
+    with pytest.raises(BadFit, match=r"^crate: what lies there does not fit the part: quality 0\.\d\d, 0\.9 asked for"):
         crate.next_part(picture(part("wrong", wrong, (0.06, 0.04, 0.03))))
     with pytest.raises(NoDepth, match=r"^crate: the crate is not seen"):
         crate.next_part(picture(camera=Pose(Position(0.6, 0.5, 0.7), Orientation(1, 0, 0, 0))))

@@ -1,0 +1,54 @@
+"""A bin on the pictures of a camera: fake, stream, driver, and the way of a program's links from action to action."""
+
+from collections.abc import Iterator
+
+import msgspec
+import pytest
+
+from arcor2_drivers.bin_picking.bin import Bin
+from arcor2_drivers.bin_picking.errors import Empty
+from arcor2_drivers.bin_picking.settings import BinSettings
+from arcor2_drivers.oak_d.oak_d import OakD
+from arcor2_drivers.oak_d.settings import OakDSettings
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.runtime.values import decode_arguments, results
+from tests.fakes.conftest import FakeProcess
+
+from .conftest import CRATE, HEIGHT, LENGTH, PART, WIDTH, at, crate, part, told, turned
+
+HANGING = Pose(Position(0.02, 0.01, 0.7), Orientation(1.0, 0.0, 0.0, 0.0))
+
+
+@pytest.fixture(scope="module")
+def fake() -> Iterator[FakeProcess]:
+    running = FakeProcess("oak_d")
+    running.control.do("camera", pose=told(HANGING))
+    yield running
+    running.end()
+
+
+def test_from_the_picture_to_the_tool(fake: FakeProcess) -> None:
+    camera = OakD("camera_id", "camera", HANGING, None, OakDSettings(fake.ready["stream"]))
+    box = Bin("bin_id", "crate", CRATE, BinSettings(LENGTH, WIDTH, HEIGHT, *PART))
+    truth = at(-0.04, 0.03, PART[2] / 2, turned(z=64))
+    try:
+        camera.connect(20.0)
+        box.connect()
+        fake.control.do("scene", things=[*crate(), part("a", truth)])
+        # As a link goes online: the result of one action as JSON is the argument of the next.
+        [depth] = results(camera.depth_image(4))
+        part_, quality = results(box.next_part(**decode_arguments(box.next_part, {"depth": depth.encode()}, "crate")))
+        arguments = {"part": part_.encode(), "above": b"0.1"}
+        [tool] = results(box.grip_pose(**decode_arguments(box.grip_pose, arguments, "crate")))
+        found, over = msgspec.json.decode(part_, type=Pose), msgspec.json.decode(tool, type=Pose)
+        off = 1000.0 * found.position.distance_to(truth.position)
+        print(f"off by {off:.2f} mm, quality {quality}")  # noqa: T201
+        assert off < 0.8
+        assert float(quality) > 0.95
+        assert over.position.distance_to(at(-0.04, 0.03, PART[2] + 0.1).position) < 0.001
+        fake.control.do("remove", name="a")
+        with pytest.raises(Empty):
+            box.next_part(camera.depth_image())
+    finally:
+        camera.disconnect()
+        box.disconnect()
