@@ -91,9 +91,26 @@ def main(
             await line.unplug()
             reader.drop_input()
 
+        async def renew(crlf: bool = crlf, stx: bool = stx) -> None:
+            """Be as it is when the process starts, or with another framing: for tests that share one."""
+            reader.as_delivered()
+            reader.framing = Framing(line_feed=crlf, stx=stx)
+            await line.fault("heal")
+            await line.unplug()
+            await line.plug()
+
         channel = ControlServer(*control_address)
+        channel.command("renew", renew)
         register_commands(channel, reader)
+
+        async def power_cycle() -> None:
+            """Be switched off and on: the port goes and comes, what was being read is forgotten."""
+            reader.close()
+            await unplug()
+            await line.plug()
+
         register_faults(channel, {"serial": line})
+        channel.command("power_cycle", power_cycle)
         channel.command("plug", plug)
         channel.command("unplug", unplug)
         channel.source("truth", lambda: truth(reader, line))

@@ -65,21 +65,29 @@ class Reader:
 
     def __init__(self, send: Callable[[bytes], None], *, framing: Framing, seed: int = 0, timeout: float = 1.0) -> None:
         self._send = send
-        self._framing = framing
+        self.framing = framing
         self._timeout = timeout
-        self._random = random.Random(seed)
+        self._seed = seed
         self._loop = asyncio.get_running_loop()
         self._line = bytearray()
         self._too_long = False
-        self._code: str | None = None
         self._decoding: asyncio.TimerHandle | None = None
         self._time_out: asyncio.TimerHandle | None = None
         self._under_way: set[asyncio.TimerHandle] = set()  # codes decoded and not sent yet
-        self._extra_delay = 0.0
-        self.reading = False
-        self.health: Health = "OK"
         self.received: deque[str] = deque(maxlen=50)
         self.sent: deque[str] = deque(maxlen=50)
+        self.as_delivered()
+
+    def as_delivered(self) -> None:
+        """Be without any past: healthy, nothing in view, nothing under way."""
+        self.close()
+        self.drop_input()
+        self._random = random.Random(self._seed)
+        self._code: str | None = None
+        self._extra_delay = 0.0
+        self.health: Health = "OK"
+        self.received.clear()
+        self.sent.clear()
 
     # ------------------------------------------------------------------------------------------------ the line's side
 
@@ -121,7 +129,7 @@ class Reader:
 
     def _answer(self, text: str) -> None:
         self.sent.append(text)
-        self._send(self._framing.wrap(text))
+        self._send(self.framing.wrap(text))
 
     # ------------------------------------------------------------------------------------------------ reading
 

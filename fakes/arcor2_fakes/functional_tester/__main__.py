@@ -46,7 +46,7 @@ def truth(station: Station, registers: RegisterMap, port: ModbusPort) -> dict[st
     }
 
 
-def register_commands(control: ControlServer, station: Station) -> None:
+def register_commands(control: ControlServer, station: Station, registers: RegisterMap, port: ModbusPort) -> None:
     """Make what the world and a test can do to the station known to the control channel."""
 
     def put_board(code: str, defect: str | None = None) -> None:
@@ -72,6 +72,22 @@ def register_commands(control: ControlServer, station: Station) -> None:
             raise ValueError(f"command is one of {', '.join(c.name.lower() for c in Command)}") from None
         return station.command(number).name.lower()
 
+    def power_cycle() -> None:
+        station.power_cycle()
+        registers.power_on()
+        port.wire.reset()
+
+    control.command("power_cycle", power_cycle)
+
+    async def renew() -> None:
+        """Be as it is when the process starts: for tests that share one."""
+        station.as_delivered()
+        registers.power_on()
+        await port.wire.fault("heal")
+        port.wire.reset()
+        port.frames.clear()
+
+    control.command("renew", renew)
     control.command("put_board", put_board)
     control.command("take_board", take_board)
     control.command("fault", fault)
@@ -119,7 +135,7 @@ def main(
         registers = RegisterMap(station)
         modbus = ModbusPort(host, port, station, registers)
         channel = ControlServer(control_host, control_port)
-        register_commands(channel, station)
+        register_commands(channel, station, registers, modbus)
         register_faults(channel, {"modbus": modbus.wire})
         channel.source("truth", lambda: truth(station, registers, modbus))
         await modbus.wire.listen()

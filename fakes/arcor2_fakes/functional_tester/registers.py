@@ -37,9 +37,14 @@ class RegisterMap:
 
     def __init__(self, station: Station) -> None:
         self._station = station
+        self.power_on()
+
+    def power_on(self) -> None:
+        """Be as after switching on: nothing written, nothing acknowledged."""
         self._acknowledged = 0
         self._answer = Answer.ACCEPTED
         self.last_command: int | None = None
+        self._written = False
 
     def device(self) -> SimDevice:
         """Give the device for the Modbus server; its registers live as long as the server."""
@@ -75,6 +80,9 @@ class RegisterMap:
         if function_code in _COIL_FUNCTIONS:
             return ExcCodes.ILLEGAL_FUNCTION
         self._station.advance()
+        if function_code not in (_READ_INPUT, _READ_DISCRETE) and not self._written:
+            self._written = True
+            registers[:_HOLDING] = self._initial_holding()
         if function_code == _READ_INPUT:
             registers[:_INPUTS] = self._inputs()
         elif function_code == _READ_DISCRETE:

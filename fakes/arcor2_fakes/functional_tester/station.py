@@ -5,65 +5,14 @@ from __future__ import annotations
 import random
 import time
 from collections.abc import Callable
-from enum import IntEnum
 
 import msgspec
 
 from arcor2_fakes.functional_tester.board import Board, Measured, measure
-
-
-class State(IntEnum):
-    """PackML states the station has (PackTags numbers)."""
-
-    CLEARING = 1
-    STOPPED = 2
-    STARTING = 3
-    IDLE = 4
-    EXECUTE = 6
-    STOPPING = 7
-    ABORTING = 8
-    ABORTED = 9
-    HOLDING = 10
-    HELD = 11
-    UNHOLDING = 12
-    RESETTING = 15
-    COMPLETING = 16
-    COMPLETE = 17
-
-
-class Command(IntEnum):
-    """Commands the station takes (PackTags `CntrlCmd`)."""
-
-    RESET = 1
-    START = 2
-    STOP = 3
-    HOLD = 4
-    UNHOLD = 5
-    ABORT = 8
-    CLEAR = 9
-
-
-class Answer(IntEnum):
-    """What became of a command."""
-
-    ACCEPTED = 0
-    WRONG_STATE = 1
-    UNKNOWN_COMMAND = 2
-    DOOR_NOT_CLOSED = 3
-    NO_BOARD = 4
-    UNKNOWN_PROGRAM = 5
-
-
-class Fault(IntEnum):
-    """Fault codes."""
-
-    NONE = 0
-    BOARD_LOST = 101
-    DOOR_OPENED = 102
-    NO_CONTACT = 103
-    SUPPLY_OVERLOAD = 104
-    HOST_LOST = 105
-    EMERGENCY_STOP = 106
+from arcor2_fakes.functional_tester.states import Answer as Answer
+from arcor2_fakes.functional_tester.states import Command as Command
+from arcor2_fakes.functional_tester.states import Fault as Fault
+from arcor2_fakes.functional_tester.states import State as State
 
 
 class Refusal(ValueError):
@@ -126,25 +75,41 @@ class Station:
         self._test_time = test_time / time_scale
         self._time_scale = time_scale
         self._clock = clock
-        self._now = self._started = self._last_request = clock()
-        self.state = State.STOPPED
-        self._due: float | None = None  # when the acting state ends
-        self._test_left = 0.0  # of Execute, kept while held
-        self._program = 1
+        self.as_delivered()
+
+    def as_delivered(self) -> None:
+        """Be without any past: closed, empty, nothing tested."""
+        self._now = self._clock()
         self._door_at = 0.0  # 0 closed, 1 open, as it was at _door_since
         self._door_since = self._now
         self._door_target: float | None = None
         self._board: Board | None = None
         self._board_seen = True  # False when the sensor has lost the board that lies there
-        self.clamped = False
         self.emergency_stop_pressed = False
+        self.mode = 1
+        self._power_on()
+
+    def _power_on(self) -> None:
+        self._started = self._last_request = self._now
+        self.state = State.STOPPED
+        self._due: float | None = None  # when the acting state ends
+        self._test_left = 0.0  # of Execute, kept while held
+        self._program = 1
+        self.clamped = False
         self.fault = Fault.NONE
         self._armed: Fault | None = None
         self.test_program = 1
         self.watchdog_ms = 0
-        self.mode = 1
         self.measured = Measured()
         self.results: list[Result] = []
+
+    def power_cycle(self) -> None:
+        """Be switched off and on: the board stays, the door stands where it was; what was counted and set is gone."""
+        self.advance()
+        self._door_at, self._door_since, self._door_target = self._door_position(), self._now, None
+        self._power_on()
+        if self.emergency_stop_pressed:
+            self.state, self.fault = State.ABORTED, Fault.EMERGENCY_STOP
 
     # ------------------------------------------------------------------------------------------------ time
 

@@ -1,7 +1,6 @@
 """A fake reader in a process of its own, and the driver on its line."""
 
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -28,12 +27,28 @@ def make() -> Iterator[Callable[..., BarcodeReader]]:
         reader.disconnect()
 
 
+@pytest.fixture(scope="module")
+def on_pty(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FakeProcess]:
+    fake = FakeProcess("barcode_reader", "--link", str(tmp_path_factory.mktemp("line") / "reader"), "--timeout", "0.5")
+    fake.truth()  # opens the control channel, which lives as long
+    yield fake
+    fake.end()
+
+
+@pytest.fixture(scope="module")
+def on_tcp() -> Iterator[FakeProcess]:
+    fake = FakeProcess("barcode_reader", "--tcp", "127.0.0.1:0", "--timeout", "0.5")
+    fake.truth()
+    yield fake
+    fake.end()
+
+
 @pytest.fixture
-def fake(request: pytest.FixtureRequest, start_fake: Callable[..., FakeProcess], tmp_path: Path) -> FakeProcess:
-    """On a pty; on TCP for a test that is parametrized with it."""
-    tcp = getattr(request, "param", "pty") == "tcp"
-    line = ("--tcp", "127.0.0.1:0") if tcp else ("--link", str(tmp_path / "ttyREADER"))
-    return start_fake("barcode_reader", *line, "--timeout", "0.5")
+def fake(request: pytest.FixtureRequest) -> FakeProcess:
+    """As delivered, on a pty; on TCP for a test that is parametrized with it. One process each serves a file."""
+    fake: FakeProcess = request.getfixturevalue(f"on_{getattr(request, 'param', 'pty')}")
+    fake.control.do("renew")
+    return fake
 
 
 @pytest.fixture

@@ -58,12 +58,10 @@ def test_connecting_only_asks(fake: FakeProcess, reader: BarcodeReader) -> None:
 
 
 @pytest.mark.parametrize(
-    ("cr", "stx"), list(itertools.product(["--cr", "--crlf"], [(), ("--stx",)])), ids=lambda value: "".join(value)
+    ("crlf", "stx"), list(itertools.product([False, True], repeat=2)), ids=lambda on: "with" if on else "without"
 )
-def test_every_framing_is_read(
-    start_fake: Callable[..., FakeProcess], make: Callable[..., BarcodeReader], cr: str, stx: tuple[str, ...]
-) -> None:
-    fake = start_fake("barcode_reader", cr, *stx)
+def test_every_framing_is_read(fake: FakeProcess, make: Callable[..., BarcodeReader], crlf: bool, stx: bool) -> None:
+    fake.control.do("renew", crlf=crlf, stx=stx)
     reader = make(fake.ready["port"])
     reader.connect()
     longest = "".join(chr(0x21 + i % 94) for i in range(128))

@@ -13,9 +13,34 @@ from tests.fakes.conftest import FakeProcess, start_fake, wait_for
 __all__ = ["start_fake", "wait_for"]
 
 
+@pytest.fixture(scope="module")
+def one_fake() -> Iterator[FakeProcess]:
+    fake = FakeProcess("functional_tester", "--seed", "1", "--test-time", "6", "--time-scale", "20")
+    fake.truth()  # opens the control channel, which lives as long
+    yield fake
+    fake.end()
+
+
 @pytest.fixture
-def fake(start_fake: Callable[..., FakeProcess]) -> FakeProcess:
-    return start_fake("functional_tester", "--seed", "1", "--test-time", "6", "--time-scale", "20")
+def fake(one_fake: FakeProcess) -> FakeProcess:
+    """A tester as delivered; one process serves the tests of a file."""
+    one_fake.control.do("renew")
+    return one_fake
+
+
+@pytest.fixture(scope="module")
+def one_slow_fake() -> Iterator[FakeProcess]:
+    fake = FakeProcess("functional_tester", "--seed", "1", "--test-time", "20", "--time-scale", "5")
+    fake.truth()
+    yield fake
+    fake.end()
+
+
+@pytest.fixture
+def slow_fake(one_slow_fake: FakeProcess) -> FakeProcess:
+    """A test takes 4 s, all else is quick."""
+    one_slow_fake.control.do("renew")
+    return one_slow_fake
 
 
 @pytest.fixture

@@ -52,12 +52,6 @@ def relay(fake: FakeProcess) -> Iterator[Relay]:
         yield relay
 
 
-@pytest.fixture
-def slow_fake(start_fake: Callable[..., FakeProcess]) -> FakeProcess:
-    """A test takes 4 s, all else is quick."""
-    return start_fake("functional_tester", "--seed", "1", "--test-time", "20", "--time-scale", "5")
-
-
 @contextmanager
 def running_test(fake: FakeProcess, tester: FunctionalTester) -> Iterator[list[Any]]:
     """A test in a thread, seen to be in Execute; the list holds what it gave or raised, and when."""
@@ -114,7 +108,8 @@ def test_connecting_to_one_that_does_not_answer_sensibly(
 def test_silent_peer_that_is_no_tester(make: Callable[..., FunctionalTester]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         address = "{}:{}".format(*server.getsockname())
-        with pytest.raises(DeviceTimeout, match=f"{address}: no answer came within .* \\(reading input registers 0 to 16\\) twice"):
+        asked = "\\(reading input registers 0 to 16\\) twice"
+        with pytest.raises(DeviceTimeout, match=f"{address}: no answer came within .* {asked}"):
             make(address).connect(0.5)
 
 

@@ -9,6 +9,7 @@ import pytest
 import serial
 
 from arcor2_fakes.control import ControlError
+from tests.fakes.conftest import FakeProcess
 
 
 class Host:
@@ -38,14 +39,34 @@ class Host:
         return self.serial.read(1) == b""
 
 
+@pytest.fixture(scope="module")
+def on_pty(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FakeProcess]:
+    fake = FakeProcess("barcode_reader", "--link", str(tmp_path_factory.mktemp("line") / "reader"))
+    fake.truth()  # opens the control channel, which lives as long
+    yield fake
+    fake.end()
+
+
+@pytest.fixture(scope="module")
+def on_tcp() -> Iterator[FakeProcess]:
+    fake = FakeProcess("barcode_reader", "--tcp", "127.0.0.1:0")
+    fake.truth()
+    yield fake
+    fake.end()
+
+
 @pytest.fixture
-def reader(start_fake: Callable[..., Any], tmp_path: Path) -> Any:
-    return start_fake("barcode_reader", "--link", str(tmp_path / "reader"))
+def reader(on_pty: FakeProcess) -> FakeProcess:
+    """As delivered, on a pty; one process serves the tests of this file."""
+    on_pty.control.do("renew")
+    return on_pty
 
 
 @pytest.fixture(params=["pty", "tcp"])
-def any_reader(request: pytest.FixtureRequest, start_fake: Callable[..., Any]) -> Any:
-    return start_fake("barcode_reader", *(["--tcp", "127.0.0.1:0"] if request.param == "tcp" else []))
+def any_reader(request: pytest.FixtureRequest) -> FakeProcess:
+    fake: FakeProcess = request.getfixturevalue(f"on_{request.param}")
+    fake.control.do("renew")
+    return fake
 
 
 @pytest.fixture
@@ -156,13 +177,16 @@ def test_a_code_that_no_reader_could_send_is_refused(reader: Any) -> None:
         reader.control.do("health", value="TIRED")
 
 
-def test_pulling_the_cable(reader: Any, host: Host) -> None:
+def test_pulling_the_cable(start_fake: Callable[..., Any], tmp_path: Path) -> None:
+    reader = start_fake("barcode_reader", "--link", str(tmp_path / "reader"))
     link = Path(reader.ready["port"])
+    host = Host(str(link))
     assert link.is_symlink()
     reader.control.do("unplug")
     assert not link.exists()
     with pytest.raises((serial.SerialException, OSError)):
         host.ask("STAT")
+    host.close()
     with pytest.raises(serial.SerialException):
         Host(str(link))
     assert reader.control.do("plug") == str(link)
@@ -253,3 +277,16 @@ def test_what_is_in_the_way_of_the_link_is_kept(tmp_path: Path) -> None:
     assert len(ended.stderr.splitlines()) == 1
     assert "precious" in ended.stderr
     assert (tmp_path / "precious").read_text() == "mine"
+
+
+def test_a_power_cycle_ends_reading(any_reader: Any) -> None:
+    host = Host(any_reader.ready["port"])
+    host.say("LON")
+    any_reader.control.wait_until(lambda truth: truth["reading"])
+    any_reader.control.do("power_cycle")
+    host.close()
+    truth = any_reader.truth()
+    assert (truth["reading"], truth["plugged"]) == (False, True)
+    again = Host(truth["port"])
+    assert again.ask("STAT") == b"STAT,1,OK\r"
+    again.close()

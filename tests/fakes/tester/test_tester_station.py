@@ -149,3 +149,27 @@ def test_invariants_hold_whatever_happens(steps: list[tuple[tuple[str, int], flo
         if station.clamped:
             assert station.state not in DOOR_MAY_MOVE
         assert [result.number for result in station.results] == list(range(1, len(station.results) + 1))
+
+
+def test_a_power_cycle_forgets_what_was_set_and_leaves_board_and_door_as_they_are() -> None:
+    clock = Clock()
+    station = station_with(clock, Board("A1"))
+    station.watchdog_ms, station.test_program = 5000, 3
+    station.command(Command.RESET)
+    after(station, clock, 0.25)
+    station.command(Command.START)
+    assert after(station, clock, 0.8) is State.EXECUTE
+    station.power_cycle()
+    assert (station.state, station.clamped, station.watchdog_ms, station.test_program) == (State.STOPPED, False, 0, 1)
+    assert after(station, clock, 10.0) is State.STOPPED
+    assert station.results == []
+    assert station.board == Board("A1")
+    station.move_door(opening=True)
+    after(station, clock, 0.25)
+    station.power_cycle()
+    after(station, clock, 5.0)
+    assert not station.door_open
+    assert not station.door_closed
+    station.press_emergency_stop(pressed=True)
+    station.power_cycle()
+    assert (station.state, station.fault) == (State.ABORTED, Fault.EMERGENCY_STOP)
