@@ -44,8 +44,8 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Fake
 
 @pytest.fixture
 def fake(request: pytest.FixtureRequest, running: dict[str, FakeProcess]) -> FakeProcess:
-    """As delivered; on TCP and silent while it cannot print, or as a test is parametrized: on a pty, or with flags."""
-    fake = running[getattr(request, "param", "tcp")]
+    """As delivered; on a pty and silent while it cannot print, or as a test is parametrized: on TCP, or with flags."""
+    fake = running[getattr(request, "param", "pty")]
     for command in ("unplug", "heal", "plug", "renew"):
         fake.control.do(command)
     return fake
