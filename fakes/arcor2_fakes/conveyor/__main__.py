@@ -59,6 +59,7 @@ def main(
     socketcand_port: int = 0,
     control: str = "127.0.0.1:0",
     node: Annotated[int, Parameter(validator=validators.Number(gte=1, lte=126))] = 5,
+    time_scale: Annotated[float, Parameter(validator=validators.Number(gt=0, lte=20))] = 1.0,
 ) -> int:
     """Start the fake; it prints one line `ready {json}` with its addresses and ends on SIGTERM.
 
@@ -68,6 +69,7 @@ def main(
         socketcand_port: port on which the same bus is served by socketcand, as can0; 0 takes a free one.
         control: HOST:PORT of the control channel; port 0 takes a free one.
         node: CANopen node id of the drive.
+        time_scale: how many times faster than real the belt moves; heartbeats and boot-up stay in real time.
     """
     try:
         control_host, control_port = parse_address(control)
@@ -78,7 +80,7 @@ def main(
     async def body() -> None:
         hub = Hub(host, port)
         daemon = Server(hub, host, socketcand_port)
-        drive = Node(hub, node)
+        drive = Node(hub, node, time_scale)
         channel = ControlServer(control_host, control_port)
         register_commands(channel, drive)
         register_faults(channel, {"can": hub.wire, "socketcand": daemon.wire})

@@ -22,8 +22,9 @@ _REGISTER = {0x2: 1 << 1, 0x3: 1 << 2, 0x4: 1 << 3, 0x81: 1 << 4}  # 1001h: curr
 class Node:
     """The node, booted when it is made. `run` is its life; it must run in the event loop that the hub runs in."""
 
-    def __init__(self, hub: Hub, number: int) -> None:
+    def __init__(self, hub: Hub, number: int, time_scale: float = 1.0) -> None:
         self.number = number
+        self._time_scale = time_scale
         self.silent = False
         self._hub = hub
         self._nmt = _PRE_OPERATIONAL
@@ -79,7 +80,7 @@ class Node:
         while True:
             await asyncio.sleep(TICK)
             now = loop.time()
-            self.drive.advance(min(now - before, 0.05))
+            self.drive.advance(min(now - before, 0.05) * self._time_scale)
             before = now
             if self._booted_at and now >= self._booted_at:
                 self._booted_at, self._nmt = 0.0, _PRE_OPERATIONAL

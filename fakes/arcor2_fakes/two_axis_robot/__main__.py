@@ -6,9 +6,9 @@ import asyncio
 import math
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from cyclopts import App
+from cyclopts import App, Parameter, validators
 
 from arcor2_fakes.control import ControlServer, parse_address
 from arcor2_fakes.process import announce, run, until_told_to_end
@@ -78,13 +78,20 @@ def register_commands(control: ControlServer, bus: Bus) -> None:
 
 
 @app.default
-def main(*, link: Path | None = None, control: str = "127.0.0.1:0", ids: tuple[int, ...] = (1, 2)) -> int:
+def main(
+    *,
+    link: Path | None = None,
+    control: str = "127.0.0.1:0",
+    ids: tuple[int, ...] = (1, 2),
+    time_scale: Annotated[float, Parameter(validator=validators.Number(gt=0, lte=20))] = 1.0,
+) -> int:
     """Start the fake; it prints one line `ready {json}` with its port and ends on SIGTERM.
 
     Args:
         link: symbolic link to keep on the pty, whose own path changes when it is unplugged and plugged.
         control: HOST:PORT of the control channel; port 0 takes a free one.
         ids: ids of the servos on the bus.
+        time_scale: how many times faster than real the servos move; their watchdogs stay in real time.
     """
     try:
         control_address = parse_address(control)
@@ -95,8 +102,12 @@ def main(*, link: Path | None = None, control: str = "127.0.0.1:0", ids: tuple[i
         return 2
 
     async def body() -> None:
-        clock = asyncio.get_running_loop().time
-        bus = Bus([Servo(number, clock) for number in ids], lambda frame: line.send(frame))
+        real = asyncio.get_running_loop().time
+
+        def clock() -> float:
+            return real() * time_scale
+
+        bus = Bus([Servo(number, clock, time_scale=time_scale) for number in ids], lambda frame: line.send(frame))
         line = PtyLine(bus.feed, link)
 
         async def plug() -> str:

@@ -60,10 +60,16 @@ GOALS: Final = ("goal",)
 
 
 class Servo:
-    """A servo with id `number`; `clock` gives s and never goes back, `position` is the shaft's, in ticks."""
+    """A servo with id `number`; `clock` gives s and never goes back, `position` is the shaft's, in ticks.
 
-    def __init__(self, number: int, clock: Callable[[], float], position: float = 2048.0) -> None:
+    The clock may run `time_scale` times faster than real; the bus watchdog, which concerns the host, does not.
+    """
+
+    def __init__(
+        self, number: int, clock: Callable[[], float], position: float = 2048.0, time_scale: float = 1.0
+    ) -> None:
         self.number = number
+        self._time_scale = time_scale
         self._clock = clock
         self._values = {name: field.default for name, field in FIELDS.items()}
         self._values["id"] = number
@@ -84,7 +90,7 @@ class Servo:
         now = self._clock()
         limit = self._values["watchdog"]
         if self._values["torque"] and 0 < limit < TRIPPED:
-            trips = self._heard + limit * WATCHDOG_UNIT
+            trips = self._heard + limit * WATCHDOG_UNIT * self._time_scale
             if trips < now:
                 self._move_until(trips)
                 self._values["watchdog"] = TRIPPED

@@ -78,6 +78,14 @@ async def _serve(options: argparse.Namespace) -> None:
     register_faults(control, dict(wires))
     register(control, controller, rtde, script, dashboard)
 
+    def power_cycle() -> None:
+        """The main switch off and on: every connection breaks, the arm is without power until somebody powers it."""
+        for wire in wires.values():
+            wire.reset()
+        controller.boot()
+
+    control.command("power_cycle", power_cycle)
+
     loop = asyncio.get_running_loop()
     owed = 0
 

@@ -50,7 +50,7 @@ def demo(
     data_dir
         Where scenes, projects and packages are kept.
     fast
-        Let the robot and the tester hurry.
+        Let the robots, the tester and the belt hurry.
     picture
         Write what the terminal showed when the last board was done to this SVG file.
     """

@@ -16,7 +16,7 @@ Ready = Mapping[str, Any]
 """What a fake's ready line says."""
 
 _UR_PORTS: Final = (30004, 30003, 29999)
-_FAST_TESTER: Final = 3.0
+_HURRY: Final = ("--time-scale", "3")
 _PICTURES: Final = ("--width", "640", "--height", "360", "--fps", "5")
 """Enough to see boards on the belt; a whole cell has to fit on two cores."""
 
@@ -58,18 +58,18 @@ def fakes(boards: int, seed: int, fast: bool) -> list[Fake]:
     """Give the fakes of one run; `fast` lets the machines among them hurry."""
     robot = free_loopback_address(_UR_PORTS)
     loopback = "127.0.0.1:0"
-    hurry = ("--time-scale", f"{_FAST_TESTER:g}") if fast else ()
+    hurry = _HURRY if fast else ()
     order = f"ORDER-{seed:06d}=Controller board:{boards}"
     return [
         Fake("robot", "arcor2_fakes.ur", ("--host", robot), "host", _plain("robot", "host"), "robot"),
         Fake("tester", "arcor2_fakes.functional_tester", hurry, "modbus", _host_and_port("tester", "modbus"), "tester"),
         Fake("reader", "arcor2_fakes.barcode_reader", (), "port", _plain("reader", "port"), "reader"),
-        Fake("belt", "arcor2_fakes.conveyor", (), "can", _plain("belt", "can", "socket://"), "conveyor"),
+        Fake("belt", "arcor2_fakes.conveyor", hurry, "can", _plain("belt", "can", "socket://"), "conveyor"),
         Fake("io", "arcor2_fakes.remote_io", (), "modbus", _host_and_port("io", "modbus"), "io"),
         Fake(
             "printer", "arcor2_fakes.label_printer", ("--tcp", loopback), "port", _plain("printer", "port"), "printer"
         ),
-        Fake("press", "arcor2_fakes.two_axis_robot", (), "port", _plain("press", "port"), "arm"),
+        Fake("press", "arcor2_fakes.two_axis_robot", hurry, "port", _plain("press", "port"), "arm"),
         Fake("camera", "arcor2_fakes.oak_d", _PICTURES, "stream", _plain("camera", "stream"), "camera", True),
         Fake("erp", "arcor2_fakes.erp", ("--order", order), "url", _plain("erp", "url")),
     ]

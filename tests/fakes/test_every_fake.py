@@ -1,0 +1,120 @@
+"""What every installed fake offers: the faults of a wire, a power cycle, and a pace of its own."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from arcor2_fakes.two_axis_robot.servo import Servo
+from arcor2_server.fakes import InstalledFake, installed_fakes
+from tests.fakes.conftest import FakeProcess
+
+FAULTS = {"silence", "reset", "half_frame", "garbage", "slow", "refuse", "heal"}
+ARGUMENTS = {"ur": ("--host", "127.83.1.7")}
+"""A UR controller's ports are fixed."""
+WORLD = "cell"
+"""The world is no device: it has a control channel and no wire."""
+
+NO_CHECKSUM = {
+    "abb_yumi": "HTTP and text over TCP",
+    "barcode_reader": "lines of text",
+    "conveyor": "a CAN controller drops such frames itself",
+    "erp": "HTTP",
+    "functional_tester": "Modbus TCP has none",
+    "label_printer": "ZPL has none",
+    "opcua_plc": "TCP's, and the library's own above it",
+    "remote_io": "Modbus TCP has none; with --serial there is one",
+    "scale": "MT-SICS has none",
+    "ur": "RTDE has none",
+}
+NO_PACE = {
+    "barcode_reader": "reads within 0.15 s; its own time-out is --timeout",
+    "erp": "nothing in it takes time",
+    "label_printer": "--duration is all the time it takes",
+    "remote_io": "nothing in it moves; pulses and watchdogs are the host's times",
+    "scale": "--settling is all the time it takes",
+}
+FOUND = [fake for fake in installed_fakes() if fake.module.startswith("arcor2_fakes.") and fake.name != WORLD]
+
+
+@pytest.fixture(scope="module", params=FOUND, ids=[fake.name for fake in FOUND])
+def running(request: pytest.FixtureRequest) -> Iterator[tuple[InstalledFake, FakeProcess]]:
+    fake: InstalledFake = request.param
+    process = FakeProcess(fake.name, *ARGUMENTS.get(fake.name, ()))
+    process.truth()  # opens the control channel, which lives as long
+    yield fake, process
+    process.end()
+
+
+def test_it_can_be_made_to_fail(running: tuple[InstalledFake, FakeProcess]) -> None:
+    fake, process = running
+    commands = set(process.control.do("commands"))
+    assert commands >= FAULTS | {"power_cycle", "truth"}
+    assert ("wrong_checksum" in commands) is (fake.name not in NO_CHECKSUM)
+
+
+def test_every_command_says_what_it_takes(running: tuple[InstalledFake, FakeProcess]) -> None:
+    _, process = running
+    described: list[dict[str, Any]] = process.control.do("describe")
+    assert {each["name"] for each in described} | {"commands", "describe", "subscribe", "unsubscribe"} == set(
+        process.control.do("commands")
+    )
+    slow = next(each for each in described if each["name"] == "slow")
+    assert slow == {
+        "name": "slow",
+        "takes": ["[wire]", "seconds=1.0"],
+        "text": "Let the wire send everything so many seconds late.",
+    }
+
+
+def test_it_lives_through_a_power_cycle_and_all_faults(running: tuple[InstalledFake, FakeProcess]) -> None:
+    _, process = running
+    for fault in (*sorted(FAULTS - {"heal"}), "heal"):
+        process.control.do(fault)
+    process.control.do("power_cycle", within=10.0)
+    process.truth()
+    assert process.process.poll() is None
+
+
+def test_it_can_be_run_faster_where_it_takes_time() -> None:
+    running = {
+        fake.name: subprocess.Popen([sys.executable, "-m", fake.module, "--help"], stdout=subprocess.PIPE, text=True)
+        for fake in FOUND
+    }
+    offering = {name for name, process in running.items() if "--time-scale" in process.communicate(timeout=60)[0]}
+    assert set(running) - offering == set(NO_PACE) & set(running)
+
+
+class Clock:
+    """A clock of the test's own, and how many times faster the servo's runs."""
+
+    def __init__(self, scale: float) -> None:
+        self.now, self.scale = 100.0, scale
+
+    def __call__(self) -> float:
+        return self.now * self.scale
+
+
+def test_ten_times_as_fast_the_servos_take_a_tenth_and_their_watchdog_its_time() -> None:
+    times, trips = [], []
+    for clock in (Clock(1.0), Clock(10.0)):
+        servo = Servo(1, clock, time_scale=clock.scale)
+        assert servo.write(64, b"\x01") == 0
+        assert servo.write(112, (100).to_bytes(4, "little")) == 0
+        assert servo.write(116, (3000).to_bytes(4, "little")) == 0
+        began = clock.now
+        while servo.speed or servo.position != 3000:
+            clock.now += 0.001
+            servo.advance()
+        times.append(clock.now - began)
+        servo.hear()
+        assert servo.write(98, b"\x0a") == 0  # 0.2 s
+        began = clock.now
+        while servo["watchdog"] != 0xFF:
+            clock.now += 0.005
+            servo.advance()
+        trips.append(clock.now - began)
+    assert times[0] / times[1] == pytest.approx(10.0, rel=0.1)
+    assert trips == pytest.approx([0.2, 0.2], abs=0.011)
