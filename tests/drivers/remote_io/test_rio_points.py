@@ -221,11 +221,14 @@ def test_a_pulse_that_is_stopped_is_off(fake: FakeProcess, block: RemoteIO, wait
     block.write_digital("valve", True)
     thread, outcome = in_thread(lambda: block.pulse("lamp", 20.0))
     wait_for(lambda: fake.truth()["outputs"][4])
+    with pytest.raises(Refused, match=r"pulsing lamp is refused while it is being pulsed$"):
+        block.pulse("lamp", 0.05)
     block.stop()
+    outputs = fake.truth()["outputs"]  # when stop returns it is off, whatever the other thread has come to
     thread.join(5.0)
     assert isinstance(outcome[0], Cancelled)
-    outputs = fake.truth()["outputs"]
     assert (outputs[4], outputs[5]) == (False, True)  # a stop switches nothing else
+    block.pulse("lamp", 0.05)
 
 
 def test_control_is_refused_while_another_host_has_it(

@@ -204,6 +204,66 @@ def test_heartbeat_loss_does_what_6007h_says(fake: FakeProcess, adapter: Adapter
         assert truth["velocity"] > 0.0
 
 
+def test_tpdo_mapping_and_timer(fake: FakeProcess, adapter: Adapter) -> None:
+    """CiA 301, 7.5.2.35 to 38: a mapping is changed while the PDO is invalid and its count 0; type 255, event timer."""
+    default = adapter.sdo("4001180100000000")
+    assert default == "4301180185020000"  # 280h + node
+    assert adapter.sdo("2F011A0000000000") == "80011A0000000106"  # valid: unsupported access, 06010000h
+    assert adapter.sdo("2301180185020080") == "6001180100000000"  # bit 31: invalid
+    assert adapter.sdo("23011A0120006460") == "80011A0100000106"  # the count is not 0
+    assert adapter.sdo("2F011A0000000000") == "60011A0000000000"
+    assert adapter.sdo("23011A0120008160") == "80011A0141000406"  # 6081h is not mappable: 06040041h
+    assert adapter.sdo("23011A0120006460") == "60011A0100000000"  # 6064h, 32 bits
+    assert adapter.sdo("23011A0220006C60") == "60011A0200000000"  # 606Ch, 32 bits
+    assert adapter.sdo("2F011A0003000000") == "80011A0042000406"  # more than is mapped: 06040042h
+    assert adapter.sdo("2F011A0002000000") == "60011A0000000000"
+    assert adapter.sdo("2F01180201000000") == "8001180230000906"  # SYNC is not modelled: 06090030h
+    assert adapter.sdo("2B01180514000000") == "6001180500000000"  # 20 ms
+    assert adapter.sdo("2301180185020000") == "6001180100000000"
+    time.sleep(0.1)
+    assert not [frame for frame in adapter.frames if frame.startswith("t285")]  # not before Operational
+    adapter.send("t00020105")
+    first = adapter.frame("t285")
+    assert first == "t28580000000000000000"
+    began = time.monotonic()
+    for _ in range(20):
+        adapter.frame("t285")
+    assert time.monotonic() - began == pytest.approx(0.4, rel=0.25)
+    adapter.send("t00028005")  # Pre-operational: no more
+    adapter.sdo("4000100000000000")
+    time.sleep(0.1)
+    sent = fake.truth()["pdos_sent"][1]
+    time.sleep(0.1)
+    assert fake.truth()["pdos_sent"][1] == sent
+
+
+def test_socketcand_beside_slcan_on_one_bus(fake: FakeProcess, adapter: Adapter) -> None:
+    host, _, port = fake.ready["socketcand"].rpartition(":")
+    with socket.create_connection((host, int(port)), 2.0) as client:
+
+        def hear(prefix: bytes) -> bytes:
+            came = b""
+            while True:
+                came += client.recv(1)
+                if came.endswith(b">"):
+                    if came.startswith(prefix):
+                        return came
+                    came = b""
+
+        assert client.recv(100) == b"< hi >"
+        client.sendall(b"< send 605 8 40 0 10 0 0 0 0 0 >")
+        assert client.recv(100) == b"< error unknown command >"  # the bus is not open
+        client.sendall(b"< open can0 >")
+        assert client.recv(100) == b"< ok >"
+        client.sendall(b"< rawmode >")
+        assert hear(b"< ok") == b"< ok >"
+        client.sendall(b"< send 605 8 40 0 10 0 0 0 0 0 >")
+        assert hear(b"< frame 585 ").split()[-2] == b"4300100092010200"
+        assert adapter.frame("t605") == "t60584000100000000000"  # what one member sends reaches the others
+        client.sendall(b"< send 605 3 40 0 >")
+        assert hear(b"< error") == b"< error could not send frame >"
+
+
 def test_python_can_reads_and_writes(fake: FakeProcess, adapter: Adapter) -> None:
     with can.Bus(
         interface="slcan", channel=f"socket://{fake.ready['can']}", bitrate=500000, sleep_after_open=0.0

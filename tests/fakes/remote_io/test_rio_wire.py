@@ -90,6 +90,21 @@ def test_power_cycle_and_faults(fake: Any, host: Any, wait_for: Callable[..., An
         fake.control.do("set_input", number=16, on=True)
 
 
+def test_a_world_switches_inputs_and_reads_outputs(fake: Any, host: Any) -> None:
+    fake.control.do("set_inputs", inputs={"0": True, "7": True})
+    assert image(host)[0] == 0b1000_0001
+    fake.control.do("set_inputs", inputs={"0": False})
+    assert image(host)[0] == 0b1000_0000
+    with pytest.raises(Exception, match="numbers are 0 to 15"):
+        fake.control.do("set_inputs", inputs={"1": True, "16": True})
+    assert image(host)[0] == 0b1000_0000  # all or nothing
+    host.write_coil(3, True, device_id=1)
+    host.write_register(1, 77, device_id=1)
+    outputs = fake.control.do("outputs")
+    assert outputs["outputs"][3] is True
+    assert outputs["analog_outputs"] == [0, 77]
+
+
 def test_rtu_line(start_fake: Callable[..., Any]) -> None:
     fake = start_fake("remote_io", "--serial")
     host = ModbusSerialClient(fake.ready["modbus"], baudrate=115200, timeout=1.0, retries=0)
