@@ -12,8 +12,8 @@ from arcor2_server.fakes import InstalledFake, installed_fakes
 from tests.fakes.conftest import FakeProcess
 
 FAULTS = {"silence", "reset", "half_frame", "garbage", "slow", "refuse", "heal"}
-ARGUMENTS = {"ur": ("--host", "127.83.1.7")}
-"""A UR controller's ports are fixed."""
+ARGUMENTS = {"ur": ("--host", "127.83.1.7"), "abb_yumi": ("--host", "127.83.1.8")}
+"""These controllers have ports of their own, so each gets an address of its own."""
 WORLD = "cell"
 """The world is no device: it has a control channel and no wire."""
 

@@ -7,3 +7,5 @@ rounding them); the configuration number cfx beyond the signs of three axes; the
 is the elbow about the line from shoulder to wrist, against the vertical plane). Kinematics are nominal, from the
 published dimensions. The arms pass through each other; `truth` tells the distance of their flanges.
 """
+
+WIRE = "Robot Web Services on HTTP, and a TCP port for each arm"

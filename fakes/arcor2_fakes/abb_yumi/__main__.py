@@ -133,6 +133,17 @@ def main(
         register_faults(channel, dict(wires))
         register_commands(channel, controller, http)
 
+        def power_cycle() -> None:
+            """The main switch off and on: sessions and connections end, the motors are off."""
+            http.end_all()
+            controller.stop()
+            controller.hold_mastership(False)
+            controller.set_control_state("motoroff")
+            for wire in wires.values():
+                wire.reset()
+
+        channel.command("power_cycle", power_cycle)
+
         def truth() -> dict[str, Any]:
             return controller.truth() | {"requests": http.requests}
 

@@ -120,7 +120,7 @@ class Demo:
         at: dict[str, Any] = {name: ready for name, (_, ready) in started.items()}
         at["world"] = await world.start_json()
         self._display.addresses(server_at, wires(started))
-        self._where.write_bytes(msgspec.json.format(msgspec.json.encode({"url": server_at, **at})))
+        self._tell_where({"url": server_at, **at})
         settings: dict[str, Scalar] = {"outbox": str((self._data_dir / "outbox").absolute())}
         settings |= FAST_ACCELERATIONS if self._fast else ACCELERATIONS
         for fake, ready in started.values():
@@ -148,6 +148,12 @@ class Demo:
             self._display.serving(server_at)
             await self._stop.wait()
         return outcome
+
+    def _tell_where(self, at: dict[str, Any]) -> None:
+        """Write where everything is; who looks meanwhile finds no half of it."""
+        new = self._where.with_suffix(".new")
+        new.write_bytes(msgspec.json.format(msgspec.json.encode(at)))
+        new.replace(self._where)
 
     async def _start_all(self) -> tuple[dict[str, tuple[Fake, Ready]], str]:
         """Start the fakes and the server, all at once; gives what their ready lines say."""
