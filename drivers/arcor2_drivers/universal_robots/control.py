@@ -33,33 +33,28 @@ from arcor2_hw.exceptions import (
 )
 
 from .dashboard import Dashboard
+from .library_words import refusal, says_broken
 from .observer import Observer
 from .program import Registers, RunState
 from .script_port import ScriptPort
+from .session_times import (
+    CALL_TIMEOUT,
+    GUARD_ENDS,
+    GUARD_PERIOD,
+    KICKS_PER_PERIOD,
+    LAST_STOP,
+    PROGRAM_GONE,
+    RESUME_TIMEOUT,
+    SPEED_STOPPED,
+    STOP_REACTION,
+    STREAM_FREQUENCY,
+    UNHEALTHY,
+)
 from .states import MAY_MOVE, REMEDIES, program_plays, safety_of
 
-STREAM_FREQUENCY: Final = 125.0
-"""Hz of the library's own stream: a command takes 16 ms instead of 4, the process 5 % of a core instead of 10."""
-KICKS_PER_PERIOD: Final = 4.0
-"""Kicks within one period of the watchdog: three may be late."""
-UNHEALTHY: Final = 0.3
-"""Seconds without an observed sample after which the session ends; the library itself needs 2.5 to notice."""
-GUARD_PERIOD: Final = 0.01
-RESUME_TIMEOUT: Final = 4.0
-"""Seconds for the control program to play again after a program of our own; it takes 0.1."""
-CALL_TIMEOUT: Final = 1.0
-"""Seconds for a command that moves nothing; the library itself waits 4 to 300."""
-STOP_REACTION: Final = 0.05
-"""Seconds the control program may take to react to a stop before the dashboard is used: two commands of 16 ms."""
-PROGRAM_GONE: Final = 0.1
-"""Seconds our program may be seen not playing before the session ends: two streams tell of it, not at one instant."""
-LAST_STOP: Final = 0.3
-"""Seconds for the dashboard to answer the stop with which a session ends."""
-
+MOTIONS: Final = frozenset({"moveJ", "moveL", "teachMode", "ready"})
+"""Commands before which a jog is ended: two threads of the program may not both move the arm."""
 _SCRIPT: Final = Path(__file__).with_name("control_process.py")
-_BROKEN: Final = (b"disconnected", b"could not receive", b"closed the connection", b"lost connection", b"reconnecting")
-"""What ur_rtde says, in lower case, when its connection has broken and before it connects again."""
-
 log = logging.getLogger(__name__)
 
 
@@ -82,6 +77,7 @@ class ControlSession:
         self._released = False
         self._process: subprocess.Popen[bytes] | None = None
         self._speed_until: float | None = None
+        self._guard: threading.Thread | None = None
         self.registers = Registers.of(upper)
         self.own: int | None = None
         """The number of the run of our own program that plays, or has just ended, in place of the control program."""
@@ -116,11 +112,12 @@ class ControlSession:
             self._stop_line.close()
             raise error from None
         except DeviceFault as e:
-            named = self._named(e.detail)
+            named = refusal(self.who, self.upper, e.detail)
             self.end(named)
             self._stop_line.close()
             raise named from e
-        threading.Thread(target=self._watch, name=f"control guard {self.host}", daemon=True).start()
+        self._guard = threading.Thread(target=self._watch, name=f"control guard {self.host}", daemon=True)
+        self._guard.start()
 
     def end(self, reason: DeviceError) -> None:
         """End the session now: the process is killed, so that no further kick and no reconnection comes from it."""
@@ -142,17 +139,10 @@ class ControlSession:
             self.call("the end of control", "stopScript", timeout=wait)
         self.end(reason)
 
-    def _named(self, text: str) -> DeviceError:
-        lower = text.lower()
-        if "in use" in lower or "in_use" in lower:
-            block = "24 to 47" if self.upper else "0 to 23"
-            return NotInControl(
-                f"the input registers {block} of {self.who} are used by a fieldbus or another client",
-                text,
-            )
-        if "remote control" in lower:
-            return NotInControl(f"{self.who} is in local control", text)
-        return DeviceFault(f"{self.who} does not start the control program", text)
+    def await_end(self) -> None:
+        """Return when the guard of an ended session is through: its last stop must not meet the next program."""
+        if self._guard is not None:
+            self._guard.join(GUARD_ENDS)
 
     # -------------------------------------------------------------------------------- commands, from any thread
     def call(
@@ -168,6 +158,9 @@ class ControlSession:
         Raises what ended the session, Cancelled when dropped, DeviceTimeout (and the session ends) when it takes longer
         than `timeout` s, DeviceFault when the library fails.
         """
+        if command in MOTIONS and self._speed_until is not None:
+            self._speed_until = None
+            self._send("the end of a jog", "speedStop", ())
         future = self._send(what, command, arguments, valid)
         try:
             return future.result(timeout)
@@ -175,6 +168,14 @@ class ControlSession:
             error = DeviceTimeout(f"{self.who} did not take {what} within {timeout:g} s")
             self.end(error)
             raise error from None
+
+    def ask(self, what: str, question: str, *arguments: Any) -> Any:
+        """Ask what changes nothing; once more when the library gives up on it, as it does on a busy computer."""
+        try:
+            return self.call(what, question, *arguments)
+        except DeviceFault as e:
+            log.info("%s: %s is asked again: %s", self.who, what, e.detail)
+            return self.call(what, question, *arguments)
 
     def do(self, what: str, command: str, *arguments: Any, **options: Any) -> None:
         """As `call`, for a command that the library answers with true or false; DeviceFault on false."""
@@ -186,22 +187,17 @@ class ControlSession:
     def speed(
         self, command: str, velocities: list[float], acceleration: float, valid_for: float, valid: Callable[[], bool]
     ) -> None:
-        """Begin or renew a motion by speed that ends `valid_for` s from now unless it is renewed."""
+        """Begin or renew a motion by speed that the guard ends `valid_for` s from now unless it is renewed."""
         until = time.monotonic() + valid_for
         self._speed_until = until
         in_time: Callable[[], bool] = lambda: valid() and time.monotonic() < until  # noqa: E731
-        self.do("a jog", command, velocities, acceleration, valid_for, valid=in_time)
+        # Without the library's own time: its call would last that long, and kicks and a stop would wait behind it.
+        self.do("a jog", command, velocities, acceleration, valid=in_time)
 
     def set_output(self, number: int, on: bool) -> None:
         """Switch an output: 0 to 7 standard, 8 to 15 configurable, 16 and 17 of the tool."""
-        command, first = (
-            ("setStandardDigitalOut", 0)
-            if number < 8
-            else ("setConfigurableDigitalOut", 8)
-            if number < 16
-            else ("setToolDigitalOut", 16)
-        )
-        self.do(f"digital output {number}", command, number - first, on)
+        command = ("setStandardDigitalOut", "setConfigurableDigitalOut", "setToolDigitalOut")[number // 8]
+        self.do(f"digital output {number}", command, number % 8, on)
 
     def stop_motion(self, deceleration: float) -> None:
         """Stop what moves; by the dashboard, which ends the session, when the program does not react in time.
@@ -209,9 +205,11 @@ class ControlSession:
         Always the asynchronous stopL, the only one of the four that is run as what it is called: ur_rtde 1.6.5 runs a
         synchronous stopL as stopj until the first asynchronous stop, and stopJ as stopl from then on.
         """
-        self._speed_until = None
+        jogs, self._speed_until = self._speed_until is not None, None
         try:
-            if (own := self.own) is not None:
+            if jogs:  # a stopL beside the thread that holds the velocity is no stop
+                self._send("a stop", "speedStop", ()).result(SPEED_STOPPED)
+            elif (own := self.own) is not None:
                 self._send("a stop", "halt", ())
                 self._await_reaction(own)
             else:
@@ -259,8 +257,7 @@ class ControlSession:
         """Have the control program play again. Raises what ended the session, DeviceFault, DeviceTimeout."""
         if self.own is None or self.ended is not None:
             return
-        newest = self._observer.newest()
-        if newest is None or program_plays(newest.runtime):
+        if (newest := self._observer.newest()) is None or program_plays(newest.runtime):
             self.end(NotInControl(f"another program plays on {self.who}"))
         self.do("the control program", "resume", timeout=RESUME_TIMEOUT)
         self.own = None
@@ -341,7 +338,7 @@ class ControlSession:
 
     def _said(self, line: bytes) -> None:
         text = line.decode("utf-8", "replace").strip()
-        if any(word in line.lower() for word in _BROKEN):
+        if says_broken(line):
             self.end(ConnectionLost(f"the control connection to {self.who} broke", text))
         elif text:
             log.info("%s: %s", self.who, text)

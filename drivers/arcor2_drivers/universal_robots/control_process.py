@@ -39,6 +39,8 @@ COMMANDS = (
     "stopScript",
     "teachMode",
 )
+SPEEDS = ("speedJ", "speedL")
+SHOWN = 0.02  # s until the next command, a kick, may take the velocity's place in the register: two cycles of a CB3
 RESUMED_WITHIN = 3.0  # s for the control program to play again; it takes 0.1
 OUTPUTS = ("setConfigurableDigitalOut", "setStandardDigitalOut", "setToolDigitalOut")
 
@@ -62,6 +64,8 @@ def main() -> None:
             answer = {"n": number, "data": commands[request["do"]](*request["args"])}
         except (RuntimeError, TypeError, ValueError, KeyError) as e:
             answer = {"n": number, "error": f"{type(e).__name__}: {e}"}
+        if request["do"] in SPEEDS:
+            time.sleep(SHOWN)
         if number is not None:
             answers.write(json.dumps(answer) + "\n")
         if request["do"] == "stopScript":

@@ -99,6 +99,7 @@ class Observer:
         self.samples_received = 0
         self.samples_missed = 0
         self.ring: collections.deque[Sample] = collections.deque(maxlen=KEPT)
+        self._newest: Sample | None = None
         self._stream: RtdeStream | None = None
         self.observing = Observing(f"{name} at {self.address}", self._open, self._watch, self._close)
 
@@ -112,7 +113,7 @@ class Observer:
 
     def newest(self) -> Sample | None:
         """Give the newest sample, however old."""
-        return self.ring[-1] if self.ring else None
+        return self._newest
 
     def sample(self, max_age: float = FRESH) -> Sample:
         """Give the newest sample. Raises NotConnected, ConnectionLost, or Stale when it is older than asked for."""
@@ -120,6 +121,9 @@ class Observer:
         if newest is not None and newest.age <= max_age and self.observing.online:
             return newest
         self.observing.check()
+        newest = self.newest()  # it may have come, and the connection back with it, since the first look
+        if newest is not None and newest.age <= max_age:
+            return newest
         if newest is None:
             raise NotConnected(f"{self.who} has sent no sample yet")
         raise Stale(f"the newest sample of {self.who} is {newest.age:.2f} s old, {max_age:g} s asked for")
@@ -133,7 +137,7 @@ class Observer:
             raise type(e)(f"{self.name}: {e}", e.detail) from e
         self.version = stream.version
         self.period = 0.002 if self.version[0] >= 5 else 0.008
-        self.ring.clear()
+        self.ring = collections.deque(maxlen=KEPT)  # others may be reading the old one
         while not self.ring:
             left = deadline - time.monotonic()
             if left <= 0.0:
@@ -159,9 +163,9 @@ class Observer:
         for row in rows:
             timestamp = row[0]
             last = self.ring[-1].timestamp if self.ring else timestamp - self.period
-            self.ring.append(
-                Sample(timestamp, now, row[1:7], row[7:13], row[13:19], row[19:25], *row[25:])  # type: ignore[arg-type]
-            )
+            parts = row[1:7], row[7:13], row[13:19], row[19:25]
+            self._newest = Sample(timestamp, now, *parts, *row[25:])  # type: ignore[arg-type]
+            self.ring.append(self._newest)
             self.samples_received += 1
             if timestamp > last:
                 self.samples_missed += max(round((timestamp - last) / self.period) - 1, 0)

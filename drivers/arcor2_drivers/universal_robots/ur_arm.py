@@ -27,18 +27,12 @@ from .control import ControlSession
 from .frames import from_vector, to_vector, world_from_base
 from .observer import Sample
 from .program import Tool
+from .session_times import POLL, REST_WITHIN, STANDING, TAKE_TIMEOUT
 from .settings import MANUAL_TCP_SPEED, UrSettings, within
 from .states import MAY_MOVE, REMEDIES, program_plays, safety_of
 from .timing import SLOWEST_FRACTION, joint_budget, linear_budget
 from .ur_observed import JOINTS, UrObserved
 
-TAKE_TIMEOUT: Final = 5.0
-"""Seconds the controller may take to start the control program."""
-POLL: Final = 0.005
-REST_WITHIN: Final = 2.0
-"""Seconds after which an arm that was told to stop must stand; from full speed it takes 0.3."""
-STANDING: Final = 0.5
-"""Seconds an arm may stand, short of its target and with no motion running, before the move counts as failed."""
 LOWER_ONLY: Final = ((5, 23), (10, 0))
 """From these versions on, ur_rtde 1.6.5 told to use the upper registers sends a program that does, but does not."""
 
@@ -78,6 +72,8 @@ class UrArm(UrObserved):
 
     def _take(self) -> None:
         self.tool()
+        if self._session is not None:
+            self._session.await_end()
         sample = self._observer.sample()
         control, _ = self._at_pendant(max_age=0.0)
         safety = safety_of(sample.safety_mode)
@@ -378,14 +374,14 @@ class UrArm(UrObserved):
         """Give the TCP in the world for joints, by the controller's calibration; needs control."""
         self._check_end_effector(end_effector_id)
         q, tcp = self._checked_joints(joints), to_vector(self._tool.tcp)
-        vector = self._controlled().call("forward kinematics", "getForwardKinematics", q, tcp)
+        vector = self._controlled().ask("forward kinematics", "getForwardKinematics", q, tcp)
         return world_from_base(self._pose) * from_vector(vector)
 
     def _solve(self, session: ControlSession, vector: list[float], near: list[float]) -> list[float]:
         # Asked first: without a solution get_inverse_kin ends the control program with an error.
         q: list[float] = []
-        if session.call("inverse kinematics", "getInverseKinematicsHasSolution", vector, near):
-            q = session.call("inverse kinematics", "getInverseKinematics", vector, near)
+        if session.ask("inverse kinematics", "getInverseKinematicsHasSolution", vector, near):
+            q = session.ask("inverse kinematics", "getInverseKinematics", vector, near)
         if len(q) != len(JOINTS) or not all(map(math.isfinite, q)):
             position = ", ".join(f"{value:.3f}" for value in vector[:3])
             raise self.KinematicsException(

@@ -11,15 +11,15 @@ from arcor2_hw.data.robot import MoveEnd, MoveResult
 from arcor2_hw.exceptions import Cancelled, DeviceFault, DeviceTimeout, NotInControl, OutOfRange, SafetyStop
 
 from .arrival import at_joints, at_pose
-from .control import PROGRAM_GONE, ControlSession
+from .control import ControlSession
 from .frames import from_vector, turned, world_from_base
 from .observer import Sample
 from .program import ENDED, Limit, RunState, joint, linear, motion_program
 from .script_port import ScriptPort
+from .session_times import POLL, PROGRAM_GONE, REST_WITHIN
 from .settings import within
 from .states import program_plays
 from .timing import GRACE, SLOWEST_FRACTION, joint_budget, linear_budget
-from .ur_arm import POLL, REST_WITHIN
 from .ur_service import UrServiced
 
 STARTS_WITHIN: Final = 1.0

@@ -48,8 +48,9 @@ class FakeUr:
 
     def reset(self) -> None:
         self.do("heal")
-        for command in ("safeguard_stop", "foreign_program", "fieldbus"):
+        for command in ("safeguard_stop", "foreign_program", "fieldbus", "emergency_stop", "reduced", "recovery"):
             self.do(command, on=False)
+        self.do("no_obstacle")
         self.do("remote_control", on=True)
         self.do("operational_mode", mode="AUTOMATIC")
         self.do("speed_slider", fraction=1.0)
@@ -94,7 +95,11 @@ def start_fake() -> Iterator[Callable[..., FakeUr]]:
 
 
 def make(host: str, pose: Pose | None = None, **settings: Any) -> UR5e:
-    return UR5e("obj_1", "ur", pose or Pose(), UrSettings(host, **{"payload_mass": 1.0, "tcp_z": 0.1, **settings}))
+    """An arm that is brisker than as delivered, so that tests need not wait for it."""
+    brisk = {"max_joint_speed": 2.0, "joint_acceleration": 8.0, "tcp_acceleration": 4.0}
+    return UR5e(
+        "obj_1", "ur", pose or Pose(), UrSettings(host, **{"payload_mass": 1.0, "tcp_z": 0.1, **brisk, **settings})
+    )
 
 
 @pytest.fixture
@@ -141,7 +146,7 @@ class Doing:
 
 def moving(fake: FakeUr) -> None:
     """Return when the arm really moves."""
-    fake.control.wait_until(lambda t: max(map(abs, t["qd"])) > 0.05)
+    wait(lambda: max(map(abs, fake.truth()["qd"])) > 0.05)
 
 
 def wait(holds: Callable[[], bool], within: float = 5.0) -> None:

@@ -42,6 +42,11 @@ def turned(robot: UR5e, by: float, joint: int = 0) -> list[Joint]:
     return joints
 
 
+def shifted(robot: UR5e, y: float) -> Pose:
+    here = robot.get_end_effector_pose("tcp")
+    return Pose(here.position + Position(0.0, y, 0.0), here.orientation)
+
+
 def far_move(robot: UR5e, fake: FakeUr, speed: float = 0.5) -> Doing:
     """A long joint move that is under way."""
     doing = Doing(robot.move_to_joints, turned(robot, 3.0), speed)
@@ -221,19 +226,8 @@ def test_manual_mode_caps_the_tcp(ready: UR5e, fake: FakeUr) -> None:
     time.sleep(0.55)  # the key is looked at twice a second
     speeds = []
     for move in (
-        lambda: ready.move_to_joints(turned(ready, 0.15), 1.0),
-        lambda: (
-            ready.move_to_pose("tcp", Pose(), 1.0)
-            if False
-            else ready.move_to_pose(
-                "tcp",
-                Pose(
-                    ready.get_end_effector_pose("tcp").position + Position(0.0, -0.2, 0.0),
-                    ready.get_end_effector_pose("tcp").orientation,
-                ),
-                1.0,
-            )
-        ),
+        lambda: ready.move_to_joints(turned(ready, 0.08), 1.0),
+        lambda: ready.move_to_pose("tcp", shifted(ready, y=-0.15), 1.0),
     ):
         doing = Doing(move)
         last, at = ready.get_end_effector_pose("tcp").position, time.monotonic()
@@ -447,7 +441,7 @@ def test_a_cable_cut_in_mid_move(ready: UR5e, fake: FakeUr, fault: str) -> None:
 
 def test_a_silence_as_long_as_the_library_cannot_bear(ready: UR5e, fake: FakeUr) -> None:
     fake.do("silence")
-    time.sleep(3.5)
+    time.sleep(2.8)  # it takes 2.5 to notice
     fake.do("heal")
     wait(lambda: ready.connection.value == "back")
     fake.do("foreign_program", on=True)
