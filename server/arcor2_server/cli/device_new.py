@@ -11,26 +11,12 @@ from typing import Annotated, Final, NamedTuple
 
 from cyclopts import Parameter
 
+from arcor2_server.cli.starter_kinds import KINDS, NO_ACT, Base
 from arcor2_server.cli.status import ExitStatus
 
 LONGEST_NAME: Final = 24
 STARTER: Final = files("arcor2_server.cli") / "starter"
 """Where the templates lie."""
-
-
-class Base(enum.StrEnum):
-    """What kind of device it is."""
-
-    MACHINE = "machine"
-    ROBOT = "robot"
-    CAMERA = "camera"
-    GRIPPER = "gripper"
-    IOBLOCK = "ioblock"
-    AXIS = "axis"
-    READER = "reader"
-    SCALE = "scale"
-    PRINTER = "printer"
-    GENERIC = "generic"
 
 
 class Bus(enum.StrEnum):
@@ -105,73 +91,6 @@ WIRES: Final = {
 }
 
 
-class Kind(NamedTuple):
-    """What a base brings into the texts.
-
-    observe, ask, command, run_long: what the suite's bench calls; run_long is empty where nothing takes its time.
-    """
-
-    actions: str
-    observe: str
-    ask: str
-    command: str
-    run_long: str
-    on_loss: str
-    words: str
-    writes: str
-    does: str
-    own_test: str
-    reset: str = ""
-
-
-_NO_ACT: Final = "the device does nothing that takes its time"
-STATUS: Final = "state (0 idle, 1 busy)"
-COMMON_WORDS: Final = "fault (0: none), owner (0 nobody, 1 the host, 2 the panel)"
-
-KINDS: Final = {
-    Base.MACHINE: Kind(
-        "process",
-        "machine_state()",
-        "fresh()",
-        "command(MachineCommand.RESET)",
-        "process(8.0)",
-        "none",
-        f"state (PackML), tenths done, pieces done, {COMMON_WORDS}",
-        "command (PackML) and with a start the tenths to do; register 2: ms of silence after which it stops, 0 lets go",
-        "`process` does one piece of work: it resets the machine where necessary, starts it and waits for its end.",
-        """def test_pieces_are_counted(bench):
-    device = bench.controlled()
-    assert device.process(0.4) == 1
-    assert device.process(0.4) == 2
-    assert device.machine_state() is MachineState.COMPLETE
-
-
-def test_a_command_that_the_state_forbids_is_refused_naming_both(bench):
-    device = bench.controlled()
-    with pytest.raises(Refused, match="CLEAR is not allowed in STOPPED"):
-        device.command(MachineCommand.CLEAR)
-""",
-        """        self.do("rest")
-""",
-    ),
-    Base.GENERIC: Kind(
-        "work",
-        "current()",
-        "fresh()",
-        'send("a reset", lambda: device._io.$write(0, 3))',
-        "work(8.0)",
-        "none",
-        f"{STATUS}, tenths done, pieces done, {COMMON_WORDS}",
-        "1 go and the tenths to do, 2 stop, 3 reset; register 2: ms of silence after which it stops, 0 lets go",
-        "`work` does one piece of work and waits for its end.",
-        """def test_work_that_is_done_is_told(bench):
-    device = bench.controlled()
-    assert device.work(0.4) == 0.4
-""",
-        """        self.do("rest")
-""",
-    ),
-}
 NO_SENSE: Final = {
     Base.ROBOT: "a robot needs its model and its kinematics: start from the robot that is most like yours "
     "(drivers/arcor2_drivers/dobot_magician, universal_robots)",
@@ -232,11 +151,12 @@ def texts(name: str, base: Base, bus: Bus) -> dict[str, str]:
     module = name.replace("-", "_")
     words = _words(name, module, base, bus)
     words["control"] = _fill("control.txt", words)
+    words["done"] = _fill("done.txt", words)
     words["long"] = _fill("long.txt", words) if KINDS[base].run_long else ""
     found = {
         f"{module}/__init__.py": f'"""{words["A_title"]}."""\n',
         f"{module}/{module}.py": _fill(f"driver_{base}.py", words),
-        f"{module}/{module}_fake.py": _fill(f"fake_{base}.py", words),
+        f"{module}/{module}_fake.py": _fill(f"fake_{KINDS[base].fake}.py", words),
         f"{module}/quality.yaml": _fill("quality.yaml", words),
         f"tests/test_{module}.py": _fill("test.py", words),
         f"docs/{name}.md": _fill("page.md", words),
@@ -308,15 +228,19 @@ def _words(name: str, module: str, base: Base, bus: Bus) -> dict[str, str]:
         "build": made_in_test,
         "orphan": orphan,
         "absent": wire.absent,
-        "reset": kind.reset,
+        "reset": '        self.do("rest")\n',
+        "rest_value": str(kind.rest_value),
         "observe": kind.observe,
         "ask": kind.ask,
         "command": Template(kind.command).substitute(write=write),
         "run_long": kind.run_long,
         "own_test": kind.own_test,
         "imports": _imports(base),
+        "threading": "import threading\n" if base is Base.READER else "",
         "settings_import": "from arcor2_hw.objects.settings import check_host\n" if wire.address == HOST else "",
         "exceptions": "" if wire.address == HOST else "from arcor2_hw.exceptions import OutOfRange\n",
+        "point_exceptions": "from arcor2_hw.exceptions import NotFound, "
+        + ("Refused\n" if wire.address == HOST else "OutOfRange, Refused\n"),
         "fault_exceptions": "from arcor2_hw.exceptions import DeviceFault"
         + ("\n" if wire.address == HOST else ", OutOfRange\n"),
         "actions": kind.actions,
@@ -369,4 +293,4 @@ device.{run_long}
 
 def _not_run() -> str:
     cases = ("nothing_resumes", "loss_reaction", "stop_passes", "one_act_at_a_time", "disconnecting_ends_an_act")
-    return "\n".join(["not_run:", *(f"  {case}: {_NO_ACT}" for case in cases)])
+    return "\n".join(["not_run:", *(f"  {case}: {NO_ACT}" for case in cases)])

@@ -9,20 +9,21 @@ from pathlib import Path
 import pytest
 
 from arcor2_hw.data.cell import read_cell
-from arcor2_server.cli.device_new import KINDS, WIRES, Base, Bus, refusal, texts
+from arcor2_server.cli.device_new import WIRES, Bus, refusal, texts
+from arcor2_server.cli.starter_kinds import KINDS, NO_ACT, Base
 
 pytestmark = pytest.mark.timeout(180)
 COMMAND = [sys.executable, "-m", "arcor2_server.cli.main"]
 ROOT = Path(__file__).parents[3]
 RUN = [
     (Base.MACHINE, Bus.MODBUS),
-    (Base.GENERIC, Bus.TCP),
+    (Base.AXIS, Bus.TCP),
     (Base.GENERIC, Bus.SERIAL),
-    (Base.MACHINE, Bus.HTTP),
+    (Base.SCALE, Bus.HTTP),
 ]
 """What is run here in full; every other combination is linted and analysed."""
-OF_THE_AUTHOR = ("hook works", "hook readings", "hook beyond_limits")
-"""Hooks of the bench that only somebody who knows the device can fill."""
+OF_THE_AUTHOR = ("hook works", "hook readings", "hook beyond_limits", NO_ACT)
+"""Hooks of the bench that only somebody who knows the device can fill, and a device that does nothing for long."""
 ALL = [(base, bus) for base in KINDS for bus in WIRES]
 
 
@@ -63,13 +64,16 @@ def test_the_suite_passes_at_once(tmp_path: Path, base: Base, bus: Bus) -> None:
             assert line.endswith(OF_THE_AUTHOR), line
 
 
-@pytest.mark.parametrize(("base", "bus"), ALL, ids=lambda each: each.value)
-@pytest.mark.parametrize("name", ["x", "feeder-of-small-round-pins"[:24]])
-def test_it_is_clean_python_whatever_its_name(tmp_path: Path, base: Base, bus: Bus, name: str) -> None:
-    for path, text in texts(name, base, bus).items():
-        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / path).write_text(text)
-        assert "$" not in text, path
+def test_all_are_clean_python_whatever_their_names(tmp_path: Path) -> None:
+    for base, bus in ALL:
+        for name in ("x", "feeder-of-small-round-pi"):
+            root = tmp_path / f"{base}-{bus}-{len(name)}"
+            for path, text in texts(name, base, bus).items():
+                (root / path).parent.mkdir(parents=True, exist_ok=True)
+                (root / path).write_text(text)
+                assert "$" not in text, path
+            (device,) = read_cell(root / "cell.yaml").devices
+            assert device.name == name.replace("-", "_")
     for command in (["check"], ["format", "--check"]):
         done = subprocess.run(
             [sys.executable, "-m", "ruff", *command, "--no-cache", "."],
@@ -79,8 +83,6 @@ def test_it_is_clean_python_whatever_its_name(tmp_path: Path, base: Base, bus: B
             check=False,
         )
         assert done.returncode == 0, done.stdout + done.stderr
-    (device,) = read_cell(tmp_path / "cell.yaml").devices
-    assert device.name == name.replace("-", "_")
 
 
 def test_a_modbus_machine_takes_sixty_lines_of_each_in_three_files(tmp_path: Path) -> None:
@@ -91,11 +93,16 @@ def test_a_modbus_machine_takes_sixty_lines_of_each_in_three_files(tmp_path: Pat
     assert lines(by_hand[1]) <= 60
 
 
-def test_the_driver_is_typed(tmp_path: Path) -> None:
-    root = written(tmp_path, Base.MACHINE, Bus.MODBUS, "press")
+def test_the_drivers_are_typed(tmp_path: Path) -> None:
+    buses = [*WIRES, *WIRES]
+    for base, bus in zip(KINDS, buses, strict=False):  # each base, each bus twice
+        for path, text in texts(f"{base}-of-mine", base, bus).items():
+            (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / path).write_text(text)
+    drivers = [f"{base}_of_mine/{base}_of_mine.py" for base in KINDS]
     done = subprocess.run(
-        [sys.executable, "-m", "mypy", "--strict", "--python-version", "3.11", "press/press.py"],
-        cwd=root,
+        [sys.executable, "-m", "mypy", "--strict", "--python-version", "3.11", *drivers],
+        cwd=tmp_path,
         env=os.environ | {"MYPYPATH": str(ROOT), "MYPY_CACHE_DIR": str(tmp_path / "mypy")},
         capture_output=True,
         text=True,
