@@ -18,7 +18,7 @@ BOARD = {"name": "board", "pose": {"position": [0.12, 0.06, 0.05]}, "size": [0.1
 class OakDBench(Bench):
     object_type = OakD
     connect_timeout = 5.0  # a network source renders its first picture only then
-    stale_after = 1.0
+    stale_after = 1.5
     fake: FakeProcess
 
     def start(self) -> None:
@@ -41,7 +41,7 @@ class OakDBench(Bench):
 
     def _build(self, address: str) -> OakD:
         pose = Pose(Position(0.0, 0.0, 0.8), Orientation(1.0, 0.0, 0.0, 0.0))
-        return OakD("camera_id", "camera", pose, None, OakDSettings(address, frame_timeout=0.8))
+        return OakD("camera_id", "camera", pose, None, OakDSettings(address, max_age=1.0, frame_timeout=1.5))
 
     def make(self) -> OakD:
         return self._build(self.address)

@@ -60,8 +60,8 @@ class Photographer:
         from arcor2_fakes.oak_d.scene import Scene
         from arcor2_fakes.oak_d.sensor import Sensor
 
-        self._lens = Lens(1280, 720)
-        self._renderer, self._sensor = Renderer(self._lens), Sensor(1280, 720, 1.0, 7)
+        self._lens = Lens(960, 540)
+        self._renderer, self._sensor = Renderer(self._lens), Sensor(960, 540, 1.0, 7)
         self._scene = Scene(ScenePose((0.0, 0.0, 0.7), (1.0, 0.0, 0.0, 0.0)), 0.0)
         self._number = 0
 

@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from arcor2_drivers.bin_picking.bin import Bin
@@ -57,14 +56,17 @@ def test_a_file_that_is_not_there_or_too_large(tmp_path: Path) -> None:
         connect(str(tmp_path / "large.stl"))
 
 
-def test_a_mesh_with_too_many_triangles(tmp_path: Path) -> None:
+def test_a_mesh_with_too_many_triangles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import open3d as o3d
 
-    mesh = o3d.geometry.TriangleMesh.create_sphere(0.05, 240)
-    assert len(np.asarray(mesh.triangles)) > 200_000
+    from arcor2_drivers.bin_picking import models
+
+    assert models.MOST_TRIANGLES == 200_000
+    monkeypatch.setattr(models, "MOST_TRIANGLES", 11)
+    mesh = o3d.geometry.TriangleMesh.create_box(0.1, 0.1, 0.1)
     mesh.compute_triangle_normals()
     o3d.io.write_triangle_mesh(str(tmp_path / "fine.stl"), mesh)
-    with pytest.raises(NotConnected, match="200000 at most are taken: simplify it"):
+    with pytest.raises(NotConnected, match="has 12 triangles, 11 at most are taken: simplify it"):
         connect(str(tmp_path / "fine.stl"))
 
 

@@ -28,7 +28,9 @@ def fake() -> Iterator[FakeProcess]:
 
 
 def test_from_the_picture_to_the_tool(fake: FakeProcess) -> None:
-    camera = OakD("camera_id", "camera", HANGING, None, OakDSettings(fake.ready["stream"]))
+    camera = OakD(
+        "camera_id", "camera", HANGING, None, OakDSettings(fake.ready["stream"], max_age=5.0, frame_timeout=10.0)
+    )
     box = Bin("bin_id", "crate", CRATE, BinSettings(LENGTH, WIDTH, HEIGHT, *PART))
     truth = at(-0.04, 0.03, PART[2] / 2, turned(z=64))
     try:

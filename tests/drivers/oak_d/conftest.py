@@ -50,6 +50,6 @@ def make() -> Iterator[Callable[..., OakD]]:
 
 @pytest.fixture
 def camera(fake: FakeProcess, make: Callable[..., OakD]) -> OakD:
-    camera = make(fake.ready["stream"], frame_timeout=0.8)
+    camera = make(fake.ready["stream"], frame_timeout=1.5)
     camera.connect(PATIENCE)
     return camera

@@ -32,9 +32,17 @@ def wait(holds: Callable[[], Any], within: float = 8.0) -> None:
         time.sleep(0.02)
 
 
+def fresh(camera: OakD) -> bool:
+    try:
+        camera.capture()
+    except (Stale, ConnectionLost):
+        return False
+    return True
+
+
 def back(camera: OakD) -> None:
     wait(lambda: camera.connection is Connection.BACK)
-    assert camera.trigger().depth is not None
+    wait(lambda: fresh(camera))
 
 
 def test_a_frozen_picture_is_stale(fake: FakeProcess, camera: OakD) -> None:
@@ -50,7 +58,7 @@ def test_a_frozen_picture_is_stale(fake: FakeProcess, camera: OakD) -> None:
     assert camera.connection is Connection.ONLINE  # it sends, after all
     fake.control.do("heal")
     wait(lambda: not camera.alarms())
-    assert camera.capture().depth is not None
+    wait(lambda: fresh(camera))
 
 
 def test_what_is_no_picture_is_an_error(fake: FakeProcess, camera: OakD) -> None:
@@ -119,14 +127,6 @@ def test_a_slow_stream_is_an_old_picture(fake: FakeProcess, camera: OakD) -> Non
     fake.control.do("heal")
     wait(lambda: camera.connection is not Connection.LOST)
     wait(lambda: fresh(camera))
-
-
-def fresh(camera: OakD) -> bool:
-    try:
-        camera.capture()
-    except (Stale, ConnectionLost):
-        return False
-    return True
 
 
 def test_a_stream_of_something_else(fake: FakeProcess, make: Callable[..., OakD]) -> None:
