@@ -180,7 +180,7 @@ class Labelling(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Fixture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A box that the camera sees and that never moves; its pose is that of its middle, its colour blue, green, red."""
+    """A box that the camera sees and that never moves; its pose is that of its middle, its colour red, green, blue."""
 
     name: str
     pose: Pose

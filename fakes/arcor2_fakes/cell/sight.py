@@ -9,8 +9,8 @@ from transforms3d.quaternions import mat2quat
 
 from arcor2_fakes.cell.layout import Camera, Matrix, Pose
 
-GREEN, LABELLED = (20, 110, 40), (215, 215, 205)
-"""A bare board, and one whose label covers it, as blue, green, red."""
+GREEN, LABELLED = (40, 110, 20), (205, 215, 215)
+"""A bare board, and one whose label covers it, as red, green, blue."""
 MOVED = 0.0005
 """m; less than that is not worth a new picture."""
 
