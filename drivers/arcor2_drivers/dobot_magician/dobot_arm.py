@@ -70,7 +70,9 @@ class DobotArm(DobotObserved):
         sample, until = self._observer.after(time.monotonic()), time.monotonic() + 2.0 * STANDING
         while sample.moving:  # one that has just come to rest counts as moving for a moment
             if time.monotonic() > until:
-                raise NotInControl(f"{self._who} moves, and not for us: somebody else has control; it is refused until it stands")
+                raise NotInControl(
+                    f"{self._who} moves, and not for us: somebody else has control; it is refused until it stands"
+                )
             sample = self._observer.after(sample.monotonic)
         has = self._dobot
         joint, ramp = math.degrees(has.max_joint_speed), math.degrees(has.joint_acceleration)
@@ -161,7 +163,7 @@ class DobotArm(DobotObserved):
 
     def _move_pose(self, target: Pose, mode: int, speed: float, stops: int) -> MoveResult:
         """Move; `stops` is the count of stops when the caller was called: one more since then, and nothing starts."""
-        within("speed", speed, SLOWEST, 1.0)
+        within(f"{self._who}: speed", speed, SLOWEST, 1.0)
         tool, q = self._solve(target)
         with self._moving():
             start = self._observer.sample()
@@ -178,7 +180,7 @@ class DobotArm(DobotObserved):
             return self._run(what, speed, budget, reached, stops, Command.PTP, "B4f", mode, *numbers)
 
     def _move_joints(self, q: Joints, speed: float, stops: int) -> MoveResult:
-        within("speed", speed, SLOWEST, 1.0)
+        within(f"{self._who}: speed", speed, SLOWEST, 1.0)
         with self._moving():
             budget = self._joint_time(self._observer.sample().q, q, speed)
 

@@ -8,7 +8,16 @@ from typing import ClassVar, Final
 from arcor2_hw.actions import action
 from arcor2_hw.data.device import Alarm, Connection, Health, LossReaction
 from arcor2_hw.data.geometry import Pose, Position
-from arcor2_hw.exceptions import Cancelled, DeviceError, DeviceFault, DeviceTimeout, NotFound, NotInControl, Refused
+from arcor2_hw.exceptions import (
+    Cancelled,
+    DeviceError,
+    DeviceFault,
+    DeviceTimeout,
+    NotFound,
+    NotInControl,
+    OutOfRange,
+    Refused,
+)
 from arcor2_hw.objects import Gripper, GripResult
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.small import GripperState
@@ -243,11 +252,14 @@ class Robotiq2F(Gripper):
     def _move(self, width: float, force: float, speed: float, what: str) -> Status:
         """Send the fingers to a width; give the status when they stand."""
         go_on = self._begin(what)
-        command = Command(
-            position=scaling.position(self._s, width),
-            force=scaling.force(self._s, force),
-            speed=scaling.speed(self._s, speed),
-        )
+        try:
+            command = Command(
+                position=scaling.position(self._s, width),
+                force=scaling.force(self._s, force),
+                speed=scaling.speed(self._s, speed),
+            )
+        except OutOfRange as e:
+            raise OutOfRange(f"{self._who}: {e}") from e
         if not self._one_motion.acquire(blocking=False):
             raise Refused(f"{self._who}: {what} is refused in state {GripperState.MOVING}")
         try:

@@ -89,8 +89,8 @@ class TwoAxisRobot(TwoAxisControlled):
 
     def _move(self, q: tuple[float, float], speed: float, acceleration: float, stops: int) -> MoveResult:
         """Move; `stops` is the count of stops when the caller was called: one more since then, and nothing starts."""
-        within("speed", speed, 0.001, 1.0)
-        within("acceleration", acceleration, 0.01, 1.0)
+        within(f"{self.name}: speed", speed, 0.001, 1.0)
+        within(f"{self.name}: acceleration", acceleration, 0.01, 1.0)
         with self._moving():
             self._require_control()
             if self._teaching:

@@ -46,13 +46,20 @@ def register_commands(control: ControlServer, arm: Arm, commands: Commands) -> N
     def drive(turn: float, percent: float = 5.0) -> None:
         """Turn the base, as a program on another host would."""
         arm.set.speed_ratio = float(percent)
-        first, *others = arm.joints
-        target = (first + float(turn), *others)
+        first, second, third, fourth = arm.joints
+        target = (first + float(turn), second, third, fourth)
         arm.enqueue(lambda: arm.point_to_point(JOINT_TO_ANGLES, target))
         arm.running = True
 
     control.command("renew", renew)
+
+    def pace(factor: float) -> None:
+        if not 0.0 < factor <= 100.0:
+            raise ValueError("factor is above 0, to 100")
+        arm.pace = float(factor)
+
     control.command("drive", drive)
+    control.command("pace", pace)
     control.command("alarm", alarm)
     control.command("wrong_checksum", wrong_checksum)
     control.command("mute", mute)
@@ -75,7 +82,9 @@ def main(
     *,
     link: Path | None = None,
     control: str = "127.0.0.1:0",
-    pace: Annotated[float, Parameter(validator=validators.Number(gt=0, lte=100))] = 1.0,
+    pace: Annotated[
+        float, Parameter(name=("--time-scale", "--pace"), validator=validators.Number(gt=0, lte=100))
+    ] = 1.0,
 ) -> int:
     """Start the fake; it prints one line `ready {json}` with its port and ends on SIGTERM.
 

@@ -74,10 +74,10 @@ class Space:
             name = self._names.get(item.NodeId)
             if name is not None and item.AttributeId == ua.AttributeIds.Value and item.Value.Value is not None:
                 value = item.Value.Value.Value
-                kind, before, status = self._kept[name]
+                kind, _, status = self._kept[name]
                 if self._takes(name):
                     self._kept[name] = (kind, value, status)
-                    if name != "Handshake.HostLife" or before != value:
+                    if name != "Handshake.HostLife":  # it is written all the time
                         self.written.append((name, value))
 
     @staticmethod

@@ -3,16 +3,18 @@
 import math
 import sys
 import tempfile
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from arcor2_drivers.dobot_magician.dobot_magician import DobotMagician
 from arcor2_drivers.dobot_magician.settings import DobotMagicianSettings
-from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.robot import Joint
 from arcor2_hw.objects import Generic
-from arcor2_hw.testing.bench import Bench
+from arcor2_hw.testing.bench import Bench, Check
 from arcor2_hw.testing.life import wait_until
 from tests.fakes.conftest import FakeProcess
 
@@ -48,6 +50,7 @@ class DobotMagicianBench(Bench):
     def reset(self) -> None:
         self.do("heal")
         self.do("renew")
+        self.do("pace", factor=1.0)
 
     @property
     def address(self) -> str:
@@ -106,3 +109,59 @@ class DobotMagicianBench(Bench):
 
     def orphan(self) -> list[str]:
         return [sys.executable, "-c", ORPHAN, self.address]
+
+    def reset_link(self) -> None:
+        self.do("reset")
+
+    def half_frame(self) -> None:
+        self.do("half_frame")
+
+    def readings(self, device: Generic) -> list[Check]:
+        assert isinstance(device, DobotMagician)
+        self.do("drive", turn=30.0, percent=100.0)
+        wait_until(lambda: self.fake.truth()["motions"] == 1 and not self.running(), 10.0, "a turn of 30 degrees")
+        time.sleep(0.3)  # until the driver has looked again
+        truth = self.fake.truth()
+        joints = zip(device.robot_joints(), truth["joints"], strict=True)
+        position = device.get_end_effector_pose(self._tool(device)).position
+        return [
+            *(Check(f"{joint.name}, rad", joint.value, math.radians(own), 1e-3) for joint, own in joints),
+            Check("the tool's x, m", position.x, truth["tool"][0] / 1000.0, 1e-3),
+            Check("the tool's y, m", position.y, truth["tool"][1] / 1000.0, 1e-3),
+        ]
+
+    @staticmethod
+    def _tool(device: DobotMagician) -> str:
+        return next(iter(device.get_end_effectors_ids()))
+
+    def _turned(self, device: DobotMagician, by: float) -> list[Joint]:
+        joints = device.robot_joints()
+        joints[0].value += by
+        return joints
+
+    def _home(self, device: DobotMagician) -> None:
+        self.do("pace", factor=20.0)
+        device.home()
+        self.do("pace", factor=1.0)
+
+    def works(self, device: Generic) -> dict[str, Callable[[], object]]:
+        assert isinstance(device, DobotMagician)
+        tool = self._tool(device)
+        return {
+            "forward_kinematics": lambda: device.forward_kinematics(tool, self._turned(device, 0.1)),
+            "inverse_kinematics": lambda: device.inverse_kinematics(tool, device.get_end_effector_pose(tool)),
+            "move_to_joints": lambda: device.move_to_joints(self._turned(device, 0.1), 0.5),
+            "move_to_pose": lambda: device.move_to_pose(
+                tool, device.forward_kinematics(tool, self._turned(device, -0.1)), 0.5
+            ),
+            "stop": device.stop,
+            "home": lambda: self._home(device),
+        }
+
+    def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
+        assert isinstance(device, DobotMagician)
+        return {
+            "a joint beyond its limit": lambda: device.move_to_joints(self._turned(device, 3.0), 0.5),
+            "a pose out of reach": lambda: device.move_to_pose(self._tool(device), Pose(Position(2.0, 0.0, 0.0)), 0.5),
+            "a speed above the highest": lambda: device.move_to_joints(self._turned(device, 0.1), 2.0),
+        }

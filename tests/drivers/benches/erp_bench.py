@@ -2,6 +2,7 @@
 
 import shutil
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -60,3 +61,21 @@ class ErpServiceBench(Bench):
     def ask(self, device: Generic) -> object:
         assert isinstance(device, ErpService)
         return device.next_order(0.0)
+
+    def reset_link(self) -> None:
+        self.do("reset")
+
+    def half_frame(self) -> None:
+        self.do("half_frame")
+
+    def works(self, device: Generic) -> dict[str, Callable[[], object]]:
+        return {}  # no optional method but those that read
+
+    def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
+        assert isinstance(device, ErpService)
+        return {
+            "a result of no order": lambda: device.report_result("", "S-1", True),
+            "a result of no piece": lambda: device.report_result("A-1", "", True),
+            "a note as long as a book": lambda: device.report_result("A-1", "S-1", True, "x" * 1000),
+            "a closing without a reason": lambda: device.close_order("A-1", ""),
+        }

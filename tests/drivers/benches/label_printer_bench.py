@@ -1,6 +1,7 @@
 """The label printer on its fake, on TCP; a label takes 1.5 s, and is finished without us."""
 
 import sys
+from collections.abc import Callable
 from typing import Any
 
 from arcor2_drivers.label_printer.settings import ZplPrinterSettings
@@ -71,3 +72,21 @@ class ZplPrinterBench(Bench):
 
     def orphan(self) -> list[str]:
         return [sys.executable, "-c", ORPHAN, self.address]
+
+    def reset_link(self) -> None:
+        self.do("reset")
+
+    def half_frame(self) -> None:
+        self.do("half_frame")
+
+    def works(self, device: Generic) -> dict[str, Callable[[], object]]:
+        return {}  # no optional method but those that read
+
+    def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
+        assert isinstance(device, ZplPrinter)
+        return {
+            "what is no label": lambda: device.print("hello"),
+            "two labels in one": lambda: device.print("^XA^FDa^FS^PQ2^XZ"),
+            "a field that is too long": lambda: device.print_label("x" * 201, "", "1"),
+            "a bar code that Code 128 does not have": lambda: device.print_label("", "", "\u20ac"),
+        }

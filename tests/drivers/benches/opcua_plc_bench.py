@@ -1,17 +1,20 @@
 """The PLC on its fake: job 3 takes 20 s and is stopped by its request, and by our life sign's end."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 from arcor2_drivers.opcua_plc.opcua_plc import OpcUaPlc
 from arcor2_drivers.opcua_plc.settings import OpcUaPlcSettings
 from arcor2_hw.objects import Generic
-from arcor2_hw.testing.bench import Bench
+from arcor2_hw.testing.bench import Bench, Check
 from tests.fakes.conftest import FakeProcess
 
-POINTS = "part=DI ns=2;s=Cell.PartPresent | lamp=DO ns=2;s=Cell.Lamp on_loss=off | level=AI ns=2;s=Cell.Level"
+POINTS = (
+    "part=DI ns=2;s=Cell.PartPresent | lamp=DO ns=2;s=Cell.Lamp on_loss=off | "
+    "level=AI ns=2;s=Cell.Level scale=0.001 unit=m | speed=AO ns=2;s=Cell.Speed scale=0.01 unit=m/s"
+)
 HANDSHAKE = (
     "owner=ns=2;s=Handshake.Owner | host_life=ns=2;s=Handshake.HostLife | plc_life=ns=2;s=Handshake.PlcLife | "
     "number=ns=2;s=Handshake.Number | request=ns=2;s=Handshake.Request | busy=ns=2;s=Handshake.Busy | "
@@ -91,3 +94,28 @@ class OpcUaPlcBench(Bench):
 
     def orphan(self) -> list[str]:
         return [sys.executable, "-c", ORPHAN, self.address, POINTS, HANDSHAKE]
+
+    def reset_link(self) -> None:
+        self.do("reset")
+
+    def half_frame(self) -> None:
+        self.do("half_frame")
+
+    def readings(self, device: Generic) -> list[Check]:
+        assert isinstance(device, OpcUaPlc)
+        self.do("set", name="Level", value=-250)
+        by_device = self.fake.truth()["points"]["Level"] / 1000.0  # the fake's level counts millimetres
+        return [Check("the level, m", float(device.read("level").value), by_device, 1e-9)]
+
+    def works(self, device: Generic) -> dict[str, Callable[[], object]]:
+        assert isinstance(device, OpcUaPlc)
+        return {"wait_for": lambda: device.wait_for("part", False, 1.0)}
+
+    def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
+        assert isinstance(device, OpcUaPlc)
+        return {
+            "a speed its type cannot hold": lambda: device.write_analog("speed", 1000.0),
+            "a negative speed of an unsigned type": lambda: device.write_analog("speed", -0.1),
+            "an input that is written": lambda: device.write_digital("part", True),
+            "a job its type cannot hold": lambda: device.run_job(100_000),
+        }

@@ -1,13 +1,14 @@
 """The 2F gripper on its fake's URCap; one that is cut off finishes its motion and holds."""
 
 import sys
+from collections.abc import Callable
 from typing import Any
 
 from arcor2_drivers.robotiq_2f.robotiq_2f import Robotiq2F
 from arcor2_drivers.robotiq_2f.settings import Robotiq2FSettings
 from arcor2_fakes.control import BlockingControlClient
 from arcor2_hw.objects import Generic
-from arcor2_hw.testing.bench import Bench
+from arcor2_hw.testing.bench import Bench, Check
 from arcor2_hw.testing.life import wait_until
 from tests.fakes.conftest import FakeProcess
 
@@ -101,3 +102,25 @@ class Robotiq2FBench(Bench):
 
     def orphan(self) -> list[str]:
         return [sys.executable, "-c", ORPHAN, *self.address.rsplit(":", 1)]
+
+    def reset_link(self) -> None:
+        self.do("reset")
+
+    def half_frame(self) -> None:
+        self.do("half_frame")
+
+    def works(self, device: Generic) -> dict[str, Callable[[], object]]:
+        return {}  # no optional method but those that read
+
+    def readings(self, device: Generic) -> list[Check]:
+        assert isinstance(device, Robotiq2F)
+        return [Check("the width, m", device.width(), self.fake.truth()["width"], 0.001)]
+
+    def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
+        assert isinstance(device, Robotiq2F)
+        return {
+            "a width beyond the stroke": lambda: device.grip(0.2),
+            "a negative width": lambda: device.grip(-0.01),
+            "a force beyond the model's": lambda: device.grip(force=500.0),
+            "a speed beyond the model's": lambda: device.grip(speed=1.0),
+        }

@@ -1,13 +1,14 @@
 """The scale on its fake, on a pty."""
 
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from arcor2_drivers.scale.mt_sics_scale import MtSicsScale
 from arcor2_drivers.scale.settings import MtSicsScaleSettings
 from arcor2_hw.objects import Generic
-from arcor2_hw.testing.bench import Bench
+from arcor2_hw.testing.bench import Bench, Check
 from tests.fakes.conftest import FakeProcess
 
 ACTING = ("T", "Z", "@", "TI", "ZI", "TA ", "M21")
@@ -65,3 +66,21 @@ class MtSicsScaleBench(Bench):
 
     def ask(self, device: Generic) -> object:
         return self.observe(device)
+
+    def reset_link(self) -> None:
+        self.do("reset")
+
+    def half_frame(self) -> None:
+        self.do("half_frame")
+
+    def works(self, device: Generic) -> dict[str, Callable[[], object]]:
+        return {}  # no optional method but those that read
+
+    def readings(self, device: Generic) -> list[Check]:
+        assert isinstance(device, MtSicsScale)
+        truth = self.fake.truth()
+        return [Check("the weight, kg", device.weigh().value, truth["load"] - truth["zero"] - truth["tare"], 1e-4)]
+
+    def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
+        assert isinstance(device, MtSicsScale)
+        return {"limits the wrong way round": lambda: device.weight_within(0.6, 0.4)}

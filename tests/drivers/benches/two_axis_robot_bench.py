@@ -3,14 +3,18 @@
 import math
 import sys
 import tempfile
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from arcor2_drivers.two_axis_robot.settings import TwoAxisRobotSettings
 from arcor2_drivers.two_axis_robot.two_axis_robot import TwoAxisRobot
-from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.robot import Joint
 from arcor2_hw.objects import Generic
-from arcor2_hw.testing.bench import Bench
+from arcor2_hw.testing.bench import Bench, Check
+from arcor2_hw.testing.life import wait_until
 from tests.fakes.conftest import FakeProcess
 
 ORPHAN = """
@@ -93,3 +97,64 @@ class TwoAxisRobotBench(Bench):
 
     def orphan(self) -> list[str]:
         return [sys.executable, "-c", ORPHAN, self.address]
+
+    def reset_link(self) -> None:
+        self.do("reset")
+
+    def half_frame(self) -> None:
+        self.do("half_frame")
+
+    def readings(self, device: Generic) -> list[Check]:
+        assert isinstance(device, TwoAxisRobot)
+        self.do("place", servo=1, ticks=2500)
+        self.do("place", servo=2, ticks=1800)
+        time.sleep(0.3)  # until the driver has looked again
+        servos = self.fake.truth()["servos"]
+        joints = device.robot_joints()
+        return [
+            Check(f"{joint.name}, rad", joint.value, servos[number]["angle"], 0.01)
+            for joint, number in zip(joints, ("1", "2"), strict=True)
+        ]
+
+    @staticmethod
+    def _tool(device: TwoAxisRobot) -> str:
+        return next(iter(device.get_end_effectors_ids()))
+
+    def _turned(self, device: TwoAxisRobot, by: float) -> list[Joint]:
+        joints = device.robot_joints()
+        joints[1].value += by
+        return joints
+
+    def _teach(self, device: TwoAxisRobot) -> None:
+        device.set_hand_teaching_mode(True)
+        device.set_hand_teaching_mode(False)
+
+    def _restart(self, device: TwoAxisRobot) -> None:
+        self.do("hardware_error", servo=1)
+        wait_until(lambda: bool(device.alarms()), 3.0, "seeing a hardware error")
+        device.restart_safety("the bench")
+
+    def works(self, device: Generic) -> dict[str, Callable[[], object]]:
+        assert isinstance(device, TwoAxisRobot)
+        tool = self._tool(device)
+        return {
+            "forward_kinematics": lambda: device.forward_kinematics(tool, self._turned(device, 0.3)),
+            "move_to_joints": lambda: device.move_to_joints(self._turned(device, 0.5), 0.5),
+            "inverse_kinematics": lambda: device.inverse_kinematics(tool, device.get_end_effector_pose(tool)),
+            "move_to_pose": lambda: device.move_to_pose(
+                tool, device.forward_kinematics(tool, self._turned(device, 0.3)), 0.5, linear=False
+            ),
+            "stop": device.stop,
+            "set_hand_teaching_mode": lambda: self._teach(device),
+            "restart_safety": lambda: self._restart(device),
+        }
+
+    def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
+        assert isinstance(device, TwoAxisRobot)
+        return {
+            "a joint beyond its limit": lambda: device.move_to_joints(self._turned(device, 9.0), 0.5),
+            "a pose out of reach": lambda: device.move_to_pose(
+                self._tool(device), Pose(Position(5.0, 0.0, 0.0)), 0.5, linear=False
+            ),
+            "a speed above the highest": lambda: device.move_to_joints(self._turned(device, 0.1), 2.0),
+        }

@@ -120,7 +120,7 @@ def test_kinematics_agrees_with_the_arm_and_names_what_is_out_of_reach(fake: Fak
         arm.forward_kinematics("tcp", joints(0, 100, 0, 0))
     with pytest.raises(OutOfRange, match="joint_4 of arm must be"):
         arm.move_to_joints(joints(0, 45, 45, math.nan), 1.0)
-    with pytest.raises(OutOfRange, match=r"^speed must be 0.01 to 1, not 1.5$"):
+    with pytest.raises(OutOfRange, match=r"^arm at .*: speed must be 0.01 to 1, not 1.5$"):
         arm.move_to_joints(joints(0, 45, 45, 0), 1.5)
     with pytest.raises(NotFound, match="no end effector 'hand'"):
         arm.get_end_effector_pose("hand")
