@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 _REWRITTEN = ("acting_cases", "acts", "conformance", "connecting_cases", "life", "loss_cases", "written_cases")
 pytest.register_assert_rewrite(*(f"arcor2_hw.testing.{each}" for each in _REWRITTEN))
 
-PENDING = pytest.StashKey[list[str]]()
-"""What the terminal summary has to tell of drivers that the suite does not cover yet."""
 OUTCOMES: pytest.StashKey[Outcomes] = pytest.StashKey()
 COLLECTED: pytest.StashKey[Mapping[str, frozenset[str]]] = pytest.StashKey()
 """By path of a collected file, the names of its tests."""
@@ -149,17 +147,13 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    """Tell the level of each driver, and name those that are not covered."""
+    """Tell the level of each driver."""
     outcomes = config.stash.get(OUTCOMES, None)
     judged = {} if outcomes is None else {name: ran for name, ran in outcomes.items() if ran.reached is not None}
     if judged:
         terminalreporter.section("levels of the drivers", sep="-")
         for name, ran in sorted(judged.items()):
             terminalreporter.write_line(_line(name, ran))
-    if lines := config.stash.get(PENDING, []):
-        terminalreporter.section("drivers without conformance", sep="-", yellow=True)
-        for line in lines:
-            terminalreporter.write_line(line)
 
 
 def _line(name: str, ran: Ran) -> str:

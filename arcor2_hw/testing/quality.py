@@ -15,7 +15,7 @@ FILE: Final = "quality.yaml"
 
 
 class Conformance(enum.StrEnum):
-    """Whether the suite runs on the driver: by a bench, or not yet, which every run of the suite tells."""
+    """Whether the suite runs on the driver: by a bench, or not yet."""
 
     BENCH = "bench"
     PENDING = "pending"
