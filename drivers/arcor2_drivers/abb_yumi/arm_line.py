@@ -21,13 +21,13 @@ from arcor2_hw.exceptions import (
 
 from .motion_lines import LAST_SEQUENCE, LONGEST_LINE, MEANING, VERSION, Answer, Code, Status, answer, line
 
-ANSWER_WITHIN: Final = 1.0
+ANSWER_WITHIN: Final = 2.0
 """Seconds an answer that needs no motion may take; the server looks every 20 ms."""
 KEEP_ALIVES: Final = 4
 """Keep-alives in the time of the watchdog."""
 LISTENS_AGAIN: Final = 0.1
 """Seconds between two attempts to connect."""
-SILENT: Final = 0.7
+SILENT: Final = 1.0
 """Seconds without an answer to a keep-alive after which the line is given up."""
 STOP_ANSWER: Final = 0.8
 """Seconds until the server has told that the arm stands: 50 ms until it looks, 0.2 s of braking, and slack."""

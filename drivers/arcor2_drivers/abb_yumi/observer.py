@@ -194,7 +194,7 @@ class Observer:
 
     def disconnect(self) -> None:
         """Stop observing and end the session; harmless when it was not observed."""
-        healthy = self.observing.online
+        healthy = self.responsive
         self._ending = True
         self._hurry.set()
         self.observing.stop()
@@ -204,6 +204,12 @@ class Observer:
     def newest(self) -> Sample | None:
         """Give the newest sample, however old."""
         return self._sample
+
+    @property
+    def responsive(self) -> bool:
+        """Tell whether the controller has answered lately: only then a courtesy is worth the wait."""
+        newest = self._sample
+        return self.observing.online and newest is not None and newest.age < FRESH / 2.0
 
     def sample(self) -> Sample:
         """Give the newest sample. Raises NotConnected, ConnectionLost, or Stale when it is too old."""

@@ -11,8 +11,8 @@ import httpx
 
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotConnected, Refused
 
-REQUEST_TIMEOUT: Final = 0.6
-"""Seconds a request may take: the web server of an IRC5 answers within some ten ms."""
+REQUEST_TIMEOUT: Final = 1.0
+"""Seconds a request may take: the web server of an IRC5 answers within some ten ms, seldom in hundreds."""
 
 Fields = dict[str, str]
 

@@ -58,7 +58,7 @@ class YumiControl(YumiObserved):
     # -------------------------------------------------------------------------------- control
     def disconnect(self) -> None:
         """Give control back and close; harmless when closed."""
-        online = self._observer.observing.online
+        online = self._observer.responsive
         self.release_control()
         command, self._command = self._command, None
         if command is not None:
@@ -124,7 +124,7 @@ class YumiControl(YumiObserved):
         for arm in ARMS:
             self._stops[arm] += 1
         if session is not None:
-            if session.ended is None and self._observer.observing.online:
+            if session.ended is None and self._observer.responsive:
                 for arm in ARMS:
                     with contextlib.suppress(DeviceError):
                         self._end_lead_through(arm)
@@ -202,7 +202,7 @@ class YumiControl(YumiObserved):
         rws = self._command
         if not self._mastership or rws is None:
             return
-        if self._observer.observing.online:
+        if self._observer.responsive:
             release_mastership(rws, "rapid")
             known = self._observer.known_panel
             if known is not None:
@@ -218,20 +218,22 @@ class YumiControl(YumiObserved):
         if session is None or session.ended is not None or sample.monotonic < self._controlled_since:
             return
         if sample.control_state != MOTORS_ON or not sample.running:
-            session.end(self._why_stopped(sample), wait=False)
+            session.end(self._why_stopped(), wait=False)
             self._mastership_back()
 
-    def _why_stopped(self, sample: Sample) -> DeviceError:
-        """Give why the program or the motors stopped, from the controller's own words."""
+    def _why_stopped(self) -> DeviceError:
+        """Give why the program or the motors stopped, from the controller's own words, asked anew.
+
+        A look takes its parts one after another: what stopped the program may have come after the control state.
+        """
         rws = self._observer.rws
-        panel = read_panel(rws)
-        self._observer.note(panel)
-        safety = safety_of(sample.control_state, panel.collision == COLLISION)
+        panel, state = self._asked(rws)
+        safety = safety_of(state, panel.collision == COLLISION)
         code, title = self._last_event(rws)
         if safety is not Safety.NORMAL:
             what = safety.value.replace("_", " ")
             return SafetyStop(f"{what} on {self.name} ({rws.address})", f"{code} {title}".strip(), safety.value)
-        if sample.control_state != MOTORS_ON:
+        if state != MOTORS_ON:
             return NotInControl(f"the motors of {self.name} ({rws.address}) were switched off", f"{code} {title}")
         return DeviceFault(
             f"RAPID stopped on {self.name} ({rws.address}): {title or 'no reason told'}", f"{code}", code
@@ -269,7 +271,7 @@ class YumiControl(YumiObserved):
         with contextlib.suppress(DeviceError):
             sample = self._observer.sample_after(time.monotonic())
             if sample.control_state != MOTORS_ON or not sample.running:
-                told = self._why_stopped(sample)
+                told = self._why_stopped()
                 if session is not None and session.ended is error:
                     session.ended = told
                 return told

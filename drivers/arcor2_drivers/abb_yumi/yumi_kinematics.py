@@ -18,11 +18,11 @@ from .frames import Configuration, RobTarget, orientation_values, pose_from, pos
 from .motion_lines import Code
 from .nominal import Array
 from .session import ControlSession
-from .settings import ARMS, MAX_PAYLOAD, YumiSettings, within
+from .settings import ARMS, MAX_PAYLOAD, YumiSettings
 from .yumi_control import YumiControl
 from .yumi_observed import JOINTS
 
-COMPUTE_WITHIN: Final = 2.0
+COMPUTE_WITHIN: Final = 3.0
 
 
 class YumiKinematics(YumiControl):
@@ -88,7 +88,7 @@ class YumiKinematics(YumiControl):
         line = session.lines[arm]
         tcp = self._pose.inverted() * pose
         if not all(map(math.isfinite, (*tcp.position, *tcp.orientation))):
-            raise OutOfRange("the numbers of a pose must be finite")
+            raise OutOfRange(f"{self.name}: the numbers of a pose must be finite")
         flange = tcp * self._tools[arm].inverted()
         near = np.array(seed) if seed is not None else self._present(arm)
         guess, missed = nominal.nearest(arm, flange.matrix(), near)
@@ -120,9 +120,9 @@ class YumiKinematics(YumiControl):
     ) -> None:
         """Tell an arm's server of its tool: TCP in the flange, mass kg, centre of gravity m; inertia is left out."""
         arm = self._arm(arm_id)
-        within("mass", mass, 0.001, MAX_PAYLOAD)
+        self._within("mass", mass, 0.001, MAX_PAYLOAD)
         for axis, value in zip("xyz", cog, strict=True):
-            within(f"cog {axis}", value, -0.5, 0.5)
+            self._within(f"cog {axis}", value, -0.5, 0.5)
         if inertia is not None:
             raise Refused(f"{self.name}: an inertia cannot be set through this driver")
         self._controlled().tell_tool(arm, tcp, (mass, cog))

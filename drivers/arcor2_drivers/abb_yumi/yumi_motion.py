@@ -4,7 +4,7 @@ import contextlib
 import math
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -16,6 +16,7 @@ from arcor2_hw.exceptions import (
     ConnectionLost,
     DeviceError,
     DeviceTimeout,
+    NotConnected,
     NotInControl,
     OutOfRange,
     Refused,
@@ -28,9 +29,9 @@ from .clearance import joint_path, other_arm
 from .frames import to_degrees
 from .motion_lines import MOST_WAYPOINTS, Code, Status
 from .nominal import Array
-from .observer import world
+from .observer import AT_REST, world
 from .session import ControlSession, stop_rapid
-from .settings import ARMS, YumiSettings, within
+from .settings import ARMS, YumiSettings
 from .yumi_kinematics import YumiKinematics
 
 RAMP: Final = 0.2
@@ -46,8 +47,6 @@ STOP_AGAIN: Final = 0.15
 """Seconds after which a motion that has not heard of its stop is told again: the two sockets have no common order."""
 LONGEST: Final = 600.0
 """Seconds a joint motion may be made to last."""
-
-Valid = Callable[[], bool]
 
 
 class YumiMotion(YumiKinematics):
@@ -103,7 +102,7 @@ class YumiMotion(YumiKinematics):
         self._move_joints(arm, self._checked_joints(target_joints, arm), speed, self._stops[arm])
 
     def _move_joints(self, arm: str, goal: list[float], speed: float, stops: int) -> MoveResult:
-        within("speed", speed, 0.001, 1.0)
+        self._within("speed", speed, 0.001, 1.0)
         with self._moving((arm,)):
             session = self._controlled()
             start = self._present(arm)
@@ -115,7 +114,7 @@ class YumiMotion(YumiKinematics):
             return self._finish(session, {arm: begun}, {arm: stops}, duration, speed)[arm]
 
     def _move_pose(self, arm: str, pose: Pose, linear: bool, speed: float, stops: int) -> MoveResult:
-        within("speed", speed, 0.001, 1.0)
+        self._within("speed", speed, 0.001, 1.0)
         with self._moving((arm,)):
             session = self._controlled()
             start = self._present(arm)
@@ -143,12 +142,12 @@ class YumiMotion(YumiKinematics):
         """Move an arm's TCP in lines through poses in the world; `blend` is the radius at corners, m, up to 0.2."""
         arm = self._arm(arm_id)
         stops = self._stops[arm]
-        within("speed", speed, 0.001, 1.0)
-        within("blend", blend, 0.0, 0.2)
+        self._within("speed", speed, 0.001, 1.0)
+        self._within("blend", blend, 0.0, 0.2)
         if not linear:
             raise Refused(f"{self.name} runs paths in lines only")
         if not 1 <= len(waypoints) <= MOST_WAYPOINTS:
-            raise OutOfRange(f"waypoints must be 1 to {MOST_WAYPOINTS} poses, not {len(waypoints)}")
+            raise OutOfRange(f"{self.name}: waypoints must be 1 to {MOST_WAYPOINTS} poses, not {len(waypoints)}")
         with self._moving((arm,)):
             session = self._controlled()
             line, start = session.lines[arm], self._present(arm)
@@ -172,9 +171,9 @@ class YumiMotion(YumiKinematics):
 
         The arms go with all axes together and are coupled in the controller: when one stops, both do.
         """
-        within("speed", speed, 0.001, 1.0)
+        self._within("speed", speed, 0.001, 1.0)
         if set(targets) != set(ARMS):
-            raise OutOfRange(f"targets must name both {' and '.join(ARMS)}; given: {', '.join(targets)}")
+            raise OutOfRange(f"{self.name}: targets must name both {' and '.join(ARMS)}; given: {', '.join(targets)}")
         stops = dict(self._stops)
         checked = {
             arm: None if isinstance(target, Pose) else self._checked_joints(target, arm)
@@ -241,7 +240,9 @@ class YumiMotion(YumiKinematics):
         longest = float(np.abs(np.array(goal) - start).max())
         duration = longest / (speed * self._yumi.max_joint_speed) + RAMP
         if duration > LONGEST:
-            raise OutOfRange(f"at speed {speed:g} the move would take {duration:.0f} s, {LONGEST:.0f} s are allowed")
+            raise OutOfRange(
+                f"{self.name}: at speed {speed:g} the move would take {duration:.0f} s, {LONGEST:.0f} s are allowed"
+            )
         return duration
 
     def _line_time(self, arm: str, poses: list[Pose], speed: float) -> float:
@@ -342,6 +343,7 @@ class YumiMotion(YumiKinematics):
         session = self._session
         if session is None or session.ended is not None:
             self._refuse_foreign()
+            self._await_rest(arms)
             return
         lines = [session.lines[arm] for arm in arms]
         if not all(_all_at_once(lines)) and session.ended is None:
@@ -351,6 +353,20 @@ class YumiMotion(YumiKinematics):
             if time.monotonic() > until:
                 raise DeviceTimeout(f"{self.name} did not come to rest within {REST_WITHIN:g} s of a stop")
             time.sleep(0.005)
+        if session.ended is not None:
+            self._await_rest(arms)
+
+    def _await_rest(self, arms: tuple[str, ...]) -> None:
+        """Wait until arms that were ours are seen to stand; what cannot be observed is left to the watchdog."""
+        newest, panel = self._observer.newest(), self._observer.known_panel
+        if newest is None or panel is None or not panel.ours or not self._observer.observing.online:
+            return
+        until = time.monotonic() + REST_WITHIN
+        with contextlib.suppress(ConnectionLost, NotConnected):
+            self._observer.sample_after(time.monotonic())
+            while max(self._observer.sample_after(time.monotonic()).speeds[arm] for arm in arms) > AT_REST:
+                if time.monotonic() > until:
+                    raise DeviceTimeout(f"{self.name} did not come to rest within {REST_WITHIN:g} s of a stop")
 
     def _refuse_foreign(self) -> None:
         newest, panel = self._observer.newest(), self._observer.known_panel

@@ -13,7 +13,7 @@ from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 
 from .nominal import LIMITS
 from .observer import UNITS, Observer, Panel, Sample, world
-from .settings import ARMS, YumiSettings
+from .settings import ARMS, YumiSettings, within
 from .states import AUTOMATIC, COLLISION, MOTORS_ON, REMEDIES, mode_of, power_of, safety_of
 
 END_EFFECTOR: Final = "tcp"
@@ -202,8 +202,15 @@ class YumiObserved(MultiArmRobot):
             )
         for name, (low, high) in zip(names, LIMITS, strict=True):
             if not low - LIMIT_SLACK <= values[name] <= high + LIMIT_SLACK:
-                raise OutOfRange(f"{name} must be {low:.3f} to {high:.3f} rad, not {values[name]!r}")
+                raise OutOfRange(f"{self.name}: {name} must be {low:.3f} to {high:.3f} rad, not {values[name]!r}")
         return [min(max(values[name], low), high) for name, (low, high) in zip(names, LIMITS, strict=True)]
+
+    def _within(self, what: str, value: float, low: float, high: float) -> None:
+        """Raise OutOfRange, naming robot and parameter, unless the value lies in the range."""
+        try:
+            within(what, value, low, high)
+        except OutOfRange as e:
+            raise OutOfRange(f"{self.name}: {e}") from None
 
     def _stated_loads(self) -> None:
         missing = [f"{arm}_mass" for arm in ARMS if self._yumi.load(arm) is None]

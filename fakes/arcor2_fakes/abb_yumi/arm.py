@@ -142,7 +142,7 @@ class Arm:
         distance = float(np.linalg.norm(target[:3, 3] - start.pose[:3, 3]))
         whole = turn(target[:3, :3] @ start.pose[:3, :3].T)
         swing = float(np.arctan2(np.sin(angle - start.angle), np.cos(angle - start.angle)))
-        size = max(distance / 0.01, float(np.linalg.norm(whole)) / 0.05, abs(swing) / 0.05)
+        size = max(distance / 0.02, float(np.linalg.norm(whole)) / 0.05, abs(swing) / 0.05)
         count = int(np.clip(size, 2, 80))
         path = [self.q]
         for part in np.linspace(0.0, 1.0, count + 1)[1:]:

@@ -71,7 +71,7 @@ class FakeYumi:
 
 @pytest.fixture(scope="module")
 def module_fake() -> Iterator[FakeYumi]:
-    fake = FakeYumi()
+    fake = FakeYumi("--time-scale", "2")
     yield fake
     fake.end()
 

@@ -33,7 +33,7 @@ def test_a_joint_move_takes_its_time_and_gets_there(fake: FakeYumi, ready: YuMi)
     began = time.monotonic()
     ready.move_to_joints(goal, 0.5, arm_id="left")
     took = time.monotonic() - began
-    assert took > 0.9  # 0.5 rad at 0.5 rad/s, and a ramp
+    assert took > 0.45  # 0.5 rad at 0.5 rad/s and a ramp, twice as fast
     assert fake.arm("left")["joints"] == pytest.approx([math.degrees(joint.value) for joint in goal], abs=0.01)
     assert [joint.value for joint in ready.robot_joints(arm_id="left")] == pytest.approx(
         [joint.value for joint in goal], abs=1e-4
@@ -169,7 +169,7 @@ def test_the_speed_override_slows_and_does_not_fail(fake: FakeYumi, ready: YuMi)
     fake.do("speed_ratio", percent=25)
     began = time.monotonic()
     ready.move_to_joints(turned(ready, "left", 1, 0.4), 1.0, arm_id="left")
-    assert time.monotonic() - began > 1.5
+    assert time.monotonic() - began > 0.75
     assert ready.state().speed_override == 0.25
 
 

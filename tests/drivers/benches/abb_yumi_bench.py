@@ -1,16 +1,18 @@
 """The YuMi on its fake controller, on an address of its own."""
 
+import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
 from arcor2_drivers.abb_yumi.settings import YumiSettings
 from arcor2_drivers.abb_yumi.yumi import YuMi
-from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.robot import Joint, Safety
 from arcor2_hw.objects import Generic
-from arcor2_hw.testing.bench import Bench
-from tests.drivers.abb_yumi.conftest import RWS_PORT, FakeYumi, settings
+from arcor2_hw.testing.bench import Bench, Check
+from tests.drivers.abb_yumi.conftest import RWS_PORT, FakeYumi, settings, wait
 
 ORPHAN = """
 import sys
@@ -92,6 +94,90 @@ class YuMiBench(Bench):
             yield
         finally:
             self.fake.do("foreign_program", on=False)
+
+    def reset_link(self) -> None:
+        self.fake.do("reset")
+
+    def half_frame(self) -> None:
+        self.fake.do("half_frame")
+
+    def readings(self, device: Generic) -> Iterable[Check]:
+        assert isinstance(device, YuMi)
+        for arm in ("left", "right"):
+            truth = self.fake.arm(arm)
+            for joint, degrees in zip(device.robot_joints(arm_id=arm), truth["joints"], strict=True):
+                yield Check(joint.name, joint.value, math.radians(degrees), 1e-5)
+            pose = device.get_end_effector_pose("tcp", arm)
+            flange = (pose * Pose(Position(0.0, 0.0, -0.136))).position
+            for axis, by_driver, by_device in zip("xyz", flange, truth["position"], strict=True):
+                yield Check(f"{axis} of the {arm} flange", by_driver, by_device, 1e-5)
+
+    def beyond_limits(self, device: Generic) -> Mapping[str, Callable[[], object]]:
+        assert isinstance(device, YuMi)
+        joints = device.robot_joints(arm_id="left")
+        beyond = [Joint(joints[0].name, 3.0), *joints[1:]]
+        far, tool = Pose(Position(1.5, 0.0, 0.3)), (0.0, 0.0, 0.05)
+        across = device.get_end_effector_pose("tcp", "left")
+        across.position.y -= 0.35
+        return {
+            "a joint beyond its range": lambda: device.move_to_joints(beyond, 0.5, arm_id="left"),
+            "a speed above 1": lambda: device.move_to_joints(joints, 1.5, arm_id="left"),
+            "a pose out of reach": lambda: device.move_to_pose("tcp", far, 0.5, arm_id="left"),
+            "a way into the other arm": lambda: device.move_to_pose("tcp", across, 0.5, linear=False, arm_id="left"),
+            "a path of nothing": lambda: device.move_path([], arm_id="left"),
+            "a blend of a metre": lambda: device.move_path([across], 1.0, arm_id="left"),
+            "one arm in step with none": lambda: device.move_synchronously({"left": joints}),
+            "a load of 2 kg": lambda: device.set_tool(Pose(), 2.0, tool, arm_id="left"),
+        }
+
+    def works(self, device: Generic) -> Mapping[str, Callable[[], object]]:
+        assert isinstance(device, YuMi)
+
+        def near(arm: str, up: float) -> Pose:
+            pose = device.get_end_effector_pose("tcp", arm)
+            pose.position.z += up
+            return pose
+
+        def turned(arm: str) -> list[Joint]:
+            joints = device.robot_joints(arm_id=arm)
+            joints[5].value += 0.1
+            return joints
+
+        def taught() -> None:
+            device.set_hand_teaching_mode(True, "left")
+            assert self.fake.arm("left")["lead_through"]
+            device.set_hand_teaching_mode(False, "left")
+            assert not self.fake.arm("left")["lead_through"]
+
+        def tooled() -> None:
+            device.set_tool(Pose(Position(0.0, 0.0, 0.15)), 0.3, (0.0, 0.0, 0.06), arm_id="left")
+            assert self.fake.arm("left")["load"] == [0.3, 0.0, 0.0, 60.0]
+
+        def collided() -> None:
+            self.fake.do("collide", arm="left")
+            wait(lambda: device.state().safety is Safety.PROTECTIVE_STOP)
+            device.acknowledge_protective_stop("the suite")
+            device.take_control()
+
+        def switched() -> None:
+            self.fake.do("control_state", state="motoroff")
+            device.power_on()
+            assert self.fake.truth()["control_state"] == "motoron"
+
+        return {
+            "move_to_pose": lambda: device.move_to_pose("tcp", near("left", 0.03), 0.5, arm_id="left"),
+            "move_to_joints": lambda: device.move_to_joints(turned("right"), 0.5, arm_id="right"),
+            "move_path": lambda: device.move_path([near("left", 0.02), near("left", 0.04)], arm_id="left"),
+            "move_synchronously": lambda: device.move_synchronously({"left": turned("left"), "right": turned("right")}),
+            "stop": device.stop,
+            "inverse_kinematics": lambda: device.inverse_kinematics("tcp", near("right", 0.02), arm_id="right"),
+            "forward_kinematics": lambda: device.forward_kinematics("tcp", turned("left"), "left"),
+            "get_hand_teaching_mode": lambda: device.get_hand_teaching_mode("left"),
+            "set_hand_teaching_mode": taught,
+            "set_tool": tooled,
+            "acknowledge_protective_stop": collided,
+            "power_on": switched,
+        }
 
     def orphan(self) -> list[str]:
         return [sys.executable, "-c", ORPHAN, self.address, str(RWS_PORT)]
