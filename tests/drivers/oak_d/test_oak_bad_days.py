@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from typing import Any
@@ -140,6 +141,7 @@ def test_a_stream_of_something_else(fake: FakeProcess, make: Callable[..., OakD]
 
 FORGETFUL = """
 import sys
+import threading
 from arcor2_drivers.oak_d.oak_d import OakD
 from arcor2_drivers.oak_d.settings import OakDSettings
 from arcor2_hw.data.geometry import Pose
@@ -191,3 +193,36 @@ def test_a_missing_library_names_the_extra(make: Callable[..., OakD], monkeypatc
     monkeypatch.delattr(package, "feed", raising=False)
     with pytest.raises(NotConnected, match=r"depthai is not installed here.*arcor2-hw\[depthai\]"):
         make("127.0.0.1:1").connect(1.0)
+
+
+def test_a_camera_that_starts_too_late_is_given_up_and_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    import depthai as dai
+
+    from arcor2_drivers.oak_d import feed
+
+    class Slow:
+        closed = threading.Event()
+
+        def __init__(self, _: object) -> None:
+            time.sleep(0.4)
+
+        def close(self) -> None:
+            self.closed.set()
+
+    monkeypatch.setattr(dai, "Device", Slow)
+    with pytest.raises(DeviceTimeout, match=r"^camera at X has not started within 0\.1 s"):
+        feed.boot("camera at X", dai.DeviceInfo("X"), 0.1)
+    assert Slow.closed.wait(5.0)  # not kept from the next that wants it
+
+
+def test_several_cameras_have_to_be_told_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    import depthai as dai
+
+    from arcor2_drivers.oak_d import feed
+
+    found = [dai.DeviceInfo("10.0.0.7"), dai.DeviceInfo("10.0.0.8")]
+    monkeypatch.setattr(dai.Device, "getAllAvailableDevices", staticmethod(lambda: found))
+    assert feed.find("camera", "10.0.0.8", 0.1).name == "10.0.0.8"
+    with pytest.raises(NotConnected, match=r"^camera: there are 2 cameras; give the device id of one") as raised:
+        feed.find("camera", "", 0.1)
+    assert "10.0.0.7" in raised.value.detail
