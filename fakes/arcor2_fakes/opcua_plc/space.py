@@ -70,20 +70,14 @@ class Space:
     def _was_written(self, event: Any, _: Any = None) -> None:
         if not isinstance(event, ServerItemCallback) or not event.is_external:
             return
-        for item in event.request_params.NodesToWrite:
+        for item, status in zip(event.request_params.NodesToWrite, event.response_params, strict=True):
             name = self._names.get(item.NodeId)
-            if name is not None and item.AttributeId == ua.AttributeIds.Value and item.Value.Value is not None:
-                value = item.Value.Value.Value
-                kind, _, status = self._kept[name]
-                if self._takes(name):
-                    self._kept[name] = (kind, value, status)
-                    if name != "Handshake.HostLife":  # it is written all the time
-                        self.written.append((name, value))
-
-    @staticmethod
-    def _takes(name: str) -> bool:
-        folder, _, short = name.partition(".")
-        return (HANDSHAKE[short] if folder == "Handshake" else POINTS[short])[1]
+            if name is None or item.AttributeId != ua.AttributeIds.Value or not status.is_good():
+                continue
+            kind, _, quality = self._kept[name]
+            self._kept[name] = (kind, item.Value.Value.Value, quality)
+            if name != "Handshake.HostLife":  # it is written all the time
+                self.written.append((name, item.Value.Value.Value))
 
     def value(self, name: str) -> Any:
         """Give the value of a variable."""
