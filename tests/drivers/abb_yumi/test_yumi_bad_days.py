@@ -266,3 +266,16 @@ def test_ports_of_the_other_arm_are_noticed(fake: FakeYumi) -> None:
         robot.take_control()
     assert "other arm" in str(error.value)
     robot.disconnect()
+
+
+def test_a_controller_that_was_switched_off_and_on(fake: FakeYumi, ready: YuMi) -> None:
+    doing = moving_far(fake, ready)
+    fake.do("power_cycle")
+    with pytest.raises(DeviceError) as error:
+        doing.result()
+    assert isinstance(error.value, (ConnectionLost, NotInControl, DeviceFault))
+    wait(lambda: ready.connection in (Connection.BACK, Connection.ONLINE), 8.0)
+    stands_still(fake)
+    assert ready.control_owner() != "us"
+    ready.take_control()
+    ready.move_to_joints(turned(ready, "left", 1, 0.1), 0.8, arm_id="left")
