@@ -346,7 +346,7 @@ class ControlSession:
     # -------------------------------------------------------------------------------- the guard
     def _watch(self) -> None:
         period = 1.0 / (KICKS_PER_PERIOD * self._watchdog)
-        kicks = {own: json.dumps({"do": do, "args": []}) for own, do in ((False, "kickWatchdog"), (True, "kick"))}
+        kick: Future[Any] | None = None
         due = gone_since = 0.0
         while True:
             now = time.monotonic()
@@ -367,11 +367,10 @@ class ControlSession:
                 self._speed_until = None
                 with contextlib.suppress(DeviceError):
                     self._send("the end of a jog", "speedStop", ())
-            if now >= due:
+            if now >= due and (kick is None or kick.done()):  # on a busy computer they must not pile up before a stop
                 due = now + period
-                with self._order:
-                    if self.ended is None:
-                        self._write(kicks[self.own is not None])
+                with contextlib.suppress(DeviceError):
+                    kick = self._send("a kick", "kickWatchdog" if self.own is None else "kick", ())
             self._ending.wait(GUARD_PERIOD)
         self._last_stop()
 

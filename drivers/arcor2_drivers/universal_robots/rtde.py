@@ -88,6 +88,8 @@ class RtdeStream:
             opened = socket.create_connection((host, port), timeout)
         except TimeoutError:
             raise DeviceTimeout(f"UR controller {address} cannot be reached within {timeout:g} s") from None
+        except ConnectionResetError as e:  # it listens: the reset may overtake the news that it accepted
+            raise ConnectionLost(f"UR controller {address} broke off the exchange", str(e)) from e
         except OSError as e:
             raise NotConnected(f"no UR controller at {address}: {e.strerror or e}", str(e)) from e
         stream = cls(host, port, opened)

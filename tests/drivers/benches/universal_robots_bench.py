@@ -47,7 +47,7 @@ class UR5eBench(Bench):
         return self.fake.host
 
     def _build(self, host: str) -> UR5e:
-        return UR5e("robot_id", "arm", Pose(), UrSettings(host, payload_mass=1.0, tcp_z=0.1))
+        return UR5e("robot_id", "arm", Pose(), UrSettings(host, payload_mass=1.0, tcp_z=0.1, watchdog_frequency=5.0))
 
     def make(self) -> UR5e:
         return self._build(self.address)

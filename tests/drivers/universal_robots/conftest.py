@@ -95,8 +95,8 @@ def start_fake() -> Iterator[Callable[..., FakeUr]]:
 
 
 def make(host: str, pose: Pose | None = None, **settings: Any) -> UR5e:
-    """An arm that is brisker than as delivered, so that tests need not wait for it."""
-    brisk = {"max_joint_speed": 2.0, "joint_acceleration": 8.0, "tcp_acceleration": 4.0}
+    """An arm brisker than as delivered, so that tests need not wait for it, whose watchdog bears a busy computer."""
+    brisk = {"max_joint_speed": 2.0, "joint_acceleration": 8.0, "tcp_acceleration": 4.0, "watchdog_frequency": 5.0}
     return UR5e(
         "obj_1", "ur", pose or Pose(), UrSettings(host, **{"payload_mass": 1.0, "tcp_z": 0.1, **brisk, **settings})
     )

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from arcor2_drivers.universal_robots.observer import Sample
+from arcor2_drivers.universal_robots.rtde import RtdeStream
 from arcor2_drivers.universal_robots.ur5e import UR5e
 from arcor2_hw.data.device import Connection
 from arcor2_hw.data.geometry import Orientation, Pose, Position
@@ -91,6 +92,15 @@ def test_what_is_no_controller_is_a_typed_error_within_the_deadline(
         robot.connect(0.5)
     assert time.monotonic() - began < 0.8
     robot.disconnect()
+
+
+def test_a_reset_that_overtakes_the_accepting_is_the_same_loss(monkeypatch: pytest.MonkeyPatch) -> None:
+    def overtaken(*_: object) -> socket.socket:
+        raise ConnectionResetError(104, "Connection reset by peer")
+
+    monkeypatch.setattr(socket, "create_connection", overtaken)
+    with pytest.raises(ConnectionLost, match=r"127\.0\.0\.9:30004"):
+        RtdeStream.open("127.0.0.9", ["timestamp"], 0.2)
 
 
 def test_connecting_observes_and_is_idempotent(fake: FakeUr) -> None:
