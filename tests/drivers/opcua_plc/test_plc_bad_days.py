@@ -12,6 +12,7 @@ from arcor2_drivers.opcua_plc.edges import Edge
 from arcor2_drivers.opcua_plc.opcua_plc import OpcUaPlc
 from arcor2_hw.data.device import Connection, Health
 from arcor2_hw.exceptions import (
+    Cancelled,
     ConnectionLost,
     DeviceError,
     DeviceTimeout,
@@ -72,10 +73,13 @@ def test_outputs_and_job_when_our_life_sign_ends(fake: FakeProcess) -> None:
 
 
 def test_our_life_sign_outlives_a_long_job(fake: FakeProcess, plc: OpcUaPlc) -> None:
-    done = len(fake.truth()["done"])
-    plc.run_job(3)  # 4 s, four times the PLC's patience
-    assert fake.truth()["done"][done:] == [3]
+    running = Beside(lambda: plc.run_job(3))
+    fake.control.wait_until(lambda t: t["moving"])
+    time.sleep(2.2)  # twice the PLC's patience
+    assert fake.truth()["moving"]
     assert plc.control_owner() == "us"
+    plc.stop()
+    assert isinstance(running.outcome(), Cancelled)
 
 
 def test_a_program_that_stands_makes_values_old(fake: FakeProcess, plc: OpcUaPlc, wait_for: Any) -> None:
