@@ -1,6 +1,7 @@
 """The observed camera: one thread takes every picture from the feed and keeps the newest."""
 
 import atexit
+import os
 import threading
 import time
 from typing import TYPE_CHECKING, Final
@@ -124,14 +125,7 @@ class Observed:
     # -------------------------------------------------------------------------------- on the observing thread
     def _open(self, timeout: float) -> None:
         deadline = time.monotonic() + timeout
-        try:
-            from . import feed
-        except ImportError as e:
-            raise NotConnected(
-                f"{self.who}: depthai is not installed here; it comes with the extra `depthai` (arcor2-hw[depthai])",
-                str(e),
-            ) from e
-        opened = feed.open_feed(self.who, self._name, self._settings, timeout)
+        opened = self._opened(timeout)
         self._feed = opened
         shot = None
         while shot is None or time.monotonic() - shot.monotonic > self._settings.max_age:
@@ -145,6 +139,23 @@ class Observed:
                 opened.set_exposure(self._exposure, min(EXPOSURE_TIMEOUT, max(deadline - time.monotonic(), 0.01)))
             except Refused:
                 self._exposure = None
+
+    def _opened(self, timeout: float) -> "Feed":
+        """Open the source that the settings name; depthai is loaded by that."""
+        os.environ.setdefault("DEPTHAI_LEVEL", "error")  # it warns of USB, which a container or a server may well lack
+        try:
+            if self._settings.network is not None:
+                from .network_feed import NetworkFeed
+
+                return NetworkFeed(self.who, self._name, self._settings, timeout)
+            from .device_feed import DeviceFeed
+
+            return DeviceFeed(self.who, self._name, self._settings, timeout)
+        except ImportError as e:
+            raise NotConnected(
+                f"{self.who}: depthai is not installed here; it comes with the extra `depthai` (arcor2-hw[depthai])",
+                str(e),
+            ) from e
 
     def _watch(self, stopping: threading.Event) -> None:
         feed = self._feed

@@ -187,10 +187,8 @@ def test_no_camera_is_found_at_once(make: Callable[..., OakD], monkeypatch: pyte
 
 def test_a_missing_library_names_the_extra(make: Callable[..., OakD], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "depthai", None)
-    monkeypatch.delitem(sys.modules, "arcor2_drivers.oak_d.feed", raising=False)
-    import arcor2_drivers.oak_d as package
-
-    monkeypatch.delattr(package, "feed", raising=False)
+    for module in ("feed", "network_feed"):
+        monkeypatch.delitem(sys.modules, f"arcor2_drivers.oak_d.{module}", raising=False)
     with pytest.raises(NotConnected, match=r"depthai is not installed here.*arcor2-hw\[depthai\]"):
         make("127.0.0.1:1").connect(1.0)
 
@@ -198,7 +196,7 @@ def test_a_missing_library_names_the_extra(make: Callable[..., OakD], monkeypatc
 def test_a_camera_that_starts_too_late_is_given_up_and_closed(monkeypatch: pytest.MonkeyPatch) -> None:
     import depthai as dai
 
-    from arcor2_drivers.oak_d import feed
+    from arcor2_drivers.oak_d import device_feed
 
     class Slow:
         closed = threading.Event()
@@ -211,18 +209,18 @@ def test_a_camera_that_starts_too_late_is_given_up_and_closed(monkeypatch: pytes
 
     monkeypatch.setattr(dai, "Device", Slow)
     with pytest.raises(DeviceTimeout, match=r"^camera at X has not started within 0\.1 s"):
-        feed.boot("camera at X", dai.DeviceInfo("X"), 0.1)
+        device_feed.boot("camera at X", dai.DeviceInfo("X"), 0.1)
     assert Slow.closed.wait(5.0)  # not kept from the next that wants it
 
 
 def test_several_cameras_have_to_be_told_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     import depthai as dai
 
-    from arcor2_drivers.oak_d import feed
+    from arcor2_drivers.oak_d import device_feed
 
     found = [dai.DeviceInfo("10.0.0.7"), dai.DeviceInfo("10.0.0.8")]
     monkeypatch.setattr(dai.Device, "getAllAvailableDevices", staticmethod(lambda: found))
-    assert feed.find("camera", "10.0.0.8", 0.1).name == "10.0.0.8"
+    assert device_feed.find("camera", "10.0.0.8", 0.1).name == "10.0.0.8"
     with pytest.raises(NotConnected, match=r"^camera: there are 2 cameras; give the device id of one") as raised:
-        feed.find("camera", "", 0.1)
+        device_feed.find("camera", "", 0.1)
     assert "10.0.0.7" in raised.value.detail

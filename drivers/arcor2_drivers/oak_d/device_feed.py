@@ -1,0 +1,158 @@
+"""The feed of a camera on USB or Ethernet, by depthai's own camera and stereo nodes. It has run on no device yet."""
+
+import contextlib
+import socket
+import threading
+import time
+from typing import Final
+
+import depthai as dai
+
+from arcor2_hw.data.device import Identity
+from arcor2_hw.exceptions import ConnectionLost, DeviceFault, DeviceTimeout, NotConnected, Refused
+
+from .calibration import BadCalibration, parameters
+from .feed import Pipeline, Shot
+from .settings import OakDSettings
+
+POE_PORT: Final = 11490
+"""TCP port on which PoE cameras take a host (from general knowledge of XLink)."""
+MONO_SIZE: Final = (640, 400)
+DEPTH_RANGE: Final = (0.35, 10.0)
+"""m, of the OAK-D's 75 mm base with extended disparity (from general knowledge of the camera)."""
+ISO: Final = 400
+
+
+def find(who: str, address: str, timeout: float) -> dai.DeviceInfo:
+    """Look for the camera before it is opened: opening one that is not there takes 11.5 s. Raises NotConnected."""
+    found = dai.Device.getAllAvailableDevices()
+    matching = [info for info in found if address in ("", info.getDeviceId(), info.name)]
+    if len(matching) > 1:
+        raise NotConnected(f"{who}: there are {len(matching)} cameras; give the device id of one", _listed(found))
+    if matching:
+        return matching[0]
+    if _is_ip(address):  # beyond a router it does not answer to the search
+        try:
+            socket.create_connection((address, POE_PORT), timeout).close()
+        except OSError as e:
+            raise NotConnected(f"{who} cannot be reached", str(e)) from e
+        return dai.DeviceInfo(address)
+    raise NotConnected(f"{who} is not there: is it plugged in, and free?", _listed(found))
+
+
+def _listed(found: list[dai.DeviceInfo]) -> str:
+    return "found: " + (", ".join(f"{info.getDeviceId()} ({info.name})" for info in found) or "none")
+
+
+def _is_ip(address: str) -> bool:
+    parts = address.split(".")
+    return len(parts) == 4 and all(part.isdigit() and int(part) < 256 for part in parts)
+
+
+def boot(who: str, info: dai.DeviceInfo, timeout: float) -> dai.Device:
+    """Open a camera within `timeout` s; one that comes up later is closed again. Raises DeviceTimeout, NotConnected."""
+    box: list[dai.Device | BaseException] = []
+    late = threading.Event()
+
+    def run() -> None:
+        try:
+            device = dai.Device(info)
+        except BaseException as e:  # noqa: BLE001 - told to who waits
+            box.append(e)
+            return
+        box.append(device)
+        if late.is_set():
+            device.close()
+
+    thread = threading.Thread(target=run, name=f"booting {who}", daemon=True)
+    thread.start()
+    thread.join(timeout)
+    if not box:
+        late.set()
+        raise DeviceTimeout(f"{who} has not started within {timeout:.1f} s")
+    if isinstance(box[0], BaseException):
+        raise NotConnected(f"{who} cannot be opened; another program may use it", str(box[0])) from box[0]
+    return box[0]
+
+
+class DeviceFeed:
+    """A camera on USB or the network. Colour is undistorted on the camera, and depth aligned to that."""
+
+    def __init__(self, who: str, name: str, settings: OakDSettings, timeout: float) -> None:
+        deadline = time.monotonic() + timeout
+        self.who = who
+        info = find(who, settings.address, timeout)
+        self._device = boot(who, info, max(deadline - time.monotonic(), 0.1))
+        self._pipeline: Pipeline | None = None
+        try:
+            self.size, self.depth_range = settings.size, DEPTH_RANGE
+            pipeline = dai.Pipeline(self._device)
+            sockets = dai.CameraBoardSocket
+            camera = pipeline.create(dai.node.Camera).build(sockets.CAM_A)
+            color = camera.requestOutput(
+                self.size, dai.ImgFrame.Type.BGR888i, fps=settings.fps, enableUndistortion=True
+            )
+            left, right = (
+                pipeline.create(dai.node.Camera).build(each).requestOutput(MONO_SIZE, fps=settings.fps)
+                for each in (sockets.CAM_B, sockets.CAM_C)
+            )
+            stereo = pipeline.create(dai.node.StereoDepth).build(left, right)
+            stereo.setLeftRightCheck(True)
+            stereo.setExtendedDisparity(True)
+            depth = stereo.depth
+            if self._device.getPlatform() == dai.Platform.RVC4:  # aligns in a node of its own
+                align = pipeline.create(dai.node.ImageAlign)
+                stereo.depth.link(align.input)
+                color.link(align.inputAlignTo)
+                depth = align.outputAligned
+            else:
+                color.link(stereo.inputAlignTo)
+            self._control = camera.inputControl.createInputQueue()
+            self._pipeline = Pipeline(pipeline, color, depth)
+            self.parameters = parameters(self._device.readCalibration(), *self.size, undistorted=True)
+            model = str(self._device.getDeviceName())
+            self.identity = Identity("Luxonis", model, self._device.getDeviceId(), f"depthai {dai.__version__}")
+            self._pipeline.start()
+        except BadCalibration as e:
+            self.close()
+            raise DeviceFault(f"{who}: {e}", "", "calibration") from e
+        except RuntimeError as e:
+            self.close()
+            raise DeviceFault(f"{who} cannot be set up", str(e), "pipeline") from e
+        except BaseException:
+            self.close()
+            raise
+
+    def next(self, timeout: float) -> Shot | None:
+        """Wait for the next picture; None when none came. Raises ConnectionLost."""
+        shot = None if self._pipeline is None else self._pipeline.next(timeout)
+        if shot is None and self._device.isClosed():
+            raise ConnectionLost(f"{self.who}: the connection was lost")
+        return shot
+
+    def temperature(self) -> float | None:
+        """Give the mean temperature of the chip, deg C. Raises ConnectionLost."""
+        try:
+            return float(self._device.getChipTemperature().average)
+        except RuntimeError as e:
+            raise ConnectionLost(f"{self.who}: the connection was lost", str(e)) from e
+
+    def set_exposure(self, exposure: float | None, timeout: float) -> None:
+        """Set the exposure, s, None for automatic; the camera does not confirm it. Raises Refused."""
+        control = dai.CameraControl()
+        if exposure is None:
+            control.setAutoExposureEnable()
+        else:
+            control.setManualExposure(round(exposure * 1e6), ISO)
+        try:
+            self._control.send(control)
+        except RuntimeError as e:
+            raise Refused(f"{self.who} does not take the exposure", str(e)) from e
+
+    def close(self) -> None:
+        """Close; harmless when closed."""
+        pipeline, self._pipeline = self._pipeline, None
+        if pipeline is not None:
+            pipeline.close()
+        with contextlib.suppress(RuntimeError):
+            self._device.close()

@@ -1,0 +1,131 @@
+"""The feed of a network source: a host node that takes frames from the stream, in a pipeline without a device."""
+
+import datetime
+import time
+from typing import Any, Final
+
+import depthai as dai
+import numpy as np
+
+from arcor2_hw.data.device import Identity
+from arcor2_hw.exceptions import DeviceError, DeviceFault
+
+from .calibration import BadCalibration, handler_of, parameters
+from .feed import JPEG, Pipeline, Shot
+from .network import NetworkSource
+from .settings import OakDSettings
+from .stream import Status
+
+LOOK: Final = 0.1
+"""s after which somebody who waits for a picture looks whether the source has failed."""
+
+
+class _Network(dai.node.ThreadedHostNode):
+    """The node that takes frames from the stream. Its thread is depthai's: no logging there, nothing that counts it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.color = self.createOutput()
+        self.depth = self.createOutput()
+        self.source: NetworkSource
+        self.first_within = self.timeout = 1.0
+        self.failure: BaseException | None = None
+
+    def run(self) -> None:
+        """Take frames until told to end."""
+        source = self.source
+        size = (source.hello.width, source.hello.height)
+        nothing = np.zeros(size[0] * size[1] * 2, np.uint8)
+        timeout = self.first_within
+        try:
+            while self.isRunning():
+                frame = source.next_frame(timeout)
+                timeout = self.timeout
+                kind = dai.ImgFrame.Type.BGR888i if frame.header.color == "bgr" else JPEG
+                exposure = frame.header.exposure
+                stamp, number = datetime.timedelta(seconds=frame.monotonic), frame.header.number
+                self.color.send(_image(frame.color, kind, size, stamp, number, exposure))
+                depth = frame.depth if len(frame.depth) else nothing
+                self.depth.send(_image(depth, dai.ImgFrame.Type.RAW16, size, stamp, number, exposure))
+        except BaseException as e:  # noqa: BLE001 - told to the thread that waits for pictures
+            self.failure = e
+
+
+def _image(
+    data: Any, kind: Any, size: tuple[int, int], stamp: datetime.timedelta, number: int, exposure: float | None
+) -> dai.ImgFrame:
+    image = dai.ImgFrame()
+    pixels: Any = np.frombuffer(data, np.uint8)
+    image.setData(pixels)
+    image.setType(kind)
+    image.setWidth(size[0])
+    image.setHeight(size[1])
+    image.setTimestamp(stamp)
+    image.setSequenceNum(number)
+    image.cam.exposureTimeUs = 0 if exposure is None else round(exposure * 1e6)
+    return image
+
+
+class NetworkFeed:
+    """A network source."""
+
+    def __init__(self, who: str, name: str, settings: OakDSettings, timeout: float) -> None:
+        deadline = time.monotonic() + timeout
+        assert settings.network is not None
+        self.who = who
+        self._told: Status | None = None
+        self._source = NetworkSource(who, *settings.network, str(settings.color_coding), self._status)
+        self._pipeline: Pipeline | None = None
+        try:
+            self._source.open(deadline)
+            hello = self._source.hello
+            self.identity = Identity(hello.vendor, hello.model, hello.serial, hello.firmware)
+            self.size, self.depth_range = (hello.width, hello.height), hello.depth_range
+            self.parameters = parameters(handler_of(self._source.eeprom), *self.size, undistorted=False)
+            pipeline = dai.Pipeline(createImplicitDevice=False)
+            self._node = pipeline.create(_Network)
+            self._node.source, self._node.timeout = self._source, settings.frame_timeout
+            self._pipeline = Pipeline(pipeline, self._node.color, self._node.depth)
+            self._source.start(name)
+            self._node.first_within = max(deadline - time.monotonic(), 0.001)
+            self._pipeline.start()
+        except BadCalibration as e:
+            self.close()
+            raise DeviceFault(f"{who}: {e}", "", "calibration") from e
+        except BaseException:
+            self.close()
+            raise
+
+    def _status(self, status: Status) -> None:
+        self._told = status
+
+    def next(self, timeout: float) -> Shot | None:
+        """Wait for the next picture; None when none came. Raises what the source was lost by."""
+        until = time.monotonic() + timeout
+        while self._pipeline is not None:
+            shot = self._pipeline.next(min(LOOK, max(until - time.monotonic(), 0.0)))
+            if shot is not None:
+                return shot
+            error = self._node.failure
+            if isinstance(error, DeviceError):
+                raise error
+            if error is not None:
+                raise DeviceFault(f"{self.who}: {type(error).__name__}: {error}") from error
+            if time.monotonic() >= until:
+                break
+        return None
+
+    def temperature(self) -> float | None:
+        """Give the temperature that the source told last, deg C."""
+        return None if self._told is None else self._told.temperature
+
+    def set_exposure(self, exposure: float | None, timeout: float) -> None:
+        """Set the exposure, s, None for automatic. Raises Refused, DeviceTimeout, ConnectionLost."""
+        self._source.set_exposure(exposure, timeout)
+
+    def close(self) -> None:
+        """Close; harmless when closed."""
+        self._source.close()
+        pipeline, self._pipeline = self._pipeline, None
+        if pipeline is not None:
+            pipeline.close()
