@@ -83,14 +83,14 @@ class ErpService(Generic):
             self._former = None
             self.observing.start(max(deadline - time.monotonic(), 0.001))
             try:
-                self._begin()
+                self._begin(deadline)
             except BaseException:
                 self.observing.stop()
                 raise
 
-    def _begin(self) -> None:
+    def _begin(self, deadline: float) -> None:
         assert self._access is not None
-        self._outbox.open()
+        self._outbox.open(deadline - time.monotonic())
         self._caller = Service(self._who, self._given, self._access)
         service = Service(self._who, self._given, self._access)
         self._sender = Sender(self._who, service, self._outbox, self._given.longest_pause)

@@ -6,6 +6,7 @@ import hashlib
 import os
 import sqlite3
 import threading
+import time
 import uuid
 from collections.abc import Iterator
 from pathlib import Path
@@ -27,6 +28,8 @@ CREATE TABLE IF NOT EXISTS asking (key TEXT PRIMARY KEY);
 PRAGMA user_version = 1;
 """
 _VERSION: Final = 1
+LOOK_AGAIN: Final = 0.02
+"""s between looks whether the file is free."""
 
 
 class Message(NamedTuple):
@@ -89,15 +92,16 @@ class Outbox:
         self._database: sqlite3.Connection | None = None
         self._held: IO[bytes] | None = None
 
-    def open(self) -> None:
-        """Open. Raises Refused when another program has it open."""
+    def open(self, patience: float = 0.0) -> None:
+        """Open. Raises Refused when another program has it open, and does not end within `patience` s."""
+        deadline = time.monotonic() + patience
         with self._one:
             if self._database is not None:
                 return
             try:
                 self.file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
                 self._held = self.file.with_suffix(".lock").open("ab")
-                fcntl.flock(self._held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                self._lock(deadline)
                 database = sqlite3.connect(self.file, check_same_thread=False, isolation_level=None)
             except BlockingIOError:
                 self._release()
@@ -115,6 +119,19 @@ class Outbox:
             except sqlite3.Error as e:
                 self._close()
                 raise self._broken(e) from e
+
+    def _lock(self, deadline: float) -> None:
+        """Have the file alone: who closed it just now may still wait for the answer to a last request."""
+        assert self._held is not None
+        while True:
+            try:
+                fcntl.flock(self._held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                if time.monotonic() >= deadline:
+                    raise
+                time.sleep(LOOK_AGAIN)
+            else:
+                return
 
     def close(self) -> None:
         """Close; harmless when closed. What waits stays on disk."""
