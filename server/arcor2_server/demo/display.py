@@ -123,6 +123,10 @@ class Display:
                     self._devices = []
                 await asyncio.sleep(period)
 
+    def alarms(self) -> list[str]:
+        """Give the alarms that stood when the devices were last asked."""
+        return [f"{device['name']}: {alarm['text']}" for device in self._devices for alarm in device.get("alarms", [])]
+
     # ------------------------------------------------------------------------------------------------ drawing
     def _out(self, text: Text) -> None:
         (self._live.console if self._live is not None else self._console).print(text, highlight=False)

@@ -227,7 +227,9 @@ class Demo:
                     problem = event.data.message
                 case "PackageState" if event.data.state is PackageStateEnum.STOPPED:
                     if problem:
-                        raise ProgramFailed(f"The program ended with an error: {problem}")
+                        # What began it may be the fault of another device, which no action was waiting for.
+                        alarms = "".join(f"; {alarm}" for alarm in self._display.alarms())
+                        raise ProgramFailed(f"The program ended with an error: {problem}{alarms}")
                     outcome.finished = True
                     return
 
