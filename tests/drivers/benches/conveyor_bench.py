@@ -1,14 +1,16 @@
-"""The conveyor on its fake: a drive behind a CAN adapter that is a TCP server."""
+"""The conveyor on its fake: a drive behind a CAN adapter that is a TCP server; the wire between is recorded."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 from arcor2_drivers.conveyor.conveyor import Conveyor
 from arcor2_drivers.conveyor.settings import ConveyorSettings
-from arcor2_hw.objects import Generic
-from arcor2_hw.testing.bench import Bench
+from arcor2_hw.objects import Generic, MachineState
+from arcor2_hw.testing.bench import Bench, Check
+from arcor2_hw.testing.frames import CanopenSlcan
+from arcor2_hw.testing.tcp_wire import TcpWire
 from tests.fakes.conftest import FakeProcess
 
 ORPHAN = """
@@ -21,9 +23,12 @@ belt.take_control()
 belt.move_by(20.0, 0.3)
 """
 
+COUNTS = 10000.0
+"""Counts of the drive for a metre of belt."""
+
 
 def build(address: str, **settings: Any) -> Conveyor:
-    return Conveyor("belt_id", "belt", ConveyorSettings(f"socket://{address}", **settings))
+    return Conveyor("belt_id", "belt", ConveyorSettings(f"socket://{address}", counts_per_metre=COUNTS, **settings))
 
 
 class ConveyorBench(Bench):
@@ -33,19 +38,26 @@ class ConveyorBench(Bench):
     def start(self) -> None:
         self.fake = FakeProcess("conveyor")
         self.do = self.fake.control.do
+        host, _, port = str(self.fake.ready["can"]).rpartition(":")
+        self.wire = TcpWire(host, [int(port)])
+        self.wire.start()
+        self.frames = CanopenSlcan()
 
     def end(self) -> None:
+        if self.wire is not None:
+            self.wire.close()
         self.fake.end()
 
     def reset(self) -> None:
-        self.do("heal")
+        self.heal()
         self.do("mute", on=False)
         self.do("power_cycle", belt=0)
         self.fake.control.wait_until(lambda truth: truth["booted"])
 
     @property
     def address(self) -> str:
-        return str(self.fake.ready["can"])
+        assert self.wire is not None
+        return self.wire.address
 
     def make(self) -> Conveyor:
         return build(self.address)
@@ -56,12 +68,6 @@ class ConveyorBench(Bench):
     def writes(self) -> Any:
         truth = self.fake.truth()
         return truth["writes"], truth["nmt"], round(truth["belt"])
-
-    def cut(self) -> None:
-        self.do("silence")
-
-    def heal(self) -> None:
-        self.do("heal")
 
     def observe(self, device: Generic) -> object:
         assert isinstance(device, Conveyor)
@@ -94,3 +100,35 @@ class ConveyorBench(Bench):
 
     def orphan(self) -> list[str]:
         return [sys.executable, "-c", ORPHAN, f"socket://{self.address}"]
+
+    def readings(self, device: Generic) -> Iterator[Check]:
+        assert isinstance(device, Conveyor)
+        device.take_control()
+        device.move_by(-0.05, 0.3)
+        yield Check("position, m", device.belt_position(), self.fake.truth()["belt"] / COUNTS, 1e-4)
+        device.run(-0.2)
+        yield Check("velocity, m/s", device.velocity().value, self.do("motion")["velocity"] / COUNTS, 0.01)
+        device.halt()
+
+    def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
+        assert isinstance(device, Conveyor)
+        return {
+            "a place beyond the belt": lambda: device.move_by(200.0, 0.3),
+            "a speed above the highest": lambda: device.move_by(0.1, 0.6),
+            "a speed of nothing": lambda: device.move_relative(0.1, 0.0),
+            "a run faster than allowed": lambda: device.run(-0.6),
+            "a place before it is homed": lambda: device.move_to(0.1, 0.3),
+            "a start of a belt that was not reset": device.start,
+        }
+
+    def works(self, device: Generic) -> dict[str, Callable[[], object]]:
+        assert isinstance(device, Conveyor)
+
+        def waited() -> None:
+            device.reset()
+            device.start()
+            device.wait_for(MachineState.EXECUTE, 1.0)
+            assert self.do("motion")["velocity"] > 0.0
+            device.halt()
+
+        return {"wait_for": waited}
