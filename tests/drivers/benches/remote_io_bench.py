@@ -1,15 +1,17 @@
-"""The remote I/O block and the tower light on one fake each."""
+"""The remote I/O block and the tower light on one fake each, with a wire between that is cut and recorded."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, ClassVar
 
 from arcor2_drivers.remote_io.remote_io import RemoteIO
 from arcor2_drivers.remote_io.settings import RemoteIOSettings, TowerLightSettings
-from arcor2_drivers.remote_io.tower_light import TowerLight
+from arcor2_drivers.remote_io.tower_light import LampColor, ShownState, TowerLight
 from arcor2_hw.objects import Generic
-from arcor2_hw.testing.bench import Bench
+from arcor2_hw.testing.bench import Bench, Check
+from arcor2_hw.testing.frames import ModbusTcp
+from arcor2_hw.testing.tcp_wire import TcpWire
 from tests.fakes.conftest import FakeProcess
 
 QUICK: dict[str, Any] = {"watchdog_ms": 400, "request_timeout": 0.1}
@@ -41,7 +43,7 @@ light.buzz(20.0)
 
 def block(address: str, **settings: Any) -> RemoteIO:
     host, _, port = address.rpartition(":")
-    points = "part=DI0; lamp=DO0; valve=DO4"
+    points = "part=DI0; level=AI0 scale=0.001 unit=m; lamp=DO0; valve=DO4; pressure=AO1 scale=10 unit=Pa"
     return RemoteIO("block_id", "block", RemoteIOSettings(host, int(port), points=points, **{**QUICK, **settings}))
 
 
@@ -57,26 +59,28 @@ class RemoteIOBench(Bench):
     def start(self) -> None:
         self.fake = FakeProcess("remote_io")
         self.do = self.fake.control.do
+        host, _, port = str(self.fake.ready["modbus"]).rpartition(":")
+        self.wire = TcpWire(host, [int(port)])
+        self.wire.start()
+        self.frames = ModbusTcp()
 
     def end(self) -> None:
+        if self.wire is not None:
+            self.wire.close()
         self.fake.end()
 
     def reset(self) -> None:
+        self.heal()
         self.do("renew")
 
     @property
     def address(self) -> str:
-        return str(self.fake.ready["modbus"])
+        assert self.wire is not None
+        return self.wire.address
 
     def writes(self) -> Any:
         truth = self.fake.truth()
         return truth["writes"], truth["outputs"]
-
-    def cut(self) -> None:
-        self.do("silence")
-
-    def heal(self) -> None:
-        self.do("heal")
 
     def running(self) -> bool:
         return bool(self.do("outputs")["outputs"][4])
@@ -116,6 +120,42 @@ class RemoteIOBench(Bench):
     def orphan(self) -> list[str]:
         return [sys.executable, "-c", ORPHAN_IO, self.address]
 
+    def readings(self, device: Generic) -> Iterator[Check]:
+        assert isinstance(device, RemoteIO)
+        self.do("set_analog", number=0, raw=-1234)
+        self.do("set_input", number=0, on=True)
+        yield Check("level, m", device.read_analog("level"), -1.234, 1e-9)
+        yield Check("part", device.read_digital("part"), True, 0.0)
+        device.take_control()
+        device.write_analog("pressure", -2500.0)
+        yield Check("pressure, Pa", device.read_analog("pressure"), self.fake.truth()["analog_outputs"][1] * 10.0, 1e-9)
+
+    def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
+        assert isinstance(device, RemoteIO)
+        return {
+            "an analogue value beyond the register": lambda: device.write_analog("pressure", 400_000.0),
+            "an analogue value that is no number": lambda: device.write_analog("pressure", float("nan")),
+            "a point that is not there": lambda: device.write_digital("light", True),
+            "writing an input": lambda: device.write("part", True),
+            "a digital value for an analogue output": lambda: device.write_digital("pressure", True),
+            "a pulse of an input": lambda: device.pulse("part", 1.0),
+            "waiting for an analogue point": lambda: device.wait_for("level", True, 1.0),
+        }
+
+    def works(self, device: Generic) -> dict[str, Callable[[], object]]:
+        assert isinstance(device, RemoteIO)
+
+        def pulsed() -> None:
+            device.pulse("valve", 0.2)
+            switched = [(each["output"], each["on"]) for each in self.fake.truth()["history"]]
+            assert switched == [(4, True), (4, False)]
+
+        def waited() -> None:
+            self.do("set_input", number=0, on=True)
+            device.wait_for("part", True, 1.0)
+
+        return {"pulse": pulsed, "wait_for": waited}
+
 
 class TowerLightBench(RemoteIOBench):
     object_type = TowerLight
@@ -144,3 +184,21 @@ class TowerLightBench(RemoteIOBench):
 
     def orphan(self) -> list[str]:
         return [sys.executable, "-c", ORPHAN_LIGHT, self.address]
+
+    def readings(self, device: Generic) -> Iterator[Check]:
+        assert isinstance(device, TowerLight)
+        device.take_control()
+        device.show(LampColor.GREEN)
+        yield Check("green, lit", device.lit()["green"], self.fake.truth()["outputs"][0], 0.0)
+        device.off()
+        yield Check("green, out", device.lit()["green"], self.fake.truth()["outputs"][0], 0.0)
+
+    def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
+        assert isinstance(device, TowerLight)
+        return {
+            "a colour that is not fitted": lambda: device.show(LampColor.BLUE),
+            "a state that it has no pattern for": lambda: device.show_state(ShownState.ABORTED),
+        }
+
+    def works(self, device: Generic) -> dict[str, Callable[[], object]]:
+        return {}  # no optional method that acts
