@@ -66,3 +66,32 @@ class ModelRow(Base):
     id: Mapped[str] = mapped_column(String(255), primary_key=True)
     kind: Mapped[str] = mapped_column(String(20))
     document: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class ProjectBesideRow(Base):
+    """What REST keeps beside a project's document: lists of parameters and of overrides, as JSON."""
+
+    __tablename__ = "project_beside"
+
+    id: Mapped[str] = mapped_column(ForeignKey("project.id", ondelete="CASCADE"), primary_key=True)
+    parameters: Mapped[bytes] = mapped_column(LargeBinary, default=b"[]")
+    object_parameters: Mapped[bytes] = mapped_column(LargeBinary, default=b"[]")
+
+
+class ExecutionTokenRow(Base):
+    """A token of the Execution service's table, which lets nobody in (docs/protocol.md)."""
+
+    __tablename__ = "execution_token"
+
+    id: Mapped[str] = mapped_column(String(255), primary_key=True)
+    name: Mapped[str] = mapped_column(Text)
+    access: Mapped[bool] = mapped_column(Boolean, default=False)
+
+
+class BreakpointsRow(Base):
+    """The breakpoints with which a package is debugged: ids of action points, as JSON."""
+
+    __tablename__ = "breakpoints"
+
+    package_id: Mapped[str] = mapped_column(String(255), primary_key=True)
+    ids: Mapped[bytes] = mapped_column(LargeBinary)

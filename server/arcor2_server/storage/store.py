@@ -76,7 +76,7 @@ class Storage:
     async def scenes(self) -> list[BareScene]:
         """Give all saved scenes without their objects, by name."""
         columns = (SceneRow.name, SceneRow.description, SceneRow.created, SceneRow.modified, SceneRow.id)
-        async with self._reading() as session:
+        async with self.reading() as session:
             rows = await session.execute(select(*columns).order_by(SceneRow.name))
             return [
                 BareScene(name=name, description=description, created=created, modified=modified, id=key)
@@ -85,14 +85,14 @@ class Storage:
 
     async def scene(self, key: str) -> Scene:
         """Give a saved scene; NotFound."""
-        async with self._reading() as session:
-            scene: Scene = self._decoded(_decode_scene, await self._one(session, SceneRow, key, "scene"))
+        async with self.reading() as session:
+            scene: Scene = self._decoded(_decode_scene, await self.one(session, SceneRow, key, "scene"))
         return scene
 
     async def put_scene(self, scene: Scene) -> Scene:
         """Save; gives the scene as saved: `created` kept or set, `modified` set, `int_modified` gone."""
         stamp = now()
-        async with self._writing() as session:
+        async with self.writing() as session:
             row = await session.get(SceneRow, scene.id)
             saved = msgspec.structs.replace(
                 scene, created=row.created if row else stamp, modified=stamp, int_modified=UNSET
@@ -111,8 +111,8 @@ class Storage:
 
     async def delete_scene(self, key: str) -> None:
         """Delete; NotFound."""
-        async with self._writing() as session:
-            await session.delete(await self._one(session, SceneRow, key, "scene"))
+        async with self.writing() as session:
+            await session.delete(await self.one(session, SceneRow, key, "scene"))
 
     # ------------------------------------------------------------------------------------------------ projects
     async def projects(self) -> list[BareProject]:
@@ -126,7 +126,7 @@ class Storage:
             ProjectRow.modified,
             ProjectRow.id,
         )
-        async with self._reading() as session:
+        async with self.reading() as session:
             rows = await session.execute(select(*columns).order_by(ProjectRow.name))
             return [
                 BareProject(
@@ -143,15 +143,15 @@ class Storage:
 
     async def project(self, key: str) -> Project:
         """Give a saved project; NotFound."""
-        async with self._reading() as session:
-            project: Project = self._decoded(_decode_project, await self._one(session, ProjectRow, key, "project"))
+        async with self.reading() as session:
+            project: Project = self._decoded(_decode_project, await self.one(session, ProjectRow, key, "project"))
         return project
 
     async def put_project(self, project: Project) -> Project:
         """Save; gives the project as saved (like put_scene). NotFound when its scene is not saved."""
         stamp = now()
-        async with self._writing() as session:
-            await self._one(session, SceneRow, project.scene_id, "scene")
+        async with self.writing() as session:
+            await self.one(session, SceneRow, project.scene_id, "scene")
             row = await session.get(ProjectRow, project.id)
             saved = msgspec.structs.replace(
                 project, created=row.created if row else stamp, modified=stamp, int_modified=UNSET
@@ -172,52 +172,52 @@ class Storage:
 
     async def delete_project(self, key: str) -> None:
         """Delete, with its source; NotFound."""
-        async with self._writing() as session:
-            row = await self._one(session, ProjectRow, key, "project")
+        async with self.writing() as session:
+            row = await self.one(session, ProjectRow, key, "project")
             await session.execute(delete(ProjectSourceRow).where(ProjectSourceRow.id == key))
             await session.delete(row)
 
     async def projects_with_scene(self, scene_id: str) -> list[str]:
         """Give the ids of the saved projects of a scene."""
-        async with self._reading() as session:
+        async with self.reading() as session:
             return list(await session.scalars(select(ProjectRow.id).where(ProjectRow.scene_id == scene_id)))
 
     async def project_source(self, key: str) -> str:
         """Give the script of a project without logic; NotFound."""
-        async with self._reading() as session:
-            script: str = (await self._one(session, ProjectSourceRow, key, "source of project")).script
+        async with self.reading() as session:
+            script: str = (await self.one(session, ProjectSourceRow, key, "source of project")).script
         return script
 
     async def put_project_source(self, key: str, script: str) -> None:
         """Save the script of a project; NotFound when there is no such project."""
-        async with self._writing() as session:
-            await self._one(session, ProjectRow, key, "project")
+        async with self.writing() as session:
+            await self.one(session, ProjectRow, key, "project")
             await session.merge(ProjectSourceRow(id=key, script=script))
 
     # ------------------------------------------------------------------------------------------------ object types
     async def object_type_stamps(self) -> dict[str, str]:
         """Give the ids of all uploaded object types with when each was modified."""
-        async with self._reading() as session:
+        async with self.reading() as session:
             rows = await session.execute(select(ObjectTypeRow.id, ObjectTypeRow.modified))
             return {key: modified for key, modified in rows}  # noqa: C416 - rows are no tuples to mypy
 
     async def object_types(self) -> list[ObjectTypeSource]:
         """Give all uploaded object types with their models."""
-        async with self._reading() as session:
+        async with self.reading() as session:
             rows = list(await session.scalars(select(ObjectTypeRow).order_by(ObjectTypeRow.id)))
             models = {row.id: row for row in await session.scalars(select(ModelRow))}
         return [self._object_type(row, models.get(row.id)) for row in rows]
 
     async def object_type(self, key: str) -> ObjectTypeSource:
         """Give an uploaded object type; NotFound."""
-        async with self._reading() as session:
-            row = await self._one(session, ObjectTypeRow, key, "object type")
+        async with self.reading() as session:
+            row = await self.one(session, ObjectTypeRow, key, "object type")
             return self._object_type(row, await session.get(ModelRow, key))
 
     async def put_object_type(self, object_type: ObjectTypeSource) -> ObjectTypeSource:
         """Save, with its model when it has one; gives it as saved (like put_scene)."""
         stamp = now()
-        async with self._writing() as session:
+        async with self.writing() as session:
             row = await session.get(ObjectTypeRow, object_type.id)
             saved = msgspec.structs.replace(object_type, created=row.created if row else stamp, modified=stamp)
             model = None
@@ -239,25 +239,25 @@ class Storage:
 
     async def delete_object_type(self, key: str) -> None:
         """Delete, with its model; NotFound."""
-        async with self._writing() as session:
-            await session.delete(await self._one(session, ObjectTypeRow, key, "object type"))
+        async with self.writing() as session:
+            await session.delete(await self.one(session, ObjectTypeRow, key, "object type"))
             await session.execute(delete(ModelRow).where(ModelRow.id == key))
         self.types_revision += 1
 
     # ------------------------------------------------------------------------------------------------ models
     async def models(self) -> list[Models]:
         """Give all collision models."""
-        async with self._reading() as session:
+        async with self.reading() as session:
             return [self._model(row) for row in await session.scalars(select(ModelRow).order_by(ModelRow.id))]
 
     async def model(self, key: str) -> Models:
         """Give a collision model; NotFound."""
-        async with self._reading() as session:
-            return self._model(await self._one(session, ModelRow, key, "model"))
+        async with self.reading() as session:
+            return self._model(await self.one(session, ModelRow, key, "model"))
 
     async def put_model(self, model: Models) -> None:
         """Save a collision model in place of one with that id, of whatever kind."""
-        async with self._writing() as session:
+        async with self.writing() as session:
             await session.merge(_model_row(model))
             if (row := await session.get(ObjectTypeRow, model.id)) is not None and row.model_kind is not None:
                 row.model_kind = model.type().value
@@ -266,19 +266,19 @@ class Storage:
 
     async def delete_model(self, key: str) -> None:
         """Delete; NotFound."""
-        async with self._writing() as session:
-            await session.delete(await self._one(session, ModelRow, key, "model"))
+        async with self.writing() as session:
+            await session.delete(await self.one(session, ModelRow, key, "model"))
         self.types_revision += 1
 
     # ------------------------------------------------------------------------------------------------ look-ups
     async def scene_named(self, name: str) -> str | None:
         """Give the id of a scene of that name."""
-        async with self._reading() as session:
+        async with self.reading() as session:
             return await session.scalar(select(SceneRow.id).where(SceneRow.name == name).limit(1))
 
     async def project_named(self, name: str) -> str | None:
         """Give the id of a project of that name."""
-        async with self._reading() as session:
+        async with self.reading() as session:
             return await session.scalar(select(ProjectRow.id).where(ProjectRow.name == name).limit(1))
 
     async def name_taken(self, name: str) -> bool:
@@ -287,7 +287,7 @@ class Storage:
 
     async def identify(self, key: str) -> DocumentId | None:
         """Tell what a stored id names, None when nothing."""
-        async with self._reading() as session:
+        async with self.reading() as session:
             for kind, column in (
                 ("scene", SceneRow.id),
                 ("project", ProjectRow.id),
@@ -299,7 +299,8 @@ class Storage:
 
     # ------------------------------------------------------------------------------------------------ inside
     @asynccontextmanager
-    async def _reading(self) -> AsyncIterator[AsyncSession]:
+    async def reading(self) -> AsyncIterator[AsyncSession]:
+        """Give a session to read with; StorageError for whatever the database says."""
         try:
             async with self._sessions() as session:
                 yield session
@@ -307,7 +308,8 @@ class Storage:
             raise self._failed("read", error) from error
 
     @asynccontextmanager
-    async def _writing(self) -> AsyncIterator[AsyncSession]:
+    async def writing(self) -> AsyncIterator[AsyncSession]:
+        """Give a session in a transaction, which is on disk when it is left; StorageError as above."""
         try:
             async with self._sessions() as session, session.begin():
                 yield session
@@ -320,7 +322,8 @@ class Storage:
         return StorageError(f"cannot {what} the database {self._place}: {cause}", detail=str(error))
 
     @staticmethod
-    async def _one(session: AsyncSession, table: type[Any], key: str, what: str) -> Any:
+    async def one(session: AsyncSession, table: type[Any], key: str, what: str) -> Any:
+        """Give the row of that key; NotFound says `what` there is not."""
         if (row := await session.get(table, key)) is None:
             raise NotFound(f"There is no {what} {key!r}.")
         return row

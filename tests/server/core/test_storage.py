@@ -183,7 +183,7 @@ async def test_what_was_acknowledged_survives_a_kill(settings: ServerSettings) -
 
 
 async def test_every_commit_is_flushed(storage: Storage) -> None:
-    async with storage._reading() as session:
+    async with storage.reading() as session:
         connection = await session.connection()
         synchronous = (await connection.exec_driver_sql("PRAGMA synchronous")).scalar()
         journal = (await connection.exec_driver_sql("PRAGMA journal_mode")).scalar()
@@ -224,7 +224,7 @@ async def test_migrations_run_only_on_an_older_schema(
     monkeypatch.setattr(schema, "migrate", lambda _: migrated.append("migrated"))
     await (await Storage.open(settings)).close()
     assert migrated == []
-    monkeypatch.setattr(schema, "REVISION", "0002")
+    monkeypatch.setattr(schema, "REVISION", "9998")
     await (await Storage.open(settings)).close()
     assert migrated == ["migrated"]
 

@@ -1,0 +1,103 @@
+"""What REST keeps beside the documents: lists of a project, tokens and breakpoints of the Execution service."""
+
+from collections.abc import Iterable
+from typing import Any, Literal
+
+import msgspec
+from sqlalchemy import delete, select
+
+from arcor2_hw.data.base import Data
+from arcor2_hw.data.project import ProjectParameter
+from arcor2_hw.data.scene import SceneObjectOverride
+from arcor2_server.storage.models import BreakpointsRow, ExecutionTokenRow, ProjectBesideRow, ProjectRow
+from arcor2_server.storage.store import Storage
+
+
+class ExecutionToken(Data, frozen=True):
+    """One token of the Execution service's table."""
+
+    id: str
+    name: str
+    access: bool = False
+
+
+class Beside:
+    """All methods may raise StorageError, and NotFound for a project or token that is not there."""
+
+    def __init__(self, storage: Storage) -> None:
+        self._storage = storage
+
+    # ------------------------------------------------------------------------------------------------ projects
+    async def parameters(self, project_id: str) -> list[ProjectParameter]:
+        """Give the parameters that are kept beside a project."""
+        return msgspec.json.decode(await self._read(project_id, "parameters"), type=list[ProjectParameter])
+
+    async def put_parameters(self, project_id: str, parameters: list[ProjectParameter]) -> None:
+        """Keep parameters beside a project, in place of those before."""
+        await self._write(project_id, "parameters", parameters)
+
+    async def object_parameters(self, project_id: str) -> list[SceneObjectOverride]:
+        """Give the overrides of objects that are kept beside a project."""
+        return msgspec.json.decode(await self._read(project_id, "object_parameters"), type=list[SceneObjectOverride])
+
+    async def put_object_parameters(self, project_id: str, overrides: list[SceneObjectOverride]) -> None:
+        """Keep overrides of objects beside a project, in place of those before."""
+        await self._write(project_id, "object_parameters", overrides)
+
+    async def _read(self, project_id: str, what: Literal["parameters", "object_parameters"]) -> bytes:
+        async with self._storage.reading() as session:
+            await Storage.one(session, ProjectRow, project_id, "project")
+            row = await session.get(ProjectBesideRow, project_id)
+            content: bytes = b"[]" if row is None else getattr(row, what)
+        return content
+
+    async def _write(self, project_id: str, what: Literal["parameters", "object_parameters"], value: Any) -> None:
+        async with self._storage.writing() as session:
+            await Storage.one(session, ProjectRow, project_id, "project")
+            row = await session.get(ProjectBesideRow, project_id)
+            if row is None:
+                row = ProjectBesideRow(id=project_id, parameters=b"[]", object_parameters=b"[]")
+                session.add(row)
+            setattr(row, what, msgspec.json.encode(value))
+
+    # ------------------------------------------------------------------------------------------------ tokens
+    async def tokens(self) -> list[ExecutionToken]:
+        """Give the table of tokens."""
+        async with self._storage.reading() as session:
+            rows = await session.scalars(select(ExecutionTokenRow).order_by(ExecutionTokenRow.name))
+            return [ExecutionToken(row.id, row.name, row.access) for row in rows]
+
+    async def token(self, key: str) -> ExecutionToken:
+        """Give one token."""
+        async with self._storage.reading() as session:
+            row = await Storage.one(session, ExecutionTokenRow, key, "token")
+            return ExecutionToken(row.id, row.name, row.access)
+
+    async def put_token(self, token: ExecutionToken) -> None:
+        """Keep a token."""
+        async with self._storage.writing() as session:
+            await session.merge(ExecutionTokenRow(**msgspec.structs.asdict(token)))
+
+    async def delete_token(self, key: str) -> None:
+        """Delete a token."""
+        async with self._storage.writing() as session:
+            await session.delete(await Storage.one(session, ExecutionTokenRow, key, "token"))
+
+    # ------------------------------------------------------------------------------ lists of breakpoints
+    async def breakpoints(self, package_id: str) -> list[str]:
+        """Give the breakpoints of a package, none where none were kept."""
+        async with self._storage.reading() as session:
+            row = await session.get(BreakpointsRow, package_id)
+            return [] if row is None else msgspec.json.decode(row.ids, type=list[str])
+
+    async def put_breakpoints(self, package_id: str, ids: Iterable[str]) -> None:
+        """Keep the breakpoints of a package, in place of those before."""
+        async with self._storage.writing() as session:
+            await session.merge(
+                BreakpointsRow(package_id=package_id, ids=msgspec.json.encode(list(dict.fromkeys(ids))))
+            )
+
+    async def forget_breakpoints(self, package_id: str) -> None:
+        """Drop the breakpoints of a package that is gone."""
+        async with self._storage.writing() as session:
+            await session.execute(delete(BreakpointsRow).where(BreakpointsRow.package_id == package_id))
