@@ -1,7 +1,7 @@
 """The vacuum gripper on a fake I/O block that is its carrier; the block is observed all the time."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from arcor2_drivers.remote_io.remote_io import RemoteIO
@@ -10,11 +10,11 @@ from arcor2_drivers.vacuum_gripper.settings import VacuumGripperSettings
 from arcor2_drivers.vacuum_gripper.suction_gripper import SuctionGripper
 from arcor2_hw.exceptions import NotFound
 from arcor2_hw.objects import Generic
-from arcor2_hw.testing.bench import Bench
+from arcor2_hw.testing.bench import Bench, Check
 from arcor2_hw.testing.life import wait_until
 from tests.fakes.conftest import FakeProcess
 
-POINTS = "part=DI0; vacuum=DO0 on_loss=hold; blow=DO1"
+POINTS = "part=DI0; vacuum=DO0 on_loss=hold; blow=DO1; pressure=AI0 scale=2.5 unit=Pa"
 ORPHAN = """
 import sys
 from arcor2_drivers.remote_io.remote_io import RemoteIO
@@ -79,8 +79,8 @@ class SuctionGripperBench(Bench):
                 return block
         raise NotFound(f"the scene has no object {name}")
 
-    def _gripper(self, carrier: str) -> SuctionGripper:
-        settings = VacuumGripperSettings(carrier, "vacuum", "blow", "part", blow_time=8.0)
+    def _gripper(self, carrier: str, blow_time: float = 8.0) -> SuctionGripper:
+        settings = VacuumGripperSettings(carrier, "vacuum", "blow", "part", "pressure", blow_time=blow_time)
         gripper = SuctionGripper("gripper_id", "gripper", settings)
         gripper.attach(self._find)
         return gripper
@@ -132,3 +132,29 @@ class SuctionGripperBench(Bench):
 
     def orphan(self) -> list[str]:
         return [sys.executable, "-c", ORPHAN, self.fake.ready["modbus"], POINTS]
+
+    def reset_link(self) -> None:
+        self.fake.control.do("reset")
+
+    def half_frame(self) -> None:
+        self.fake.control.do("half_frame")
+
+    def readings(self, device: Generic) -> Iterator[Check]:
+        assert isinstance(device, SuctionGripper)
+        self.fake.control.do("set_analog", number=0, raw=24000)
+        self.fake.control.do("set_input", number=0, on=True)
+        yield Check("the vacuum, Pa", device.vacuum().value, 60_000.0, 1e-6)
+        yield Check("a part is held", device.part_held(), True, 0.0)
+
+    def works(self, device: Generic) -> dict[str, Callable[[], object]]:
+        quick = self._gripper(CARRIER, blow_time=0.3)
+        self.keep(quick)
+
+        def blown() -> None:
+            quick.connect(self.connect_timeout)
+            quick.on()
+            quick.blow_off()
+            switched = [(each["output"], each["on"]) for each in self.fake.truth()["history"]]
+            assert switched == [(0, True), (0, False), (1, True), (1, False)]
+
+        return {"blow_off": blown}
