@@ -47,7 +47,7 @@ from arcor2_server.rpc import (  # noqa: F401
 from arcor2_server.services import Services
 from arcor2_server.session import Session
 from arcor2_server.settings import ServerSettings
-from arcor2_server.storage import Storage
+from arcor2_server.storage import AssetStore, Storage
 from arcor2_server.users import Users
 
 
@@ -57,6 +57,7 @@ async def running_services(settings: ServerSettings) -> AsyncIterator[Services]:
     async with AsyncExitStack() as stack:
         storage = await Storage.open(settings)
         stack.push_async_callback(storage.close)
+        assets = await AssetStore.open(settings.assets_dir)
         hub = Hub()
         locks = Locks(settings.lock_retries, settings.lock_retry_wait)
         users = Users(hub, locks, settings)
@@ -70,6 +71,7 @@ async def running_services(settings: ServerSettings) -> AsyncIterator[Services]:
             users=users,
             locks=locks,
             storage=storage,
+            assets=assets,
             types=types,
             session=cast("Session", None),  # these know the others, and are made below
             cell=cast("OnlineCell", None),

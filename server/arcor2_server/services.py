@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from arcor2_server.object_types import ObjectTypes
     from arcor2_server.session import Session
     from arcor2_server.settings import ServerSettings
-    from arcor2_server.storage import Storage
+    from arcor2_server.storage import AssetStore, Storage
     from arcor2_server.users import Users
 
 
@@ -25,7 +25,8 @@ class Services:
     """What handlers work with.
 
     access: who gets in. hub: the connected clients. users: who is logged in. locks: who holds what.
-    storage: saved documents. types: what is known of object types. session: the open scene or project.
+    storage: saved documents. assets: meshes and the like. types: what is known of object types.
+    session: the open scene or project.
     cell: the scene when online. execution: packages and the running program. build: project to package.
     kept: encoded answers.
     """
@@ -36,6 +37,7 @@ class Services:
     users: "Users"
     locks: "Locks"
     storage: "Storage"
+    assets: "AssetStore"
     types: "ObjectTypes"
     session: "Session"
     cell: "OnlineCell"

@@ -72,6 +72,11 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
         return self.data_dir / "journal.sqlite"
 
     @property
+    def assets_dir(self) -> Path:
+        """Give the directory of assets."""
+        return self.data_dir / "assets"
+
+    @property
     def packages_dir(self) -> Path:
         """Give the directory of execution packages."""
         return self.data_dir / "packages"

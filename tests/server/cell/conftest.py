@@ -132,7 +132,9 @@ async def running_server(data_dir: Path) -> AsyncIterator[Server]:
     settings = ServerSettings(data_dir=data_dir, streaming_period=0.05)
     hub, locks, types = Hub(), Locks(2, 0.05), Types()
     none: Any = None
-    given: dict[str, Any] = dict.fromkeys(("users", "storage", "session", "cell", "execution", "build"), none)
+    given: dict[str, Any] = dict.fromkeys(
+        ("access", "users", "storage", "assets", "session", "cell", "execution", "build"), none
+    )
     services = Services(settings=settings, hub=hub, locks=locks, types=types, **given)  # type: ignore[arg-type]
     services.session = Session(services)
     await services.session.open()

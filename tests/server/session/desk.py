@@ -286,10 +286,12 @@ async def open_desk(directory: Path, **settings: Any) -> AsyncIterator[Desk]:
     execution: Any = SimpleNamespace(busy=False, greeting=list)
     services = Services(
         settings=chosen,
+        access=None,  # type: ignore[arg-type]
         hub=hub,
         users=users,
         locks=locks,
         storage=storage,
+        assets=None,  # type: ignore[arg-type]
         types=types,  # type: ignore[arg-type]
         session=None,  # type: ignore[arg-type]
         cell=cell,  # type: ignore[arg-type]

@@ -1,0 +1,240 @@
+"""Assets (meshes, robot descriptions): files by the hash of their content, with a record by the hash of their id.
+
+Nothing that comes from outside ever becomes part of a path. Each file is written beside its place, flushed, and then
+put there in one step; a crash leaves either the old asset or the new one.
+"""
+
+import asyncio
+import contextlib
+import hashlib
+import os
+import tempfile
+from collections.abc import AsyncIterable, AsyncIterator, Iterator
+from pathlib import Path
+from typing import Final, Self
+
+import msgspec
+import structlog
+from msgspec import UNSET
+
+from arcor2_hw.data.base import Data, Timestamp, Unset, new_id, now
+from arcor2_hw.exceptions import Conflict, InvalidData, NotFound, StorageError
+
+log = structlog.get_logger(__name__)
+
+MAX_ASSET: Final = 256 * 1024 * 1024
+"""Bytes of one asset; the meshes of a whole robot have some tens of MiB."""
+MAX_ID: Final = 255
+CHUNK: Final = 256 * 1024
+"""Bytes that are read from a file at once."""
+
+
+class TooLarge(InvalidData):
+    """What was sent is larger than is taken."""
+
+    code = "too_large"
+
+
+class Asset(Data, frozen=True):
+    """What is known of one asset. `size` in bytes, `digest` the SHA-256 of its content in hexadecimal."""
+
+    id: str
+    created: Timestamp
+    modified: Timestamp
+    size: int
+    digest: str
+    file_name: str | Unset = UNSET
+    description: str | Unset = UNSET
+
+
+class AssetStore:
+    """All assets; the records are in memory. For use on one event loop.
+
+    `revision` grows with every change. Methods that touch the disk raise StorageError naming the directory.
+    """
+
+    def __init__(self, directory: Path, limit: int = MAX_ASSET) -> None:
+        self.revision = 0
+        self.limit = limit
+        self._directory = directory
+        self._content = directory / "content"
+        self._records = directory / "records"
+        self._incoming = directory / "incoming"
+        self._assets: dict[str, Asset] = {}
+        self._changing = asyncio.Lock()
+
+    @classmethod
+    async def open(cls, directory: Path, limit: int = MAX_ASSET) -> Self:
+        """Open, or create, the store; what a crash left half written is removed."""
+        store = cls(directory, limit)
+        with store._told("use"):
+            store._assets = await asyncio.to_thread(store._load)
+        return store
+
+    def _load(self) -> dict[str, Asset]:
+        for folder in (self._content, self._records, self._incoming):
+            folder.mkdir(parents=True, exist_ok=True)
+        for left in self._incoming.iterdir():
+            left.unlink()
+        assets: dict[str, Asset] = {}
+        decoder = msgspec.json.Decoder(Asset)
+        for path in sorted(self._records.glob("*.json")):
+            try:
+                asset = decoder.decode(path.read_bytes())
+            except msgspec.DecodeError as error:
+                log.warning("asset ignored: its record is damaged", record=str(path), reason=str(error))
+                continue
+            if not self._path(asset.digest).is_file():
+                log.warning("asset ignored: its content is missing", asset=asset.id, digest=asset.digest)
+                continue
+            assets[asset.id] = asset
+        return assets
+
+    # ------------------------------------------------------------------------------------------------ look-ups
+    def infos(self) -> list[Asset]:
+        """Give all assets, by id."""
+        return [self._assets[key] for key in sorted(self._assets)]
+
+    def exists(self, key: str) -> bool:
+        """Tell whether there is such an asset."""
+        return key in self._assets
+
+    def info(self, key: str) -> Asset:
+        """Give what is known of an asset; NotFound."""
+        try:
+            return self._assets[key]
+        except KeyError:
+            raise NotFound(f"There is no asset {key!r}.") from None
+
+    async def read(self, asset: Asset) -> AsyncIterator[bytes]:
+        """Give the content of an asset in pieces, of the very version that `info` told of."""
+        with self._told("read"):
+            file = await asyncio.to_thread(self._path(asset.digest).open, "rb")
+        with file:
+            while True:
+                with self._told("read"):
+                    chunk = await asyncio.to_thread(file.read, CHUNK)
+                if not chunk:
+                    return
+                yield chunk
+
+    # ------------------------------------------------------------------------------------------------ changes
+    async def put(
+        self,
+        content: AsyncIterable[bytes],
+        key: str | None = None,
+        *,
+        file_name: str | Unset = UNSET,
+        description: str | Unset = UNSET,
+        upsert: bool = False,
+    ) -> Asset:
+        """Take in an asset as it arrives; without `key` it is given an id.
+
+        Conflict when there is one of that id, unless `upsert`; InvalidData for an impossible id; TooLarge.
+        """
+        key = new_id("asset") if key is None else _checked(key)
+        self._refuse_known(key, upsert)
+        with self._told("write"):
+            descriptor, name = await asyncio.to_thread(tempfile.mkstemp, dir=self._incoming)
+        try:
+            size, digest = await self._receive(content, descriptor)
+            async with self._changing:
+                self._refuse_known(key, upsert)
+                old = self._assets.get(key)
+                stamp = now()
+                asset = Asset(key, old.created if old else stamp, stamp, size, digest, file_name, description)
+                with self._told("write"):
+                    await asyncio.to_thread(self._place, Path(name), asset)
+                self._assets[key] = asset
+                self.revision += 1
+                if old is not None:
+                    await self._drop_unused(old.digest)
+        finally:
+            os.close(descriptor)
+            with contextlib.suppress(FileNotFoundError):  # it is in its place
+                os.unlink(name)  # noqa: PTH108 - at once, not on a thread that a cancelled task would not wait for
+        return asset
+
+    async def delete(self, key: str) -> None:
+        """Delete; NotFound. What is being read at this moment is read to its end."""
+        async with self._changing:
+            asset = self.info(key)
+            with self._told("write"):
+                await asyncio.to_thread(self._record(key).unlink, missing_ok=True)
+                await asyncio.to_thread(_flush, self._records)
+            del self._assets[key]
+            self.revision += 1
+            await self._drop_unused(asset.digest)
+
+    # ------------------------------------------------------------------------------------------------ inside
+    def _refuse_known(self, key: str, upsert: bool) -> None:
+        if key in self._assets and not upsert:
+            raise Conflict(f"There is an asset {key!r} already.")
+
+    async def _receive(self, content: AsyncIterable[bytes], descriptor: int) -> tuple[int, str]:
+        size = 0
+        hashed = hashlib.sha256()
+        async for chunk in content:
+            size += len(chunk)
+            if size > self.limit:
+                raise TooLarge(f"An asset has at most {self.limit} bytes.")
+            with self._told("write"):
+                await asyncio.to_thread(_append, descriptor, chunk, hashed)
+        with self._told("write"):
+            await asyncio.to_thread(os.fsync, descriptor)
+        return size, hashed.hexdigest()
+
+    def _place(self, received: Path, asset: Asset) -> None:
+        place = self._path(asset.digest)
+        place.parent.mkdir(exist_ok=True)
+        received.replace(place)
+        _flush(place.parent)
+        _flush(self._content)
+        descriptor, name = tempfile.mkstemp(dir=self._incoming)
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(msgspec.json.encode(asset))
+            file.flush()
+            os.fsync(file.fileno())
+        Path(name).replace(self._record(asset.id))
+        _flush(self._records)
+
+    async def _drop_unused(self, digest: str) -> None:
+        if all(asset.digest != digest for asset in self._assets.values()):
+            with self._told("write"):
+                await asyncio.to_thread(self._path(digest).unlink, missing_ok=True)
+
+    def _path(self, digest: str) -> Path:
+        return self._content / digest[:2] / digest
+
+    def _record(self, key: str) -> Path:
+        return self._records / f"{hashlib.sha256(key.encode()).hexdigest()}.json"
+
+    @contextlib.contextmanager
+    def _told(self, what: str) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            text = f"cannot {what} the assets in {self._directory}: {error.strerror}"
+            raise StorageError(text, detail=str(error)) from error
+
+
+def _checked(key: str) -> str:
+    if not key or len(key) > MAX_ID or not key.isprintable():
+        raise InvalidData(f"The id of an asset has 1 to {MAX_ID} printable characters.")
+    return key
+
+
+def _append(descriptor: int, chunk: bytes, hashed: "hashlib._Hash") -> None:
+    hashed.update(chunk)
+    rest = memoryview(chunk)
+    while rest:
+        rest = rest[os.write(descriptor, rest) :]
+
+
+def _flush(folder: Path) -> None:
+    """Make sure that what was put into, or taken out of, a folder stays so."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
