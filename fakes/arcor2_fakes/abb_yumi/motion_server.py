@@ -115,6 +115,8 @@ class MotionServer:
         self._motion: tuple[int, int] | None = None
         self._end = DONE
         self._stops: list[tuple[int, int]] = []
+        self.stops_taken: deque[float] = deque(maxlen=200)
+        """When the program took a stop from its socket, by the machine's monotonic clock, s."""
         self._joints: Array | None = None
         self._position: list[float] | None = None
         self._orientation: list[float] | None = None
@@ -236,6 +238,7 @@ class MotionServer:
         if code != 91:
             raise Rejected(BAD_CODE)
         self._stops.append((sequence, code))
+        self.stops_taken.append(time.monotonic())
         self._brake(STOPPED)
         return None
 

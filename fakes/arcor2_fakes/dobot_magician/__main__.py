@@ -63,6 +63,7 @@ def register_commands(control: ControlServer, arm: Arm, commands: Commands) -> N
     control.command("alarm", alarm)
     control.command("wrong_checksum", wrong_checksum)
     control.command("mute", mute)
+    control.command("stops", lambda: list(commands.stops))
     control.command("power_cycle", arm.power_cycle)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import time
 from collections import deque
 from collections.abc import Callable
 
@@ -22,6 +23,8 @@ class Commands:
         self._arm, self._send = arm, send
         self._cutter = Cutter()
         self.received: deque[tuple[int, int]] = deque(maxlen=2000)
+        self.stops: deque[float] = deque(maxlen=200)
+        """When forced stops came, by the machine's monotonic clock, s."""
         self.spoiled = 0
         self.mute: set[int] = set()
 
@@ -33,6 +36,7 @@ class Commands:
         """Forget all that has come, and every fault."""
         self.drop_input()
         self.received.clear()
+        self.stops.clear()
         self.mute.clear()
         self.spoiled = 0
 
@@ -141,6 +145,7 @@ class Commands:
             case 241:
                 arm.running = False
             case 242:
+                self.stops.append(time.monotonic())
                 arm.force_stop()
             case 245:
                 arm.clear()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 from typing import Any
 
 from cyclopts import App
@@ -80,13 +81,21 @@ def register_commands(control: ControlServer, block: Block, port: TcpPort | Seri
 
 
 @app.default
-def main(*, host: str = "127.0.0.1", port: int = 0, serial: bool = False, control: str = "127.0.0.1:0") -> int:
+def main(
+    *,
+    host: str = "127.0.0.1",
+    port: int = 0,
+    serial: bool = False,
+    link: Path | None = None,
+    control: str = "127.0.0.1:0",
+) -> int:
     """Start the fake; it prints one line `ready {json}` with its addresses and ends on SIGTERM.
 
     Args:
         host: address to serve Modbus TCP on.
         port: port to serve Modbus TCP on; 0 takes a free one.
         serial: serve Modbus RTU on a pty instead.
+        link: symbolic link to keep on the pty, whose own path changes when it is unplugged and plugged.
         control: HOST:PORT of the control channel; port 0 takes a free one.
     """
     try:
@@ -98,7 +107,7 @@ def main(*, host: str = "127.0.0.1", port: int = 0, serial: bool = False, contro
     async def body() -> None:
         block = Block()
         registers = RegisterMap(block)
-        modbus = SerialPort(registers) if serial else TcpPort(host, port, registers)
+        modbus = SerialPort(registers, link) if serial else TcpPort(host, port, registers)
         channel = ControlServer(control_host, control_port)
         register_commands(channel, block, modbus)
         register_faults(channel, {"modbus": modbus}, checked=("modbus",) if serial else ())
@@ -109,7 +118,7 @@ def main(*, host: str = "127.0.0.1", port: int = 0, serial: bool = False, contro
             announce(name="remote_io", modbus=modbus.address, control=await channel.start())
             await until_told_to_end()
         finally:
-            modbus.close()
+            await modbus.close()
             await channel.close()
 
     return run(body, "remote_io")

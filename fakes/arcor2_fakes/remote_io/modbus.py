@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-import os
-import tty
 from collections.abc import Callable
+from pathlib import Path
 
 from pymodbus import FramerType
 from pymodbus.server import ModbusTcpServer
 
 from arcor2_fakes.remote_io.registers import IDENTITY, RegisterMap
-from arcor2_fakes.wire import Connection, Faults, TcpWire
+from arcor2_fakes.serial_line import PtyLine
+from arcor2_fakes.wire import Connection, TcpWire
 
 
 class TcpPort:
@@ -41,7 +41,7 @@ class TcpPort:
         """Apply one of the shared faults."""
         await self.wire.fault(kind, seconds)
 
-    def close(self) -> None:
+    async def close(self) -> None:
         """Close everything."""
         self.wire.close()
 
@@ -53,62 +53,34 @@ class TcpPort:
 
 
 class SerialPort:
-    """The block's RTU line as a pty, whose path stays the same; reset and refuse do nothing to a serial line."""
+    """The block's RTU line on a pty. Must be made inside the event loop."""
 
-    def __init__(self, registers: RegisterMap) -> None:
-        self._server = ModbusTcpServer(registers.device(), framer=FramerType.RTU, identity=IDENTITY)
-        self._faults = Faults()
-        self._loop = asyncio.get_running_loop()
-        self._ends: tuple[int, int] | None = None
-        self.address = ""
+    def __init__(self, registers: RegisterMap, link: Path | None = None) -> None:
+        server = ModbusTcpServer(registers.device(), framer=FramerType.RTU, identity=IDENTITY)
+        self._protocol = server.handle_new_connection()
+        self._line = PtyLine(self._protocol.data_received, link)
+        self._protocol.connection_made(_Onto(self._line.send, lambda: None))
+
+    @property
+    def address(self) -> str:
+        """The path that a host opens."""
+        return self._line.port
 
     async def open(self) -> None:
         """Make the terminal and answer on it."""
-        ours, hosts = os.openpty()
-        self._ends = ours, hosts
-        tty.setraw(hosts)
-        os.set_blocking(ours, False)
-        self.address = os.ttyname(hosts)
-        self._protocol = self._server.handle_new_connection()
-        self._protocol.connection_made(_Onto(self._send, lambda: None))
-        self._loop.add_reader(ours, self._readable)
+        await self._line.plug()
 
     def reset(self) -> None:
-        """Do nothing: a serial line has no connection."""
+        """Do nothing: a block that starts anew leaves the port of its host as it is."""
 
     async def fault(self, kind: str, seconds: float = 1.0) -> None:
         """Apply one of the shared faults."""
-        self._faults.set(kind, seconds)
+        await self._line.fault(kind, seconds)
 
-    def close(self) -> None:
+    async def close(self) -> None:
         """Take the terminal away."""
-        if self._ends is not None:
-            self._loop.remove_reader(self._ends[0])
-            for end in self._ends:
-                os.close(end)
-            self._ends = None
-            self._protocol.connection_lost(None)
-
-    def _readable(self) -> None:
-        assert self._ends is not None
-        try:
-            data = os.read(self._ends[0], 4096)
-        except BlockingIOError:
-            return
-        if not self._faults.silent:
-            self._protocol.data_received(data)
-
-    def _send(self, frame: bytes) -> None:
-        data = self._faults.outgoing(frame)
-        if data:
-            self._loop.call_later(self._faults.delay, self._write, data)
-
-    def _write(self, data: bytes) -> None:
-        if self._ends is not None:
-            try:
-                os.write(self._ends[0], data)
-            except BlockingIOError:
-                return  # nobody reads; what a serial line carries then is lost
+        await self._line.unplug()
+        self._protocol.connection_lost(None)
 
 
 class _Onto(asyncio.Transport):

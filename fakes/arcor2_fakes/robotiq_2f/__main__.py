@@ -25,6 +25,7 @@ def register_commands(control: ControlServer, gripper: Gripper) -> None:
     control.command("remove_part", gripper.remove_part)
     control.command("block", gripper.block)
     control.command("fault", gripper.fault)
+    control.command("stops", lambda: list(gripper.stops))
     control.command("power_cycle", gripper.power_cycle)
 
 

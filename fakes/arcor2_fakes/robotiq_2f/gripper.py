@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import time
 from collections import deque
 from collections.abc import Callable
 from typing import Final
@@ -76,6 +77,8 @@ class Gripper:
         self._part: float | None = None
         self._blocked = False
         self.commands: deque[dict[str, int]] = deque(maxlen=50)
+        self.stops: deque[float] = deque(maxlen=200)
+        """When requests came that end a motion (GTO 0), by the machine's monotonic clock, s."""
         self.count = 0
         """Commands since the start."""
 
@@ -84,6 +87,8 @@ class Gripper:
         """Take requests; they are obeyed after the gripper's latency."""
         self.commands.append(dict(changes))
         self.count += 1
+        if changes.get("GTO") == 0:
+            self.stops.append(time.monotonic())
         self._pending.append((self._clock() + self.mechanics.latency, dict(changes)))
 
     def registers(self) -> dict[str, int]:

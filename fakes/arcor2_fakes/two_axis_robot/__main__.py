@@ -73,6 +73,7 @@ def register_commands(control: ControlServer, bus: Bus) -> None:
     control.command("place", lambda servo, ticks: at(servo).place(ticks))
     control.command("status_error", lambda servo, error=1: bus.refuse_next(at(servo).number, byte("error", error)))
     control.command("wrong_crc", wrong_crc)
+    control.command("sync_writes", lambda: list(bus.sync_writes))
     control.command("absent", absent)
     control.command("power_cycle", power_cycle)
 

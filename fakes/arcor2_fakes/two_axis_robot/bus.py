@@ -1,5 +1,7 @@
 """The bus: takes instruction packets to the servos and puts their status packets on the line."""
 
+import time
+from collections import deque
 from collections.abc import Callable
 from typing import Final
 
@@ -22,6 +24,8 @@ class Bus:
         self._send = send
         self._receiver = Receiver()
         self.packets = 0
+        self.sync_writes: deque[float] = deque(maxlen=200)
+        """When sync writes came, by the machine's monotonic clock, s."""
         self.wrong_crcs = 0
         self._refusals: dict[int, int] = {}
 
@@ -108,6 +112,7 @@ class Bus:
     def _sync_write(self, parameters: bytes) -> None:
         address, size = int.from_bytes(parameters[:2], "little"), int.from_bytes(parameters[2:4], "little")
         rest = parameters[4:]
+        self.sync_writes.append(time.monotonic())
         if len(rest) % (size + 1):
             return  # nobody answers a broadcast, not even to refuse it
         for start in range(0, len(rest), size + 1):

@@ -245,8 +245,10 @@ def test_a_stop_brakes_and_is_answered_at_rest(fake: FakeProcess, lines: Callabl
     commands.ask("20 " + " ".join(f"{value:.3f}" for value in joints))
     commands.ask("30 3")
     fake.control.wait_until(lambda t: t["arms"]["right"]["speed"] > 0.3)
+    sent = time.monotonic()
     assert watch.ask("91") == [0]
     assert fake.truth()["arms"]["right"]["speed"] == 0.0
+    assert sent <= fake.control.do("stops")[-1] <= time.monotonic()
     assert commands.receive()[1:] == [30, 2]
     assert abs(fake.truth()["arms"]["right"]["joints"][5]) < 99.0
 

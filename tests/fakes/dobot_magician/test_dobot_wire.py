@@ -2,6 +2,7 @@
 
 import itertools
 import struct
+import time
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -70,7 +71,10 @@ def test_the_queue_has_indices_and_a_forced_stop_leaves_what_waits(fake: FakePro
     line.ask(240, 1)
     path = [fake.control.wait_until(lambda truth: truth["joints"][0] > 2.0)["joints"][0] for _ in range(20)]
     assert all(a <= b for a, b in itertools.pairwise(path))
+    sent = time.monotonic()
     line.ask(242, 1)
+    (stamped,) = fake.control.do("stops")
+    assert sent <= stamped <= time.monotonic()
     stood = fake.truth()
     assert stood["moving"] is False
     assert 2.0 < stood["joints"][0] < 40.0

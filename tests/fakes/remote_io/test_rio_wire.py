@@ -3,10 +3,12 @@
 import logging
 import socket
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
+from pymodbus.exceptions import ModbusException
 
 EXPIRED = 2
 
@@ -115,3 +117,26 @@ def test_rtu_line(start_fake: Callable[..., Any]) -> None:
     finally:
         host.close()
     assert fake.terminate() == 0
+
+
+def test_rtu_line_is_pulled_out_and_plugged(start_fake: Callable[..., Any], tmp_path: Path) -> None:
+    link = tmp_path / "ttyBLOCK"
+    fake = start_fake("remote_io", "--serial", "--link", str(link))
+    assert fake.ready["modbus"] == str(link)
+    first = ModbusSerialClient(str(link), baudrate=115200, timeout=0.3, retries=0)
+    assert first.connect()
+    try:
+        assert len(image(first)) == 17
+        fake.control.do("refuse")
+        assert not link.exists()
+        with pytest.raises((OSError, ModbusException)):
+            image(first)
+    finally:
+        first.close()
+    fake.control.do("heal")
+    again = ModbusSerialClient(str(link), baudrate=115200, timeout=1.0, retries=0)
+    assert again.connect()
+    try:
+        assert len(image(again)) == 17
+    finally:
+        again.close()

@@ -1,6 +1,7 @@
 """The fake gripper on its ASCII port, spoken to in raw bytes; and its fingers against a clock of our own."""
 
 import socket
+import time
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -50,6 +51,15 @@ def test_answers_byte_for_byte(wire: Wire, wait_for: Callable[..., object]) -> N
     wait_for(lambda: wire.ask(b"GET PRE\n") == b"PRE 255\n")
     wait_for(lambda: wire.ask(b"GET OBJ\n") == b"OBJ 3\n")
     assert wire.ask(b"GET POS\n") == b"POS 230\n"
+
+
+def test_what_ends_a_motion_is_stamped(fake: FakeProcess, wire: Wire) -> None:
+    wire.ask(b"SET GTO 1 POS 100\n")
+    assert fake.control.do("stops") == []
+    sent = time.monotonic()
+    wire.ask(b"SET GTO 0\n")
+    (stamped,) = fake.control.do("stops")
+    assert sent <= stamped <= time.monotonic()
 
 
 def test_an_endless_line_is_cut_off(wire: Wire) -> None:

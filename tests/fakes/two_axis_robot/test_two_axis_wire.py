@@ -131,6 +131,11 @@ def test_the_vendors_library_speaks_with_it(fake: FakeProcess, port: Any) -> Non
     assert speak.write4ByteTxRx(port, 1, 116, 3000) == (COMM_SUCCESS, 0)
     fake.control.wait_until(lambda t: t["servos"]["1"]["ticks"] == 3000)
     assert speak.read4ByteTxRx(port, 1, 132) == (3000, COMM_SUCCESS, 0)
+    sent = time.monotonic()
+    assert speak.syncWriteTxOnly(port, 116, 4, [1, *(2900).to_bytes(4, "little")], 5) == COMM_SUCCESS
+    fake.control.wait_until(lambda t: t["servos"]["1"]["goal"] == 2900)
+    (stamped,) = fake.control.do("sync_writes")
+    assert sent <= stamped <= time.monotonic()
     fake.control.do("wrong_crc")
     assert speak.ping(port, 1)[1] == COMM_RX_CORRUPT
     fake.control.do("status_error", servo=2, error=1)
