@@ -19,6 +19,7 @@ from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ObjectTypeSource, ParameterMeta
 from arcor2_hw.data.robot import Joint, RobotMeta, RobotType
 from arcor2_hw.exceptions import NotFound
+from arcor2_server.access import Access
 from arcor2_server.endpoint import Endpoint
 from arcor2_server.hub import Hub
 from arcor2_server.locks import Locks
@@ -163,6 +164,8 @@ class _Socket:
         self.incoming: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
         self.scope = {"extensions": {EXTENSION: self}}
         self.client = None
+        self.headers: dict[str, str] = {}
+        self.query_params: dict[str, str] = {}
         self.receive = self.incoming.get
         self._take = take
 
@@ -286,7 +289,7 @@ async def open_desk(directory: Path, **settings: Any) -> AsyncIterator[Desk]:
     execution: Any = SimpleNamespace(busy=False, greeting=list)
     services = Services(
         settings=chosen,
-        access=None,  # type: ignore[arg-type]
+        access=Access(chosen),
         hub=hub,
         users=users,
         locks=locks,
