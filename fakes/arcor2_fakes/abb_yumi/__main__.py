@@ -148,7 +148,7 @@ def main(
             return controller.truth() | {"requests": http.requests}
 
         channel.source("truth", truth)
-        channel.command("stops", lambda: sorted(t for server in servers.values() for t in server.stops_taken))
+        channel.command("stops", lambda: {name: list(server.stops_taken) for name, server in servers.items()})
         addresses = {name: await wire.listen() for name, wire in wires.items()}
         life = asyncio.create_task(live(controller, list(servers.values()), http))
         try:

@@ -248,7 +248,7 @@ def test_a_stop_brakes_and_is_answered_at_rest(fake: FakeProcess, lines: Callabl
     sent = time.monotonic()
     assert watch.ask("91") == [0]
     assert fake.truth()["arms"]["right"]["speed"] == 0.0
-    assert sent <= fake.control.do("stops")[-1] <= time.monotonic()
+    assert sent <= fake.control.do("stops")["right"][-1] <= time.monotonic()
     assert commands.receive()[1:] == [30, 2]
     assert abs(fake.truth()["arms"]["right"]["joints"][5]) < 99.0
 
