@@ -226,6 +226,14 @@ class ObjectTypes:
         """Tell whether a type really has an optional method, by itself or by an ancestor."""
         return method in self._analysis(name).implemented
 
+    def is_installed(self, name: str) -> bool:
+        """Tell whether a type belongs to an installed distribution, or to us, and so can only be changed with it."""
+        return name in self._installed or (name in self._library and name not in self._uploaded)
+
+    def files(self) -> list[SourceFile]:
+        """Give the sources of installed and uploaded types, for reading them together with others."""
+        return [self._library.file(name) for name in (*self._installed, *self._uploaded) if name in self._library]
+
     def is_uploaded(self, name: str) -> bool:
         """Tell whether a type was uploaded, and so can be changed and deleted."""
         return name in self._uploaded

@@ -145,7 +145,7 @@ def unpack(content: bytes, directory: Path) -> None:
             if len(entries) > MAX_FILES:
                 raise InvalidPackage(f"The package has more than {MAX_FILES} files.")
             for entry in entries:
-                target = directory / _inside(entry)
+                target = directory / inside(entry)
                 if entry.is_dir():
                     target.mkdir(parents=True, exist_ok=True)
                     continue
@@ -164,7 +164,8 @@ def unpack(content: bytes, directory: Path) -> None:
         raise InvalidPackage(f"The package is no usable zip: {error}.") from error
 
 
-def _inside(entry: zipfile.ZipInfo) -> PurePosixPath:
+def inside(entry: zipfile.ZipInfo) -> PurePosixPath:
+    """Give the path of a file in a package; InvalidPackage for one that leads outside, or is a link or a device."""
     name = entry.filename
     path = PurePosixPath(name)
     kind = stat.S_IFMT(entry.external_attr >> 16)

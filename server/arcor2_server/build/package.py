@@ -6,15 +6,20 @@ import shutil
 import stat
 import tempfile
 import zipfile
-from collections.abc import Mapping
+import zlib
+from collections.abc import Callable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Final
 
 from arcor2_hw.exceptions import InvalidPackage, StorageError
+from arcor2_server.packages import MAX_FILES, inside
 
 Files = Mapping[str, bytes]
 """Content by path, relative, with slashes."""
 
+MAX_READ: Final = 64 * 1024 * 1024
+"""Bytes that are read of a package at most, counted while unpacking: a zip may lie about its sizes."""
+_CHUNK: Final = 1 << 20
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)
 """The earliest time a zip can hold; a real one would make two zips of the same files differ."""
 _MODE: Final = (stat.S_IFREG | 0o644) << 16
@@ -38,6 +43,41 @@ def to_zip(files: Files) -> bytes:
                 entry.create_system = 3  # Unix, on whatever it is made
                 archive.writestr(entry, files[path])
         return buffer.getvalue()
+
+
+def from_zip(data: Path | bytes, wanted: Callable[[PurePosixPath], bool]) -> dict[str, bytes]:
+    """Give the wanted files of a zip; nothing else of it is unpacked, but every path is checked.
+
+    InvalidPackage when it is damaged, leads outside, holds a link or one file twice, or is too large; StorageError.
+    """
+    found: dict[str, bytes] = {}
+    left = MAX_READ
+    try:
+        with zipfile.ZipFile(io.BytesIO(data) if isinstance(data, bytes) else data) as archive:
+            entries = archive.infolist()
+            if len(entries) > MAX_FILES:
+                raise InvalidPackage(f"The package has more than {MAX_FILES} files.")
+            seen: set[PurePosixPath] = set()
+            for entry in entries:
+                path = inside(entry)
+                if path in seen:
+                    raise InvalidPackage(f"The package has the file {entry.filename[:80]!r} twice.")
+                seen.add(path)
+                if entry.is_dir() or not wanted(path):
+                    continue
+                content = bytearray()
+                with archive.open(entry) as source:
+                    while chunk := source.read(min(_CHUNK, left + 1)):
+                        left -= len(chunk)
+                        if left < 0:
+                            raise InvalidPackage(f"What the package tells is larger than {MAX_READ} bytes.")
+                        content += chunk
+                found[path.as_posix()] = bytes(content)
+    except OSError as error:
+        raise StorageError(f"the package cannot be read: {error.strerror or error}") from error
+    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, ValueError) as error:
+        raise InvalidPackage(f"The package is no usable zip: {error}.") from error
+    return found
 
 
 def write(files: Files, directory: Path) -> None:

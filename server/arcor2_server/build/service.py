@@ -97,6 +97,8 @@ class BuildService:
     """Builds packages. Errors: NotFound (project, scene, object type), InvalidProject, StorageError."""
 
     def __init__(self, services: "Services") -> None:
+        self.importing = asyncio.Lock()
+        """Held by the one import that is being checked and written."""
         self._services = services
 
     async def gather(self, project_id: str, package_name: str = "") -> Ingredients:

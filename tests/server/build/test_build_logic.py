@@ -48,7 +48,7 @@ def random_draft(rng: random.Random, size: int, joining: float, ending: float, w
         if sources and rng.random() < 0.6:
             asked = n if results[n] and rng.random() < 0.7 else rng.choice(sources)
             output = rng.randrange(results[asked])
-            conditions = [(asked, output, True), (asked, output, False)]
+            conditions: list[tuple[int, int, bool] | None] = [(asked, output, True), (asked, output, False)]
             rng.shuffle(conditions)
             others = [(s, k) for s in sources for k in range(results[s]) if (s, k) != (asked, output)]
             if others and rng.random() < 0.3:

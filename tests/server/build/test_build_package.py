@@ -17,48 +17,23 @@ from typing import Any
 import msgspec
 import pytest
 
-import arcor2_hw.objects
-from arcor2_hw.analysis import Enumeration, InstalledType, SourceFile
-from arcor2_hw.data.base import UNSET
-from arcor2_hw.data.object_type import Box, Model3dType, ObjectModel, ObjectTypeSource
+from arcor2_hw.analysis import Enumeration
+from arcor2_hw.data.object_type import Box, Model3dType, ObjectModel
 from arcor2_hw.data.project import END, START, Project
 from arcor2_hw.data.project_index import ProjectIndex, global_pose
 from arcor2_hw.data.rpc import BuildProjectArgs, BuildProjectData
 from arcor2_hw.exceptions import InvalidPackage, InvalidProject, NotFound, StorageError
 from arcor2_server.build import package, versions
 from arcor2_server.build.service import BuildService, Ingredients, files_of
-from arcor2_server.object_types import ObjectTypes, PackageType
+from arcor2_server.object_types import PackageType
 from arcor2_server.rpc.build import build_project
 from arcor2_server.rpc.registry import Context, RequestRefused
-from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import Storage
-from tests.server.build import workplace
+from tests.server.build import hub, workplace
+from tests.server.build.conftest import STOCK
 
 ROOT = Path(__file__).parents[3]
-STOCK = Path(arcor2_hw.objects.__file__).parent / "stock"
 MODELS = {"table": ObjectModel(Model3dType.BOX, box=Box("table", 1.0, 1.0, 0.02))}
-
-
-@pytest.fixture
-def driver(tmp_path: Path) -> PackageType:
-    folder = tmp_path / "vendor" / "acme_devices" / "acme_reader"
-    for name, content in workplace.DRIVER.items():
-        file = folder / name
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(content)
-    entry = "acme_devices.acme_reader.reader:AcmeReader"
-    return PackageType("AcmeReader", "acme_reader", "", entry, folder, "acme-devices", "2.1")
-
-
-@pytest.fixture
-def code(driver: PackageType) -> list[PackageType]:
-    entry = "arcor2_hw.objects.stock.flow_actions:FlowActions"
-    return [
-        PackageType("Arm", "arm", workplace.ARM),
-        driver,
-        PackageType("FlowActions", "flow_actions", "", entry, STOCK, "arcor2-hw", "0.1.0"),
-        PackageType("table", "table", workplace.TABLE),
-    ]
 
 
 @pytest.fixture
@@ -278,28 +253,10 @@ def test_a_package_appears_whole_or_not_at_all(tmp_path: Path, monkeypatch: pyte
 async def service(
     code: list[PackageType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> AsyncIterator[tuple[BuildService, Storage]]:
-    """Give a Build service on a real storage and registry; the driver is installed as far as those can tell."""
-    settings = ServerSettings(data_dir=tmp_path / "data")
-    settings.data_dir.mkdir()
-    storage = await Storage.open(settings)
-    installed = []
-    for one in code:
-        if one.source:
-            await storage.put_object_type(ObjectTypeSource(one.name, one.source, model=MODELS.get(one.name, UNSET)))
-        else:
-            module = one.entry_point.partition(":")[0]
-            path = Path(str(one.folder)) / f"{module.rpartition('.')[2]}.py"
-            file = SourceFile(one.name, module, path.read_text(), str(path))
-            installed.append(
-                InstalledType(one.name, one.entry_point, one.distribution, one.version, str(one.folder), file)
-            )
-    monkeypatch.setattr("arcor2_server.object_types.installed_types", lambda: installed)
-    object_types = ObjectTypes(storage)
-    await object_types.load()
-    await storage.put_scene(workplace.scene())
-    services: Any = types.SimpleNamespace(settings=settings, storage=storage, types=object_types)
-    yield BuildService(services), storage
-    await storage.close()
+    """Give a Build service on a real storage and registry."""
+    async with hub.opened(tmp_path / "data", code, monkeypatch, MODELS) as services:
+        await services.storage.put_scene(workplace.scene())
+        yield services.build, services.storage
 
 
 async def test_a_build_lands_among_the_packages(service: tuple[BuildService, Storage], tmp_path: Path) -> None:

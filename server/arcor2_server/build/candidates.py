@@ -1,0 +1,69 @@
+"""Object types as they would be with those of a package: what an import is checked against before it is made."""
+
+from collections.abc import Iterable, Mapping
+
+import msgspec
+
+from arcor2_hw.analysis import Enumeration, Library, SourceFile, TypeAnalysis, module_name
+from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ObjectTypeSource
+from arcor2_hw.data.robot import RobotMeta
+from arcor2_hw.data.scene import Scene
+from arcor2_hw.exceptions import InvalidData, InvalidPackage, NotFound
+from arcor2_server.build import snapshot
+from arcor2_server.build.frame import TypeFacts
+
+
+class Candidates:
+    """Look-ups over object types (`Types` of session.checks); each raises NotFound for a type that is not known.
+
+    known: the sources that are here. given: those of the package, which stand in for the ones of the same names.
+    """
+
+    def __init__(self, known: Iterable[SourceFile], given: Mapping[str, ObjectTypeSource]) -> None:
+        self._given = given
+        self._library = Library(file for file in known if file.name not in given)
+        for name, one in given.items():
+            try:
+                self._library.add(SourceFile(name, module_name(name), one.source))
+            except InvalidData as error:
+                raise InvalidPackage(f"object type {name}: {error}") from error
+
+    def analysis(self, name: str) -> TypeAnalysis:
+        """Give what the source of a type, or of a helper or mixin, says."""
+        if name not in self._library:
+            raise NotFound(f"The object type {name} is neither in the package nor here.")
+        return self._library.analyse(name)
+
+    def meta(self, name: str) -> ObjectTypeMeta:
+        """Give one type."""
+        found = self.analysis(name)
+        if not found.is_object_type:
+            raise NotFound(f"{name} is no object type.")
+        given = self._given.get(name)
+        return found.meta if given is None else msgspec.structs.replace(found.meta, object_model=given.model)
+
+    def action(self, type_name: str, name: str) -> ObjectAction:
+        """Give one action, also a hidden one."""
+        for action in self.analysis(type_name).actions:
+            if action.name == name:
+                return action
+        raise NotFound(f"The object type {type_name} has no action {name!r}.")
+
+    def robot_meta(self, name: str) -> RobotMeta:
+        """Give the features of a robot type; NotFound when it is none."""
+        if (robot := self.analysis(name).robot) is None:
+            raise NotFound(f"The object type {name} is no robot.")
+        return robot
+
+    def enumerations(self, name: str) -> dict[tuple[str, str], Enumeration]:
+        """Give the enumerations that the actions of a type take."""
+        return self.analysis(name).enumerations
+
+    def facts(self, scene: Scene) -> dict[str, TypeFacts]:
+        """Give what a script needs of the types in a scene: all of their actions."""
+        facts: dict[str, TypeFacts] = {}
+        for name in {obj.type for obj in scene.objects}:
+            found = self.analysis(name)
+            module = f"{snapshot.FOLDER}.{module_name(name)}"
+            facts[name] = TypeFacts(module, {one.name: one for one in found.actions}, found.enumerations)
+        return facts

@@ -1,0 +1,59 @@
+"""As much of a server as Build and import work with: real storage, assets and registry; nothing is open."""
+
+import contextlib
+import types
+from collections.abc import AsyncIterator, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+from msgspec import UNSET
+
+from arcor2_hw.analysis import InstalledType, SourceFile
+from arcor2_hw.data.object_type import ObjectModel, ObjectTypeSource
+from arcor2_server.build.service import BuildService
+from arcor2_server.object_types import ObjectTypes, PackageType
+from arcor2_server.settings import ServerSettings
+from arcor2_server.storage import AssetStore, Storage
+
+
+@contextlib.asynccontextmanager
+async def opened(
+    directory: Path,
+    code: Iterable[PackageType],
+    monkeypatch: pytest.MonkeyPatch,
+    models: Mapping[str, ObjectModel] | None = None,
+) -> AsyncIterator[Any]:
+    """Give services on an empty storage but for the uploaded types among `code`; the others are installed."""
+    settings = ServerSettings(data_dir=directory)
+    settings.data_dir.mkdir(parents=True)
+    storage = await Storage.open(settings)
+    try:
+        installed = []
+        for one in code:
+            if one.source:
+                model = UNSET if models is None else models.get(one.name, UNSET)
+                await storage.put_object_type(ObjectTypeSource(one.name, one.source, model=model))
+            else:
+                module = one.entry_point.partition(":")[0]
+                path = Path(str(one.folder)) / f"{module.rpartition('.')[2]}.py"
+                file = SourceFile(one.name, module, path.read_text(), str(path))
+                installed.append(
+                    InstalledType(one.name, one.entry_point, one.distribution, one.version, str(one.folder), file)
+                )
+        monkeypatch.setattr("arcor2_server.object_types.installed_types", lambda: installed)
+        object_types = ObjectTypes(storage)
+        await object_types.load()
+        told: list[Any] = []
+        services: Any = types.SimpleNamespace(
+            settings=settings,
+            storage=storage,
+            assets=await AssetStore.open(directory / "assets"),
+            types=object_types,
+            session=types.SimpleNamespace(scene=None, project=None),
+            hub=types.SimpleNamespace(broadcast=told.append, told=told),
+        )
+        services.build = BuildService(services)
+        yield services
+    finally:
+        await storage.close()

@@ -1,0 +1,349 @@
+"""A package goes back into scene, project and types; what must not be overwritten is named, what is foul refused."""
+
+import io
+import json
+import stat
+import struct
+import zipfile
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+from msgspec.structs import replace
+
+from arcor2_hw.data.object_type import Box, Mesh, Model3dType, ObjectModel, ObjectTypeSource
+from arcor2_hw.data.project import END, START, Project
+from arcor2_hw.exceptions import Conflict, InvalidPackage, InvalidProject, NotFound, StorageError
+from arcor2_server.build import package
+from arcor2_server.build.importing import ImportOptions, import_package
+from arcor2_server.object_types import PackageType
+from tests.server.build import hub, workplace
+
+MODELS = {"table": ObjectModel(Model3dType.BOX, box=Box("table", 1.0, 1.0, 0.02))}
+NOTHING = ImportOptions()
+ALL = ImportOptions(True, True, True, True, True)
+
+
+def the_project() -> Project:
+    """Give the workplace's project without joints, which only a robot may have: its arm is none."""
+    points = []
+    for point in workplace.project().action_points:
+        actions = []
+        for one in point.actions:
+            if one.type.endswith("/move_joints"):
+                given = ("position", "position", '"acp_feeder"'), ("height", "double", "0.1")
+                one = workplace.action(one.name, "obj_robot/drop", *given)
+            actions.append(one)
+        points.append(replace(point, actions=actions, robot_joints=[]))
+    return replace(workplace.project(), action_points=points)
+
+
+@pytest.fixture
+async def packed(code: list[PackageType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> bytes:
+    """Give the workplace's package as another hub publishes it."""
+    async with hub.opened(tmp_path / "there", code, monkeypatch, MODELS) as there:
+        await there.storage.put_scene(workplace.scene())
+        await there.storage.put_project(the_project())
+        return bytes(await there.build.publish("pro_1"))
+
+
+@pytest.fixture
+async def here(code: list[PackageType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Any]:
+    """Give a hub that has the drivers installed and nothing saved."""
+    async with hub.opened(tmp_path / "here", [one for one in code if not one.source], monkeypatch) as services:
+        yield services
+
+
+def files_in(packed: bytes) -> dict[str, bytes]:
+    with zipfile.ZipFile(io.BytesIO(packed)) as archive:
+        return {entry.filename: archive.read(entry) for entry in archive.infolist()}
+
+
+def changed(packed: bytes, **contents: bytes | None) -> bytes:
+    """Give the package with other files; None leaves one out. `__` in a name stands for a slash."""
+    files: dict[str, bytes] = files_in(packed)
+    for name, content in contents.items():
+        path = name.replace("__", "/").replace("_py", ".py").replace("_json", ".json")
+        if content is None:
+            del files[path]
+        else:
+            files[path] = content
+    return package.to_zip(files)
+
+
+def untimed(document: Any) -> Any:
+    return replace(document, created=msgspec.UNSET, modified=msgspec.UNSET)
+
+
+# ------------------------------------------------------------------------------------------------ what comes back
+async def test_all_of_a_package_comes_back(here: Any, packed: bytes) -> None:
+    ids = await import_package(here, packed, NOTHING)
+    assert (ids.scene_id, ids.project_id) == ("scn_1", "pro_1")
+    assert msgspec.to_builtins(ids) == {"sceneId": "scn_1", "projectId": "pro_1"}
+    assert untimed(await here.storage.scene("scn_1")) == workplace.scene()
+    assert untimed(await here.storage.project("pro_1")) == the_project()
+    stored = {one.id: one for one in await here.storage.object_types()}
+    assert {name: one.source for name, one in stored.items()} == {"Arm": workplace.ARM, "table": workplace.TABLE}
+    assert stored["table"].model == MODELS["table"]
+    assert [event.event for event in here.hub.told] == ["ChangedObjectTypes"]
+    assert {meta.type for meta in here.hub.told[0].data} == {"Arm", "table"}
+    # What came back can be built again at once, into the same program.
+    again = files_in(await here.build.publish("pro_1"))
+    assert again["script.py"] == files_in(packed)["script.py"]
+
+
+async def test_from_a_file(here: Any, packed: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "package.zip"
+    path.write_bytes(packed)
+    assert (await import_package(here, path, NOTHING)).project_id == "pro_1"
+    with pytest.raises(StorageError, match="cannot be read"):
+        await import_package(here, tmp_path / "none.zip", NOTHING)
+
+
+async def test_twice_changes_nothing(here: Any, packed: bytes) -> None:
+    await import_package(here, packed, NOTHING)
+    revision, before = here.storage.revision, await here.storage.project("pro_1")
+    await import_package(here, packed, NOTHING)
+    assert here.storage.revision == revision
+    assert await here.storage.project("pro_1") == before
+    assert len(here.hub.told) == 1
+
+
+async def test_camel_case_documents_are_read(here: Any, packed: bytes) -> None:
+    project = json.loads(files_in(packed)["data/project.json"])
+    renamed = {"sceneId": project.pop("scene_id"), "hasLogic": project.pop("has_logic", True), **project}
+    renamed["actionPoints"] = renamed.pop("action_points")
+    for point in renamed["actionPoints"]:
+        point["robotJoints"] = point.pop("robot_joints", [])
+    await import_package(here, changed(packed, data__project_json=json.dumps(renamed).encode()), NOTHING)
+    assert untimed(await here.storage.project("pro_1")) == the_project()
+
+
+async def test_a_script_by_hand_comes_back(here: Any, packed: bytes) -> None:
+    project = replace(the_project(), has_logic=False, logic=[])
+    by_hand = changed(packed, data__project_json=msgspec.json.encode(project), script_py=b"print('by hand')\n")
+    await import_package(here, by_hand, NOTHING)
+    assert await here.storage.project_source("pro_1") == "print('by hand')\n"
+    other = changed(by_hand, script_py=b"print('other')\n")
+    with pytest.raises(Conflict, match="overwriteProjectSources"):
+        await import_package(here, other, ImportOptions(overwrite_project=True))
+    await import_package(here, other, ImportOptions(overwrite_project_sources=True))
+    assert await here.storage.project_source("pro_1") == "print('other')\n"
+    with pytest.raises(InvalidProject, match="line 2"):
+        await import_package(here, changed(by_hand, script_py=b"a = 1\nb = (\n"), ALL)
+
+
+# ------------------------------------------------------------------------------------------------ conflicts
+def _other_scene(services: Any) -> Any:
+    return services.storage.put_scene(replace(workplace.scene(), description="other"))
+
+
+def _other_project(services: Any) -> Any:
+    return services.storage.put_project(replace(the_project(), description="other"))
+
+
+def _other_type(services: Any) -> Any:
+    return services.storage.put_object_type(ObjectTypeSource("Arm", workplace.ARM + "\n# other\n", "kept text"))
+
+
+def _other_model(services: Any) -> Any:
+    model = ObjectModel(Model3dType.BOX, box=Box("table", 2.0, 1.0, 0.02))
+    return services.storage.put_object_type(ObjectTypeSource("table", workplace.TABLE, model=model))
+
+
+@pytest.mark.parametrize(
+    ("change", "option", "named"),
+    [
+        (_other_scene, "overwrite_scene", r"The scene workplace .*overwriteScene "),
+        (_other_project, "overwrite_project", r"The project Sort boards .*overwriteProject "),
+        (_other_type, "overwrite_object_types", r"The object type Arm .*overwriteObjectTypes "),
+        (_other_model, "overwrite_collision_models", r"The collision model of table .*overwriteCollisionModels "),
+    ],
+)
+async def test_what_differs_is_named_and_kept(
+    here: Any, packed: bytes, change: Callable[[Any], Any], option: str, named: str
+) -> None:
+    await import_package(here, packed, NOTHING)
+    await change(here)
+    revision = here.storage.revision
+    others = replace(ALL, **{option: False})
+    with pytest.raises(Conflict, match=named):
+        await import_package(here, packed, others)
+    assert here.storage.revision == revision
+    await import_package(here, packed, ImportOptions(**{option: True}))
+    assert here.storage.revision > revision
+    assert untimed(await here.storage.scene("scn_1")) == workplace.scene()
+    assert untimed(await here.storage.project("pro_1")) == the_project()
+    stored = {one.id: one for one in await here.storage.object_types()}
+    assert (stored["Arm"].source, stored["table"].model) == (workplace.ARM, MODELS["table"])
+    if change is _other_type:
+        assert stored["Arm"].description == "kept text"
+
+
+async def test_all_conflicts_are_named_at_once(here: Any, packed: bytes) -> None:
+    await import_package(here, packed, NOTHING)
+    for change in (_other_scene, _other_project, _other_type, _other_model):
+        await change(here)
+    with pytest.raises(Conflict) as caught:
+        await import_package(here, packed, NOTHING)
+    for what in ("scene workplace", "project Sort boards", "type Arm", "model of table"):
+        assert what in str(caught.value)
+
+
+async def test_a_name_that_is_taken_is_a_conflict(here: Any, packed: bytes) -> None:
+    await here.storage.put_scene(replace(workplace.scene(), id="scn_other"))
+    with pytest.raises(Conflict, match="Another scene is named workplace"):
+        await import_package(here, packed, ALL)
+
+
+@pytest.mark.parametrize("what", ["scene", "project"])
+async def test_what_is_open_is_not_replaced(here: Any, packed: bytes, what: str) -> None:
+    await import_package(here, packed, NOTHING)
+    here.session.scene = workplace.scene()
+    here.session.project = the_project() if what == "project" else None
+    await import_package(here, packed, NOTHING)  # nothing differs
+    await (_other_scene(here) if what == "scene" else _other_project(here))
+    with pytest.raises(Conflict, match=f"The {what} .* is open"):
+        await import_package(here, packed, ALL)
+
+
+async def test_an_installed_type_is_not_replaced(here: Any, packed: bytes) -> None:
+    source = b"from arcor2_hw.objects import Generic\n\n\nclass AcmeReader(Generic):\n    _ABSTRACT = False\n"
+    with pytest.raises(Conflict, match="AcmeReader is installed here"):
+        await import_package(here, changed(packed, object_types__acme_reader_py=source), ALL)
+
+
+# ------------------------------------------------------------------------------------------------ refusals
+async def test_a_driver_that_is_not_installed_is_named(
+    packed: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with hub.opened(tmp_path / "bare", [], monkeypatch) as bare:
+        with pytest.raises(NotFound, match="AcmeReader"):
+            await import_package(bare, packed, ALL)
+        assert bare.storage.revision == 0
+
+
+async def test_a_mesh_needs_its_asset(here: Any, packed: bytes) -> None:
+    mesh = ObjectModel(Model3dType.MESH, mesh=Mesh("table", "table.stl"))
+    other = changed(packed, data__models__table_json=msgspec.json.encode(mesh))
+    with pytest.raises(NotFound, match=r"table\.stl"):
+        await import_package(here, other, ALL)
+
+    async def content() -> AsyncIterator[bytes]:
+        yield b"solid"
+
+    await here.assets.put(content(), "table.stl")
+    await import_package(here, other, ALL)
+
+
+def _project(**fields: Any) -> bytes:
+    return msgspec.json.encode(replace(the_project(), **fields))
+
+
+def _renamed_action() -> bytes:
+    first, *others = the_project().action_points
+    actions = [replace(one, type="obj_robot/fly") if one.name == "pick" else one for one in first.actions]
+    return _project(action_points=[replace(first, actions=actions), *others])
+
+
+@pytest.mark.parametrize(
+    ("contents", "text"),
+    [
+        ({"script_py": None}, "no script.py"),
+        ({"data__scene_json": None}, "no data/scene.json"),
+        ({"data__project_json": b"{"}, "data/project.json of the package is damaged"),
+        ({"data__project_json": b"[" * 200_000}, "data/project.json of the package is damaged"),
+        ({"data__project_json": _project(id="")}, "no usable id"),
+        ({"data__project_json": _project(scene_id="scn_2")}, "another scene"),
+        ({"data__project_json": _renamed_action()}, "fly"),
+        (
+            {"data__project_json": _project(logic=[workplace.step(START, "pick"), workplace.step("gone", END)])},
+            "act_gone",
+        ),
+        ({"object_types__arm_py": b"class Arm(:\n"}, "object_types/arm.py of the package is no Python"),
+        ({"object_types__arm_py": b"class Leg:\n    pass\n"}, "object_types/arm.py of the package has no class"),
+        ({"object_types__arm_py": b"\xff"}, "is no text"),
+        (
+            {"object_types__arm_py": b"from .nothing import Base\n\n\nclass Arm(Base):\n    pass\n"},
+            "The object type Arm of the package cannot be used",
+        ),
+        ({"data__models__table_json": b'{"type": "Box"}'}, "data/models/table.json of the package is damaged"),
+        (
+            {"data__models__table_json": b'{"type":"Sphere","sphere":{"id":"Arm","radius":1.0}}'},
+            "is the model of Arm, not of table",
+        ),
+        ({"data__models__chair_json": b"{}"}, "belongs to none"),
+    ],
+)
+async def test_an_unsound_package_is_refused_whole(
+    here: Any, packed: bytes, contents: dict[str, bytes | None], text: str
+) -> None:
+    with pytest.raises(InvalidPackage) as caught:
+        await import_package(here, changed(packed, **contents), ALL)
+    assert text in str(caught.value)
+    assert here.storage.revision == 0
+    assert here.hub.told == []
+
+
+def _zip(*entries: tuple[str, bytes, int]) -> bytes:
+    with io.BytesIO() as buffer:
+        with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, content, mode in entries:
+                entry = zipfile.ZipInfo(name)
+                entry.external_attr = mode << 16
+                entry.compress_type = zipfile.ZIP_DEFLATED
+                archive.writestr(entry, content)
+        return buffer.getvalue()
+
+
+FILE, LINK = stat.S_IFREG | 0o644, stat.S_IFLNK | 0o777
+
+
+@pytest.mark.parametrize(
+    "foul",
+    [
+        b"",
+        b"no zip",
+        _zip(("../script.py", b"", FILE)),
+        _zip(("/script.py", b"", FILE)),
+        _zip(("data\\scene.json", b"", FILE)),
+        _zip(("C:/script.py", b"", FILE)),
+        _zip(("data/scene.json", b"/etc/passwd", LINK)),
+        _zip(("object_types/../../x.py", b"", FILE)),
+        _zip(*((f"f{n}", b"", FILE) for n in range(10_001))),
+    ],
+    ids=["empty", "text", "up", "root", "backslash", "drive", "link", "inner-up", "many"],
+)
+async def test_a_foul_zip_is_refused(here: Any, foul: bytes) -> None:
+    with pytest.raises(InvalidPackage):
+        await import_package(here, foul, ALL)
+    assert here.storage.revision == 0
+
+
+async def test_a_zip_bomb_is_refused_while_it_is_read(here: Any) -> None:
+    bomb = _zip(("script.py", bytes(package.MAX_READ + 1), FILE))
+    assert len(bomb) < 100_000
+    with pytest.raises(InvalidPackage, match="larger than"):
+        await import_package(here, bomb, ALL)
+    # The size that the zip tells of itself is a lie: what counts is what comes out.
+    at = bomb.index(b"PK\x01\x02")
+    liar = bomb[: at + 24] + struct.pack("<I", 10) + bomb[at + 28 :]
+    with pytest.raises(InvalidPackage):
+        await import_package(here, liar, ALL)
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+async def test_one_file_twice_is_refused(here: Any) -> None:
+    with pytest.raises(InvalidPackage, match="twice"):
+        await import_package(here, _zip(("script.py", b"", FILE), ("./script.py", b"", FILE)), ALL)
+
+
+async def test_a_damaged_zip_is_refused(here: Any, packed: bytes) -> None:
+    for cut in range(100, len(packed), len(packed) // 40):
+        torn = packed[:cut] + bytes(16) + packed[cut + 16 :]
+        try:
+            await import_package(here, torn, ALL)
+        except (InvalidPackage, InvalidProject, NotFound):
+            continue
