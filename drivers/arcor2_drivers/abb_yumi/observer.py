@@ -25,6 +25,10 @@ AT_REST: Final = 2e-3
 """rad/s below which a joint counts as standing."""
 
 
+class _Leaving(Exception):
+    """Observing ends in the middle of a look."""
+
+
 class Holder(NamedTuple):
     """Who has mastership of RAPID."""
 
@@ -192,24 +196,22 @@ class Observer:
         self._ending = False
         self.observing.start(timeout)
 
-    def disconnect(self) -> None:
-        """Stop observing and end the session; harmless when it was not observed."""
-        healthy = self.responsive
+    def leave(self) -> None:
+        """Ask no more; the request under way is the last. To be followed by `disconnect`."""
         self._ending = True
         self._hurry.set()
+
+    def disconnect(self) -> None:
+        """Stop observing and end the session; harmless when it was not observed."""
+        online = self.observing.online
+        self.leave()
         self.observing.stop()
-        if healthy:
+        if online:
             self.rws.logout()
 
     def newest(self) -> Sample | None:
         """Give the newest sample, however old."""
         return self._sample
-
-    @property
-    def responsive(self) -> bool:
-        """Tell whether the controller has answered lately: only then a courtesy is worth the wait."""
-        newest = self._sample
-        return self.observing.online and newest is not None and newest.age < FRESH / 2.0
 
     def sample(self) -> Sample:
         """Give the newest sample. Raises NotConnected, ConnectionLost, or Stale when it is too old."""
@@ -251,15 +253,14 @@ class Observer:
 
     # -------------------------------------------------------------------------------- on the observing thread
     def _open(self, timeout: float) -> None:
-        until = time.monotonic() + timeout
-        self.version = self.rws.get("/rw/system", min(timeout, FIRST_WITHIN))[0].get("rwversion", "")
-        if not self.version.startswith("6."):
-            raise Refused(f"{self.who} has RobotWare {self.version or '?'}; this driver speaks RWS 1.0 of RobotWare 6")
-        self._sample = None
-        self._panel = read_panel(self.rws)
-        self._look()
-        if time.monotonic() > until:
-            raise DeviceTimeout(f"{self.who} takes more than {timeout:g} s to tell its state")
+        with self.rws.all_until(time.monotonic() + timeout):
+            self.version = self.rws.get("/rw/system", FIRST_WITHIN)[0].get("rwversion", "")
+            if not self.version.startswith("6."):
+                version = self.version or "?"
+                raise Refused(f"{self.who} has RobotWare {version}; this driver speaks RWS 1.0 of RobotWare 6")
+            self._sample = None
+            self._panel = read_panel(self.rws)
+            self._look()
 
     def _close(self) -> None:
         self.rws.close()
@@ -268,10 +269,11 @@ class Observer:
         while not stopping.is_set():
             self._hurry.wait(self._period)
             self._hurry.clear()
-            if self._ending:
+            try:
+                self._look()
+            except _Leaving:
                 stopping.wait(1.0)
                 return
-            self._look()
             self._part = (self._part + 1) % len(PARTS)
             assert self._panel is not None
             noted = self._panel
@@ -279,14 +281,22 @@ class Observer:
             if self._panel is noted:  # else it was asked elsewhere in between
                 self._panel = found._replace(monotonic=time.monotonic())
 
+    def _go_on(self) -> None:
+        if self._ending:
+            raise _Leaving
+
     def _look(self) -> None:
         began, rws = time.monotonic(), self.rws
+        self._go_on()
         state = rws.value("/rw/panel/ctrlstate", "ctrlstate")
+        self._go_on()
         running = read_running(rws)
         joints, targets = {}, {}
         for arm, unit in UNITS.items():
             place = f"/rw/motionsystem/mechunits/{unit}"
+            self._go_on()
             told = rws.get(f"{place}/jointtarget")
+            self._go_on()
             posed = rws.get(f"{place}/robtarget", tool="tool0", wobj="wobj0", coordinate="World")
             try:
                 joints[arm], targets[arm] = read_joints(told[0]), read_target(posed[0])

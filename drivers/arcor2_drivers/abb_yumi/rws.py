@@ -2,6 +2,7 @@
 
 import contextlib
 import logging
+import math
 import threading
 import time
 from collections.abc import Iterator
@@ -30,6 +31,16 @@ class Rws:
         self._cookies = httpx.Cookies()
         self._client: httpx.Client | None = None
         self._lock = threading.Lock()
+        self._until = math.inf
+
+    @contextlib.contextmanager
+    def all_until(self, moment: float) -> Iterator[None]:
+        """Have all requests of a block be over by a moment (monotonic): many that are slow are as bad as one."""
+        self._until = moment
+        try:
+            yield
+        finally:
+            self._until = math.inf
 
     def close(self) -> None:
         """Close the connection; harmless when closed. The session stays."""
@@ -79,7 +90,8 @@ class Rws:
             self._lock.release()
 
     def _ask(self, method: str, path: str, query: Fields, body: Fields | None, timeout: float) -> httpx.Response:
-        until = time.monotonic() + timeout
+        until = min(time.monotonic() + timeout, self._until)
+        timeout = max(until - time.monotonic(), 0.01)
         with self._turn(timeout):
             client = self._client
             if client is None:

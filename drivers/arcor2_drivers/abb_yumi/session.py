@@ -1,13 +1,13 @@
 """ControlSession: what is ours while we control: mastership of RAPID, and a line to each arm's motion server."""
 
-import contextlib
+import math
 import threading
 import time
 from collections.abc import Callable
 from typing import Final
 
 from arcor2_hw.data.geometry import Pose
-from arcor2_hw.exceptions import DeviceError, DeviceTimeout, NotInControl
+from arcor2_hw.exceptions import DeviceError, DeviceTimeout, NotInControl, Refused
 
 from .arm_line import ArmLine
 from .frames import orientation_values, position_values
@@ -23,10 +23,13 @@ Load = tuple[float, tuple[float, float, float]]
 
 
 class ControlSession:
-    """Control of both arms. `ended` is why it is over, None while it lives; `over` is told when it ends itself."""
+    """Control of both arms. `ended` is why it is over, None while it lives, `ended_at` when (monotonic); `over` is told
+    when it ends itself.
+    """
 
     def __init__(self, name: str, settings: YumiSettings, over: Callable[[DeviceError], None]) -> None:
         self.ended: DeviceError | None = None
+        self.ended_at = math.inf
         self.lines = {arm: ArmLine(name, arm, settings.host, settings.port(arm), self._line_ended) for arm in ARMS}
         self._settings = settings
         self._over = over
@@ -47,7 +50,7 @@ class ControlSession:
         """End it: the servers stop their arms. Harmless when it is over."""
         with self._ending:
             if self.ended is None:
-                self.ended = why
+                self.ended, self.ended_at = why, time.monotonic()
         for line in self.lines.values():
             line.end(why, wait)
 
@@ -63,10 +66,15 @@ def request_mastership(rws: Rws, domain: str) -> None:
     rws.act(f"/rw/mastership/{domain}", "request")
 
 
-def release_mastership(rws: Rws, domain: str, timeout: float = 0.3) -> None:
-    """Give mastership of a domain back; not having it is no error."""
-    with contextlib.suppress(DeviceError):
-        rws.act(f"/rw/mastership/{domain}", "release", timeout=timeout)
+def release_mastership(rws: Rws, domain: str) -> bool:
+    """Give mastership of a domain back; not having it is no error. Tells whether the controller has confirmed it."""
+    try:
+        rws.act(f"/rw/mastership/{domain}", "release")
+    except Refused:
+        return True
+    except DeviceError:
+        return False
+    return True
 
 
 def await_value(rws: Rws, path: str, field: str, value: str, within: float, what: str) -> None:

@@ -4,6 +4,7 @@ import contextlib
 import logging
 import threading
 import time
+from collections.abc import Iterable
 from typing import ClassVar, Final
 
 from arcor2_hw.data.device import LossReaction
@@ -36,6 +37,8 @@ from .yumi_observed import YumiObserved
 
 MOTORS_WITHIN: Final = 5.0
 """Seconds the controller may take to switch the motors on; a real one takes one or two."""
+GIVEN_BACK_WITHIN: Final = 0.5
+"""Seconds that `disconnect` waits for a controller that has fallen silent just now, or is slow."""
 log = logging.getLogger(__name__)
 
 
@@ -53,18 +56,24 @@ class YumiControl(YumiObserved):
         self._mastership = False
         self._taking = threading.Lock()
         self._stops = dict.fromkeys(ARMS, 0)
+        self._stopped_at = dict.fromkeys(ARMS, 0.0)
         self._loads = {arm: settings.load(arm) for arm in ARMS}
 
     # -------------------------------------------------------------------------------- control
     def disconnect(self) -> None:
         """Give control back and close; harmless when closed."""
-        online = self._observer.responsive
-        self.release_control()
-        command, self._command = self._command, None
+        online = self._observer.observing.online
+        self._observer.leave()
+        command = self._command
+        with contextlib.ExitStack() as hurried:
+            if command is not None:
+                hurried.enter_context(command.all_until(time.monotonic() + GIVEN_BACK_WITHIN))
+            self.release_control()
+            if command is not None and online:
+                command.logout(GIVEN_BACK_WITHIN)  # with the session goes all it has mastership of
         if command is not None:
-            if online:
-                command.logout()
             command.close()
+        self._command, self._mastership = None, False
         super().disconnect()
 
     def take_control(self) -> None:
@@ -121,15 +130,19 @@ class YumiControl(YumiObserved):
     def release_control(self) -> None:
         """Stop both arms and give control back; harmless when it is not ours. Motors and servers stay on."""
         session, self._session = self._session, None
-        for arm in ARMS:
-            self._stops[arm] += 1
+        self._count_stop(ARMS)
         if session is not None:
-            if session.ended is None and self._observer.responsive:
+            if session.ended is None and self._observer.observing.online:
                 for arm in ARMS:
                     with contextlib.suppress(DeviceError):
                         self._end_lead_through(arm)
             session.end(NotInControl(f"control of {self.name} was given back"))
         self._give_mastership()
+
+    def _count_stop(self, arms: Iterable[str]) -> None:
+        for arm in arms:
+            self._stopped_at[arm] = time.monotonic()
+            self._stops[arm] += 1
 
     def control_owner(self) -> str | None:
         """Tell who has control: "us", the pendant, who holds mastership, the program that runs, or nobody."""
@@ -200,14 +213,14 @@ class YumiControl(YumiObserved):
 
     def _give_mastership(self) -> None:
         rws = self._command
-        if not self._mastership or rws is None:
+        if not self._mastership or rws is None or not self._observer.observing.online:
             return
-        if self._observer.responsive:
-            release_mastership(rws, "rapid")
-            known = self._observer.known_panel
-            if known is not None:
-                self._observer.note(known._replace(holder=None))
+        if not release_mastership(rws, "rapid"):
+            return  # it is still ours, and is given back at the next occasion
         self._mastership = False
+        known = self._observer.known_panel
+        if known is not None:
+            self._observer.note(known._replace(holder=None))
 
     # -------------------------------------------------------------------------------- how it ends by itself
     def _seen(self, sample: Sample) -> None:

@@ -306,11 +306,12 @@ class YumiMotion(YumiKinematics):
         self, session: ControlSession, begun: dict[str, Command], stops: dict[str, int], error: DeviceError
     ) -> DeviceError:
         """Stop what still moves, and give the error that says what happened."""
-        cancelled = any(self._stops[arm] != stops[arm] for arm in begun)
+        stopped = [self._stopped_at[arm] for arm in begun if self._stops[arm] != stops[arm]]
         for arm in begun:
             if session.ended is None:
                 session.lines[arm].stop()
-        if cancelled and (session.ended is None or not isinstance(session.ended, (ConnectionLost, SafetyStop))):
+        lost = isinstance(session.ended, ConnectionLost) and min(stopped, default=0.0) > session.ended_at
+        if stopped and not lost and not isinstance(session.ended, SafetyStop):
             return Cancelled(f"the move of {self.name} was stopped")
         if isinstance(error, Unwilling):
             if error.status is Status.WATCHDOG:
@@ -338,8 +339,7 @@ class YumiMotion(YumiKinematics):
         moves the robot, DeviceTimeout when an arm does not come to rest.
         """
         arms = self._arms(arm_id)
-        for arm in arms:
-            self._stops[arm] += 1
+        self._count_stop(arms)
         session = self._session
         if session is None or session.ended is not None:
             self._refuse_foreign()

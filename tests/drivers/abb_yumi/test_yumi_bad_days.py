@@ -86,7 +86,7 @@ def test_rapid_is_stopped_when_the_watch_line_hangs(fake: FakeYumi, ready: YuMi)
     doing = moving_far(fake, ready)
     fake.do("slow", wire="left_watch", seconds=30.0)
     ready.stop("left")
-    with pytest.raises((Cancelled, ConnectionLost)):
+    with pytest.raises(Cancelled):  # it was asked to stop before its line was lost
         doing.result()
     fake.control.wait_until(lambda t: not t["arms"]["left"]["moving"], 1.0 + BUSY)
     fake.do("heal")
@@ -115,6 +115,27 @@ def test_rws_that_fails_is_lost_and_back(fake: FakeYumi, robot: YuMi, fault: str
     fake.do("heal")
     wait(lambda: robot.connection in (Connection.BACK, Connection.ONLINE), 8.0)
     wait(lambda: len(robot.robot_joints()) == 14)
+
+
+def test_connecting_to_a_slow_controller_keeps_to_its_time(fake: FakeYumi) -> None:
+    fake.do("slow", wire="rws", seconds=0.3)
+    robot, began = make(fake.host), time.monotonic()
+    with pytest.raises(DeviceTimeout) as error:
+        robot.connect(1.0)
+    assert time.monotonic() - began < 1.0 + BUSY
+    assert fake.host in str(error.value)
+    fake.do("heal")
+    robot.connect(3.0)
+    robot.disconnect()
+
+
+def test_leaving_a_slow_controller_leaves_no_mastership_behind(fake: FakeYumi, ready: YuMi) -> None:
+    fake.do("slow", wire="rws", seconds=0.12)
+    time.sleep(0.5)
+    began = time.monotonic()
+    ready.disconnect()
+    assert time.monotonic() - began < 1.0 + BUSY
+    assert fake.truth()["mastership"]["rapid"] is None
 
 
 def test_stale_is_an_error_and_names_the_address(fake: FakeYumi, robot: YuMi) -> None:

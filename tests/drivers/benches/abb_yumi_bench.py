@@ -31,6 +31,7 @@ ABSENT = "127.99.77.2"
 
 class YuMiBench(Bench):
     object_type = YuMi
+    connect_timeout = 5.0  # some twenty requests, each of which a busy machine delays
     call_within = 3.0
     fake: FakeYumi
 
@@ -48,7 +49,7 @@ class YuMiBench(Bench):
         return self.fake.host
 
     def make(self) -> YuMi:
-        return YuMi("robot_id", "both arms", Pose(), settings(self.fake.host))
+        return YuMi("robot_id", "both arms", Pose(), settings(self.fake.host, watchdog=0.6))
 
     def absent(self) -> tuple[Generic, str]:
         return YuMi("robot_id", "both arms", Pose(), YumiSettings(ABSENT)), ABSENT
@@ -69,11 +70,11 @@ class YuMiBench(Bench):
         assert isinstance(device, YuMi)
         return device.robot_joints()
 
-    def _turn(self, device: Generic, by: float) -> None:
+    def _turn(self, device: Generic, by: float) -> object:
         assert isinstance(device, YuMi)
         joints = device.robot_joints(arm_id="left")
         joints[5].value += by if joints[5].value < 0.5 else -by
-        device.move_to_joints(joints, 0.5, arm_id="left")
+        return device.move_to_joints(joints, 0.5, arm_id="left")
 
     def ask(self, device: Generic) -> object:
         return self._turn(device, 0.1)
