@@ -74,7 +74,8 @@ class YuMiBench(Bench):
         assert isinstance(device, YuMi)
         joints = device.robot_joints(arm_id="left")
         joints[5].value += by if joints[5].value < 0.5 else -by
-        return device.move_to_joints(joints, 0.5, arm_id="left")
+        device.move_to_joints(joints, 0.5, arm_id="left")
+        return device.last_moves
 
     def ask(self, device: Generic) -> object:
         return self._turn(device, 0.1)
