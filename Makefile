@@ -1,5 +1,5 @@
 # Two commands: `make run` and `make test`. Both do all the set-up; the second time they start at once.
-.PHONY: run test bench lint types layers check lock clean
+.PHONY: run test bench bench-long lint types layers check lock clean
 .DEFAULT_GOAL := run
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
@@ -20,6 +20,10 @@ test: .make/dev
 
 bench: .make/dev
 	$(BIN)/python -m benchmarks $(ARGS)
+
+# Every transport lost and back 300 times instead of 18, which takes half an hour.
+bench-long: .make/dev
+	$(BIN)/python -m benchmarks --long recovery $(ARGS)
 
 check: lint types layers
 

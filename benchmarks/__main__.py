@@ -1,34 +1,44 @@
-"""`make bench`: all figures, as JSON lines on standard output and a table on standard error."""
+"""`make bench`: all figures, as JSON lines on standard output and a table on standard error.
+
+`python -m benchmarks [--long] [ROOM ...]`: all rooms, or those named; `--long` is for recovery: 50 cycles, not 3.
+"""
 
 import asyncio
 import sys
 import tempfile
+from collections.abc import Awaitable, Callable
 from pathlib import Path
+from typing import Final
 
-from benchmarks import building, buses, camera, hung, operation, requests, robot
+from benchmarks import building, buses, camera, hung, operation, recovery, requests, robot, stops
 from benchmarks.figures import Report
+
+LONG: Final = "--long"
+ROOMS: Final[dict[str, Callable[[Report, Path], Awaitable[None]]]] = {
+    "requests": requests.run,
+    "operation": operation.run,
+    "building": lambda report, _: building.build(report),
+    "robot": robot.run,
+    "buses": buses.run,
+    "camera": camera.run,
+    "hung": hung.run,
+    "stops": lambda report, _: stops.run(report),
+    "recovery": lambda report, _: recovery.run(report, LONG in sys.argv),
+}
 
 
 async def main(rooms: list[str]) -> None:
     """Measure the named rooms, or all."""
     report = Report()
     with tempfile.TemporaryDirectory(prefix="arcor2-hw-bench-", ignore_cleanup_errors=True) as name:
-        directory = Path(name)
-        if not rooms or "requests" in rooms:
-            await requests.run(report, directory)
-        if not rooms or "operation" in rooms:
-            await operation.run(report, directory)
-        if not rooms or "building" in rooms:
-            await building.build(report)
-        if not rooms or "robot" in rooms:
-            await robot.run(report, directory)
-        if not rooms or "buses" in rooms:
-            await buses.run(report, directory)
-        if not rooms or "camera" in rooms:
-            await camera.run(report, directory)
-        if not rooms or "hung" in rooms:
-            await hung.run(report, directory)
+        for room, measure in ROOMS.items():
+            if not rooms or room in rooms:
+                await measure(report, Path(name))
     report.table()
 
 
-asyncio.run(main(sys.argv[1:]))
+if __name__ == "__main__":
+    named = [argument for argument in sys.argv[1:] if argument != LONG]
+    if unknown := set(named) - set(ROOMS):
+        sys.exit(f"no room {', '.join(sorted(unknown))}; there are {', '.join(ROOMS)}")
+    asyncio.run(main(named))

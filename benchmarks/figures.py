@@ -29,6 +29,9 @@ GOALS: Final[dict[str, tuple[str, str]]] = {
     "can_pdo_lost": ("frames", "<= 0"),
     "dynamixel_sync_read_6_ms": ("ms", "<= 1"),
     "hung_beside_p99_ms": ("ms", "<= 50"),
+    "recovery_p95_s": ("s", "<= 5"),
+    "recovery_growth": ("threads, descriptors, tasks", "<= 0"),
+    "driver_stop_p99_ms": ("ms", "<= 100"),
     "oak_core_percent": ("% of a core", "<= 25"),
     "build_1000_ms": ("ms", "linear"),
 }
