@@ -187,8 +187,8 @@ class UrArm(UrObserved):
 
     def _move_pose(self, target: Pose, linear: bool, speed: float, acceleration: float, stops: int) -> MoveResult:
         """Move; `stops` is the count of stops when the caller was called: one more since then, and nothing starts."""
-        within("speed", speed, 0.001, 1.0)
-        within("acceleration", acceleration, 0.01, 1.0)
+        within(f"{self.name}: speed", speed, 0.001, 1.0)
+        within(f"{self.name}: acceleration", acceleration, 0.01, 1.0)
         vector = self._controller_vector(target)
         with self._moving():
             session = self._controlled()
@@ -213,8 +213,8 @@ class UrArm(UrObserved):
             )
 
     def _move_joints(self, q: list[float], speed: float, acceleration: float, stops: int) -> MoveResult:
-        within("speed", speed, 0.001, 1.0)
-        within("acceleration", acceleration, 0.01, 1.0)
+        within(f"{self.name}: speed", speed, 0.001, 1.0)
+        within(f"{self.name}: acceleration", acceleration, 0.01, 1.0)
         with self._moving():
             session = self._controlled()
             return self._run_joints(session, self._observer.sample(), q, speed, acceleration, stops)
@@ -392,5 +392,5 @@ class UrArm(UrObserved):
     def _controller_vector(self, pose: Pose) -> list[float]:
         vector = to_vector(world_from_base(self._pose).inverted() * pose)
         if not all(map(math.isfinite, vector)):
-            raise OutOfRange("the numbers of a pose must be finite")
+            raise OutOfRange(f"{self.name}: the numbers of a pose must be finite")
         return vector

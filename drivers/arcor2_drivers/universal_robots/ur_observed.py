@@ -49,7 +49,9 @@ class UrObserved(Robot):
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: UrSettings) -> None:
         super().__init__(obj_id, name, pose, settings)
         if settings.payload_mass > self.max_payload:
-            raise OutOfRange(f"payload_mass must be at most {self.max_payload:g} kg, not {settings.payload_mass!r}")
+            raise OutOfRange(
+                f"{name}: payload_mass must be at most {self.max_payload:g} kg, not {settings.payload_mass!r}"
+            )
         self._ur = settings
         self._observer = Observer(name, settings.host)
         self._dashboard = Dashboard(settings.host)
@@ -248,5 +250,7 @@ class UrObserved(Robot):
             raise InvalidData(f"the joints of {self.name} are {', '.join(JOINTS)}; given: {', '.join(values)}")
         for name, value in values.items():
             if not -self.joint_limit <= value <= self.joint_limit:
-                raise OutOfRange(f"{name} must be {-self.joint_limit:.3f} to {self.joint_limit:.3f} rad, not {value!r}")
+                raise OutOfRange(
+                    f"{self.name}: {name} must be {-self.joint_limit:.3f} to {self.joint_limit:.3f} rad, not {value!r}"
+                )
         return [values[name] for name in JOINTS]

@@ -61,9 +61,9 @@ class UrPathed(UrServiced):
         """
         length = math.hypot(*direction)
         if len(direction) != 3 or not math.isfinite(length) or length < 1e-9:
-            raise OutOfRange("direction must be three numbers, not all zero")
-        within("force", force, *FORCE_LIMITS)
-        within("max_distance", max_distance, 0.001, FARTHEST)
+            raise OutOfRange(f"{self.name}: direction must be three numbers, not all zero")
+        within(f"{self.name}: force", force, *FORCE_LIMITS)
+        within(f"{self.name}: max_distance", max_distance, 0.001, FARTHEST)
         here = self._world(self._observer.sample())
         x, y, z = (max_distance * value / length for value in direction)
         target = Pose(here.position + Position(x, y, z), here.orientation)
@@ -82,14 +82,14 @@ class UrPathed(UrServiced):
 
         Raises DeviceFault `force_limit` when it was stopped so; the arm stands where it met the force.
         """
-        within("force", force, *FORCE_LIMITS)
+        within(f"{self.name}: force", force, *FORCE_LIMITS)
         result, state = self._guarded_line(target, speed, Limit(force), self._stops)
         if state is RunState.PUSHED:
             raise DeviceFault(f"{self.name} was stopped by a force of {force:g} N", "on its way", FORCE_LIMIT)
         return result
 
     def _guarded_line(self, target: Pose, speed: float, limit: Limit, stops: int) -> tuple[MoveResult, RunState]:
-        within("speed", speed, 0.001, 1.0)
+        within(f"{self.name}: speed", speed, 0.001, 1.0)
         vector = self._controller_vector(target)
         with self._moving():
             session = self._controlled()
@@ -114,10 +114,10 @@ class UrPathed(UrServiced):
         return self._path(waypoints, blend, linear, speed, self._stops)
 
     def _path(self, waypoints: list[Pose], blend: float, in_lines: bool, speed: float, stops: int) -> MoveResult:
-        within("speed", speed, 0.001, 1.0)
-        within("blend", blend, 0.0, LONGEST_BLEND)
+        within(f"{self.name}: speed", speed, 0.001, 1.0)
+        within(f"{self.name}: blend", blend, 0.0, LONGEST_BLEND)
         if not 1 <= len(waypoints) <= MOST_WAYPOINTS:
-            raise OutOfRange(f"a path has 1 to {MOST_WAYPOINTS} waypoints, not {len(waypoints)}")
+            raise OutOfRange(f"{self.name}: a path has 1 to {MOST_WAYPOINTS} waypoints, not {len(waypoints)}")
         vectors = [self._controller_vector(pose) for pose in waypoints]
         with self._moving():
             session = self._controlled()
@@ -147,13 +147,14 @@ class UrPathed(UrServiced):
     def _line_budget(a: Pose, b: Pose, speed: float, ramp: float) -> float:
         return linear_budget(a.position.distance_to(b.position), a.orientation.angle_to(b.orientation), speed, ramp)
 
-    @staticmethod
-    def _check_blend(blend: float, vectors: list[list[float]]) -> None:
+    def _check_blend(self, blend: float, vectors: list[list[float]]) -> None:
         """Refuse blends that would overlap: the controller would end the program on the way."""
         for number, (a, b) in enumerate(itertools.pairwise(vectors), 1):
             way = math.dist(a[:3], b[:3])
             if len(vectors) > 2 and blend > 0.0 and blend >= way / 2.0:
-                raise OutOfRange(f"blend must be less than half the way of {way:.3f} m to waypoint {number}")
+                raise OutOfRange(
+                    f"{self.name}: blend must be less than half the way of {way:.3f} m to waypoint {number}"
+                )
 
     # -------------------------------------------------------------------------------- the run of a program
     def _run_own(

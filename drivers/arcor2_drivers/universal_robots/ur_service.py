@@ -44,14 +44,14 @@ class UrServiced(UrArm):
         `inertia`: Ixx, Iyy, Izz, Ixy, Ixz, Iyz in kg m² about the centre of gravity; None leaves it to the controller.
         Raises OutOfRange, Refused for an inertia before controller 5.10, Refused while moving, NotInControl.
         """
-        within("mass", mass, 0.0, self.max_payload)
+        within(f"{self.name}: mass", mass, 0.0, self.max_payload)
         for axis, value in zip("xyz", cog, strict=True):
-            within(f"cog {axis}", value, -1.0, 1.0)
+            within(f"{self.name}: cog {axis}", value, -1.0, 1.0)
         if inertia is not None:
             if len(inertia) != 6:
-                raise OutOfRange("inertia must be six numbers: Ixx, Iyy, Izz, Ixy, Ixz, Iyz")
+                raise OutOfRange(f"{self.name}: inertia must be six numbers: Ixx, Iyy, Izz, Ixy, Ixz, Iyz")
             for value in inertia:
-                within("inertia", value, -MOST_INERTIA, MOST_INERTIA)
+                within(f"{self.name}: inertia", value, -MOST_INERTIA, MOST_INERTIA)
             if self._observer.version[:2] < INERTIA_FROM:
                 raise Refused(f"{self.name}: an inertia can be set from controller 5.10 on, not on this one")
         with self._moving():
@@ -84,9 +84,9 @@ class UrServiced(UrArm):
         valid_for: float = 0.2,
     ) -> None:
         """Move with a velocity that runs out by itself `valid_for` s from now. Raises OutOfRange, Refused as a move."""
-        within("valid_for", valid_for, 0.01, 1.0)
+        within(f"{self.name}: valid_for", valid_for, 0.01, 1.0)
         if (twist is None) == (joint_velocities is None):
-            raise OutOfRange("jog needs either twist or joint_velocities")
+            raise OutOfRange(f"{self.name}: jog needs either twist or joint_velocities")
         stops = self._stops
         with self._moving():
             session = self._controlled()
@@ -94,18 +94,21 @@ class UrServiced(UrArm):
                 limit = min(self._ur.max_joint_speed, self._joint_speed_cap())
                 velocities = [*joint_velocities]
                 if len(velocities) != len(JOINTS):
-                    raise OutOfRange(f"joint_velocities must have {len(JOINTS)} numbers")
+                    raise OutOfRange(f"{self.name}: joint_velocities must have {len(JOINTS)} numbers")
                 for name, value in zip(JOINTS, velocities, strict=True):
-                    within(f"velocity of {name}", value, -limit, limit)
+                    within(f"{self.name}: velocity of {name}", value, -limit, limit)
                 ramp = self._ur.joint_acceleration
                 command = "speedJ"
             else:
                 assert twist is not None
                 linear, angular = self._turned_twist(twist, frame)
                 within(
-                    "speed of the twist", math.hypot(*linear), 0.0, min(self._ur.max_tcp_speed, self._tcp_speed_cap())
+                    f"{self.name}: speed of the twist",
+                    math.hypot(*linear),
+                    0.0,
+                    min(self._ur.max_tcp_speed, self._tcp_speed_cap()),
                 )
-                within("angular speed of the twist", math.hypot(*angular), 0.0, self._ur.max_joint_speed)
+                within(f"{self.name}: angular speed of the twist", math.hypot(*angular), 0.0, self._ur.max_joint_speed)
                 ramp = self._ur.tcp_acceleration
                 command, velocities = "speedL", [*linear, *angular]
             session.speed(command, velocities, ramp, valid_for, lambda: self._stops == stops)

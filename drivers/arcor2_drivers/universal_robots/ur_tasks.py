@@ -289,7 +289,7 @@ class UrTasks(UrPathed):
 
     def _switch(self, output: int, value: bool) -> None:
         if not 0 <= output <= 17:
-            raise OutOfRange(f"output must be 0 to 17, not {output}")
+            raise OutOfRange(f"{self.name}: output must be 0 to 17, not {output}")
         self._controlled().set_output(output, value)
         if not self._within(OUTPUT_WITHIN, lambda: bool(self._observer.sample().outputs >> output & 1) is value):
             raise DeviceFault(f"output {output} of {self.name} did not switch {'on' if value else 'off'}")
