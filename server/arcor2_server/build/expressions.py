@@ -21,6 +21,6 @@ def dotted(first: str, parts: tuple[str, ...]) -> ast.expr:
     return result
 
 
-def equals(variable: str, value: bool | str) -> ast.expr:
+def equals(variable: str, value: bool | int | str) -> ast.expr:
     """Give `variable == value`."""
     return ast.Compare(name(variable), [ast.Eq()], [ast.Constant(value)])

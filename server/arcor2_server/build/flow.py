@@ -18,7 +18,7 @@ class Condition(NamedTuple):
 
     action: int
     output: int
-    value: bool
+    value: bool | int | str
 
 
 class Edge(NamedTuple):

@@ -13,60 +13,7 @@ from arcor2_hw.data.project import END, START
 from arcor2_hw.exceptions import InvalidProject
 from arcor2_server.build.layout import MAX_NESTING, Tree
 from arcor2_server.build.script import from_logic
-from tests.server.build.projects import SCENE, TYPES, Draft, run, same_runs
-
-
-def random_draft(rng: random.Random, size: int, joining: float, ending: float, window: int) -> Draft:
-    """Draw a graph without loops: each action goes on to one, two or three others, near ones rather than far ones."""
-    draft = Draft()
-    names = [f"a{n}" for n in range(size)]
-    # Which actions always run before another one: the sets are what the program may rely on.
-    always: dict[int, set[int]] = {0: {0}}
-    results: dict[int, int] = {n: rng.choice((0, 1, 1, 1, 2)) for n in range(size)}
-    for n in range(size):
-        draft.action(names[n], *[f"r{k}_{n}" for k in range(results[n])])
-    draft.way(START, names[0])
-    fresh = 1
-    for n in range(size):
-        if n not in always:
-            continue
-
-        def target(n: int = n) -> int:
-            nonlocal fresh
-            if rng.random() < ending or n == size - 1:
-                return size
-            known = [t for t in always if t > n]
-            if known and rng.random() < joining:
-                return rng.choice(sorted(known)[:window])
-            fresh = max(fresh, n + 1)
-            if fresh >= size:
-                return size
-            fresh += 1
-            return fresh - 1
-
-        sources = sorted(a for a in always[n] if results[a])
-        if sources and rng.random() < 0.6:
-            asked = n if results[n] and rng.random() < 0.7 else rng.choice(sources)
-            output = rng.randrange(results[asked])
-            conditions: list[tuple[int, int, bool] | None] = [(asked, output, True), (asked, output, False)]
-            rng.shuffle(conditions)
-            others = [(s, k) for s in sources for k in range(results[s]) if (s, k) != (asked, output)]
-            if others and rng.random() < 0.3:
-                conditions.insert(rng.randrange(2), (*rng.choice(others), rng.random() < 0.5))
-        else:
-            conditions = []
-        for condition in conditions or [None]:
-            end = target()
-            way = None if condition is None else (names[condition[0]], f"r{condition[1]}_{condition[0]}", condition[2])
-            draft.way(names[n], names[end] if end < size else END, way)
-            if end < size:
-                always[end] = (always[end] & always[n] if end in always else always[n]) | {end}
-    for n in sorted(always):
-        sources = [a for a in sorted(always[n]) if results[a] and a != n]
-        if not results[n] and sources and rng.random() < 0.5:
-            source = rng.choice(sources)
-            draft.links[names[n]] = (names[source], rng.randrange(results[source]))
-    return draft
+from tests.server.build.projects import SCENE, TYPES, Draft, random_draft, run, same_runs
 
 
 @settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.too_slow])

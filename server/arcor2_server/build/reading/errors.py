@@ -1,0 +1,21 @@
+"""What is told of a script that does not keep the conventions."""
+
+import ast
+
+from arcor2_hw.exceptions import InvalidProject
+
+
+class NotUnderstood(InvalidProject):
+    """A line of a script cannot become actions and logic. `line` counts from 1."""
+
+    code = "script_not_understood"
+
+    def __init__(self, line: int, message: str, detail: str = "") -> None:
+        super().__init__(f"script.py, line {line}: {message}", detail)
+        self.line = line
+
+
+def shown(node: ast.AST) -> str:
+    """Give the text of a piece of a script, shortened, to be quoted."""
+    text = " ".join(ast.unparse(node).split())
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,0 +1,281 @@
+"""Calls and ways of a script as a project: what was there before keeps its ids and its place."""
+
+import json
+from collections.abc import Mapping
+
+from msgspec import UNSET
+from msgspec.structs import replace
+
+from arcor2_hw.data.base import Unset, is_valid_name, new_id
+from arcor2_hw.data.project import (
+    END,
+    START,
+    Action,
+    ActionParameter,
+    ActionParameterType,
+    ActionPoint,
+    Flow,
+    LogicItem,
+    Project,
+    ProjectLogicIf,
+    ProjectParameter,
+)
+from arcor2_hw.data.scene import Scene
+from arcor2_hw.exceptions import InvalidProject
+from arcor2_server.build import flow, layout
+from arcor2_server.build.cycle import Cycle
+from arcor2_server.build.flow import END_NODE, Condition, Edge
+from arcor2_server.build.frame import Frame, TypeFacts
+from arcor2_server.build.reading import module
+from arcor2_server.build.reading.errors import NotUnderstood
+from arcor2_server.build.reading.module import Script
+from arcor2_server.build.reading.values import PLAIN, Values, json_of, kept, of_type, plain
+from arcor2_server.build.reading.ways import START_NODE, Call, Way, Ways
+
+_Asked = tuple[str, object] | None
+"""A condition to be compared: what it asks for, and the value."""
+
+
+def from_script(source: str, scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -> Project:
+    """Give the project with the actions, logic and project parameters that the script has.
+
+    project: what the script was made from. An action of the same name (`an`) keeps its id, action point and what the
+    script does not say; one that the script left out is removed, one that could not be in it stays. A new action lies
+    on the action point that it uses, else on the one of the action written before it.
+    Raises NotUnderstood naming the line, NotFound for an object type that `types` does not have.
+    """
+    return _Reading(source, scene, project, types).project()
+
+
+class _Reading:
+    def __init__(self, source: str, scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -> None:
+        self._old = project
+        frame = Frame(scene, project, types)
+        self._script: Script = module.read(source)
+        known = {obj.id for obj in scene.objects}
+        for name, object_id in self._script.objects.items():
+            if object_id not in known:
+                raise NotUnderstood(self._script.lines[name], f"the scene has no object {object_id}")
+        self._values = Values(frame, self._script)
+        self._parameters = self._read_parameters(frame)
+        ways = Ways(frame, self._script, self._values)
+        self._calls = ways.calls
+        self._ways = {number: _merged(found) for number, found in ways.ways.items()}
+        self._check_uses(ways)
+
+        points = [(point, action) for point in project.action_points for action in point.actions]
+        self._before: dict[str, tuple[ActionPoint, Action]] = {}
+        for point, action in points:
+            self._before.setdefault(action.name, (point, action))
+        self._variables = _variables(frame, project)
+        self._ids = [
+            self._before[call.name][1].id if call.name in self._before else new_id("act") for call in self._calls
+        ]
+
+    def _check_uses(self, ways: Ways) -> None:
+        """Refuse results that are not always there where they are used."""
+        edges = [tuple(Edge(way.target, None) for way in ways.ways[number]) for number in range(len(self._calls))]
+        _, natural = layout.arrange(edges)
+        for use in ways.uses:
+            if not natural.always_before(use.source, use.node):
+                giver = self._calls[use.source].name
+                raise NotUnderstood(use.line, f"{use.name} is not always there: {giver!r} has not run on every way")
+
+    # ------------------------------------------------------------------------------------------------ parameters
+    def _read_parameters(self, frame: Frame) -> list[ProjectParameter]:
+        by_name = {name: key for key, name in frame.parameters.items()}
+        found = {parameter.id: parameter for parameter in self._old.parameters}
+        for name, node in self._script.constants.items():
+            value = plain(node)
+            key = by_name.get(name)
+            if key is None:
+                if not is_valid_name(name):
+                    raise NotUnderstood(node.lineno, f"{name} cannot name a project parameter")
+                key = new_id("pco")
+                found[key] = ProjectParameter(name, PLAIN[type(value)], json_of(value), id=key)
+            else:
+                old = found[key]
+                value = of_type(value, old.type)
+                if PLAIN[type(value)] != old.type:
+                    raise NotUnderstood(node.lineno, f"the project parameter {old.name} is {old.type}, not {value!r}")
+                found[key] = replace(old, value=kept(old.type, value, old))
+            self._values.parameters[name] = (key, found[key].type)
+        return list(found.values())
+
+    # ------------------------------------------------------------------------------------------------ actions
+    def project(self) -> Project:
+        """Give the project as the script has it."""
+        reached = _reached(self._old)
+        number_of = {call.name: number for number, call in enumerate(self._calls)}
+        named: dict[str, str] = {}
+        actions: dict[str, list[Action]] = {point.id: [] for point in self._old.action_points}
+        left_over: set[str] = set()
+        for point in self._old.action_points:
+            for old in point.actions:
+                number = number_of.get(old.name)
+                if number is not None and self._ids[number] == old.id:
+                    actions[point.id].append(self._action(number, old))
+                elif old.id not in reached and number is None:
+                    actions[point.id].append(old)
+                    left_over.add(old.id)
+                    named |= dict.fromkeys(old.outputs(), old.name)
+        place: str | None = None
+        for number, call in enumerate(self._calls):
+            if call.name in self._before:
+                place = self._before[call.name][0].id
+                continue
+            place = self._place(call, place)
+            actions[place].append(self._action(number, None))
+        for action in (action for of in actions.values() for action in of if action.id not in left_over):
+            for output in action.outputs():
+                if output in named:
+                    line = self._calls[number_of[action.name]].line
+                    raise NotUnderstood(line, f"{output} is a result of the action {named[output]!r} already")
+                named[output] = action.name
+        return replace(
+            self._old,
+            action_points=[replace(point, actions=actions[point.id]) for point in self._old.action_points],
+            parameters=self._parameters,
+            logic=self._logic(left_over),
+        )
+
+    def _place(self, call: Call, before: str | None) -> str:
+        """Give the id of the action point that a new action lies on."""
+        used = [key for node in call.arguments.values() for key in self._values.points_in(node)]
+        if used:
+            return used[-1]
+        if before is not None:
+            return before
+        if not self._old.action_points:
+            raise NotUnderstood(call.line, f"the project has no action point on which {call.name!r} could lie")
+        return self._old.action_points[0].id
+
+    def _action(self, number: int, old: Action | None) -> Action:
+        call = self._calls[number]
+        given = {} if old is None else {parameter.name: parameter for parameter in old.parameters}
+        found: dict[str, ActionParameter] = {}
+        for meta in call.declared.parameters:
+            if (node := call.arguments.get(meta.name)) is None:
+                continue
+            if meta.name in call.results:
+                source, output = call.results[meta.name]
+                link = f"{self._ids[source]}/default/{output}"
+                found[meta.name] = ActionParameter(meta.name, ActionParameterType.LINK, json_of(link))
+            else:
+                found[meta.name] = self._values.constant(
+                    node, meta, call.object_id, call.type_name, call.declared.name, given.get(meta.name)
+                )
+        order = [*(name for name in given if name in found), *(name for name in found if name not in given)]
+        return Action(
+            call.name,
+            f"{call.object_id}/{call.declared.name}",
+            self._ids[number],
+            [found[name] for name in order],
+            self._flows(call, old),
+        )
+
+    def _flows(self, call: Call, old: Action | None) -> list[Flow]:
+        before = [] if old is None else self._variables.get(old.id, [])
+        outputs = []
+        for place, variable in enumerate(call.outputs):
+            if old is not None and place < len(before) and before[place] == variable:
+                outputs.append(old.outputs()[place])
+                continue
+            if not is_valid_name(variable):
+                raise NotUnderstood(call.line, f"{variable} cannot name a result")
+            outputs.append(variable)
+        if old is not None and old.outputs() == outputs:
+            return old.flows
+        return [Flow(outputs=outputs)]
+
+    # ------------------------------------------------------------------------------------------------ logic
+    def _logic(self, left_over: set[str]) -> list[LogicItem]:
+        old_items: dict[str, list[LogicItem]] = {}
+        for item in self._old.logic:
+            old_items.setdefault(item.start.partition("/")[0], []).append(item)
+        kept_items: dict[int, LogicItem] = {}
+        changed: list[LogicItem] = []
+        for number, ways in self._ways.items():
+            start = START if number == START_NODE else self._ids[number]
+            old = old_items.get(start, [])
+            wanted = self._steps(ways, old)
+            same = {_key(item): item for item in old}
+            keys = [(end, _asked(condition)) for end, condition in wanted]
+            ordered = len(wanted) <= 2 or list(same) == keys
+            if len(same) == len(old) == len(keys) and set(same) == set(keys) and ordered:
+                kept_items |= {id(item): item for item in old}
+                continue
+            spare = {item.end.partition("/")[0]: item for item in old}
+            for end, condition in wanted:
+                key = spare.pop(end).id if end in spare else new_id("lit")
+                changed.append(LogicItem(start, end, condition, key))
+        there = {*self._ids, *left_over, END}
+        for item in self._old.logic:
+            if item.start.partition("/")[0] in left_over and item.end.partition("/")[0] in there:
+                kept_items[id(item)] = item
+        return [*(item for item in self._old.logic if id(item) in kept_items), *changed]
+
+    def _steps(self, ways: list[Way], old: list[LogicItem]) -> list[tuple[str, ProjectLogicIf | Unset]]:
+        steps: list[tuple[str, ProjectLogicIf | Unset]] = []
+        for way in ways:
+            end = END if way.target == END_NODE else self._ids[way.target]
+            if way.taken is not None:
+                steps.append((end, self._written(way.taken)))
+                continue
+            opposites = [
+                self._written(one._replace(value=not one.value)) for one in way.tried if isinstance(one.value, bool)
+            ]
+            before = {_key(item) for item in old}
+            known = [one for one in opposites if (end, _asked(one)) in before]
+            chosen = [*known, *reversed(opposites)]
+            steps.append((end, chosen[0] if chosen else UNSET))
+        return steps
+
+    def _written(self, condition: Condition) -> ProjectLogicIf:
+        return ProjectLogicIf(f"{self._ids[condition.action]}/default/{condition.output}", json_of(condition.value))
+
+
+def _merged(ways: list[Way]) -> list[Way]:
+    """Leave out conditions that make no difference: the last ways that lead to one place."""
+    *others, last = ways
+    while others and others[-1].target == last.target:
+        others.pop()
+    return [*others, last._replace(tried=tuple(way.taken for way in others if way.taken is not None))]
+
+
+def _asked(condition: ProjectLogicIf | Unset) -> _Asked:
+    if isinstance(condition, Unset):
+        return None
+    try:
+        value = json.loads(condition.value)
+    except ValueError:
+        return condition.what, condition.value
+    return condition.what, (type(value).__name__, value)
+
+
+def _key(item: LogicItem) -> tuple[str, _Asked]:
+    return item.end.partition("/")[0], _asked(item.condition)
+
+
+def _variables(frame: Frame, project: Project) -> dict[str, list[str]]:
+    """Give the variables into which the script of a project puts the results of its actions, by action."""
+    try:
+        cycle = Cycle(frame, flow.read(project))
+    except InvalidProject:
+        return {}
+    return {action.id: cycle.results[number] for number, action in enumerate(cycle.flow.actions)}
+
+
+def _reached(project: Project) -> set[str]:
+    """Give the actions that START leads to: those that a script of the project has."""
+    following: dict[str, list[str]] = {}
+    for item in project.logic:
+        following.setdefault(item.start.partition("/")[0], []).append(item.end.partition("/")[0])
+    seen: set[str] = set()
+    waiting = [START]
+    while waiting:
+        for action_id in following.get(waiting.pop(), ()):
+            if action_id != END and action_id not in seen:
+                seen.add(action_id)
+                waiting.append(action_id)
+    return seen

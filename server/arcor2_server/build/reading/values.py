@@ -1,0 +1,202 @@
+"""What stands in a call: literals, members of enumerations, action points, project parameters, results."""
+
+import ast
+from collections.abc import Mapping
+from typing import Any, Final
+
+import msgspec
+
+from arcor2_hw.actions.parameter_types import PARAMETER_TYPES
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.object_type import ObjectAction, ParameterMeta
+from arcor2_hw.data.parameter import Parameter
+from arcor2_hw.data.project import ActionParameter, ActionParameterType
+from arcor2_hw.exceptions import InvalidData
+from arcor2_server.build.frame import REFERENCES, Frame, TypeFacts
+from arcor2_server.build.reading.errors import NotUnderstood, shown
+from arcor2_server.build.reading.module import Script
+
+ENUMERATIONS: Final = ("string_enum", "integer_enum")
+PLAIN: Final[dict[type, str]] = {bool: "boolean", int: "integer", float: "double", str: "string"}
+"""The parameter type of a plain value."""
+
+
+def json_of(value: Any) -> str:
+    """Give a plain value as JSON."""
+    return msgspec.json.encode(value).decode()
+
+
+def plain(node: ast.expr) -> Any:
+    """Give the value of a literal: truth value, number or text; NotUnderstood for anything else."""
+    match node:
+        case ast.Constant(bool() | int() | float() | str() as value):
+            return value
+        case ast.UnaryOp(ast.USub(), ast.Constant(int() | float() as value)) if not isinstance(value, bool):
+            return -value
+    raise NotUnderstood(node.lineno, f"{shown(node)} is no truth value, number or text")
+
+
+def of_type(value: Any, kind: str) -> Any:
+    """Give a plain value as what `kind` takes: a whole number may stand for a double."""
+    if kind == "double" and type(value) is int:
+        return float(value)
+    return value
+
+
+def kept(kind: str, value: Any, old: Parameter | None) -> str:
+    """Give a plain value as JSON: as it was written before if it is still the same."""
+    if old is not None and old.type == kind:
+        try:
+            before = msgspec.json.decode(old.value)
+        except msgspec.DecodeError:
+            before = None
+        if type(before) is type(value) and repr(before) == repr(value):
+            return old.value
+    return json_of(value)
+
+
+class Values:
+    """Reads the arguments of calls. `frame` knows the names that Build gives to what is in the project."""
+
+    def __init__(self, frame: Frame, script: Script) -> None:
+        self._frame = frame
+        self._script = script
+        self.parameters: dict[str, tuple[str, str]] = {}
+        """Ids and types of project parameters by their names in the script."""
+        self._poses = {path: key for key, path in frame.points.poses.items()}
+        self._joints = {path: key for key, path in frame.points.joints.items()}
+        self._positions = {path: key for key, path in frame.points.positions.items()}
+        self._point_of = {key: frame.points.poses[key][0] for key in frame.points.poses}
+        self._point_of |= {key: frame.points.joints[key][0] for key in frame.points.joints}
+        self._points = {path[0]: key for key, path in frame.points.positions.items()}
+        self._members = {
+            (kind.name, member): value
+            for facts in frame.types.values()
+            for kind in facts.enumerations.values()
+            for value, member in kind.members.items()
+        }
+
+    # ------------------------------------------------------------------------------------------------ calls
+    def arguments(self, call: ast.Call, declared: ObjectAction) -> dict[str, ast.expr]:
+        """Give what is written for each parameter but `an`; NotUnderstood where it does not fit."""
+        given: dict[str, ast.expr] = {}
+        names = [meta.name for meta in declared.parameters]
+        for name, node in zip(names, call.args, strict=False):
+            if isinstance(node, ast.Starred):
+                raise NotUnderstood(node.lineno, "arguments have to be written one by one")
+            given[name] = node
+        if len(call.args) > len(names):
+            node = call.args[len(names)]
+            raise NotUnderstood(node.lineno, f"{declared.name} takes {len(names)} arguments; {shown(node)} is too much")
+        for keyword in call.keywords:
+            if keyword.arg is None:
+                raise NotUnderstood(keyword.value.lineno, "arguments have to be written one by one")
+            if keyword.arg == "an":
+                continue
+            if keyword.arg not in names:
+                raise NotUnderstood(keyword.value.lineno, f"{declared.name} has no parameter {keyword.arg}")
+            if keyword.arg in given:
+                raise NotUnderstood(keyword.value.lineno, f"the parameter {keyword.arg} is given twice")
+            given[keyword.arg] = keyword.value
+        for meta in declared.parameters:
+            if meta.name not in given and isinstance(meta.default_value, Unset):
+                raise NotUnderstood(call.lineno, f"the parameter {meta.name} of {declared.name} is missing")
+        return given
+
+    def points_in(self, node: ast.expr) -> list[str]:
+        """Give the ids of the action points that an argument refers to."""
+        path = self._path(node)
+        return [self._points[path[0]]] if path and path[0] in self._points else []
+
+    def constant(
+        self, node: ast.expr, meta: ParameterMeta, object_id: str, type_name: str, method: str, old: Parameter | None
+    ) -> ActionParameter:
+        """Read an argument that is no result of an action."""
+        if isinstance(node, ast.Name):
+            return self._project_parameter(node, meta)
+        path = self._path(node)
+        if path is not None:
+            return self._reference(node, path, meta, object_id)
+        if meta.type in ENUMERATIONS:
+            value = self._member(node, meta, type_name, method)
+        elif meta.type in REFERENCES or meta.type == "image":
+            raise NotUnderstood(node.lineno, f"{meta.name} is {meta.type}, not {shown(node)}")
+        else:
+            value = of_type(plain(node), meta.type)
+        text = kept(meta.type, value, old)
+        parameter = ActionParameter(meta.name, meta.type, text)
+        try:
+            PARAMETER_TYPES[meta.type].check(parameter, meta)
+        except (KeyError, InvalidData) as error:
+            raise NotUnderstood(node.lineno, str(error)) from error
+        return parameter
+
+    def _project_parameter(self, node: ast.Name, meta: ParameterMeta) -> ActionParameter:
+        if node.id not in self.parameters:
+            raise NotUnderstood(node.lineno, f"{node.id} is not known here")
+        key, kind = self.parameters[node.id]
+        if kind != meta.type:
+            raise NotUnderstood(node.lineno, f"{meta.name} is {meta.type}, but {node.id} is {kind}")
+        return ActionParameter(meta.name, ActionParameterType.PROJECT_PARAMETER, json_of(key))
+
+    # ------------------------------------------------------------------------------------------------ references
+    def _path(self, node: ast.expr) -> tuple[str, ...] | None:
+        """Give the parts behind the name of the action points, None when something else is meant."""
+        parts: list[str] = []
+        while isinstance(node, ast.Attribute):
+            parts.append(node.attr)
+            node = node.value
+        if isinstance(node, ast.Name) and node.id == self._script.points and parts:
+            return tuple(reversed(parts))
+        return None
+
+    def _reference(self, node: ast.expr, path: tuple[str, ...], meta: ParameterMeta, object_id: str) -> ActionParameter:
+        tables: Mapping[str, Mapping[tuple[str, ...], str]] = {
+            "pose": self._poses,
+            "joints": self._joints,
+            "position": self._positions,
+        }
+        kind = next((kind for kind, table in tables.items() if path in table), None)
+        if kind is None:
+            raise NotUnderstood(node.lineno, f"the project has no {shown(node)}")
+        if kind != meta.type:
+            raise NotUnderstood(node.lineno, f"{meta.name} is {meta.type}, but {shown(node)} is {kind}")
+        key = tables[kind][path]
+        if kind == "joints" and self._frame.index.joints(key)[1].robot_id != object_id:
+            raise NotUnderstood(node.lineno, f"{shown(node)} belong to another robot")
+        return ActionParameter(meta.name, kind, json_of(key))
+
+    # ------------------------------------------------------------------------------------------------ enumerations
+    def _named_member(self, node: ast.expr) -> tuple[str, str] | None:
+        """Give the enumeration, as it is called where it is defined, and the member that an expression names."""
+        match node:
+            case ast.Attribute(ast.Name(name), member) if name in self._script.imports:
+                return self._script.imports[name], member
+            case ast.Attribute(ast.Attribute(ast.Name(name), inner), member) if name in self._script.imports:
+                return f"{self._script.imports[name]}.{inner}", member
+        return None
+
+    def _member(self, node: ast.expr, meta: ParameterMeta, type_name: str, method: str) -> str | int:
+        facts: TypeFacts = self._frame.types[type_name]
+        kind = facts.enumerations.get((method, meta.name))
+        named = self._named_member(node)
+        if kind is None or named is None or named[0] != kind.name:
+            wanted = "an enumeration" if kind is None else f"one of {kind.name}"
+            raise NotUnderstood(node.lineno, f"{meta.name} takes {wanted}, not {shown(node)}")
+        for value, member in kind.members.items():
+            if member == named[1]:
+                return value
+        raise NotUnderstood(node.lineno, f"{kind.name} has no member {named[1]}")
+
+    def compared(self, node: ast.expr) -> bool | int | str:
+        """Give the value that a condition compares a result with: a literal, or a member of an enumeration."""
+        named = self._named_member(node)
+        if named is not None:
+            if named not in self._members:
+                raise NotUnderstood(node.lineno, f"{shown(node)} is not known")
+            return self._members[named]
+        value = plain(node)
+        if isinstance(value, float):
+            raise NotUnderstood(node.lineno, f"a condition compares with a truth value, integer or text, not {value}")
+        assert isinstance(value, bool | int | str)
+        return value
