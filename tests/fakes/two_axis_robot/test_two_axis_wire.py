@@ -116,9 +116,16 @@ def fake(start_fake: Callable[..., FakeProcess]) -> FakeProcess:
     return start_fake("two_axis_robot")
 
 
+class PatientPort(PortHandler):  # type: ignore[misc]
+    """Waits longer than the library's 34 ms: the fake's process may have to wait for a core."""
+
+    def setPacketTimeout(self, _length: int) -> None:  # noqa: N802 - the library's name
+        self.setPacketTimeoutMillis(500.0)
+
+
 @pytest.fixture
 def port(fake: FakeProcess) -> Iterator[Any]:
-    port = PortHandler(fake.ready["port"])
+    port = PatientPort(fake.ready["port"])
     assert port.openPort()
     yield port
     with contextlib.suppress(OSError):
