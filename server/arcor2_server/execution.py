@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Coroutine, Iterable
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import IO, TYPE_CHECKING, Any, Final, TypeVar
 
 import msgspec
 import structlog
@@ -79,6 +79,11 @@ class Execution:
         """Give the connections of the objects of the running program."""
         return self._board.states() if self.busy else []
 
+    @property
+    def action_in_progress(self) -> bytes | None:
+        """Give the ActionStateBefore of the action that runs, or that the program is paused before, as it was sent."""
+        return self._before
+
     def greeting(self) -> list[Event]:
         """Give the events that tell a new connection of the running program; none when none runs."""
         if self._info is None:
@@ -103,6 +108,11 @@ class Execution:
         """Take a package as a zip in base64, in place of one of the same id."""
         self._require_not_used(package_id)
         return await asyncio.to_thread(self.packages.upload, package_id, data)
+
+    async def take(self, package_id: str, content: IO[bytes]) -> PackageSummary:
+        """Take a package as a zip, in place of one of the same id."""
+        self._require_not_used(package_id)
+        return await asyncio.to_thread(self.packages.take, package_id, content)
 
     async def delete(self, package_id: str) -> PackageSummary:
         """Delete a package that does not run."""

@@ -4,7 +4,6 @@ import asyncio
 from collections.abc import Iterable
 from pathlib import Path
 
-import msgspec
 import structlog
 from msgspec import Struct
 from msgspec.structs import replace
@@ -76,6 +75,7 @@ class ObjectTypes:
         self._uploaded: dict[str, ObjectTypeSource] = {}
         self._known = _Known()
         self._read_at = -1
+        self._told_of: dict[str, ObjectTypeMeta] = {}
         self._untold = Changes()
         self._reading = asyncio.Lock()
 
@@ -99,7 +99,14 @@ class ObjectTypes:
             if self._storage.types_revision != self._read_at:
                 await self._read_uploaded()
             changes, self._untold = self._untold, Changes()
+            self._told_of = self._known.metas
         return changes
+
+    async def take_in(self) -> None:
+        """Take in what was put straight into storage; what clients do not know yet waits for the next refresh."""
+        async with self._reading:
+            if self._storage.types_revision != self._read_at:
+                await self._read_uploaded()
 
     def _read_installed(self) -> None:
         for installed in installed_types():
@@ -128,9 +135,10 @@ class ObjectTypes:
             self._uploaded[name] = one
         # Off the event loop: a hundred types take a moment to read.
         known = await asyncio.to_thread(self._analyse)
-        if not first:
-            self._note(self._known.metas, known.metas)
+        if first:
+            self._told_of = known.metas
         self._known = known
+        self._note()
         self._read_at = revision
         self.revision += 1
 
@@ -150,19 +158,22 @@ class ObjectTypes:
                 analyses[name] = TypeAnalysis(metas[name], problem=installed.problem)
         return _Known(analyses, dict(sorted(metas.items())))
 
-    def _note(self, before: dict[str, ObjectTypeMeta], after: dict[str, ObjectTypeMeta]) -> None:
-        """Remember what clients have to be told."""
+    def _note(self) -> None:
+        """Remember in what clients have to be told: how what is known differs from what they were told of."""
+        before, after = self._told_of, self._known.metas
         self._untold = Changes(
-            self._untold.removed + [meta for name, meta in before.items() if name not in after],
-            self._untold.updated + [meta for name, meta in after.items() if before.get(name, meta) != meta],
-            self._untold.added + [meta for name, meta in after.items() if name not in before],
+            [meta for name, meta in before.items() if name not in after],
+            [meta for name, meta in after.items() if before.get(name, meta) != meta],
+            [meta for name, meta in after.items() if name not in before],
         )
 
     def _told(self, name: str) -> None:
         """Leave out of what is untold what the caller tells himself."""
-        self._untold = Changes(
-            *([meta for meta in metas if meta.type != name] for metas in msgspec.structs.astuple(self._untold))
-        )
+        told = {key: meta for key, meta in self._told_of.items() if key != name}
+        if (meta := self._known.metas.get(name)) is not None:
+            told[name] = meta
+        self._told_of = told
+        self._note()
 
     # ------------------------------------------------------------------------------------------------ look-ups
     def names(self) -> list[str]:
@@ -290,7 +301,7 @@ class ObjectTypes:
 
         InvalidData for the name of a built-in or installed type.
         """
-        self._refuse_given(source.id, "replaced")
+        self.refuse_given(source.id, "replaced")
         async with self._reading:
             await self._storage.put_object_type(source)
             await self._read_uploaded()
@@ -299,7 +310,7 @@ class ObjectTypes:
 
     async def remove(self, name: str) -> ObjectTypeMeta:
         """Delete an uploaded type; gives its last meta. InvalidData for a built-in or installed type, NotFound."""
-        self._refuse_given(name, "deleted")
+        self.refuse_given(name, "deleted")
         meta = self.meta(name)
         async with self._reading:
             await self._storage.delete_object_type(name)
@@ -307,7 +318,8 @@ class ObjectTypes:
             self._told(name)
         return meta
 
-    def _refuse_given(self, name: str, what: str) -> None:
+    def refuse_given(self, name: str, what: str) -> None:
+        """Refuse that a built-in or installed type is `what`; InvalidData."""
         if name in self._installed:
             installed = self._installed[name]
             raise InvalidData(

@@ -10,7 +10,7 @@ import tempfile
 import zipfile
 from io import BytesIO
 from pathlib import Path, PurePosixPath
-from typing import Any, Final
+from typing import IO, Any, Final
 
 import humps
 import msgspec
@@ -26,6 +26,8 @@ log = structlog.get_logger(__name__)
 MAX_FILES: Final = 10_000
 MAX_SIZE: Final = 512 * 1024 * 1024
 """Bytes that all files of an upload may have when unpacked, counted while unpacking: a zip may lie about it."""
+MAX_UPLOAD: Final = 128 * 1024 * 1024
+"""Bytes of a zip that is sent as a file."""
 _CHUNK: Final = 1 << 20
 _ID: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,127}")
 _NEVER_BUILT: Final = PackageMeta("N/A", "1970-01-01T00:00:00+00:00")
@@ -103,6 +105,21 @@ class Packages:
             raise StorageError(f"The package {package_id} cannot be deleted: {error.strerror}.") from error
         return summary
 
+    def zipped(self, package_id: str) -> IO[bytes]:
+        """Give a package as a zip, in a file that is gone when it is closed; NotFound, StorageError."""
+        directory = self.directory(package_id)
+        file = tempfile.TemporaryFile()  # noqa: SIM115 - the caller reads it
+        try:
+            with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, strict_timestamps=False) as archive:
+                for path in sorted(directory.rglob("*")):
+                    if path.is_file() and not path.is_symlink() and "__pycache__" not in path.parts:
+                        archive.write(path, path.relative_to(directory))
+            file.seek(0)
+        except OSError as error:
+            file.close()
+            raise StorageError(f"The package {package_id} cannot be read: {error.strerror}.") from error
+        return file
+
     def _discard(self, path: Path) -> None:
         """Take a directory away at once, and its files after that."""
         grave = Path(tempfile.mkdtemp(prefix=".old-", dir=self._root))
@@ -111,11 +128,16 @@ class Packages:
 
     def upload(self, package_id: str, data: str) -> PackageSummary:
         """Put a zip (base64) in the place of a package. InvalidPackage says what is wrong with it, StorageError."""
-        target = self.checked(package_id)
+        self.checked(package_id)
         try:
             content = base64.b64decode(data, validate=True)
         except (binascii.Error, ValueError) as error:
             raise InvalidPackage(f"The package is not base64: {error}.") from error
+        return self.take(package_id, BytesIO(content))
+
+    def take(self, package_id: str, content: IO[bytes]) -> PackageSummary:
+        """Put a zip in the place of a package, as `upload` does."""
+        target = self.checked(package_id)
         try:
             self._root.mkdir(parents=True, exist_ok=True)
             temporary = Path(tempfile.mkdtemp(prefix=".new-", dir=self._root))
@@ -136,11 +158,11 @@ class Packages:
         return self.summary(package_id)
 
 
-def unpack(content: bytes, directory: Path) -> None:
+def unpack(content: IO[bytes], directory: Path) -> None:
     """Unpack a zip into an empty directory. InvalidPackage when it is damaged, leads outside, or is too large."""
     left = MAX_SIZE
     try:
-        with zipfile.ZipFile(BytesIO(content)) as archive:
+        with zipfile.ZipFile(content) as archive:
             entries = archive.infolist()
             if len(entries) > MAX_FILES:
                 raise InvalidPackage(f"The package has more than {MAX_FILES} files.")

@@ -3,7 +3,9 @@
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from arcor2_server.collisions import CollisionWorld
 from arcor2_server.kept import KeptAnswers
+from arcor2_server.type_news import TypeNews
 
 if TYPE_CHECKING:
     from arcor2_hw.data.events import Event
@@ -28,7 +30,7 @@ class Services:
     storage: saved documents. assets: meshes and the like. types: what is known of object types.
     session: the open scene or project.
     cell: the scene when online. execution: packages and the running program. build: project to package.
-    kept: encoded answers.
+    collisions: what is in the way. type_news: object types that clients have to be told of. kept: encoded answers.
     """
 
     settings: "ServerSettings"
@@ -43,6 +45,8 @@ class Services:
     cell: "OnlineCell"
     execution: "Execution"
     build: "BuildService"
+    collisions: CollisionWorld = field(default_factory=CollisionWorld)
+    type_news: TypeNews = field(default_factory=TypeNews)
     kept: KeptAnswers = field(default_factory=KeptAnswers)
 
     def greeting(self) -> list["Event"]:

@@ -34,6 +34,8 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     port: int = 6789
     insecure: bool = False
     """Ask nobody for a token, wherever the server listens."""
+    classic_ports: dict[str, int] = {}
+    """Further ports by the name of the service that the original has there; empty: all is on one port."""
     legacy: "LegacyListener | None" = None
     """Where clients connect that can send no token, nor speak TLS."""
     database_url: str = ""
@@ -45,6 +47,8 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     lock_retries: int = 13
     lock_retry_wait: float = 0.15
     streaming_period: float = 0.1
+    scene_inflation: float = 0.01
+    """By how much sizes are larger than stated where the safety of a line is asked, m."""
     history_limit: int = 1000
     """Steps of undo that the journal keeps."""
     allowed_hosts: frozenset[str] = frozenset()
@@ -111,6 +115,7 @@ _VARIABLES: Final = {
     "ARCOR2_ARSERVER_LOCK_RETRIES": "lock_retries",
     "ARCOR2_ARSERVER_LOCK_RETRY_WAIT": "lock_retry_wait",
     "ARCOR2_STREAMING_PERIOD": "streaming_period",
+    "ARCOR2_SCENE_INFLATION": "scene_inflation",
     "ARCOR2_HW_HOST": "host",
     "ARCOR2_HW_DATABASE_URL": "database_url",
     "ARCOR2_HW_ALLOWED_HOSTS": "allowed_hosts",

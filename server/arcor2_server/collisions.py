@@ -1,0 +1,121 @@
+"""The world of collision models: what was put in over REST, what stands in the scene in operation; lines through it."""
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Final
+
+from arcor2_hw.data.base import Data, Unset
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.object_type import Box, Cylinder, Models, Sphere
+from arcor2_hw.exceptions import NotFound
+
+if TYPE_CHECKING:
+    from arcor2_server.services import Services
+
+INFLATION: Final = 0.01
+"""By how much sizes are larger than stated where safety of a line is asked, m (protocol, section 14)."""
+_TINY: Final = 1e-12
+
+
+class Placed(Data, frozen=True):
+    """A collision model, and its pose in the world."""
+
+    model: Models
+    pose: Pose
+
+
+class CollisionWorld:
+    """What is in the way. What REST puts in stays until it is deleted or the scene is stopped over REST."""
+
+    def __init__(self, inflation: float = INFLATION) -> None:
+        self.started = False
+        self.inflation = inflation
+        self._put: dict[str, Placed] = {}
+
+    def put(self, placed: Placed) -> None:
+        """Put a model in, in place of one of its id."""
+        self._put[placed.model.id] = placed
+
+    def remove(self, key: str) -> None:
+        """Take a model out; NotFound."""
+        if self._put.pop(key, None) is None:
+            raise NotFound(f"There is no collision model {key!r}.")
+
+    def stop(self) -> None:
+        """Stop, and take all models out that were put in."""
+        self.started = False
+        self._put.clear()
+
+    def everything(self, services: "Services") -> dict[str, Placed]:
+        """Give all models by id: those put in, and those of the objects of the scene that is online."""
+        return dict(_standing(services)) | self._put
+
+
+def _standing(services: "Services") -> Iterator[tuple[str, Placed]]:
+    scene = services.session.scene
+    if scene is None or not services.cell.online:
+        return
+    for placed in scene.objects:
+        model = services.types.meta(placed.type).object_model
+        if not isinstance(model, Unset) and not isinstance(placed.pose, Unset):
+            yield placed.id, Placed(model.model(), placed.pose)
+
+
+# ------------------------------------------------------------------------------------------------ lines
+def first_hit(start: Position, end: Position, placed: Iterable[tuple[str, Placed]], inflation: float) -> str | None:
+    """Give the id of what a straight line from `start` to `end` meets first, None when it is free.
+
+    Boxes, spheres and cylinders (along their z) with sizes increased by `inflation`, m: edges of a box, radius and
+    height. Meshes are not looked at: their content is no business of this process.
+    """
+    nearest, hit = math.inf, None
+    for key, one in placed:
+        frame = one.pose.inverted()
+        a, b = (frame.position + point.rotated(frame.orientation) for point in (start, end))
+        at = _entry(a, b - a, one.model, inflation)
+        if at is not None and at < nearest:
+            nearest, hit = at, key
+    return hit
+
+
+def _entry(a: Position, d: Position, model: Models, inflation: float) -> float | None:
+    """Give at which share of the way from `a` along `d` a model around the origin is entered, None if it is not."""
+    match model:
+        case Box():
+            sizes = (model.size_x, model.size_y, model.size_z)
+            spans = [_slab(a[i], d[i], (size + inflation) / 2) for i, size in enumerate(sizes)]
+        case Sphere():
+            spans = [_round((a.x, a.y, a.z), (d.x, d.y, d.z), model.radius + inflation)]
+        case Cylinder():
+            radius = model.radius + inflation
+            spans = [_round((a.x, a.y), (d.x, d.y), radius), _slab(a.z, d.z, (model.height + inflation) / 2)]
+        case _:
+            return None
+    low, high = 0.0, 1.0
+    for span in spans:
+        if span is None:
+            return None
+        low, high = max(low, span[0]), min(high, span[1])
+    return low if low <= high else None
+
+
+def _slab(a: float, d: float, half: float) -> tuple[float, float] | None:
+    """Give between which shares of the way the line is within +-half of one axis."""
+    if abs(d) < _TINY:
+        return (-math.inf, math.inf) if abs(a) <= half else None
+    one, other = (-half - a) / d, (half - a) / d
+    return min(one, other), max(one, other)
+
+
+def _round(a: tuple[float, ...], d: tuple[float, ...], radius: float) -> tuple[float, float] | None:
+    """Give between which shares of the way the line is within `radius` of the origin (of a plane, or of space)."""
+    square = math.fsum(x * x for x in d)
+    constant = math.fsum(x * x for x in a) - radius * radius
+    if square < _TINY * _TINY:
+        return (-math.inf, math.inf) if constant <= 0 else None
+    half = math.fsum(x * y for x, y in zip(a, d, strict=True))
+    discriminant = half * half - square * constant
+    if discriminant < 0:
+        return None
+    root = math.sqrt(discriminant)
+    return (-half - root) / square, (-half + root) / square
