@@ -6,6 +6,7 @@
 import asyncio
 import sys
 import tempfile
+import traceback
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Final
@@ -27,18 +28,24 @@ ROOMS: Final[dict[str, Callable[[Report, Path], Awaitable[None]]]] = {
 }
 
 
-async def main(rooms: list[str]) -> None:
-    """Measure the named rooms, or all."""
+async def main(rooms: list[str]) -> int:
+    """Measure the named rooms, or all; give how many could not be measured to the end."""
     report = Report()
+    broken = 0
     with tempfile.TemporaryDirectory(prefix="arcor2-hw-bench-", ignore_cleanup_errors=True) as name:
         for room, measure in ROOMS.items():
             if not rooms or room in rooms:
-                await measure(report, Path(name))
+                try:
+                    await measure(report, Path(name))
+                except Exception:  # noqa: BLE001 - the other rooms are measured all the same
+                    broken += 1
+                    sys.stderr.write(f"the room {room} could not be measured:\n{traceback.format_exc()}")
     report.table()
+    return broken
 
 
 if __name__ == "__main__":
     named = [argument for argument in sys.argv[1:] if argument != LONG]
     if unknown := set(named) - set(ROOMS):
         sys.exit(f"no room {', '.join(sorted(unknown))}; there are {', '.join(ROOMS)}")
-    asyncio.run(main(named))
+    sys.exit(1 if asyncio.run(main(named)) else 0)

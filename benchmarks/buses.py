@@ -14,8 +14,9 @@ from arcor2_drivers.remote_io.registers import IMAGE_COUNT
 from arcor2_drivers.remote_io.remote_io import RemoteIO
 from arcor2_drivers.remote_io.settings import RemoteIOSettings
 from arcor2_drivers.two_axis_robot.bus import Bus
-from arcor2_drivers.two_axis_robot.registers import PRESENT_POSITION, STATE
+from arcor2_drivers.two_axis_robot.registers import PRESENT_POSITION, STATE, Register
 from arcor2_fakes.control import BlockingControlClient
+from arcor2_hw.exceptions import DeviceTimeout
 from arcor2_server.demo.processes import Child, python_module
 from benchmarks.figures import Figure, Report, median
 
@@ -62,16 +63,26 @@ def modbus_reads(address: str, rounds: int = 150, n: int = 100) -> Figure:
 def dynamixel_reads(port: str, n: int = 1000) -> Figure:
     """Read the positions of six servos at once, through the driver's bus; the pty has no bit rate."""
     bus = Bus("servos", port, 1_000_000)
+    unanswered = 0
+
+    def read(register: Register) -> None:
+        """Ask as the driver does: once more when a servo does not answer within the library's few ms."""
+        nonlocal unanswered
+        try:
+            bus.again(lambda: bus.sync_read(SERVOS, register))
+        except DeviceTimeout:  # the fake did not get a core twice; that counts with the time it took
+            unanswered += 1
+
     bus.open()
     try:
-        # As the driver asks: once more when a servo does not answer within the library's few ms.
-        samples = [
-            seconds_each(lambda: bus.again(lambda: bus.sync_read(SERVOS, PRESENT_POSITION)), 1) for _ in range(n)
-        ]
-        whole = [seconds_each(lambda: bus.again(lambda: bus.sync_read(SERVOS, STATE)), 1) for _ in range(n // 2)]
+        samples = [seconds_each(lambda: read(PRESENT_POSITION), 1) for _ in range(n)]
+        whole = [seconds_each(lambda: read(STATE), 1) for _ in range(n // 2)]
     finally:
         bus.close()
-    note = f"worst {max(samples) * 1e3:.2f} ms; all that changes ({STATE.size} bytes each) {median(whole) * 1e3:.2f} ms"
+    note = (
+        f"worst {max(samples) * 1e3:.2f} ms, {unanswered} unanswered; "
+        f"all that changes ({STATE.size} bytes each) {median(whole) * 1e3:.2f} ms"
+    )
     return Figure("dynamixel_sync_read_6_ms", median(samples) * 1e3, n, note)
 
 
