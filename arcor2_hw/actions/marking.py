@@ -9,6 +9,9 @@ from arcor2_hw.data.object_type import ActionMetadata
 DEFAULT_DEADLINE: Final = 120.0
 """Seconds after which a call that has not returned is given up; longer than any single motion of the demo cell."""
 
+OLDER_DEADLINE: Final = 3600.0
+"""Seconds for an action marked in the older way, which says nothing of its own: the peer waits for ever."""
+
 F = TypeVar("F", bound=Callable[..., object])
 
 
@@ -58,5 +61,6 @@ def metadata_of(method: object) -> ActionMetadata | None:
 
 def deadline_of(method: object) -> float | None:
     """Give the deadline of a call of `method`, s; None: it has none."""
-    found: float | None = getattr(method, "__deadline__", DEFAULT_DEADLINE)
+    otherwise = DEFAULT_DEADLINE if metadata_of(method) is None else OLDER_DEADLINE
+    found: float | None = getattr(method, "__deadline__", otherwise)
     return found

@@ -18,6 +18,7 @@ from arcor2_hw.analysis.source import Broken, Problem, SourceFile, sendable
 from arcor2_hw.analysis.symbols import External, Resolver, is_framework
 from arcor2_hw.data.base import UNSET, Data
 from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ParameterMeta
+from arcor2_hw.data.older_names import not_offered
 from arcor2_hw.data.robot import RobotMeta
 from arcor2_hw.exceptions import InvalidData, NotFound
 
@@ -190,6 +191,8 @@ class Library:
 
     def _imported(self, module: Module, found: Import) -> list[Module]:
         """Give the modules that an import statement runs, as far as they are read at all."""
+        if not found.guarded and (lacking := not_offered(found.module, found.name)) is not None:
+            raise module.problem(lacking, found.line)
         try:
             first = self._load(found.module)
             second = self._load(f"{found.module}.{found.name}") if found.name not in (None, "*") else None

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Final, TypeAlias
 
 from arcor2_hw.analysis.module import ClassInfo, FunctionNode, Import, Module, Value
+from arcor2_hw.data.older_names import OLDER_NAMES, OLDER_PACKAGES
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,24 +45,8 @@ Symbol: TypeAlias = ClassInfo | ModuleSymbol | Constant | Function | External
 Load: TypeAlias = Callable[[str], Module | None]
 
 _BASES: Final = "arcor2_hw.objects"
-_COMMON: Final = {
-    **dict.fromkeys(("IntEnum", "StrEnum"), "arcor2_hw.actions"),
-    **dict.fromkeys(("Orientation", "Pose", "Position"), "arcor2_hw.data.geometry"),
-    "ActionMetadata": "arcor2_hw.data.object_type",
-    "ActionPoint": "arcor2_hw.data.project",
-    "Joint": "arcor2_hw.data.robot",
-    "ProjectRobotJoints": "arcor2_hw.data.project",
-}
-_OLDER_MODULES: Final = {
-    "arcor2_object_types.abstract": _BASES,
-    "arcor2.exceptions": "arcor2_hw.exceptions",
-    "arcor2.data.robot": "arcor2_hw.data.robot",
-    "arcor2.data.object_type": "arcor2_hw.data.object_type",
-    "arcor2.data.camera": "arcor2_hw.data.camera",
-}
-_OLDER_NAMES: Final = {"Arcor2Exception": "Arcor2Error"}
 
-FRAMEWORK: Final = frozenset({"arcor2_hw", "arcor2", "arcor2_object_types"})
+FRAMEWORK: Final = OLDER_PACKAGES | {"arcor2_hw"}
 """Top-level packages whose names are ours."""
 
 _DEPTH: Final = 40
@@ -70,11 +55,7 @@ _DEPTH: Final = 40
 
 def our_spelling(module: str, name: str) -> tuple[str, str]:
     """Give module and name as we spell them for what older object types import (protocol, 9.6)."""
-    if module == "arcor2.data.common" and name in _COMMON:
-        return _COMMON[name], name
-    return _OLDER_MODULES.get(module, module), (
-        _OLDER_NAMES.get(name, name) if module.startswith(("arcor2.", "arcor2_object_types")) else name
-    )
+    return OLDER_NAMES.get(module, {}).get(name, (module, name))
 
 
 def dotted_name(expression: ast.expr) -> list[str] | None:

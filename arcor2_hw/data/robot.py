@@ -61,13 +61,11 @@ class RobotArg(Data, frozen=True):
 
 
 class InverseKinematicsRequest(MutableData):
-    """A question for joints that reach a pose."""
+    """A question for joints that reach a pose, as older object types put it to a service of their own."""
 
-    end_effector_id: str
     pose: Pose
-    start_joints: list[Joint] | Unset = UNSET
+    start_joints: list[Joint] | None = None
     avoid_collisions: bool = True
-    arm_id: str | Unset = UNSET
 
 
 class Mode(enum.StrEnum):

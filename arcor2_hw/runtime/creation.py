@@ -24,13 +24,20 @@ from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.scene import SceneObject, SceneObjectOverride
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound
 from arcor2_hw.objects import CollisionObject, Generic, GenericWithPose, Settings
+from arcor2_hw.runtime import older
 from arcor2_hw.runtime.messages import TypeCode
 
 ENTRY_POINTS: Final = "arcor2_hw.object_types"
 """Entry point group under which installed object types are found, by the type's name."""
 
-source_hooks: list[Callable[[], None]] = []
+source_hooks: list[Callable[[], None]] = [older.install]
 """Called before a source that is no installed module is imported: the place of what older sources want to import."""
+
+
+def prepare_for_sources() -> None:
+    """Do what has to be done before sources that are no installed modules are imported."""
+    for hook in source_hooks:
+        hook()
 
 
 def module_name(type_name: str) -> str:
@@ -68,8 +75,7 @@ def write_sources(types: Iterable[TypeCode]) -> str | None:
     uploaded = [code for code in types if not code.entry_point and code.source]
     if not uploaded:
         return None
-    for hook in source_hooks:
-        hook()
+    prepare_for_sources()
     root = tempfile.mkdtemp(prefix="arcor2-hw-types-")
     package = Path(root) / "object_types"
     package.mkdir()

@@ -15,6 +15,7 @@ from arcor2_hw.data.project import ActionPoint, Project, ProjectRobotJoints
 from arcor2_hw.data.project_index import ProjectIndex, global_pose
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import InvalidPackage, NotFound
+from arcor2_hw.runtime.creation import prepare_for_sources
 from arcor2_hw.runtime.program import POINT
 
 T = TypeVar("T")
@@ -132,7 +133,8 @@ class Places:
 
 
 def put_on_path(directory: Path) -> None:
-    """Make the package's own modules importable, before everything else of their names."""
+    """Make the package's own modules importable, before everything else of their names; older ones too."""
+    prepare_for_sources()
     path = str(directory)
     if path in sys.path:
         sys.path.remove(path)
