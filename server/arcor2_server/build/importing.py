@@ -13,13 +13,14 @@ from msgspec import UNSET, field
 from arcor2_hw.analysis import SourceFile, module_name
 from arcor2_hw.data.base import Data, Unset
 from arcor2_hw.data.object_type import Mesh, Model3dType, Models, ObjectModel, ObjectTypeSource
-from arcor2_hw.data.project import END, START, Project
+from arcor2_hw.data.project import END, START, Action, Project
 from arcor2_hw.data.scene import Scene
-from arcor2_hw.exceptions import Arcor2NotImplemented, Conflict, InvalidPackage, NotFound
+from arcor2_hw.exceptions import Conflict, InvalidPackage, InvalidProject, NotFound
 from arcor2_server.build import package, script, snapshot
 from arcor2_server.build.candidates import Candidates
+from arcor2_server.build.reading import from_script
 from arcor2_server.rpc.object_types import change_events
-from arcor2_server.session.checks import project_problems
+from arcor2_server.session.checks import complete_parameters, project_problems
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services
@@ -189,9 +190,28 @@ def _checked(given: Imported, known: Sequence[SourceFile], options: ImportOption
     """Give what is to be saved, when all of it is sound."""
     types = Candidates(known, given.types)
     if options.update_project_from_script:
-        raise Arcor2NotImplemented("A project cannot be read back from its script yet.")
+        given = msgspec.structs.replace(given, project=_from_script(given, types))
     _check(given, types)
     return given
+
+
+def _from_script(given: Imported, types: Candidates) -> Project:
+    """Give the project as the script has it, with what calls leave to a default filled in, as editors do."""
+    if given.needs_source:
+        raise InvalidProject(f"The project {given.project.name} has no logic that its script could be read back into.")
+    facts = types.facts(given.scene)
+    project = from_script(given.script, given.scene, given.project, facts)
+    type_of = {obj.id: obj.type for obj in given.scene.objects}
+
+    def filled(action: Action) -> Action:
+        object_id, method = action.parse_type()
+        return complete_parameters(action, facts[type_of[object_id]].actions[method])
+
+    points = [
+        msgspec.structs.replace(point, actions=[filled(action) for action in point.actions])
+        for point in project.action_points
+    ]
+    return msgspec.structs.replace(project, action_points=points)
 
 
 class _Saved(Data, frozen=True):

@@ -11,23 +11,28 @@ from tests.server.build import workplace
 STOCK = Path(arcor2_hw.objects.__file__).parent / "stock"
 
 
-@pytest.fixture
-def driver(tmp_path: Path) -> PackageType:
-    folder = tmp_path / "vendor" / "acme_devices" / "acme_reader"
+def make_code(directory: Path) -> list[PackageType]:
+    """Write the driver below a directory and give all types."""
+    folder = directory / "vendor" / "acme_devices" / "acme_reader"
     for name, content in workplace.DRIVER.items():
         file = folder / name
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(content)
-    entry = "acme_devices.acme_reader.reader:AcmeReader"
-    return PackageType("AcmeReader", "acme_reader", "", entry, folder, "acme-devices", "2.1")
+    reader = "acme_devices.acme_reader.reader:AcmeReader"
+    flow = "arcor2_hw.objects.stock.flow_actions:FlowActions"
+    return [
+        PackageType("Arm", "arm", workplace.ARM),
+        PackageType("AcmeReader", "acme_reader", "", reader, folder, "acme-devices", "2.1"),
+        PackageType("FlowActions", "flow_actions", "", flow, STOCK, "arcor2-hw", "0.1.0"),
+        PackageType("table", "table", workplace.TABLE),
+    ]
 
 
 @pytest.fixture
-def code(driver: PackageType) -> list[PackageType]:
-    entry = "arcor2_hw.objects.stock.flow_actions:FlowActions"
-    return [
-        PackageType("Arm", "arm", workplace.ARM),
-        driver,
-        PackageType("FlowActions", "flow_actions", "", entry, STOCK, "arcor2-hw", "0.1.0"),
-        PackageType("table", "table", workplace.TABLE),
-    ]
+def code(tmp_path: Path) -> list[PackageType]:
+    return make_code(tmp_path)
+
+
+@pytest.fixture
+def driver(code: list[PackageType]) -> PackageType:
+    return code[1]

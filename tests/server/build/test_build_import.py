@@ -1,5 +1,6 @@
 """A package goes back into scene, project and types; what must not be overwritten is named, what is foul refused."""
 
+import asyncio
 import io
 import json
 import stat
@@ -18,8 +19,10 @@ from arcor2_hw.data.project import END, START, Project
 from arcor2_hw.exceptions import Conflict, InvalidPackage, InvalidProject, NotFound, StorageError
 from arcor2_server.build import package
 from arcor2_server.build.importing import ImportOptions, import_package
+from arcor2_server.build.reading import NotUnderstood
 from arcor2_server.object_types import PackageType
 from tests.server.build import hub, workplace
+from tests.server.build.conftest import make_code
 
 MODELS = {"table": ObjectModel(Model3dType.BOX, box=Box("table", 1.0, 1.0, 0.02))}
 NOTHING = ImportOptions()
@@ -40,13 +43,19 @@ def the_project() -> Project:
     return replace(workplace.project(), action_points=points)
 
 
-@pytest.fixture
-async def packed(code: list[PackageType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> bytes:
+@pytest.fixture(scope="module")
+def packed(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """Give the workplace's package as another hub publishes it."""
-    async with hub.opened(tmp_path / "there", code, monkeypatch, MODELS) as there:
-        await there.storage.put_scene(workplace.scene())
-        await there.storage.put_project(the_project())
-        return bytes(await there.build.publish("pro_1"))
+    directory = tmp_path_factory.mktemp("there")
+
+    async def published() -> bytes:
+        with pytest.MonkeyPatch.context() as patch:
+            async with hub.opened(directory / "data", make_code(directory), patch, MODELS) as there:
+                await there.storage.put_scene(workplace.scene())
+                await there.storage.put_project(the_project())
+                return bytes(await there.build.publish("pro_1"))
+
+    return asyncio.run(published())
 
 
 @pytest.fixture
@@ -133,6 +142,49 @@ async def test_a_script_by_hand_comes_back(here: Any, packed: bytes) -> None:
     assert await here.storage.project_source("pro_1") == "print('other')\n"
     with pytest.raises(InvalidProject, match="line 2"):
         await import_package(here, changed(by_hand, script_py=b"a = 1\nb = (\n"), ALL)
+
+
+# ------------------------------------------------------------------------------------------------ from the script
+FROM_SCRIPT = replace(ALL, update_project_from_script=True)
+
+
+async def test_an_edited_script_becomes_the_project(here: Any, packed: bytes) -> None:
+    await import_package(here, packed, NOTHING)
+    source = files_in(packed)["script.py"].decode()
+    line = '        robot.pick(aps.feeder.poses.default, grip=Grip.FIRM, an="pick")\n'
+    assert line in source
+    new = line + '        robot.drop(aps.good.position, 0.25, an="lay down")\n'
+    await import_package(here, changed(packed, script_py=source.replace(line, new).encode()), FROM_SCRIPT)
+    project = await here.storage.project("pro_1")
+    actions = {action.name: action for point in project.action_points for action in point.actions}
+    assert {name for name in actions if name not in workplace_actions()} == {"lay down"}
+    assert all(actions[name].id == key for name, key in workplace_actions().items())
+    # What a call leaves to its default is there when the project is opened.
+    assert {one.name: one.value for one in actions["pick"].parameters} == {
+        "pose": '"ori_feeder"',
+        "speed": "1.0",
+        "grip": '"firm"',
+    }
+    again = files_in(await here.build.publish("pro_1"))["script.py"].decode()
+    assert again.count('an="lay down"') == 1
+    assert again.index('an="pick"') < again.index('an="lay down"') < again.index('an="known?"')
+
+
+def workplace_actions() -> dict[str, str]:
+    return {action.name: action.id for point in the_project().action_points for action in point.actions}
+
+
+async def test_an_edited_script_that_is_not_understood_changes_nothing(here: Any, packed: bytes) -> None:
+    source = files_in(packed)["script.py"].replace(b"    while True:\n", b"    while True:\n        print(1)\n")
+    with pytest.raises(NotUnderstood, match=r"line \d+: print"):
+        await import_package(here, changed(packed, script_py=source), FROM_SCRIPT)
+    assert here.storage.revision == 0
+
+
+async def test_a_script_by_hand_has_no_logic_to_go_back_to(here: Any, packed: bytes) -> None:
+    project = msgspec.json.encode(replace(the_project(), has_logic=False, logic=[]))
+    with pytest.raises(InvalidProject, match="has no logic"):
+        await import_package(here, changed(packed, data__project_json=project), FROM_SCRIPT)
 
 
 # ------------------------------------------------------------------------------------------------ conflicts

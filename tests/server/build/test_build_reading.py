@@ -1,14 +1,21 @@
 """A script goes back into the project that it was made from; edited by hand, into the project that it says."""
 
 import random
+from pathlib import Path
 from typing import Any
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from arcor2_server.build.reading import from_script
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.project import END, START, Action, ActionPoint, Flow, Project
+from arcor2_hw.data.scene import SceneObject
+from arcor2_server.build.reading import NotUnderstood, from_script
 from arcor2_server.build.script import from_logic
+from tests.server.build import workplace
 from tests.server.build.projects import SCENE, TYPES, random_draft, walk
 
 
@@ -20,7 +27,7 @@ def _oracle(seed: int) -> Any:
     return results
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
     st.integers(0, 2**32),
     st.integers(1, 30),
@@ -43,3 +50,363 @@ def test_there_and_back(seed: int, size: int, joining: float, ending: float, win
         expected = walk(project, _oracle(seed + draw), 3 * size)
         assert walk(back, _oracle(seed + draw), 3 * size) == expected, source
         assert walk(fresh, _oracle(seed + draw), 3 * size) == expected, source
+
+
+# ------------------------------------------------------------------------------------------------ edits by hand
+SCRIPT = Path(__file__).with_name("workplace_script.txt").read_text()
+ABOVE = '        robot.move_joints(aps.feeder.joints.above, 0.5, an="above feeder")\n'
+PICK = '        robot.pick(aps.feeder.poses.default, grip=Grip.FIRM, an="pick")\n'
+IF_KNOWN = "        if known == True:\n"
+GOOD = '            robot.place(aps.good.poses.default, an="into good box")\n'
+AWAY = '            robot.drop(aps.good.position, -0.2, an="throw away")\n'
+BACK = '        robot.move_joints(aps.feeder.joints.above, an="back")\n'
+
+
+def edited(*changes: tuple[str, str]) -> str:
+    source = SCRIPT
+    for old, new in changes:
+        assert source.count(old) == 1, old
+        source = source.replace(old, new)
+    return source
+
+
+def read(*changes: tuple[str, str]) -> Project:
+    return from_script(edited(*changes), workplace.scene(), workplace.project(), workplace.FACTS)
+
+
+def actions_of(project: Project) -> dict[str, Action]:
+    return {action.name: action for point in project.action_points for action in point.actions}
+
+
+def point_of(project: Project, name: str) -> str:
+    return next(point.id for point in project.action_points if name in {action.name for action in point.actions})
+
+
+def values_of(project: Project, name: str) -> dict[str, tuple[str, str]]:
+    return {one.name: (one.type, one.value) for one in actions_of(project)[name].parameters}
+
+
+def steps_of(project: Project) -> list[tuple[str, str, str]]:
+    """Give the logic by names, with the value of each condition."""
+    names = {action.id: name for name, action in actions_of(project).items()} | {START: START, END: END}
+    return sorted(
+        (names[item.start], names[item.end], "" if isinstance(item.condition, Unset) else item.condition.value)
+        for item in project.logic
+    )
+
+
+def test_an_untouched_script_changes_nothing() -> None:
+    assert read() == workplace.project()
+    # Layout, comments and quotes are not what a project keeps.
+    spread = (PICK, "\n        # well\n        robot.pick(\n aps.feeder.poses.default,\n grip=Grip.FIRM, an='pick')\n")
+    assert read(spread) == workplace.project()
+
+
+def test_a_changed_literal_changes_nothing_else() -> None:
+    project = read(("0.5, an=", "0.25, an="))
+    assert values_of(project, "above feeder")["speed"] == ("double", "0.25")
+    assert project.logic == workplace.project().logic
+    before = actions_of(workplace.project())
+    assert [name for name, action in actions_of(project).items() if action != before[name]] == ["above feeder"]
+    assert values_of(read(("0.5, an=", "1, an=")), "above feeder")["speed"] == ("double", "1.0")
+
+
+def test_arguments_of_every_kind() -> None:
+    changes = [
+        ("poses.default, grip=Grip.FIRM", "poses.default, 0.75, Grip.SOFT"),
+        ("reader.scan(2.5, Mode.TWICE", "reader.scan(pause, mode=Mode.ONCE"),
+        ("    boards = 2\n", "    boards = 7\n    pause = 0.5\n"),
+        ("robot.place(aps.good.poses.default", "robot.place(aps.feeder.poses.default"),
+        ("robot.drop(aps.good.position, -0.2", "robot.drop(height=-0.125, position=aps.feeder.position"),
+    ]
+    project = read(*changes)
+    assert values_of(project, "pick") == {
+        "pose": ("pose", '"ori_feeder"'),
+        "speed": ("double", "0.75"),
+        "grip": ("string_enum", '"soft"'),
+    }
+    [boards, _, pause] = project.parameters
+    assert (boards.id, boards.value, boards.type) == ("pco_boards", "7", "integer")
+    assert (pause.name, pause.value, pause.type) == ("pause", "0.5", "double")
+    assert values_of(project, "scan code") == {
+        "timeout": ("project_parameter", f'"{pause.id}"'),
+        "mode": ("integer_enum", "1"),
+    }
+    assert values_of(project, "into good box") == {"pose": ("pose", '"ori_feeder"')}
+    assert values_of(project, "throw away") == {
+        "position": ("position", '"acp_feeder"'),
+        "height": ("double", "-0.125"),
+    }
+    # An action stays where it was; what it refers to may lie elsewhere.
+    assert point_of(project, "into good box") == "acp_good"
+
+
+def test_calls_in_another_order() -> None:
+    project = read((ABOVE + PICK, PICK + ABOVE))
+    before = workplace.project()
+    assert project.action_points == before.action_points
+    assert {("scan code", "pick", ""), ("pick", "above feeder", ""), ("above feeder", "known?", "")} <= set(
+        steps_of(project)
+    )
+    assert len(steps_of(project)) == len(steps_of(before))
+    assert len({item.id for item in project.logic}) == len(project.logic)
+    kept = {item.id for item in before.logic} & {item.id for item in project.logic}
+    assert len(kept) == len(before.logic) - 3
+
+
+def test_a_new_action_lies_where_it_acts() -> None:
+    project = read(
+        (GOOD, GOOD + '            robot.drop(aps.feeder.position, 0.3, an="let go")\n'),
+        (BACK, BACK + '        again = reader.scan(1.0, an="once more")\n'),
+    )
+    assert point_of(project, "let go") == "acp_feeder"
+    assert point_of(project, "once more") == point_of(project, "back")  # it names no point: that of the one before
+    new = actions_of(project)["once more"]
+    assert (new.type, new.outputs()) == ("obj_reader/scan", ["again"])
+    assert new.id.startswith("act_")
+    assert new.id not in {action.id for action in actions_of(workplace.project()).values()}
+    assert {("into good box", "let go", ""), ("let go", "back", ""), ("once more", END, "")} <= set(steps_of(project))
+
+
+def test_a_removed_action_is_gone_and_the_rest_closes_up() -> None:
+    project = read((ABOVE, ""))
+    assert "above feeder" not in actions_of(project)
+    assert ("scan code", "pick", "") in steps_of(project)
+    assert len(actions_of(project)) == len(actions_of(workplace.project())) - 1
+
+
+def test_another_name_makes_another_action() -> None:
+    project = read(('an="pick"', 'an="grip"'))
+    assert "pick" not in actions_of(project)
+    assert actions_of(project)["grip"].id != "act_pick"
+    assert point_of(project, "grip") == "acp_feeder"
+
+
+def test_what_no_script_shows_stays() -> None:
+    before = workplace.project()
+    idle = [workplace.action("idle", "obj_flow/finish"), workplace.action("idler", "obj_flow/finish")]
+    first = replace(before.action_points[0], actions=[*before.action_points[0].actions, *idle])
+    before = replace(
+        before,
+        action_points=[first, *before.action_points[1:]],
+        logic=[*before.logic, workplace.step("idle", "idler"), workplace.step("idler", "pick")],
+    )
+    source = from_logic(workplace.scene(), before, workplace.FACTS)
+    assert "idle" not in source
+    assert from_script(source, workplace.scene(), before, workplace.FACTS) == before
+    without = from_script(source.replace(PICK, ""), workplace.scene(), before, workplace.FACTS)
+    assert {("idle", "idler", "")} <= set(steps_of(without))
+    assert [start for start, end, _ in steps_of(without) if end == "pick"] == []
+
+
+def test_new_branches() -> None:
+    pack = '            robot.place(aps.good.poses.default, an="pack")\n'
+    project = read(
+        (
+            PICK,
+            PICK
+            + '        full = reader.known(code, an="full?")\n        if full:\n'
+            + pack
+            + "            continue\n\n",
+        ),
+        (IF_KNOWN, "        if not known:\n            pass\n        else:\n"),
+        (GOOD + "        else:\n" + AWAY, GOOD),
+    )
+    assert {
+        ("pick", "full?", ""),
+        ("full?", "pack", "true"),
+        ("full?", "known?", "false"),
+        ("pack", END, ""),
+        ("known?", "into good box", "true"),
+        ("known?", "back", "false"),
+    } <= set(steps_of(project))
+    assert "throw away" not in actions_of(project)
+    assert values_of(project, "full?") == {"code": ("link", '"act_scan_code/default/0"')}
+    kept = {item.id: item for item in workplace.project().logic}
+    assert kept["lit_known?_into good box"] in project.logic
+
+
+def test_a_result_of_another_name() -> None:
+    project = read(
+        ("known = reader.known(code, ", "fine = reader.known(label, "),
+        ("code = reader.scan(", "label = reader.scan("),
+        (IF_KNOWN, "        if fine == True:\n"),
+    )
+    assert actions_of(project)["known?"].outputs() == ["fine"]
+    assert actions_of(project)["scan code"].outputs() == ["label"]
+    assert actions_of(project)["known?"].id == "act_known?"
+    assert project.logic == workplace.project().logic
+
+
+def test_a_result_whose_name_build_had_to_change_keeps_it() -> None:
+    before = workplace.project()
+    points = [
+        replace(
+            point,
+            actions=[
+                replace(one, flows=[Flow(outputs=["robot"])]) if one.name == "known?" else one for one in point.actions
+            ],
+        )
+        for point in before.action_points
+    ]
+    before = replace(before, action_points=points)
+    source = from_logic(workplace.scene(), before, workplace.FACTS)
+    assert "robot_2 = reader.known" in source
+    assert from_script(source, workplace.scene(), before, workplace.FACTS) == before
+
+
+def test_conditions_one_after_the_other_are_one_branching() -> None:
+    body = """\
+        left = flow.repeat(boards, an="boards left?")
+        if left == False:
+            flow.finish(an="finish")
+            continue
+
+"""
+    project = read(
+        (
+            body,
+            body.replace(
+                "            continue\n\n", "            continue\n        if left == True:\n            pass\n"
+            ),
+        )
+    )
+    assert steps_of(project) == steps_of(workplace.project())
+
+
+def test_a_script_of_the_original_is_read() -> None:
+    source = edited(
+        ("from arcor2_hw.runtime.exceptions import", "from arcor2_runtime.exceptions import"),
+        ("from arcor2_hw.runtime.resources import", "from arcor2_runtime.resources import"),
+        ("    boards = 2\n", "    boards: int = 2\n"),
+        (
+            "except Exception as error:\n        print_exception(error)",
+            "except Exception as e:\n        print_exception(e)",
+        ),
+    )
+    assert from_script(source, workplace.scene(), workplace.project(), workplace.FACTS) == workplace.project()
+
+
+# ------------------------------------------------------------------------------------------------ not understood
+@pytest.mark.parametrize(
+    ("old", "new", "text"),
+    [
+        (ABOVE, "        import os  #!\n", "import os"),
+        (ABOVE, "        for n in range(3):  #!\n            pass\n", "for n in range(3)"),
+        (ABOVE, "        print('x')  #!\n", "print is no action"),
+        (ABOVE, "        while True:  #!\n            pass\n", "while True"),
+        (ABOVE, "        return  #!\n", "return"),
+        (ABOVE, "        x = 1  #!\n", "x = 1"),
+        (ABOVE, "        robot.pose.x()  #!\n", "robot.pose.x is no action"),
+        (ABOVE, "        robot.pick(  #!\n            aps.feeder.poses.default)\n", "has no name"),
+        (ABOVE, "        robot.pick(aps.feeder.poses.default, an=name)  #!\n", "is a text, not name"),
+        (BACK, '        robot.pick(aps.feeder.poses.default, an="pick")  #!\n', "'pick' is there already, in line"),
+        (ABOVE, '        robot.fly(an="x")  #!\n', "Arm has no action fly"),
+        (ABOVE, '        robot.pick(an="x")  #!\n', "parameter pose of pick is missing"),
+        (ABOVE, '        robot.pick(aps.nowhere.poses.default, an="x")  #!\n', "the project has no aps.nowhere"),
+        (
+            ABOVE,
+            '        robot.pick(aps.feeder.position, an="x")  #!\n',
+            "pose is pose, but aps.feeder.position is position",
+        ),
+        (ABOVE, '        robot.pick(aps.feeder.poses.default, 2.0, an="x")  #!\n', "not within"),
+        (ABOVE, '        robot.pick(aps.feeder.poses.default, "a", an="x")  #!\n', "speed"),
+        (ABOVE, '        robot.pick(aps.feeder.poses.default, 0.1 + 0.2, an="x")  #!\n', "0.1 + 0.2 is no"),
+        (ABOVE, '        robot.pick(aps.feeder.poses.default, grip="soft", an="x")  #!\n', "one of Grip"),
+        (
+            ABOVE,
+            '        robot.pick(aps.feeder.poses.default, grip=Grip.HARD, an="x")  #!\n',
+            "Grip has no member HARD",
+        ),
+        (ABOVE, '        robot.pick(aps.feeder.poses.default, grip=Mode.ONCE, an="x")  #!\n', "one of Grip"),
+        (ABOVE, '        robot.pick(aps.feeder.poses.default, force=1.0, an="x")  #!\n', "no parameter force"),
+        (ABOVE, '        robot.pick(*aps, an="x")  #!\n', "one by one"),
+        (ABOVE, '        robot.pick(aps.feeder.poses.default, 0.5, Grip.SOFT, 1, an="x")  #!\n', "takes 3 arguments"),
+        (ABOVE, '        robot.pick(here, an="x")  #!\n', "here is not known"),
+        (ABOVE, '        robot.pick(code, an="x")  #!\n', "pose is pose, but code is string"),
+        (ABOVE, '        x = robot.pick(aps.feeder.poses.default, an="x")  #!\n', "gives 0 results, not 1"),
+        (ABOVE, '        code = reader.scan(1.0, an="x")  #!\n', "code means something else already"),
+        (ABOVE, '        robot = reader.scan(1.0, an="x")  #!\n', "robot means something else already"),
+        (ABOVE, '        list = reader.scan(1.0, an="x")  #!\n', "list cannot name a result"),
+        (ABOVE, '        x[0] = reader.scan(1.0, an="x")  #!\n', "into variables"),
+        (ABOVE, '        reader.known(fresh, an="x")  #!\n', "fresh is not known"),
+        (IF_KNOWN, "        if known > 1:  #!\n", "known > 1"),
+        (IF_KNOWN, "        if known == 1:  #!\n", "known is boolean and cannot be 1"),
+        (IF_KNOWN, '        if code == "x":  #!\n', "code is string"),
+        (IF_KNOWN, "        if fresh == True:  #!\n", "fresh is no result"),
+        (IF_KNOWN, "        if known == True and left == True:  #!\n", "known == True and left == True"),
+        (GOOD, "            if left == True:  #!\n    " + GOOD, "has to be an action"),
+        (BACK, '        next_action = "x"\n        if next_action == "y":  #!\n    ' + BACK, "never holds"),
+        (BACK, '        if next_action == "y":  #!\n    ' + BACK, "not set on every way"),
+        (AWAY, AWAY + "            continue\n            pass  #!\n", "never reached"),
+        (
+            BACK,
+            "        if known == True:\n    " + BACK + "        elif known == True:  #!\n            pass\n",
+            "never holds here",
+        ),
+        (BACK, BACK + "    robot.drop(aps.good.position, 1.0)  #!\n", "nothing stands behind the loop"),
+        ("    # Project parameters\n", '    robot.drop(aps.good.position, 1.0, an="x")  #!\n', "before the loop"),
+        ("    boards = 2\n", "    boards = 2.5  #!\n", "boards is integer, not 2.5"),
+        ("    boards = 2\n", "    boards = len('ab')  #!\n", "plain value"),
+        ("    boards = 2\n", "    boards = 2\n    robot = 3  #!\n", "robot means something else"),
+        ('res.objects["obj_robot"]', 'res.objects["obj_gone"]  #!', "the scene has no object obj_gone"),
+        ("from action_points import ActionPoints\n", "import os  #!\n", "import os"),
+        ("from action_points import ActionPoints\n", "from os import path  #!\n", "not from os"),
+        ("def main(", "def other() -> None:  #!\n    pass\n\n\ndef main(", "def other"),
+        ("            main(res)\n", "            main(res)\n            res.scene()  #!\n", "only calls main"),
+        ("    while True:\n", "    while res:  #!\n", "while res"),
+        ("    boards = 2\n", "    boards = (2  #!\n", "never closed"),
+    ],
+)
+def test_what_is_not_understood_is_named_with_its_line(old: str, new: str, text: str) -> None:
+    source = edited((old, new))
+    line = next(number for number, content in enumerate(source.splitlines(), 1) if "#!" in content)
+    with pytest.raises(NotUnderstood) as caught:
+        from_script(source, workplace.scene(), workplace.project(), workplace.FACTS)
+    assert caught.value.line == line, str(caught.value)
+    assert str(caught.value).startswith(f"script.py, line {line}: ")
+    assert text in str(caught.value)
+
+
+def test_a_result_that_is_not_always_there_is_named() -> None:
+    source = edited(
+        (GOOD, GOOD + '            label = reader.scan(1.0, an="label")\n'),
+        (BACK, '        reader.known(label, an="late")\n'),
+    )
+    with pytest.raises(NotUnderstood, match="label is not always there: 'label' has not run on every way") as caught:
+        from_script(source, workplace.scene(), workplace.project(), workplace.FACTS)
+    assert source.splitlines()[caught.value.line - 1].strip().startswith("reader.known(label")
+
+
+@pytest.mark.parametrize("source", ["", "\0", "def main(res):\n    pass\n", "(" * 5000, "def main():\n    pass\n"])
+def test_what_is_no_script_at_all(source: str) -> None:
+    with pytest.raises(NotUnderstood):
+        from_script(source, workplace.scene(), workplace.project(), workplace.FACTS)
+
+
+def test_joints_of_another_robot() -> None:
+    project = workplace.project()
+    scene = workplace.scene()
+    scene = replace(scene, objects=[*scene.objects, SceneObject("other", "Arm", Pose(), id="obj_other")])
+    source = edited(
+        ('    robot: Arm = res.objects["obj_robot"]\n', '    robot: Arm = res.objects["obj_other"]\n'),
+    )
+    with pytest.raises(NotUnderstood, match="belong to another robot"):
+        from_script(source, scene, project, workplace.FACTS)
+
+
+def test_a_project_without_action_points_has_no_place_for_actions() -> None:
+    bare = replace(workplace.project(), action_points=[], logic=[])
+    source = from_logic(
+        workplace.scene(),
+        replace(
+            bare,
+            action_points=[
+                ActionPoint("p", Position(), id="acp_p", actions=[workplace.action("a", "obj_flow/finish")])
+            ],
+            logic=[workplace.step(START, "a"), workplace.step("a", END)],
+        ),
+        workplace.FACTS,
+    )
+    with pytest.raises(NotUnderstood, match="no action point on which 'a' could lie"):
+        from_script(source, workplace.scene(), bare, workplace.FACTS)
