@@ -11,11 +11,14 @@ from arcor2_hw.data.project import ActionPoint, Project, ProjectRobotJoints
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error, ProgramFinished, ProgramStopped
 from arcor2_hw.runtime.cell import SceneFault, recipes
-from arcor2_hw.runtime.creation import find_type
+from arcor2_hw.runtime.creation import find_type, prepare_for_sources
 from arcor2_hw.runtime.package import PackageData, Places, package_name, put_on_path
 from arcor2_hw.runtime.program import Program, current
 from arcor2_hw.runtime.proxy import proxy
 from arcor2_hw.runtime.standalone import Standalone
+
+# A script that is run by hand imports this before its object types, which it imports before anything is called here.
+prepare_for_sources()
 
 
 class Resources:

@@ -351,6 +351,38 @@ def test_a_whole_package_as_it_came_from_arcor2(
     assert bench_service.left.wait(5)
 
 
+def test_a_script_of_ours_over_older_types_runs_by_hand(package: Package, bench_service: BenchService) -> None:
+    script = """
+from arcor2_hw.runtime.resources import Resources
+from object_types.test_bench import Level, TestBench
+
+with Resources() as res:
+    bench: TestBench = res.objects["obj_bench"]
+    assert bench.test("a", "fast", Level.HIGH, an="a1") == (True, 4.5)
+"""
+    bench = scene_object("bench", "TestBench", port=bench_service.server_address[1])
+    point = ActionPoint("top", Position(), id="acp_top", actions=[Action("a1", "obj_bench/test", "act_a1")])
+    directory = package.write({}, [bench], Project("p", "scn_1", action_points=[point]), "", script=script)
+    (directory / "object_types" / "test_bench.py").write_text(SOURCES["TestBench"])
+    done = subprocess.run(
+        [sys.executable, "script.py"],
+        cwd=directory,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        stdin=subprocess.DEVNULL,
+    )
+    assert done.returncode == 0, done.stderr
+    events = [json.loads(line) for line in done.stdout.splitlines()]
+    assert [event["event"] for event in events][:4] == [
+        "PackageState",
+        "PackageInfo",
+        "ActionStateBefore",
+        "ActionStateAfter",
+    ]
+    assert events[3]["data"] == {"action_id": "act_a1", "results": ["true", "4.5"]}
+
+
 # ---------------------------------------------------------------------------------------------- the finder itself
 def run_python(code: str, path: Path | None = None) -> str:
     prefix = "" if path is None else f"import sys; sys.path.insert(0, {str(path)!r})\n"
