@@ -17,7 +17,7 @@ from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.data.project import Project
 from tests.e2e.harness import Cell, alive, kill, running_cell, scene_state, until
 
-pytestmark = pytest.mark.timeout(180)
+pytestmark = [pytest.mark.timeout(180), pytest.mark.alone]
 
 REST_JOINT_SPEED = 1e-3
 """rad/s below which a joint counts as standing."""
