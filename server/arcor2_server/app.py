@@ -32,6 +32,7 @@ from arcor2_server.rpc import (  # noqa: F401
     copying,
     execution,
     general,
+    history,
     joints,
     lists,
     locking,

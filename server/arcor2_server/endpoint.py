@@ -259,7 +259,7 @@ class Endpoint:
         if route.handler is None:
             self._refuse(client, request, f"{rpc.name} is not available in this version.")
             return
-        context = Context(self._services, client, request.dry_run and rpc.dry_run)
+        context = Context(self._services, client, request.dry_run and rpc.dry_run, rpc.name)
         try:
             data = await route.handler(context, args)
         except RequestRefused as error:

@@ -117,6 +117,12 @@ class LockTable:
             return next(iter(root.writers.values()), None)
         return root.writers.get(item)
 
+    def holders_of(self, item: str) -> set[str]:
+        """Give who may write an id, or keeps others from it by a read lock."""
+        root = self._roots.get(self._where.get(item) or self._known_root(item))
+        writer = self.writer_of(item)
+        return set(root.readers.get(item, ()) if root else ()) | ({writer} if writer else set())
+
     def announced(self) -> dict[str, list[str]]:
         """Give the ids that were announced as locked, by owner."""
         found = {user: sorted(set().union(*ids.values())) for user, ids in self._announced.items()}

@@ -53,6 +53,15 @@ from arcor2_hw.data.rpc.general import RenameArgs as RenameArgs
 from arcor2_hw.data.rpc.general import SubscribeEventsArgs as SubscribeEventsArgs
 from arcor2_hw.data.rpc.general import SystemInfoData as SystemInfoData
 from arcor2_hw.data.rpc.general import TypeArgs as TypeArgs
+from arcor2_hw.data.rpc.history import HistoryArgs as HistoryArgs
+from arcor2_hw.data.rpc.history import HistoryData as HistoryData
+from arcor2_hw.data.rpc.history import HistoryEdit as HistoryEdit
+from arcor2_hw.data.rpc.history import HistoryItem as HistoryItem
+from arcor2_hw.data.rpc.history import RedoArgs as RedoArgs
+from arcor2_hw.data.rpc.history import RestoreRevisionArgs as RestoreRevisionArgs
+from arcor2_hw.data.rpc.history import RestoreRevisionData as RestoreRevisionData
+from arcor2_hw.data.rpc.history import UndoArgs as UndoArgs
+from arcor2_hw.data.rpc.history import UndoData as UndoData
 from arcor2_hw.data.rpc.locks import LockType as LockType
 from arcor2_hw.data.rpc.locks import ReadLockArgs as ReadLockArgs
 from arcor2_hw.data.rpc.locks import ReadUnlockArgs as ReadUnlockArgs
@@ -190,6 +199,7 @@ RPCS: Final = {
         Rpc("GetScene", IdArgs, Scene, Role.OPERATOR),
         Rpc("GetSuctions", GetSuctionsArgs, set[str], Role.OPERATOR),
         Rpc("HandTeachingMode", HandTeachingModeArgs, None, Role.STANDARD_USER, dry_run=True),
+        Rpc("History", HistoryArgs, HistoryData, Role.OPERATOR, args_optional=True, additional=True),
         Rpc("InverseKinematics", InverseKinematicsArgs, list[Joint], Role.STANDARD_USER),
         Rpc("ListPackages", None, list[PackageSummary], Role.OPERATOR),
         Rpc("ListProjects", None, list[ListProjectsData], Role.OPERATOR),
@@ -212,6 +222,7 @@ RPCS: Final = {
         Rpc("ProjectsWithScene", IdArgs, set[str], Role.OPERATOR),
         Rpc("ReadLock", ReadLockArgs, None, Role.OPERATOR),
         Rpc("ReadUnlock", ReadUnlockArgs, None, Role.OPERATOR),
+        Rpc("Redo", RedoArgs, UndoData, Role.STANDARD_USER, args_optional=True, dry_run=True, additional=True),
         Rpc("RegisterForRobotEvent", RegisterForRobotEventArgs, set[str], Role.OPERATOR),
         Rpc("RegisterUser", RegisterUserArgs, None, Role.OPERATOR),
         Rpc("RemoveAction", IdArgs, None, Role.STANDARD_USER, dry_run=True),
@@ -229,6 +240,14 @@ RPCS: Final = {
         Rpc("RenamePackage", RenamePackageArgs, None, Role.ADVANCED_USER),
         Rpc("RenameProject", RenameProjectArgs, None, Role.STANDARD_USER, dry_run=True),
         Rpc("RenameScene", RenameArgs, None, Role.TECHNICIAN, dry_run=True),
+        Rpc(
+            "RestoreRevision",
+            RestoreRevisionArgs,
+            RestoreRevisionData,
+            Role.STANDARD_USER,
+            dry_run=True,
+            additional=True,
+        ),
         Rpc("ResumePackage", None, None, Role.OPERATOR),
         Rpc("RunPackage", RunPackageArgs, None, Role.OPERATOR),
         Rpc("SaveProject", None, None, Role.STANDARD_USER, dry_run=True),
@@ -244,6 +263,7 @@ RPCS: Final = {
         Rpc("SubscribeEvents", SubscribeEventsArgs, None, Role.OPERATOR, additional=True),
         Rpc("SystemInfo", None, SystemInfoData, Role.OPERATOR),
         Rpc("TemporaryPackage", TemporaryPackageArgs, None, Role.STANDARD_USER, args_optional=True),
+        Rpc("Undo", UndoArgs, UndoData, Role.STANDARD_USER, args_optional=True, dry_run=True, additional=True),
         Rpc("UpdateAction", UpdateActionArgs, None, Role.STANDARD_USER, dry_run=True),
         Rpc("UpdateActionPointJoints", UpdateActionPointJointsArgs, None, Role.STANDARD_USER),
         Rpc("UpdateActionPointJointsUsingRobot", UpdateActionPointJointsUsingRobotArgs, None, Role.STANDARD_USER),

@@ -15,7 +15,7 @@ async def commit(context: Context, changes: Sequence[Change]) -> bool:
     """Make changes, unless this is a dry run; tells whether they were made."""
     if context.dry_run:
         return False
-    await context.services.session.commit(context.client.user or "", changes)
+    await context.services.session.commit(context.client.user or "", changes, context.request)
     return True
 
 

@@ -46,12 +46,13 @@ class Context:
     sent when the request is granted, or refused with data; an error that is raised otherwise drops them.
     """
 
-    __slots__ = ("client", "dry_run", "events_after", "events_before", "events_to_caller", "services")
+    __slots__ = ("client", "dry_run", "events_after", "events_before", "events_to_caller", "request", "services")
 
-    def __init__(self, services: "Services", client: "Client", dry_run: bool = False) -> None:
+    def __init__(self, services: "Services", client: "Client", dry_run: bool = False, request: str = "") -> None:
         self.services = services
         self.client = client
         self.dry_run = dry_run
+        self.request = request
         self.events_before: list[Event] = []
         self.events_after: list[Event] = []
         self.events_to_caller: list[Event] = []

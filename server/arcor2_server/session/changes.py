@@ -1,6 +1,7 @@
 """What the open document is made of, and the one way in which it changes."""
 
 import enum
+from collections.abc import Iterable
 from typing import Any, Final
 
 import msgspec
@@ -78,13 +79,40 @@ class Change(Struct, frozen=True, array_like=True):
         return Change(self.kind, self.id, self.parent, self.rank, self.after, self.before)
 
 
+class How(enum.StrEnum):
+    """Why an edit was made."""
+
+    EDIT = "edit"
+    UNDO = "undo"
+    REDO = "redo"
+    RESTORE = "restore"
+
+
 class Edit(Struct, frozen=True):
-    """The changes of one request, which are made, undone and kept together. `number` grows by one with each edit."""
+    """The changes of one request, which are made, undone and kept together. `number` grows by one with each edit.
+
+    `request` is what asked for it; of an undo or redo, what had asked for the edit that is taken back. `of` is the
+    number of that edit, or the revision that was restored.
+    """
 
     number: int
     time: str
     user: str
     changes: list[Change]
+    request: str = ""
+    how: How = How.EDIT
+    of: int = 0
+
+
+def net(changes: Iterable[Change]) -> list[Change]:
+    """Give one change for each item: from before the first of the changes to after the last, none without effect."""
+    found: dict[tuple[Kind, str], Change] = {}
+    for change in changes:
+        key = (change.kind, change.id)
+        if (first := found.get(key)) is not None:
+            change = Change(change.kind, change.id, change.parent, change.rank, first.before, change.after)
+        found[key] = change
+    return [change for change in found.values() if change.before != change.after]
 
 
 class _Row(Struct, frozen=True, array_like=True):

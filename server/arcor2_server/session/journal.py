@@ -19,6 +19,7 @@ from arcor2_hw.data.scene import BareScene
 from arcor2_hw.exceptions import StorageError
 from arcor2_server.session.changes import (
     Edit,
+    How,
     Item,
     decode_changes,
     decode_items,
@@ -28,8 +29,8 @@ from arcor2_server.session.changes import (
 
 log = structlog.get_logger(__name__)
 
-FORMAT: Final = 1
-"""Version of the file, kept in SQLite's user_version; another one is set aside as a damaged file is."""
+FORMAT: Final = 2
+"""Version of the file, kept in SQLite's user_version; a newer one is set aside as a damaged file is."""
 
 CHECKPOINT_PAGES: Final = 200
 """Pages of the write-ahead log that are written before it starts again at its beginning."""
@@ -43,8 +44,17 @@ ALL: Final = 2**63 - 1
 _SCHEMA: Final = """
 create table base (id integer primary key check (id = 1), items blob not null, edit integer not null,
                    scene_times text not null, project_times text not null) strict;
-create table edit (number integer primary key, time text not null, user text not null, changes blob not null) strict;
+create table edit (number integer primary key, time text not null, user text not null, changes blob not null,
+                   request text not null default '', how text not null default 'edit', target integer not null default 0
+                  ) strict;
 """
+
+_FROM_1: Final = """
+alter table edit add column request text not null default '';
+alter table edit add column how text not null default 'edit';
+alter table edit add column target integer not null default 0;
+"""
+"""Format 1 did not keep why an edit was made."""
 
 
 class Times(msgspec.Struct, frozen=True):
@@ -221,12 +231,13 @@ def _resolve(future: "asyncio.Future[Any]", result: Any, error: Exception | None
 
 def _write(connection: sqlite3.Connection, job: Edit | Base | None) -> None:
     match job:
-        case Edit(number, time, user, changes):
-            connection.execute("insert into edit values (?, ?, ?, ?)", (number, time, user, encode_changes(changes)))
+        case Edit(number, time, user, changes, request, how, of):
+            row = (number, time, user, encode_changes(changes), request, how.value, of)
+            connection.execute("insert into edit values (?, ?, ?, ?, ?, ?, ?)", row)
         case Base(items, number, scene, project, forget):
             times = (msgspec.json.encode(scene).decode(), msgspec.json.encode(project).decode())
-            row = (encode_items(items), number, *times)
-            connection.execute("insert or replace into base values (1, ?, ?, ?, ?)", row)
+            whole = (encode_items(items), number, *times)
+            connection.execute("insert or replace into base values (1, ?, ?, ?, ?)", whole)
             connection.execute("delete from edit where number <= ?", (forget,))
         case None:
             connection.execute("delete from base")
@@ -247,7 +258,7 @@ def _open(path: Path) -> tuple[sqlite3.Connection, Recovered | None]:
         if error.sqlite_errorcode & 0xFF not in _DAMAGED:
             raise
         reason = str(error)
-    except (sqlite3.DatabaseError, msgspec.DecodeError, _WrongFormat) as error:
+    except (sqlite3.DatabaseError, msgspec.DecodeError, ValueError, _WrongFormat) as error:
         connection.close()
         reason = str(error)
     except BaseException:
@@ -277,16 +288,22 @@ def _recover(connection: sqlite3.Connection) -> Recovered | None:
     if version == 0:
         connection.executescript(f"begin immediate; {_SCHEMA} pragma user_version = {FORMAT}; commit;")
         return None
-    if version != FORMAT:
+    if version not in (1, FORMAT):
         raise _WrongFormat(f"format {version} is not {FORMAT}")
     (check,) = connection.execute("pragma quick_check(1)").fetchone()
     if check != "ok":
         raise _WrongFormat(check)
+    if version == 1:
+        connection.executescript(f"begin immediate; {_FROM_1} pragma user_version = {FORMAT}; commit;")
     row = connection.execute("select items, edit, scene_times, project_times from base").fetchone()
     if row is None:
         return None
-    rows = connection.execute("select number, time, user, changes from edit order by number").fetchall()
-    edits = [Edit(number, time, user, decode_changes(changes)) for number, time, user, changes in rows]
+    columns = "number, time, user, changes, request, how, target"
+    rows = connection.execute(f"select {columns} from edit order by number").fetchall()  # noqa: S608
+    edits = [
+        Edit(number, time, user, decode_changes(changes), request, How(how), of)
+        for number, time, user, changes, request, how, of in rows
+    ]
     following = [edit.number for edit in edits if edit.number > row[1]]
     if following != list(range(row[1] + 1, row[1] + 1 + len(following))):
         raise _WrongFormat("an edit is missing")

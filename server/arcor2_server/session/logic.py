@@ -1,6 +1,6 @@
 """What makes a step between two actions right (protocol, section 10.4)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import msgspec
 
@@ -11,8 +11,13 @@ from arcor2_hw.exceptions import InvalidData
 from arcor2_server.session.document import Document, action_of
 
 
-def check_logic_item(document: Document, meta_of: Callable[[Action], ObjectAction], item: LogicItem) -> None:
-    """Check an item that is to be added, or to replace the one with its id. Raises InvalidData, NotFound."""
+def check_logic_item(
+    document: Document, meta_of: Callable[[Action], ObjectAction], item: LogicItem, *, loops: bool = True
+) -> None:
+    """Check an item that is to be added, or to replace the one with its id. Raises InvalidData, NotFound.
+
+    Without `loops` it is left to `check_no_loops`, which looks at many items at once.
+    """
     start, end = _place(item.start, START), _place(item.end, END)
     if start == START and end == END:
         raise InvalidData("START cannot lead straight to END: put an action between them.")
@@ -33,8 +38,32 @@ def check_logic_item(document: Document, meta_of: Callable[[Action], ObjectActio
         _check_condition(document, meta_of, item.condition)
         if any(_same(item.condition, other.condition) for other in siblings):
             raise InvalidData(f"Another step from {_name(document, start)} has the same condition.")
-    if start != START and end != END and _reaches(document, end, start, item.id):
+    if loops and start != START and end != END and _reaches(document, end, start, item.id):
         raise InvalidData(f"The step from {_name(document, start)} to {_name(document, end)} would close a loop.")
+
+
+def check_no_loops(document: Document, items: Iterable[LogicItem]) -> None:
+    """Check that none of the items, all of which are in the document, is part of a loop; InvalidData."""
+    done: set[str] = set()
+    for item in items:
+        path = [action_of(item.start)]
+        on_path = set(path)
+        # What is still to be followed from each place of the path.
+        waiting = [document.outgoing(path[0])] if path[0] not in done else []
+        while waiting:
+            if not waiting[-1]:
+                waiting.pop()
+                left = path.pop()
+                on_path.discard(left)
+                done.add(left)
+                continue
+            following = action_of(waiting[-1].pop().end)
+            if following in on_path:
+                raise InvalidData(f"The steps through {_name(document, following)} would close a loop.")
+            if following not in done:
+                path.append(following)
+                on_path.add(following)
+                waiting.append(document.outgoing(following))
 
 
 def _place(text: str, border: str) -> str:

@@ -42,7 +42,7 @@ def changes_for_parent(document: Document, point_id: str, new_parent: str) -> tu
     moved = replace(point, parent=new_parent or UNSET)
     if new_parent:
         check_parent(document, new_parent, point.name)
-        _check_loop(document, point, new_parent)
+        check_no_loop(document, point, new_parent)
     here = relative_pose(document, moved, global_pose(document, point))
     changes = [document.update(Kind.POINT, point_id, replace(moved, position=here.position))]
     # The point's own pose has no rotation, so what is left in `here` is the turn between the two frames.
@@ -66,7 +66,8 @@ def _turned(document: Document, point_id: str, turn: Orientation) -> list[Change
     ]
 
 
-def _check_loop(document: Document, point: BareActionPoint, new_parent: str) -> None:
+def check_no_loop(document: Document, point: BareActionPoint, new_parent: str) -> None:
+    """Check that a parent is neither the action point itself nor hangs on it; InvalidData."""
     at: str | Unset = new_parent
     while not isinstance(at, Unset):
         if at == point.id:

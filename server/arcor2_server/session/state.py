@@ -2,7 +2,7 @@
 
 import asyncio
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Awaitable, Sequence
 from typing import TYPE_CHECKING
 
 import structlog
@@ -20,17 +20,30 @@ from arcor2_hw.data.project import (
     ProjectRobotJoints,
 )
 from arcor2_hw.data.scene import BareScene, Scene, SceneObject
-from arcor2_hw.exceptions import NotFound
+from arcor2_hw.exceptions import NotFound, StorageError
 from arcor2_server.rpc.registry import RequestRefused, make_event
-from arcor2_server.session.changes import OF_SCENE, Change, Edit, Kind
+from arcor2_server.session.changes import OF_SCENE, Change, Edit, How, Kind
 from arcor2_server.session.checks import project_problems, scene_problems
 from arcor2_server.session.document import Document
+from arcor2_server.session.history import History
 from arcor2_server.session.journal import ALL, Base, Journal, Recovered, Times
+from arcor2_server.session.unsaved import Unsaved
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services
 
 log = structlog.get_logger(__name__)
+
+
+def _touched(times: Times, time: str, *, differs: bool) -> Times:
+    """Give the times after a change, which may have brought a document back to what is saved."""
+    return replace(times, changed=time if differs or not times.modified else "")
+
+
+def _settled(times: Times, *, differs: bool, saved: BareScene | BareProject | None = None) -> Times:
+    """Give the times of a document that was compared with what is saved, or was saved."""
+    changed = times.changed if differs or (saved is None and not times.modified) else ""
+    return replace(times if saved is None else Times.of(saved), changed=changed)
 
 
 class _Pending:
@@ -45,17 +58,14 @@ class _Pending:
 
 
 class Session:
-    """What is open. Between two awaits of a handler nobody else changes it.
-
-    `history` holds the newest edits, oldest first.
-    """
+    """What is open. Between two awaits of a handler nobody else changes it."""
 
     def __init__(self, services: "Services") -> None:
         settings = services.settings
         self.document = Document()
         self.removed_types: set[str] = set()
         """Object types of objects that were removed: those made for one object are deleted when the scene is saved."""
-        self.history: deque[Edit] = deque(maxlen=settings.history_limit)
+        self.history = History(settings.history_limit)
         self._services = services
         self._limit = settings.history_limit
         self._journal = Journal(settings.journal_database, self._take_back)
@@ -63,6 +73,7 @@ class Session:
         self._based_on = 0
         self._scene_times = Times()
         self._project_times = Times()
+        self._unsaved = Unsaved()
         self._pending: deque[_Pending] = deque()
         self._scene: Scene | None = None
         self._project: Project | None = None
@@ -74,6 +85,7 @@ class Session:
         if recovered is None:
             return
         self._restore(recovered)
+        await self._find_unsaved()
         log.info(
             "reopened",
             scene=self._name(Kind.SCENE),
@@ -94,6 +106,25 @@ class Session:
             self.history.append(edit)
             if edit.number > recovered.number:
                 self._apply(edit)
+
+    async def _find_unsaved(self) -> None:
+        """Compare with what is saved: the journal does not keep what changes were made since when."""
+        try:
+            saved = Document.of(*await self._saved())
+        except (NotFound, StorageError) as error:
+            log.warning("what is open cannot be compared with what is saved", reason=str(error))
+            saved = Document()
+        self._unsaved = Unsaved.between(saved, self.document)
+        self._scene_times = _settled(self._scene_times, differs=self._unsaved.scene)
+        self._project_times = _settled(self._project_times, differs=self._unsaved.project)
+        self._forget_snapshots()
+
+    async def _saved(self) -> tuple[Scene, Project | None]:
+        storage, scene, project = self._services.storage, self.require_scene(), self.project
+        saved = await storage.scene(scene.id) if self._scene_times.modified else Scene(name="", id=scene.id)
+        if project is None or not self._project_times.modified:
+            return saved, None
+        return saved, await storage.project(project.id)
 
     def _name(self, kind: Kind) -> str | None:
         return next((item.value.name for item in self.document.of_kind(kind)), None)
@@ -194,12 +225,24 @@ class Session:
         return [make_event("OpenScene", OpenSceneData(scene)), state]
 
     # ------------------------------------------------------------------------------------------ edits
-    async def commit(self, user: str, changes: Sequence[Change]) -> None:
-        """Make changes as one edit; returns when they are on the disk.
+    @property
+    def revision(self) -> int:
+        """The number of the newest edit; 0 for the document as it was opened."""
+        return self._number
+
+    @property
+    def oldest_revision(self) -> int:
+        """The oldest revision to which the edits that are kept lead back."""
+        return self._number - len(self.history)
+
+    async def commit(
+        self, user: str, changes: Sequence[Change], request: str = "", how: How = How.EDIT, of: int = 0
+    ) -> None:
+        """Make changes as one edit; returns when they are on the disk. `request`, `how`, `of`: see Edit.
 
         Others see them at once. Raises StorageError when they cannot be kept: then they are taken back.
         """
-        edit = Edit(self._number + 1, now(), user, list(changes))
+        edit = Edit(self._number + 1, now(), user, list(changes), request, how, of)
         kept = self._journal.append(edit)
         self._pending.append(_Pending(edit, self._scene_times, self._project_times))
         kept.add_done_callback(self._kept)
@@ -214,10 +257,12 @@ class Session:
         self.document.apply(edit.changes)
         self._number = edit.number
         for change in edit.changes:
-            if change.kind in OF_SCENE:
-                self._scene_times = replace(self._scene_times, changed=edit.time)
-            else:
-                self._project_times = replace(self._project_times, changed=edit.time)
+            self._unsaved.note(change)
+        kinds = {change.kind for change in edit.changes}
+        if kinds & OF_SCENE:
+            self._scene_times = _touched(self._scene_times, edit.time, differs=self._unsaved.scene)
+        if kinds - OF_SCENE:
+            self._project_times = _touched(self._project_times, edit.time, differs=self._unsaved.project)
         self._forget_snapshots()
 
     def _kept(self, future: "asyncio.Future[None]") -> None:
@@ -228,10 +273,13 @@ class Session:
         """Undo all that is not on the disk: the journal cannot be written."""
         while self._pending:
             pending = self._pending.pop()
-            self.document.apply(change.inverse() for change in reversed(pending.edit.changes))
+            inverse = [change.inverse() for change in reversed(pending.edit.changes)]
+            self.document.apply(inverse)
+            for change in inverse:
+                self._unsaved.note(change)
             self._number = pending.edit.number - 1
             self._scene_times, self._project_times = pending.scene, pending.project
-            if self.history and self.history[-1] is pending.edit:
+            if len(self.history):
                 self.history.pop()
         self._forget_snapshots()
         self._journal.next_epoch()
@@ -271,25 +319,31 @@ class Session:
         self.history.clear()
         self.removed_types.clear()
         self._number = self._based_on = 0
+        self._unsaved = Unsaved()
         self._forget_snapshots()
 
     async def save(self) -> None:
         """Save what has changes: the scene, the project, or both. Raises StorageError."""
+        storage = self._services.storage
         if self.scene_changed:
-            at, scene = self._number, self.require_scene()
-            saved_scene = await self._services.storage.put_scene(scene)
-            self._scene_times = self._times_after(at, saved_scene, self._scene_times)
+            saved = await self._save(storage.put_scene(self.require_scene()), scene=True)
+            self._scene_times = _settled(self._scene_times, differs=self._unsaved.scene, saved=saved)
             self._forget_snapshots()
         if self.project_changed:
-            at, project = self._number, self.require_project()
-            saved_project = await self._services.storage.put_project(project)
-            self._project_times = self._times_after(at, saved_project, self._project_times)
+            saved = await self._save(storage.put_project(self.require_project()), scene=False)
+            self._project_times = _settled(self._project_times, differs=self._unsaved.project, saved=saved)
             self._forget_snapshots()
         await self._rebase(forget=self._number - self._limit)
 
-    def _times_after(self, at: int, saved: BareScene | BareProject, before: Times) -> Times:
-        # An edit that came while the storage was writing is not saved yet.
-        return replace(Times.of(saved), changed=before.changed if self._number != at else "")
+    async def _save(self, put: Awaitable[BareScene | BareProject], *, scene: bool) -> BareScene | BareProject:
+        # An edit that comes while the storage is writing is not saved yet.
+        unsaved = self._unsaved
+        before = unsaved.begin_saving(scene=scene)
+        try:
+            return await put
+        except BaseException:
+            unsaved.saving_failed(before, self.document)
+            raise
 
     # ------------------------------------------------------------------------------------------ problems
     def scene_problems(self, scene: Scene) -> list[str]:

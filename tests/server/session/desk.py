@@ -29,6 +29,7 @@ from arcor2_server.rpc import (  # noqa: F401
     actions,
     copying,
     general,
+    history,
     joints,
     lists,
     locking,

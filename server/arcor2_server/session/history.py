@@ -1,0 +1,117 @@
+"""The newest edits of the open document, and which of them each user can take back."""
+
+from collections import defaultdict, deque
+from collections.abc import Iterator
+
+from arcor2_server.session.changes import Edit, How
+
+
+class History:
+    """Edits, oldest first, with numbers that follow each other; the oldest goes when there are more than `limit`.
+
+    An undo is an edit that takes back another one, a redo is an edit that takes back an undo.
+    """
+
+    def __init__(self, limit: int) -> None:
+        self._edits: deque[Edit] = deque(maxlen=limit)
+        self._undoable: defaultdict[str, deque[int]] = defaultdict(deque)
+        self._redoable: defaultdict[str, deque[int]] = defaultdict(deque)
+        self._taken_back: set[int] = set()
+
+    def __iter__(self) -> Iterator[Edit]:
+        return iter(self._edits)
+
+    def __reversed__(self) -> Iterator[Edit]:
+        return reversed(self._edits)
+
+    def __len__(self) -> int:
+        return len(self._edits)
+
+    # ------------------------------------------------------------------------------------------ what is kept
+    def append(self, edit: Edit) -> None:
+        """Take in the next edit."""
+        if self._edits and len(self._edits) == self._edits.maxlen:
+            self._forget(self._edits[0])
+        self._edits.append(edit)
+        self._note(edit)
+
+    def pop(self) -> Edit:
+        """Give back the newest edit: it could not be kept."""
+        edit = self._edits.pop()
+        kept = list(self._edits)
+        self.clear()
+        for one in kept:
+            self.append(one)
+        return edit
+
+    def clear(self) -> None:
+        """Forget all: another document is opened."""
+        self._edits.clear()
+        self._undoable.clear()
+        self._redoable.clear()
+        self._taken_back.clear()
+
+    def _note(self, edit: Edit) -> None:
+        undoable, redoable = self._undoable[edit.user], self._redoable[edit.user]
+        if edit.how in (How.UNDO, How.REDO):
+            self._taken_back.add(edit.of)
+            source, target = (undoable, redoable) if edit.how is How.UNDO else (redoable, undoable)
+            if edit.of in source:
+                source.remove(edit.of)
+            target.append(edit.number)
+        else:
+            undoable.append(edit.number)
+            redoable.clear()
+
+    def _forget(self, edit: Edit) -> None:
+        self._taken_back.discard(edit.number)
+        for numbers in (self._undoable[edit.user], self._redoable[edit.user]):
+            if edit.number in numbers:
+                numbers.remove(edit.number)
+
+    # ------------------------------------------------------------------------------------------ what is asked
+    def find(self, number: int) -> Edit | None:
+        """Give an edit, None when it is not kept."""
+        index = number - self._edits[0].number if self._edits else -1
+        return self._edits[index] if 0 <= index < len(self._edits) else None
+
+    def in_force(self, edit: Edit) -> bool:
+        """Tell whether an edit was not taken back."""
+        return edit.number not in self._taken_back
+
+    def undoable(self, user: str) -> Edit | None:
+        """Give the latest edit of a user that is in force, and no undo itself."""
+        numbers = self._undoable.get(user)
+        return self.find(numbers[-1]) if numbers else None
+
+    def redoable(self, user: str) -> Edit | None:
+        """Give the latest undo of a user after which he made no other edit."""
+        numbers = self._redoable.get(user)
+        return self.find(numbers[-1]) if numbers else None
+
+    def can_undo(self, user: str, number: int) -> bool:
+        """Tell whether an edit is one of the user's that are in force, and no undo itself."""
+        return number in self._undoable.get(user, ())
+
+    def can_redo(self, user: str, number: int) -> bool:
+        """Tell whether an edit is an undo of the user after which he made no other edit."""
+        return number in self._redoable.get(user, ())
+
+    def since(self, number: int) -> list[Edit]:
+        """Give the edits after one, oldest first."""
+        found = []
+        for edit in reversed(self._edits):
+            if edit.number <= number:
+                break
+            found.append(edit)
+        return found[::-1]
+
+    def last_to_touch(self, ids: set[str], *, after: int, besides: str) -> Edit | None:
+        """Give the latest edit after number `after` that touched any of the ids; one of others than `besides` first."""
+        own = None
+        for edit in reversed(self.since(after)):
+            if any(change.id in ids for change in edit.changes):
+                if edit.user != besides:
+                    return edit
+                own = own or edit
+        return own

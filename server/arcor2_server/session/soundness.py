@@ -1,0 +1,166 @@
+"""Whether a document holds together after edits were taken back: what the changes touch is checked, not the whole."""
+
+from collections.abc import Callable, Iterable, Sequence
+
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.object_type import ObjectAction
+from arcor2_hw.data.project import END, START, Action, LogicItem
+from arcor2_hw.exceptions import Arcor2Error, InvalidData
+from arcor2_server.session.changes import Change, Kind
+from arcor2_server.session.checks import Types, action_meta, check_action, object_problems
+from arcor2_server.session.document import OWNED, Document, action_of, reference
+from arcor2_server.session.logic import check_logic_item, check_no_loops
+from arcor2_server.session.placing import check_no_loop, check_parent
+
+_NAMED_IN_POINT = (Kind.ORIENTATION, Kind.JOINTS)
+_NAMED = (Kind.OBJECT, Kind.POINT, Kind.ACTION, Kind.PARAMETER, *_NAMED_IN_POINT)
+
+
+class Unsound(InvalidData):
+    """The document would not hold together; `ids` are what stands against it."""
+
+    code = "unsound"
+
+    def __init__(self, message: str, ids: Iterable[str]) -> None:
+        super().__init__(message)
+        self.ids = set(ids)
+
+
+def check_sound(document: Document, changes: Sequence[Change], types: Types) -> None:
+    """Check that the document holds together once the changes are made; it is left as it is. Raises Unsound."""
+    document.apply(changes)
+    try:
+        for change in changes:
+            if change.after is None:
+                _check_unneeded(document, change)
+            else:
+                _check_name(document, change)
+                _CHECKS.get(change.kind, _nothing)(document, change, types)
+        _check_loops(document, [c.after for c in changes if c.kind is Kind.LOGIC and c.after is not None])
+    finally:
+        document.apply([change.inverse() for change in reversed(changes)])
+
+
+def title(change: Change) -> str:
+    """Give what people call the thing that a change is about."""
+    value = change.before if change.after is None else change.after
+    name = getattr(value, "name", "")
+    what = {Kind.LOGIC: "step of the logic", Kind.OVERRIDE: "override"}.get(change.kind, change.kind.replace("_", " "))
+    return f"{name} ({what})" if name else f"a {what}"
+
+
+# ---------------------------------------------------------------------------------------------- what goes
+def _check_unneeded(document: Document, change: Change) -> None:
+    key = change.id
+    needing: list[str] = [user.id for user in document.users_of(key)]
+    if change.kind is Kind.POINT:
+        needing += [point.id for point in document.points_of(key)]
+        needing += [item.id for kind in OWNED for item in document.owned(key, kind)]
+    if change.kind is Kind.ACTION:
+        needing += [item.id for item in (*document.outgoing(key), *document.incoming(key))]
+    if needing:
+        raise Unsound(f"{title(change)} is needed by what was made since.", needing)
+
+
+# ---------------------------------------------------------------------------------------------- what comes or changes
+def _check_name(document: Document, change: Change) -> None:
+    if change.kind not in _NAMED:
+        return
+    parent = change.parent if change.kind in _NAMED_IN_POINT else ""
+    names: list[tuple[str, str]] = [(change.kind, change.after.name)]
+    if change.kind is Kind.ACTION:
+        names += [("output", output) for output in change.after.outputs()]
+    for kind, name in names:
+        other = document.named(kind, name, parent)
+        if other is not None and other != change.id:
+            raise Unsound(f"The name {name} is taken.", [other])
+
+
+def _nothing(document: Document, change: Change, types: Types) -> None:
+    pass
+
+
+def _object(document: Document, change: Change, types: Types) -> None:  # noqa: ARG001
+    if problems := object_problems(change.after, types):
+        raise Unsound(" ".join(problems), [])
+
+
+def _point(document: Document, change: Change, types: Types) -> None:  # noqa: ARG001
+    point = change.after
+    if isinstance(point.parent, Unset):
+        return
+    try:
+        check_parent(document, point.parent, point.name)
+        check_no_loop(document, point, point.parent)
+    except Arcor2Error as error:
+        above = {point.parent, *(each.id for each in document.descendants(point.id))}
+        raise Unsound(str(error), above) from None
+
+
+def _owned(document: Document, change: Change, types: Types) -> None:  # noqa: ARG001
+    if document.find(Kind.POINT, change.parent) is None:
+        raise Unsound(f"The action point of {title(change)} is gone.", [change.parent])
+
+
+def _action(document: Document, change: Change, types: Types) -> None:
+    _owned(document, change, types)
+    _check_action(document, change.after, types)
+    for user in document.users_of(change.id):
+        if isinstance(user, Action):
+            _check_action(document, user, types, blamed=user.id)
+        else:
+            _check_step(document, user, types)
+
+
+def _check_action(document: Document, action: Action, types: Types, blamed: str = "") -> None:
+    try:
+        check_action(action, document, types)
+    except Arcor2Error as error:
+        targets = {reference(parameter.type, parameter.value) for parameter in action.parameters}
+        raise Unsound(str(error), [blamed] if blamed else [target for target in targets if target]) from None
+
+
+def _logic(document: Document, change: Change, types: Types) -> None:
+    project = next((item for item in document.of_kind(Kind.PROJECT)), None)
+    if project is not None and not project.value.has_logic:
+        raise Unsound(f"The project {project.value.name} has no logic any more.", [project.id])
+    _check_step(document, change.after, types)
+
+
+def _check_step(document: Document, item: LogicItem, types: Types) -> None:
+    meta_of: Callable[[Action], ObjectAction] = lambda action: action_meta(action, document, types)  # noqa: E731
+    try:
+        check_logic_item(document, meta_of, item, loops=False)
+    except Arcor2Error as error:
+        places = {action_of(item.start), action_of(item.end)} - {START, END}
+        siblings = {other.id for other in document.outgoing(action_of(item.start))} - {item.id}
+        if not isinstance(item.condition, Unset):
+            places.add(action_of(item.condition.what))
+        raise Unsound(str(error), places | siblings) from None
+
+
+def _check_loops(document: Document, steps: list[LogicItem]) -> None:
+    try:
+        check_no_loops(document, steps)
+    except InvalidData as error:
+        # Which of the other steps closes it: whichever was made last.
+        own = {step.id for step in steps}
+        raise Unsound(str(error), {item.id for item in document.of_kind(Kind.LOGIC)} - own) from None
+
+
+def _project(document: Document, change: Change, types: Types) -> None:  # noqa: ARG001
+    if not change.after.has_logic and document.count(Kind.LOGIC):
+        raise Unsound(
+            f"{change.after.name} has steps of its logic.", [item.id for item in document.of_kind(Kind.LOGIC)]
+        )
+
+
+_CHECKS: dict[Kind, Callable[[Document, Change, Types], None]] = {
+    Kind.OBJECT: _object,
+    Kind.PROJECT: _project,
+    Kind.POINT: _point,
+    Kind.ORIENTATION: _owned,
+    Kind.JOINTS: _owned,
+    Kind.ACTION: _action,
+    Kind.LOGIC: _logic,
+}

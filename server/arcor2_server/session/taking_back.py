@@ -1,0 +1,115 @@
+"""What taking edits back comes to: the changes, the locks and the role that they need, and who stands against it."""
+
+from collections.abc import Iterable, Sequence
+
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.project import END, START
+from arcor2_hw.data.role import Role
+from arcor2_server.lock_table import PROJECT, SCENE
+from arcor2_server.rpc.registry import RequestRefused
+from arcor2_server.session.changes import OF_SCENE, Change, Edit, Kind, net
+from arcor2_server.session.checks import Types
+from arcor2_server.session.document import Document, action_of
+from arcor2_server.session.history import History
+from arcor2_server.session.soundness import Unsound, check_sound, title
+
+
+def changes_back(edits: Iterable[Edit]) -> list[Change]:
+    """Give the changes that take back edits, which are given oldest first and follow each other."""
+    return [change.inverse() for change in net(change for edit in edits for change in edit.changes)]
+
+
+def require_possible(
+    document: Document, changes: Sequence[Change], types: Types, history: History, after: int, user: str
+) -> None:
+    """Refuse when what was made since edit number `after` stands against the changes; names who made it."""
+    for change in changes:
+        item = document.find(change.kind, change.id)
+        if (None if item is None else item.value) != change.before:
+            what = "removed" if item is None else "changed"
+            raise RequestRefused(f"{title(change)} was {what} since{_by(history, {change.id}, after, user)}.")
+    try:
+        check_sound(document, changes, types)
+    except Unsound as error:
+        raise RequestRefused(f"{error}{_by(history, error.ids, after, user, ' That was made')}") from None
+
+
+def _by(history: History, ids: set[str], after: int, user: str, opening: str = "") -> str:
+    edit = history.last_to_touch(ids, after=after, besides=user) if ids else None
+    if edit is None:
+        return ""
+    who = "you" if edit.user == user else edit.user
+    return f"{opening} by {who} (edit {edit.number}{f', {edit.request}' if edit.request else ''})" + "." * bool(opening)
+
+
+def role_for(changes: Iterable[Change]) -> Role:
+    """Give the least role that may make such changes by the ordinary requests."""
+    needed = Role.STANDARD_USER
+    for change in changes:
+        needed = max(needed, _role_for(change))
+    return needed
+
+
+def _role_for(change: Change) -> Role:
+    if change.kind in OF_SCENE:
+        return Role.TECHNICIAN
+    if change.kind is Kind.OVERRIDE:
+        return Role.ADVANCED_USER
+    if change.kind is Kind.PARAMETER and (change.before is None or change.after is None):
+        return Role.ADVANCED_USER
+    if change.kind is Kind.PROJECT and change.before.has_logic != change.after.has_logic:
+        return Role.ADVANCED_USER
+    return Role.STANDARD_USER
+
+
+# ---------------------------------------------------------------------------------------------- locks
+def ids_to_lock(document: Document, changes: Iterable[Change]) -> list[str]:
+    """Give the ids on which the ordinary requests for such changes take locks, as far as they exist."""
+    found: dict[str, None] = {}
+    for change in changes:
+        found.update(dict.fromkeys(_places(change)))
+    return [key for key in found if key in _OWN or _is_there(document, key)]
+
+
+_OWN = frozenset({SCENE, PROJECT, START, END})
+_LOCKABLE = (Kind.SCENE, Kind.OBJECT, Kind.PROJECT, Kind.POINT, Kind.ORIENTATION, Kind.JOINTS, Kind.ACTION)
+
+
+def _is_there(document: Document, key: str) -> bool:
+    return any(document.find(kind, key) is not None for kind in (*_LOCKABLE, Kind.PARAMETER))
+
+
+def _places(change: Change) -> list[str]:
+    values = [value for value in (change.before, change.after) if value is not None]
+    match change.kind:
+        case Kind.OBJECT:
+            return [change.id if change.before is not None else SCENE]
+        case Kind.PARAMETER:
+            return [change.id if change.before is not None else PROJECT]
+        case Kind.POINT:
+            parents = {value.parent for value in values if not isinstance(value.parent, Unset)}
+            moved_to = [parent for parent in parents if len(values) > 1 and _parent_changes(change)]
+            return [change.id if change.before is not None else PROJECT, *moved_to]
+        case Kind.JOINTS:
+            return [change.parent, change.id]
+        case Kind.ORIENTATION | Kind.ACTION:
+            return [change.id if change.before is not None else change.parent]
+        case Kind.LOGIC:
+            return [action_of(place) for value in values for place in (value.start, value.end)]
+        case _:
+            return [change.id]
+
+
+def _parent_changes(change: Change) -> bool:
+    return bool(change.before.parent != change.after.parent)
+
+
+def ids_that_move(document: Document, changes: Iterable[Change]) -> list[str]:
+    """Give the ids of all that hangs on action points that are moved, or hung elsewhere, by the changes."""
+    found: dict[str, None] = {}
+    for change in changes:
+        if change.kind is not Kind.POINT or change.before is None or change.after is None:
+            continue
+        if change.before.position != change.after.position or _parent_changes(change):
+            found.update(dict.fromkeys(document.tree_of(change.id)))
+    return list(found)

@@ -1,0 +1,66 @@
+"""What of the open document differs from what is saved."""
+
+from typing import Any
+
+from arcor2_server.session.changes import OF_SCENE, Change, Kind
+from arcor2_server.session.document import Document
+
+_Values = dict[tuple[Kind, str], Any]
+
+
+class Unsaved:
+    """Each item that differs, with its saved value (None: it is not saved). Scene and project are saved apart."""
+
+    def __init__(self) -> None:
+        self._of_scene: _Values = {}
+        self._of_project: _Values = {}
+
+    @classmethod
+    def between(cls, saved: Document, present: Document) -> "Unsaved":
+        """Compare two documents."""
+        found = cls()
+        for item in saved.items():
+            now = present.find(item.kind, item.id)
+            if now is None or now.value != item.value:
+                found._of(item.kind)[item.kind, item.id] = item.value
+        for item in present.items():
+            if saved.find(item.kind, item.id) is None:
+                found._of(item.kind)[item.kind, item.id] = None
+        return found
+
+    def _of(self, kind: Kind) -> _Values:
+        return self._of_scene if kind in OF_SCENE else self._of_project
+
+    @property
+    def scene(self) -> bool:
+        """Whether the scene differs."""
+        return bool(self._of_scene)
+
+    @property
+    def project(self) -> bool:
+        """Whether the project differs."""
+        return bool(self._of_project)
+
+    def note(self, change: Change) -> None:
+        """Take in a change that is made."""
+        values, key = self._of(change.kind), (change.kind, change.id)
+        if key not in values:
+            values[key] = change.before
+        if values[key] == change.after:
+            del values[key]
+
+    def begin_saving(self, *, scene: bool) -> _Values:
+        """Count from now on what differs from the present state, which is being saved; gives what differed before."""
+        if scene:
+            before, self._of_scene = self._of_scene, {}
+        else:
+            before, self._of_project = self._of_project, {}
+        return before
+
+    def saving_failed(self, before: _Values, document: Document) -> None:
+        """Count again from what was saved earlier: `before` is what `begin_saving` gave."""
+        for (kind, key), saved in before.items():
+            values, now = self._of(kind), document.find(kind, key)
+            values[kind, key] = saved
+            if saved == (None if now is None else now.value):
+                del values[kind, key]

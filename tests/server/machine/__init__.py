@@ -1,0 +1,1 @@
+"""Random edits of several clients over the websocket endpoint."""
