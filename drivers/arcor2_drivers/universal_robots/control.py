@@ -357,9 +357,9 @@ class ControlSession:
                 self._stopped_by_safety(safety)
             elif program_plays(newest.runtime) or self.own is not None:
                 gone_since = 0.0
-            elif gone_since == 0.0:
-                gone_since = now
-            elif now - gone_since > PROGRAM_GONE:
+            elif gone_since == 0.0:  # by the samples' time: an old one was taken before the program was sent
+                gone_since = newest.monotonic
+            elif newest.monotonic - gone_since > PROGRAM_GONE:
                 self.end(NotInControl(f"the control program was stopped at {self.who}, not by this driver"))
             if self._ending.is_set():
                 break

@@ -42,6 +42,8 @@ COMMANDS = (
 SPEEDS = ("speedJ", "speedL")
 SHOWN = 0.02  # s until the next command, a kick, may take the velocity's place in the register: two cycles of a CB3
 RESUMED_WITHIN = 3.0  # s for the control program to play again; it takes 0.1
+BEGINS_WITHIN = 2.0  # s for who asked for control to ask for the first thing, which is a kick
+FIRST_KICKS = 0.01  # s between kicks until then
 OUTPUTS = ("setConfigurableDigitalOut", "setStandardDigitalOut", "setToolDigitalOut")
 
 
@@ -57,8 +59,10 @@ def main() -> None:
         answers.write(json.dumps({"n": 0, "error": str(e)}) + "\n")
         os._exit(1)
     answers.write(json.dumps({"n": 0, "data": None}) + "\n")
+    first: str | None = _first(requests, commands["kickWatchdog"])
     while True:
-        request = json.loads(requests.get())
+        request = json.loads(first or requests.get())
+        first = None
         number = request.get("n")
         try:
             answer = {"n": number, "data": commands[request["do"]](*request["args"])}
@@ -70,6 +74,17 @@ def main() -> None:
             answers.write(json.dumps(answer) + "\n")
         if request["do"] == "stopScript":
             os._exit(0)
+
+
+def _first(requests: "queue.SimpleQueue[str]", kick: Callable[[], Any]) -> str | None:
+    """Give the first request. Until it comes nothing moves, and the watchdog is kept quiet: who asks has to begin."""
+    until = time.monotonic() + BEGINS_WITHIN
+    while time.monotonic() < until:
+        try:
+            return requests.get(timeout=FIRST_KICKS)
+        except queue.Empty:
+            kick()
+    return None
 
 
 def _listen(requests: "queue.SimpleQueue[str]") -> None:

@@ -14,6 +14,7 @@ import psutil
 import pytest
 
 from arcor2_drivers.universal_robots import timing
+from arcor2_drivers.universal_robots.control import ControlSession
 from arcor2_drivers.universal_robots.ur5e import UR5e
 from arcor2_drivers.universal_robots.ur_tasks import MoveType
 from arcor2_hw.data.device import LossKind
@@ -458,7 +459,7 @@ def owner(fake: FakeUr) -> Iterator[Callable[[], Any]]:
         from arcor2_drivers.universal_robots.settings import UrSettings
         from arcor2_drivers.universal_robots.ur5e import UR5e
         from arcor2_hw.data.geometry import Pose
-        robot = UR5e("obj_1", "ur", Pose(), UrSettings({fake.host!r}, payload_mass=1.0))
+        robot = UR5e("obj_1", "ur", Pose(), UrSettings({fake.host!r}, payload_mass=1.0, watchdog_frequency=5.0))
         robot.connect(3.0)
         robot.take_control()
         joints = robot.robot_joints()
@@ -499,6 +500,22 @@ def test_a_stopped_owner_stops_the_arm(owner: Callable[[], Any], fake: FakeUr) -
     time.sleep(0.3)
     os.kill(process.pid, signal.SIGSTOP)  # it lives, but no longer works
     assert at_rest(fake, 2.0) < UR5e.loss_reaction.within
+
+
+def test_the_program_waits_for_a_slow_owner_but_not_for_ever(
+    robot: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From arming the watchdog to the first command the control process kicks; then it is up to the owner."""
+    monkeypatch.setattr(ControlSession, "_watch", lambda _: None)  # an owner that is kept from its first kick
+    session = ControlSession(robot._observer, robot._upper_registers(), 5.0)
+    trips = fake.truth()["watchdog_trips"]
+    session.open(8.0, dashboard=False)
+    try:
+        time.sleep(0.8)
+        assert (fake.truth()["watchdog_trips"], fake.truth()["program"] is not None) == (trips, True)
+        fake.control.wait_until(lambda t: t["watchdog_trips"] == trips + 1 and t["program"] is None, 5.0)
+    finally:
+        session.end(NotInControl("the test is over"))
 
 
 def test_a_program_stopped_at_the_pendant_ends_control(ready: UR5e, fake: FakeUr) -> None:

@@ -130,7 +130,7 @@ def test_a_path_stops_when_its_owner_is_killed(fake: FakeUr) -> None:
         from arcor2_drivers.universal_robots.settings import UrSettings
         from arcor2_drivers.universal_robots.ur5e import UR5e
         from arcor2_hw.data.geometry import Pose, Position
-        robot = UR5e("obj_1", "ur", Pose(), UrSettings({fake.host!r}, payload_mass=1.0))
+        robot = UR5e("obj_1", "ur", Pose(), UrSettings({fake.host!r}, payload_mass=1.0, watchdog_frequency=5.0))
         robot.connect(3.0)
         robot.take_control()
         here = robot.get_end_effector_pose("tcp")
