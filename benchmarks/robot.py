@@ -57,6 +57,7 @@ async def stop_latency(report: Report, directory: Path, host: str, control: str,
         while (await client.next_event("RobotMoveToJoints")).data.move_event_type == "start":
             pass
         samples: list[float] = []
+        trips = 0
         while len(samples) < n:
             (present, *_) = await client.call("GetRobotJoints", rpc.GetRobotJointsArgs(robot))
             target = targets[0] if present.value < home[0].value else targets[1]
@@ -67,12 +68,18 @@ async def stop_latency(report: Report, directory: Path, host: str, control: str,
             await client.call("StopRobot", rpc.StopRobotArgs(robot))
             await client.next_event("RobotMoveToJoints")
             arrived = [stop["t"] for stop in await ask(control, "stops") if stop["t"] >= sent]
-            if not arrived:
+            if arrived:
+                samples.append(arrived[0] - sent)
+                continue
+            # On a machine so busy that the control process got no core in time, the watchdog was there before the stop.
+            tripped = (await ask(control, "truth"))["watchdog_trips"]
+            if tripped == trips:
                 raise RuntimeError("a stop did not arrive at the controller")
-            samples.append(arrived[0] - sent)
+            trips = tripped
         await client.call("StopScene")
         await scene_state(client, "stopped")
     note = f"median {median(samples) * 1e3:.1f} ms, worst {max(samples) * 1e3:.1f} ms"
+    note += f"; {trips} motions ended by the watchdog before, not counted" if trips else ""
     report.add(Figure("stop_latency_p99_ms", percentile(samples, 99) * 1e3, n, note))
 
 
