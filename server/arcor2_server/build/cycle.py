@@ -8,7 +8,7 @@ from arcor2_hw.data.object_type import ParameterMeta
 from arcor2_hw.data.project import ActionParameter, ActionParameterType, parse_link
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, InvalidProject
 from arcor2_server.build import expressions
-from arcor2_server.build.flow import END_NODE, Condition, Flow
+from arcor2_server.build.flow import BRANCHABLE, END_NODE, Condition, Flow
 from arcor2_server.build.frame import NOTE, REFERENCES, Frame, References
 from arcor2_server.build.layout import arrange
 
@@ -81,10 +81,9 @@ class Cycle:
             self._go(node, targets.pop(), block, stack, placed.follow)
             return
         follow = placed.follow if placed.last == END_NODE else placed.last
-        branches: list[tuple[Condition, Block, bool]] = []
+        branches: list[tuple[Condition | None, Block, bool]] = []
         for edge in self.flow.edges[node]:
             inside: Block = []
-            assert edge.condition is not None, "an action with several ways on has conditions"
             waiting = len(stack)
             if edge.target == END_NODE or edge.target != placed.last:
                 self._go(node, edge.target, inside, stack, follow)
@@ -95,8 +94,10 @@ class Cycle:
         if not branches:
             return
         if len(self.flow.edges[node]) == 2 and not branches[0][2]:
-            condition, inside, _ = branches[1]
-            block.append(ast.If(self._test(node, condition), inside, []))
+            (first, _, _), (condition, inside, _) = branches
+            # A way without a condition is taken when the other one's does not hold.
+            test = self._test(node, condition) if condition else self._test(node, first, negated=True)
+            block.append(ast.If(test, inside, []))
             return
         above: ast.If | None = None
         for number, (condition, inside, filled) in enumerate(branches):
@@ -126,11 +127,24 @@ class Cycle:
             )
         return names[output]
 
-    def _test(self, node: int, condition: Condition) -> ast.expr:
+    def _test(self, node: int, condition: Condition | None, *, negated: bool = False) -> ast.expr:
+        assert condition is not None, "only the last of several ways on is without a condition"
         source = condition.action
         if not self.natural.always_before(source, node):
             raise self._too_early(node, source)
-        return expressions.equals(self._result(node, source, condition.output, "boolean"), condition.value)
+        user, returns = self.flow.actions[node].name, self.declared[source][3].returns
+        kind = returns[condition.output] if condition.output < len(returns) else ""
+        if kind not in BRANCHABLE:
+            name = self.flow.actions[source].outputs()[condition.output]
+            raise InvalidProject(f"action {user!r}: {name} is {kind or 'nothing'}, which cannot be branched on")
+        variable = self._result(node, source, condition.output, kind)
+        if type(condition.value) is not BRANCHABLE[kind]:
+            allowed = "true and false" if kind == "boolean" else "texts" if kind == "string_enum" else "integers"
+            raise InvalidProject(
+                f"action {user!r}: on {variable}, which is {kind}, only {allowed} can be branched on,"
+                f" not {condition.value!r}"
+            )
+        return (expressions.differs if negated else expressions.equals)(variable, condition.value)
 
     def _too_early(self, node: int, source: int) -> InvalidProject:
         user, giver = self.flow.actions[node].name, self.flow.actions[source].name

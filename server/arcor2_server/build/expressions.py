@@ -24,3 +24,8 @@ def dotted(first: str, parts: tuple[str, ...]) -> ast.expr:
 def equals(variable: str, value: bool | int | str) -> ast.expr:
     """Give `variable == value`."""
     return ast.Compare(name(variable), [ast.Eq()], [ast.Constant(value)])
+
+
+def differs(variable: str, value: bool | int | str) -> ast.expr:
+    """Give `variable != value`."""
+    return ast.Compare(name(variable), [ast.NotEq()], [ast.Constant(value)])

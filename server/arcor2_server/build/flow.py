@@ -3,7 +3,7 @@
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeGuard
 
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.project import END, START, Action, LogicItem, Project, ProjectLogicIf, parse_link
@@ -11,6 +11,10 @@ from arcor2_hw.exceptions import InvalidProject
 
 END_NODE: Final = -1
 """Stands for the end of a cycle among the numbers of actions."""
+
+
+BRANCHABLE: Final[dict[str, type]] = {"boolean": bool, "integer": int, "integer_enum": int, "string_enum": str}
+"""The types of results that may be branched on, and what they are compared with (docs/protocol.md)."""
 
 
 class Condition(NamedTuple):
@@ -22,7 +26,7 @@ class Condition(NamedTuple):
 
 
 class Edge(NamedTuple):
-    """One way on: to action number `target` (or END_NODE), always or under a condition."""
+    """One way on: to action number `target` (or END_NODE), under a condition, or always, or when no condition holds."""
 
     target: int
     condition: Condition | None
@@ -33,7 +37,7 @@ class Flow:
     """The actions that a cycle can reach, numbered so that every edge leads to a higher number; 0 is the first.
 
     `edges[n]`: one edge without a condition, or several of which exactly one holds if they are tried in order: the last
-    one holds when no other does.
+    one holds when no other does, whether it has a condition or not.
     """
 
     actions: list[Action]
@@ -60,8 +64,10 @@ def _condition(
         raise InvalidProject(f"action {source.name!r}: a condition cannot be read: {error}") from None
     if action_id not in known or flow != "default":
         raise InvalidProject(f"action {source.name!r}: a condition asks for {condition.what!r}, which does not exist")
-    if not isinstance(value, bool):
-        raise InvalidProject(f"action {source.name!r}: only true and false can be branched on, not {condition.value}")
+    if not isinstance(value, bool | int | str):
+        raise InvalidProject(
+            f"action {source.name!r}: only true, false, integers and texts can be branched on, not {condition.value}"
+        )
     asked = actions[known[action_id]]
     if output >= len(asked.outputs()):
         raise InvalidProject(f"action {source.name!r}: a condition asks for a result that {asked.name!r} does not name")
@@ -69,29 +75,45 @@ def _condition(
 
 
 def _ordered(edges: list[Edge], source: Action, actions: Sequence[Action]) -> tuple[Edge, ...]:
-    """Check that exactly one edge is taken whatever the results are; put true before false where two are opposite."""
+    """Check that exactly one edge is taken whatever the results are.
+
+    Puts true before false where two are opposite, and the one without a condition last.
+    """
     if not edges:
         raise InvalidProject(f"action {source.name!r}: nothing follows it")
-    if len(edges) == 1 and edges[0].condition is None:
+    plain = [edge for edge in edges if edge.condition is None]
+    if plain and len(edges) == 1:
         return tuple(edges)
+    asked = [edge for edge in edges if edge.condition is not None]
+    if len(plain) > 1 or (plain and any(_is_boolean(edge.condition) for edge in asked)):
+        raise InvalidProject(f"action {source.name!r}: one of the ways on has no condition")
     tried: set[Condition] = set()
     settled = False
-    for edge in edges:
-        if (condition := edge.condition) is None:
-            raise InvalidProject(f"action {source.name!r}: one of the ways on has no condition")
-        if settled or condition in tried:
+    for edge in asked:
+        assert edge.condition is not None
+        if settled or edge.condition in tried:
             where = "the end" if edge.target == END_NODE else repr(actions[edge.target].name)
             raise InvalidProject(f"action {source.name!r}: the way on to {where} can never be taken")
-        tried.add(condition)
-        settled = condition._replace(value=not condition.value) in tried
-    if not settled:
+        tried.add(edge.condition)
+        settled = _is_boolean(edge.condition) and edge.condition._replace(value=not edge.condition.value) in tried
+    if not settled and not plain:
         [one, *more] = tried
         result = actions[one.action].outputs()[one.output]
-        when = "no condition holds" if more else f"{result} is {str(not one.value).lower()}"
+        when = "no condition holds" if more else f"{result} is not {_shown(one.value)}"
+        if not more and isinstance(one.value, bool):
+            when = f"{result} is {_shown(not one.value)}"
         raise InvalidProject(f"action {source.name!r}: nothing follows it when {when}")
-    if len(edges) == 2:
-        edges.sort(key=lambda edge: edge.condition is not None and not edge.condition.value)
-    return tuple(edges)
+    if len(asked) == 2 and not plain:
+        asked.sort(key=lambda edge: _is_boolean(edge.condition) and edge.condition.value is False)
+    return (*asked, *plain)
+
+
+def _is_boolean(condition: Condition | None) -> TypeGuard[Condition]:
+    return condition is not None and isinstance(condition.value, bool)
+
+
+def _shown(value: bool | int | str) -> str:
+    return json.dumps(value, ensure_ascii=False)
 
 
 def _number(first: int, edges: list[list[int]], actions: Sequence[Action]) -> list[int]:

@@ -29,12 +29,15 @@ from arcor2_server.build.frame import TypeFacts
 from arcor2_server.build.script import from_logic
 
 OBJECT = "obj_1"
-Way = tuple[str, str, bool] | None
+Way = tuple[str, str, bool | int | str] | None
 """Condition: the action asked, its output's name, the value."""
+SORTS = ("low", "middle", "high")
 
 DECLARED = {
     "do": ObjectAction("do"),
     "ask": ObjectAction("ask", returns=["boolean"]),
+    "count": ObjectAction("count", returns=["integer"]),
+    "sort": ObjectAction("sort", returns=["string_enum"]),
     "ask2": ObjectAction("ask2", returns=["boolean", "boolean"]),
     "use": ObjectAction("use", parameters=[ParameterMeta("flag", "boolean"), ParameterMeta("x", "double")]),
 }
@@ -49,6 +52,7 @@ class Draft:
     actions: dict[str, list[str]] = field(default_factory=dict)
     ways: list[tuple[str, str, Way]] = field(default_factory=list)
     links: dict[str, tuple[str, int]] = field(default_factory=dict)
+    methods: dict[str, str] = field(default_factory=dict)
 
     def action(self, name: str, *results: str) -> "Draft":
         self.actions[name] = list(results)
@@ -73,7 +77,7 @@ class Draft:
 
     def _action(self, name: str) -> Action:
         results = self.actions[name]
-        method = ("do", "ask", "ask2")[len(results)]
+        method = self.methods.get(name) or ("do", "ask", "ask2")[len(results)]
         parameters = []
         if name in self.links:
             source, output = self.links[name]
@@ -106,12 +110,22 @@ Oracle = Callable[[str, int], tuple[bool, ...]]
 """Gives the results of the n-th action that runs."""
 
 
+def given(method: str, drawn: tuple[bool, ...]) -> tuple[Any, ...]:
+    """Give the results of a method for what an oracle draws."""
+    match method:
+        case "count":
+            return (sum(drawn),)
+        case "sort":
+            return (SORTS[sum(drawn)],)
+    return drawn[: len(DECLARED[method].returns)]
+
+
 def walk(project: Project, oracle: Oracle, count: int) -> list[tuple[str, tuple[Any, ...]]]:
     """Follow the logic item by item, without any notion of blocks; gives what runs with which linked values."""
     actions = {action.id: action for point in project.action_points for action in point.actions}
     done: list[tuple[str, tuple[Any, ...]]] = []
     while True:
-        results: dict[str, tuple[bool, ...]] = {}
+        results: dict[str, tuple[Any, ...]] = {}
         at = next(item.end for item in project.logic if item.start == START)
         while at != END:
             if len(done) == count:
@@ -124,14 +138,14 @@ def walk(project: Project, oracle: Oracle, count: int) -> list[tuple[str, tuple[
                     values.append(results[source][output])
                 else:
                     values.append(json.loads(parameter.value))
-            results[at] = oracle(action.name, len(done))
+            results[at] = given(action.parse_type()[1], oracle(action.name, len(done)))
             done.append((action.name, tuple(values)))
-            for item in project.logic:
-                if item.start != at:
-                    continue
+            ways = [item for item in project.logic if item.start == at]
+            # The one without a condition is for when none holds, wherever it stands.
+            for item in sorted(ways, key=lambda way: not isinstance(way.condition, ProjectLogicIf)):
                 if isinstance(item.condition, ProjectLogicIf):
                     source, _, output = parse_link(item.condition.what)
-                    if results[source][output] is not json.loads(item.condition.value):
+                    if results[source][output] != json.loads(item.condition.value):
                         continue
                 at = item.end
                 break
@@ -148,10 +162,9 @@ class _Thing:
         def call(*arguments: Any, an: str) -> Any:
             if len(self.done) == self._count:
                 raise Enough
-            results = self._oracle(an, len(self.done))
+            results = given(method, self._oracle(an, len(self.done)))
             self.done.append((an, arguments))
-            wanted = len(DECLARED[method].returns)
-            return None if wanted == 0 else results[0] if wanted == 1 else results[:wanted]
+            return None if not results else results[0] if len(results) == 1 else results
 
         return call
 
@@ -231,4 +244,30 @@ def random_draft(rng: random.Random, size: int, joining: float, ending: float, w
         if not results[n] and sources and rng.random() < 0.5:
             source = rng.choice(sources)
             draft.links[names[n]] = (names[source], rng.randrange(results[source]))
+    return draft
+
+
+def with_choices(draft: Draft, rng: random.Random) -> Draft:
+    """Turn branchings on truth values into branchings on numbers and texts with an else, wherever that can be."""
+    linked = {source for source, _ in draft.links.values()}
+    choices = {name for name, results in draft.actions.items() if len(results) == 1} - linked
+    groups: dict[str, list[int]] = {}
+    for number, (start, _, condition) in enumerate(draft.ways):
+        if condition is not None:
+            groups.setdefault(start, []).append(number)
+    asked = {start: {draft.ways[n][2][0] for n in numbers} for start, numbers in groups.items()}  # type: ignore[index]
+    while lost := {name for names in asked.values() if not names <= choices for name in names & choices}:
+        choices -= lost
+    values = {name: rng.choice((("count", 0, 1), ("count", 2, 1), ("sort", *SORTS[:2]))) for name in sorted(choices)}
+    draft.methods |= {name: kind for name, (kind, *_) in values.items()}
+    for numbers in groups.values():
+        for number in numbers:
+            start, end, condition = draft.ways[number]
+            assert condition is not None
+            if condition[0] in choices:
+                value = values[condition[0]][1 + bool(condition[2])]
+                draft.ways[number] = (start, end, None if number == numbers[-1] else (*condition[:2], value))
+    if rng.random() < 0.5:
+        # Where the way without a condition stands among the others makes no difference.
+        draft.ways.sort(key=lambda way: way[2] is not None)
     return draft

@@ -9,11 +9,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from arcor2_hw.data.object_type import ObjectAction
 from arcor2_hw.data.project import END, START
 from arcor2_hw.exceptions import InvalidProject
+from arcor2_server.build.frame import TypeFacts
 from arcor2_server.build.layout import MAX_NESTING, Tree
 from arcor2_server.build.script import from_logic
-from tests.server.build.projects import SCENE, TYPES, Draft, random_draft, run, same_runs
+from tests.server.build.projects import DECLARED, SCENE, TYPES, Draft, random_draft, run, same_runs, with_choices
 
 
 @settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -23,9 +25,14 @@ from tests.server.build.projects import SCENE, TYPES, Draft, random_draft, run, 
     st.sampled_from([0.0, 0.2, 0.5, 0.9]),
     st.sampled_from([0.0, 0.1, 0.3]),
     st.sampled_from([1, 2, 3, 20]),
+    st.booleans(),
 )
-def test_a_program_does_what_the_logic_says(seed: int, size: int, joining: float, ending: float, window: int) -> None:
+def test_a_program_does_what_the_logic_says(
+    seed: int, size: int, joining: float, ending: float, window: int, choices: bool
+) -> None:
     draft = random_draft(random.Random(seed), size, joining, ending, window)
+    if choices:
+        draft = with_choices(draft, random.Random(seed))
     for draw in range(4):
         same_runs(draft, _oracle(seed + draw), 4 * size)
 
@@ -312,3 +319,85 @@ def test_what_cannot_be_reached_is_left_out() -> None:
     draft = Draft().chain(START, "a", END).chain("lost", "also lost")
     assert "lost" not in draft.script()
     assert run(draft.script(), _oracle(0), 2) == [("a", ()), ("a", ())]
+
+
+# ------------------------------------------------------------------------------------------------ numbers and texts
+def choosing(*values: int | str | None) -> Draft:
+    """Give a project whose first action leads to b0, b1 ... by the values of its result, all joining in z."""
+    method = "count" if isinstance(values[0], int) else "sort"
+    draft = Draft(methods={"a": method}).action("a", "r").way(START, "a")
+    for number, value in enumerate(values):
+        draft.action(f"b{number}").way("a", f"b{number}", None if value is None else ("a", "r", value))
+        draft.chain(f"b{number}", "z")
+    return draft.chain("z", END)
+
+
+def test_a_choice_of_numbers_reads_like_one() -> None:
+    draft = choosing(0, None, 2)
+    assert (
+        loop(draft.script())
+        == """\
+r = thing.count(an="a")
+if r == 0:
+    thing.do(an="b0")
+elif r == 2:
+    thing.do(an="b2")
+else:
+    thing.do(an="b1")
+
+thing.do(an="z")"""
+    )
+    same_runs(draft, _oracle(1), 60)
+
+
+def test_a_choice_of_texts() -> None:
+    draft = choosing("low", "high", None)
+    assert 'if r == "low":' in draft.script()
+    same_runs(draft, _oracle(2), 60)
+
+
+def test_otherwise_the_end() -> None:
+    draft = Draft(methods={"a": "count"}).action("a", "r").way(START, "a").action("b")
+    draft.way("a", "b", ("a", "r", 1)).way("a", END).way("b", END)
+    assert loop(draft.script()).splitlines()[1:] == ["if r == 1:", '    thing.do(an="b")']
+    same_runs(draft, _oracle(3), 40)
+
+
+def test_otherwise_something_more() -> None:
+    draft = Draft(methods={"a": "count"}).action("a", "r").way(START, "a").action("b").chain("b", "z", END)
+    draft.way("a", "z", ("a", "r", 1)).way("a", "b")
+    assert loop(draft.script()).splitlines()[1:3] == ["if r != 1:", '    thing.do(an="b")']
+    same_runs(draft, _oracle(4), 40)
+
+
+@pytest.mark.parametrize(
+    ("draft", "text"),
+    [
+        (choosing(0, 1), "nothing follows it when no condition holds"),
+        (choosing(0, None, None), "one of the ways on has no condition"),
+        (choosing(0, 0, None), "can never be taken"),
+        (choosing(0, "low", None), "only integers can be branched on, not 'low'"),
+        (choosing(0, True, None), "one of the ways on has no condition"),
+        (choosing("low", 1, None), "only texts can be branched on, not 1"),
+        (choosing(0, 1.5, None), "only true, false, integers and texts"),  # type: ignore[arg-type]
+    ],
+)
+def test_choices_that_are_refused(draft: Draft, text: str) -> None:
+    with pytest.raises(InvalidProject) as caught:
+        draft.script()
+    assert "'a'" in str(caught.value)
+    assert text in str(caught.value)
+
+
+def test_a_truth_value_has_no_otherwise() -> None:
+    draft = Draft().action("a", "r").way(START, "a").action("b").way("a", "b", ("a", "r", True)).way("a", END)
+    with pytest.raises(InvalidProject, match="one of the ways on has no condition"):
+        draft.chain("b", END).script()
+
+
+def test_only_some_results_can_be_branched_on() -> None:
+    draft = choosing("low", None)
+    project = draft.project()
+    types = {"Thing": TypeFacts("object_types.thing", {**DECLARED, "sort": ObjectAction("sort", returns=["double"])})}
+    with pytest.raises(InvalidProject, match="r is double, which cannot be branched on"):
+        from_logic(SCENE, project, types)

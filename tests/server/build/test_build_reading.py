@@ -11,12 +11,14 @@ from msgspec.structs import replace
 
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.object_type import ObjectAction
 from arcor2_hw.data.project import END, START, Action, ActionPoint, Flow, Project
 from arcor2_hw.data.scene import SceneObject
+from arcor2_server.build.frame import TypeFacts
 from arcor2_server.build.reading import NotUnderstood, from_script
 from arcor2_server.build.script import from_logic
 from tests.server.build import workplace
-from tests.server.build.projects import SCENE, TYPES, random_draft, walk
+from tests.server.build.projects import SCENE, TYPES, random_draft, walk, with_choices
 
 
 def _oracle(seed: int) -> Any:
@@ -34,9 +36,13 @@ def _oracle(seed: int) -> Any:
     st.sampled_from([0.0, 0.2, 0.5, 0.9]),
     st.sampled_from([0.0, 0.1, 0.3]),
     st.sampled_from([1, 2, 3, 20]),
+    st.booleans(),
 )
-def test_there_and_back(seed: int, size: int, joining: float, ending: float, window: int) -> None:
-    project = random_draft(random.Random(seed), size, joining, ending, window).project()
+def test_there_and_back(seed: int, size: int, joining: float, ending: float, window: int, choices: bool) -> None:
+    draft = random_draft(random.Random(seed), size, joining, ending, window)
+    if choices:
+        draft = with_choices(draft, random.Random(seed))
+    project = draft.project()
     source = from_logic(SCENE, project, TYPES)
     back = from_script(source, SCENE, project, TYPES)
     steps = [(item.start, item.end) for item in project.logic]
@@ -272,6 +278,37 @@ def test_conditions_one_after_the_other_are_one_branching() -> None:
         )
     )
     assert steps_of(project) == steps_of(workplace.project())
+
+
+def test_numbers_and_texts_with_an_else() -> None:
+    pack = '            robot.place(aps.good.poses.default, an="pack")\n'
+    counted = PICK + '        n = flow.count(an="count")\n'
+    before = workplace.project()
+    facts = {**workplace.FACTS}
+    more = {**facts["FlowActions"].actions, "count": ObjectAction("count", returns=["integer"])}
+    facts["FlowActions"] = TypeFacts("object_types.flow_actions", more)
+
+    def steps(branches: str) -> list[tuple[str, str, str]]:
+        source = edited((PICK, counted + branches))
+        project = from_script(source, workplace.scene(), before, facts)
+        # Whatever was written, Build writes the same project again.
+        again = from_script(from_logic(workplace.scene(), project, facts), workplace.scene(), project, facts)
+        assert again == project
+        return [step for step in steps_of(project) if step[0] == "count"]
+
+    finish = '            flow.finish(an="enough")\n            continue\n'
+    expected = [("count", "enough", ""), ("count", "known?", "-1"), ("count", "pack", "3")]
+    assert steps("        if n == 3:\n" + pack + "        elif n != -1:\n" + finish) == expected
+    assert (
+        steps("        if n == 3:\n" + pack + "        elif n == -1:\n            pass\n        else:\n" + finish)
+        == expected
+    )
+    assert steps("        if n != 3:\n            pass\n        else:\n" + pack) == [
+        ("count", "known?", ""),
+        ("count", "pack", "3"),
+    ]
+    with pytest.raises(NotUnderstood, match="n is integer and cannot be True"):
+        steps("        if n:\n" + pack)
 
 
 def test_a_script_of_the_original_is_read() -> None:

@@ -282,11 +282,14 @@ def test_a_condition_needs_a_named_boolean() -> None:
     with pytest.raises(InvalidProject, match="known"):
         script.from_logic(workplace.scene(), project, workplace.FACTS)
     numbers = [
-        msgspec.structs.replace(item, condition=msgspec.structs.replace(item.condition, value="1"))
+        msgspec.structs.replace(
+            item,
+            condition=msgspec.structs.replace(item.condition, value="1") if item.condition.value == "true" else UNSET,
+        )
         if item.condition is not UNSET
         else item
         for item in workplace.project().logic
     ]
     project = msgspec.structs.replace(workplace.project(), logic=numbers)
-    with pytest.raises(InvalidProject, match="only true and false"):
+    with pytest.raises(InvalidProject, match="boolean, only true and false can be branched on"):
         script.from_logic(workplace.scene(), project, workplace.FACTS)

@@ -201,7 +201,8 @@ class _Reading:
             wanted = self._steps(ways, old)
             same = {_key(item): item for item in old}
             keys = [(end, _asked(condition)) for end, condition in wanted]
-            ordered = len(wanted) <= 2 or list(same) == keys
+            # The order in which conditions are tried counts; the one way without a condition is the last anyway.
+            ordered = len(wanted) <= 2 or [key for key in same if key[1]] == [key for key in keys if key[1]]
             if len(same) == len(old) == len(keys) and set(same) == set(keys) and ordered:
                 kept_items |= {id(item): item for item in old}
                 continue

@@ -11,15 +11,13 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 from arcor2_hw.data.object_type import ObjectAction
-from arcor2_server.build.flow import END_NODE, Condition
+from arcor2_server.build.flow import BRANCHABLE, END_NODE, Condition
 from arcor2_server.build.frame import NOTE, Frame
 from arcor2_server.build.reading.errors import NotUnderstood, shown
 from arcor2_server.build.reading.module import Script
 from arcor2_server.build.reading.values import Values
 
 START_NODE: Final = -2
-BRANCHABLE: Final = {"boolean": bool, "integer": int, "integer_enum": int, "string_enum": str}
-"""What a condition may ask for, and what it compares it with."""
 
 
 @dataclass(slots=True)
@@ -199,7 +197,7 @@ class Ways:
                 if any(way.note is None for way in going):
                     raise NotUnderstood(test.lineno, f"{NOTE} is not set on every way that leads here")
                 return [way for way in going if way.note == note], [way for way in going if way.note != note]
-        condition, variable = self._condition(test)
+        condition, variable, negated = self._condition(test)
         opposite = condition._replace(value=not condition.value) if isinstance(condition.value, bool) else None
         holds: list[_Going] = []
         others: list[_Going] = []
@@ -216,9 +214,11 @@ class Ways:
             else:
                 holds.append(way._replace(taken=condition))
                 others.append(way._replace(tried=(*way.tried, condition)))
-        return holds, others
+        return (others, holds) if negated else (holds, others)
 
-    def _condition(self, test: ast.expr) -> tuple[Condition, str]:
+    def _condition(self, test: ast.expr) -> tuple[Condition, str, bool]:
+        """Give what a condition asks for, the variable, and whether it is to be otherwise (`!=`)."""
+        negated = False
         match test:
             case ast.Name(variable):
                 value: bool | int | str = True
@@ -226,6 +226,8 @@ class Ways:
                 value = False
             case ast.Compare(ast.Name(variable), [ast.Eq() | ast.Is()], [right]):
                 value = self._values.compared(right)
+            case ast.Compare(ast.Name(variable), [ast.NotEq() | ast.IsNot()], [right]):
+                value, negated = self._values.compared(right), True
             case _:
                 raise NotUnderstood(test.lineno, f"a condition is written `result == value`, not {shown(test)}")
         if variable not in self._results:
@@ -236,4 +238,4 @@ class Ways:
             raise NotUnderstood(test.lineno, f"{variable} is {kind}, which cannot be asked for in a condition")
         if type(value) is not BRANCHABLE[kind]:
             raise NotUnderstood(test.lineno, f"{variable} is {kind} and cannot be {value!r}")
-        return Condition(source, output, value), variable
+        return Condition(source, output, value), variable, negated
