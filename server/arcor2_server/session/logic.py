@@ -8,6 +8,7 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectAction
 from arcor2_hw.data.project import END, START, Action, LogicItem, ProjectLogicIf
 from arcor2_hw.exceptions import InvalidData
+from arcor2_server.build.flow import BRANCHABLE
 from arcor2_server.session.document import Document, action_of
 
 
@@ -30,8 +31,7 @@ def check_logic_item(
         raise InvalidData(f"START leads to {_name(document, action_of(siblings[0].end))} already.")
     if any(action_of(other.end) == end for other in siblings):
         raise InvalidData(f"{_name(document, start)} leads to {_name(document, end)} already.")
-    if siblings and (isinstance(item.condition, Unset) or any(isinstance(s.condition, Unset) for s in siblings)):
-        raise InvalidData(f"Each of several steps from {_name(document, start)} needs a condition.")
+    _check_otherwise(document, start, [item, *siblings])
     if not isinstance(item.condition, Unset):
         if start == START:
             raise InvalidData("The step from START cannot have a condition: there is no result yet.")
@@ -40,6 +40,26 @@ def check_logic_item(
             raise InvalidData(f"Another step from {_name(document, start)} has the same condition.")
     if loops and start != START and end != END and _reaches(document, end, start, item.id):
         raise InvalidData(f"The step from {_name(document, start)} to {_name(document, end)} would close a loop.")
+
+
+def _check_otherwise(document: Document, start: str, items: list[LogicItem]) -> None:
+    """Refuse a step without a condition beside others, but one beside those that ask for no truth value."""
+    conditions = [item.condition for item in items if not isinstance(item.condition, Unset)]
+    without = len(items) - len(conditions)
+    if len(items) == 1 or not without:
+        return
+    if any(isinstance(msgspec.json.decode(condition.value), bool) for condition in conditions if _is_json(condition)):
+        raise InvalidData(f"Each of several steps from {_name(document, start)} needs a condition.")
+    if without > 1:
+        raise InvalidData(f"Each of several steps from {_name(document, start)} but one needs a condition.")
+
+
+def _is_json(condition: ProjectLogicIf) -> bool:
+    try:
+        msgspec.json.decode(condition.value)
+    except msgspec.DecodeError:
+        return False
+    return True
 
 
 def check_no_loops(document: Document, items: Iterable[LogicItem]) -> None:
@@ -95,12 +115,19 @@ def _check_condition(document: Document, meta_of: Callable[[Action], ObjectActio
     outputs, returns = action.outputs(), meta_of(action).returns
     if flow != "default" or index >= len(outputs) or index >= len(returns):
         raise InvalidData(f"Action {action.name} keeps no result number {index}: name its results first.")
-    if returns[index] != "boolean":
-        raise InvalidData(f"The result {outputs[index]} of {action.name} is {returns[index]}; only boolean can branch.")
+    kind = BRANCHABLE.get(returns[index])
+    if kind is None:
+        raise InvalidData(
+            f"The result {outputs[index]} of {action.name} is {returns[index]};"
+            " only boolean, integer and enumerations can branch."
+        )
     try:
-        msgspec.json.decode(condition.value, type=bool)
+        value = msgspec.json.decode(condition.value)
     except msgspec.DecodeError:
-        raise InvalidData(f"A condition compares with true or false, not with {condition.value[:40]}.") from None
+        value = None
+    if type(value) is not kind:
+        wanted = {bool: "true or false", int: "an integer", str: "a text in quotes"}[kind]
+        raise InvalidData(f"A condition on {outputs[index]} compares with {wanted}, not with {condition.value[:40]}.")
 
 
 def _reaches(document: Document, origin: str, target: str, without: str) -> bool:

@@ -49,11 +49,11 @@ def types() -> RecordedTypes:
 
 # ------------------------------------------------------------------------------------------------ logic
 def meta_of(action: Action) -> ObjectAction:
-    return ObjectAction("random", returns=["boolean", "double"])
+    return ObjectAction("random", returns=["boolean", "double", "integer", "string_enum"])
 
 
 def branching(*names: str) -> Document:
-    flows = [[Flow(outputs=[f"{name}_b", f"{name}_d"])] for name in names]
+    flows = [[Flow(outputs=[f"{name}_{kind}" for kind in "bdis"])] for name in names]
     actions = [Action(name, "obj_r/random", name, [], flow) for name, flow in zip(names, flows, strict=True)]
     point = ActionPoint("p", Position(), id="acp", actions=actions)
     return Document.of(Scene("s", id="scn", objects=[RANDOM]), Project("p", "scn", id="pro", action_points=[point]))
@@ -82,7 +82,11 @@ def add(document: Document, item: LogicItem) -> None:
         (step("a", "c"), "needs a condition"),
         (step("a", "c", "a/default/0", " true"), "same condition"),
         (step("a", "c", "a/default/1"), "only boolean"),
-        (step("a", "c", "a/default/2"), "result number 2"),
+        (step("a", "c", "a/default/2"), "an integer, not with true"),
+        (step("a", "c", "a/default/2", "1.0"), "an integer, not with 1.0"),
+        (step("a", "c", "a/default/3", "3"), "a text in quotes, not with 3"),
+        (step("a", "c", "a/default/3", "soft"), "a text in quotes, not with soft"),
+        (step("a", "c", "a/default/4"), "result number 4"),
         (step("a", "c", "a/other/0"), "result number"),
         (step("a", "c", "a"), "not understood"),
         (step("a", "c", "a/default/0", '"yes"'), "true or false"),
@@ -110,6 +114,33 @@ def test_steps_that_are_allowed() -> None:
     with pytest.raises(InvalidData, match="loop"):
         check_logic_item(document, meta_of, step("c", "b", key="new"))
     add(document, step("c", "END"))
+
+
+def test_numbers_and_texts_may_have_a_step_for_everything_else() -> None:
+    document = branching("a", "b", "c", "d", "e")
+    add(document, step("START", "a"))
+    add(document, step("a", "b", "a/default/2", "3"))
+    add(document, step("a", "c"))  # otherwise
+    add(document, step("a", "d", "a/default/2", "-4"))
+    for item, reason in (
+        (step("a", "e"), "but one needs a condition"),
+        (step("a", "e", "a/default/2", "3"), "same condition"),
+        (step("a", "e", "a/default/0", "true"), "Each of several steps from a needs a condition"),
+    ):
+        with pytest.raises(InvalidData, match=reason):
+            check_logic_item(document, meta_of, item)
+    add(document, step("a", "e", "a/default/3", '"soft"'))
+    # The step for everything else may get a condition, and another one become it.
+    check_logic_item(document, meta_of, step("a", "c", "a/default/2", "7", key="a>c"))
+    with pytest.raises(InvalidData, match="but one"):
+        check_logic_item(document, meta_of, step("a", "d", key="a>d"))
+
+
+def test_a_truth_value_has_no_step_for_everything_else() -> None:
+    document = branching("a", "b", "c")
+    add(document, step("a", "b"))
+    with pytest.raises(InvalidData, match="needs a condition"):
+        check_logic_item(document, meta_of, step("a", "c", "a/default/0", "true"))
 
 
 def test_eighteen_diamonds_and_a_long_chain_are_checked_in_time() -> None:
