@@ -27,7 +27,7 @@ from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_server.build.service import BuildService
 from arcor2_server.object_types import ObjectTypes
 from arcor2_server.settings import ServerSettings
-from arcor2_server.storage import Storage
+from arcor2_server.storage import AssetStore, Storage
 from benchmarks.figures import Figure, Report, median
 
 SIZES: Final = (250, 500, 1000, 2000)
@@ -91,7 +91,7 @@ async def build(report: Report) -> None:
         storage = await Storage.open(settings)
         try:
             await storage.put_object_type(ObjectTypeSource("Bench", _SOURCE))
-            types = ObjectTypes(storage)
+            types = ObjectTypes(storage, await AssetStore.open(settings.assets_dir))
             await types.load()
             await storage.put_scene(_SCENE)
             services: Any = SimpleNamespace(settings=settings, storage=storage, types=types)

@@ -63,7 +63,7 @@ async def running_services(settings: ServerSettings) -> AsyncIterator[Services]:
         locks = Locks(settings.lock_retries, settings.lock_retry_wait)
         users = Users(hub, locks, settings)
         stack.callback(users.close)
-        types = ObjectTypes(storage)
+        types = ObjectTypes(storage, assets)
         await types.load()
         services = Services(
             settings=settings,

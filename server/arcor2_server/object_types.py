@@ -17,12 +17,12 @@ from arcor2_hw.analysis import (
     installed_types,
     module_name,
 )
-from arcor2_hw.data.base import Data
+from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ObjectTypeSource
 from arcor2_hw.data.robot import RobotMeta
 from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_hw.runtime.messages import TypeCode
-from arcor2_server.storage import Storage
+from arcor2_server.storage import AssetStore, Storage
 
 log = structlog.get_logger(__name__)
 
@@ -59,22 +59,25 @@ class _Known(Struct, frozen=True):
 
     analyses: dict[str, TypeAnalysis] = {}
     metas: dict[str, ObjectTypeMeta] = {}
+    robots: dict[str, RobotMeta] = {}
 
 
 class ObjectTypes:
     """The registry. Look-ups raise NotFound for a type or action that is not known.
 
-    `revision` grows with every change of what is known.
+    `revision` grows with every change of what is known. A type whose collision model, or the mesh of it, is not there
+    is disabled, as is one whose source cannot be read; a robot's description is named only when it is there.
     """
 
-    def __init__(self, storage: Storage) -> None:
+    def __init__(self, storage: Storage, assets: AssetStore) -> None:
         self.revision = 0
         self._storage = storage
+        self._assets = assets
         self._library = Library()
         self._installed: dict[str, InstalledType] = {}
         self._uploaded: dict[str, ObjectTypeSource] = {}
         self._known = _Known()
-        self._read_at = -1
+        self._read_at: tuple[int, int] | None = None
         self._told_of: dict[str, ObjectTypeMeta] = {}
         self._untold = Changes()
         self._reading = asyncio.Lock()
@@ -89,14 +92,18 @@ class ObjectTypes:
     @property
     def up_to_date(self) -> bool:
         """Tell whether there is nothing that clients do not know yet."""
-        return self._storage.types_revision == self._read_at and not self._untold
+        return self._stored_revision == self._read_at and not self._untold
+
+    @property
+    def _stored_revision(self) -> tuple[int, int]:
+        return self._storage.types_revision, self._assets.revision
 
     async def refresh(self) -> Changes:
         """Take in what was put straight into storage since the last time; gives what clients do not know yet."""
         if self.up_to_date:
             return self._untold
         async with self._reading:
-            if self._storage.types_revision != self._read_at:
+            if self._stored_revision != self._read_at:
                 await self._read_uploaded()
             changes, self._untold = self._untold, Changes()
             self._told_of = self._known.metas
@@ -105,7 +112,7 @@ class ObjectTypes:
     async def take_in(self) -> None:
         """Take in what was put straight into storage; what clients do not know yet waits for the next refresh."""
         async with self._reading:
-            if self._storage.types_revision != self._read_at:
+            if self._stored_revision != self._read_at:
                 await self._read_uploaded()
 
     def _read_installed(self) -> None:
@@ -115,8 +122,8 @@ class ObjectTypes:
                 self._library.add(installed.file)
 
     async def _read_uploaded(self) -> None:
-        first = self._read_at == -1
-        revision = self._storage.types_revision
+        first = self._read_at is None
+        revision = self._stored_revision
         stored = {one.id: one for one in await self._storage.object_types()}
         for name in self._uploaded.keys() - stored.keys():
             del self._uploaded[name]
@@ -134,7 +141,7 @@ class ObjectTypes:
                 continue
             self._uploaded[name] = one
         # Off the event loop: a hundred types take a moment to read.
-        known = await asyncio.to_thread(self._analyse)
+        known = await asyncio.to_thread(self._analyse, await self._storage.types_without_model())
         if first:
             self._told_of = known.metas
         self._known = known
@@ -142,7 +149,7 @@ class ObjectTypes:
         self._read_at = revision
         self.revision += 1
 
-    def _analyse(self) -> _Known:
+    def _analyse(self, without_model: set[str]) -> _Known:
         analyses = {name: self._library.analyse(name) for name in self._library.names()}
         metas = {}
         for name, analysis in analyses.items():
@@ -151,12 +158,29 @@ class ObjectTypes:
             meta = analysis.meta
             if (one := self._uploaded.get(name)) is not None:
                 meta = replace(meta, object_model=one.model, modified=one.modified)
+                problem = f"its collision model {name} is missing" if name in without_model else self._lacking(one)
+                if problem and not meta.disabled:
+                    meta = replace(meta, disabled=True, problem=problem)
             metas[name] = meta
         for name, installed in self._installed.items():
             if installed.file is None:
                 metas[name] = ObjectTypeMeta(name, abstract=True, disabled=True, problem=str(installed.problem))
                 analyses[name] = TypeAnalysis(metas[name], problem=installed.problem)
-        return _Known(analyses, dict(sorted(metas.items())))
+        robots = {name: self._with_asset(a.robot) for name, a in analyses.items() if a.robot and name in metas}
+        return _Known(analyses, dict(sorted(metas.items())), dict(sorted(robots.items())))
+
+    def _lacking(self, one: ObjectTypeSource) -> str:
+        """Say which mesh a type needs that is not there; empty when none is missing."""
+        mesh = UNSET if isinstance(one.model, Unset) else one.model.mesh
+        if isinstance(mesh, Unset) or self._assets.exists(mesh.asset_id):
+            return ""
+        return f"the mesh {mesh.asset_id} of its collision model is missing"
+
+    def _with_asset(self, robot: RobotMeta) -> RobotMeta:
+        name = robot.urdf_package_filename
+        if isinstance(name, Unset) or self._assets.exists(name):
+            return robot
+        return replace(robot, urdf_package_filename=UNSET)
 
     def _note(self) -> None:
         """Remember in what clients have to be told: how what is known differs from what they were told of."""
@@ -224,12 +248,12 @@ class ObjectTypes:
 
     def robot_metas(self) -> list[RobotMeta]:
         """Give the features of all non-abstract robot types."""
-        found = (self._known.analyses[name].robot for name in self._known.metas)
-        return [robot for robot in found if robot is not None]
+        return list(self._known.robots.values())
 
     def robot_meta(self, name: str) -> RobotMeta:
         """Give the features of one robot type; NotFound when it is no robot."""
-        if (robot := self._analysis(name).robot) is None:
+        self.meta(name)
+        if (robot := self._known.robots.get(name)) is None:
             raise NotFound(f"The object type {name} is no robot.")
         return robot
 

@@ -6,7 +6,7 @@ from msgspec import UNSET, Raw
 
 from arcor2_hw.data.base import Unset, is_valid_name
 from arcor2_hw.data.events import ChangeType, Event
-from arcor2_hw.data.object_type import ObjectTypeMeta, ObjectTypeSource
+from arcor2_hw.data.object_type import Mesh, Models, ObjectTypeMeta, ObjectTypeSource
 from arcor2_hw.data.rpc import DeleteObjectTypesData, IdArgs, TypeArgs
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.runtime.messages import TypeCode
@@ -115,6 +115,13 @@ def _check_new(context: Context, new: ObjectTypeMeta) -> None:
         raise RequestRefused(f"A collision model is needed: {error}.") from None
     if model.id != new.type:
         raise RequestRefused(f"The model of {new.type} needs the id {new.type}, not {model.id}.")
+    require_mesh(context.services, model)
+
+
+def require_mesh(services: Services, model: Models) -> None:
+    """Refuse a collision model whose mesh is no asset."""
+    if isinstance(model, Mesh) and not services.assets.exists(model.asset_id):
+        raise RequestRefused(f"There is no asset {model.asset_id!r} that could be the mesh of {model.id}.")
 
 
 def _because(meta: ObjectTypeMeta) -> str:

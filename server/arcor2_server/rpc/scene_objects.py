@@ -23,6 +23,7 @@ from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_server.locks import ADDING_OBJECT, SCENE
 from arcor2_server.rpc.editing import commit, eef_pose, require_free, require_held, tell, unlock
+from arcor2_server.rpc.object_types import require_mesh
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
 from arcor2_server.session.aftermath import VIRTUAL, uses_object
 from arcor2_server.session.changes import Kind
@@ -217,6 +218,7 @@ async def update_object_model(context: Context, args: UpdateObjectModelArgs) -> 
         raise RequestRefused(f"{meta.type} has this model already.")
     if _model_of(args.object_model).id != meta.type:
         raise InvalidData(f"The model of {meta.type} needs the id {meta.type}.")
+    require_mesh(services, _model_of(args.object_model))
     require_held(context, args.object_type_id)
     try:
         stored = await services.storage.object_type(meta.type)

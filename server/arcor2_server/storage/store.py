@@ -214,6 +214,12 @@ class Storage:
             row = await self.one(session, ObjectTypeRow, key, "object type")
             return self._object_type(row, await session.get(ModelRow, key))
 
+    async def types_without_model(self) -> set[str]:
+        """Give the ids of uploaded object types whose collision model is gone."""
+        wanted = select(ObjectTypeRow.id).where(ObjectTypeRow.model_kind.is_not(None))
+        async with self.reading() as session:
+            return set(await session.scalars(wanted.where(ObjectTypeRow.id.not_in(select(ModelRow.id)))))
+
     async def put_object_type(self, object_type: ObjectTypeSource) -> ObjectTypeSource:
         """Save, with its model when it has one; gives it as saved (like put_scene)."""
         stamp = now()

@@ -42,13 +42,14 @@ async def opened(
                     InstalledType(one.name, one.entry_point, one.distribution, one.version, str(one.folder), file)
                 )
         monkeypatch.setattr("arcor2_server.object_types.installed_types", lambda: installed)
-        object_types = ObjectTypes(storage)
+        assets = await AssetStore.open(directory / "assets")
+        object_types = ObjectTypes(storage, assets)
         await object_types.load()
         told: list[Any] = []
         services: Any = types.SimpleNamespace(
             settings=settings,
             storage=storage,
-            assets=await AssetStore.open(directory / "assets"),
+            assets=assets,
             types=object_types,
             session=types.SimpleNamespace(scene=None, project=None),
             hub=types.SimpleNamespace(broadcast=told.append, told=told),

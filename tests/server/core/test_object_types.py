@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from msgspec import UNSET
 
-from arcor2_hw.data.object_type import Box, ObjectModel, ObjectTypeSource, Sphere
+from arcor2_hw.data.object_type import Box, Mesh, ObjectModel, ObjectTypeSource, Sphere
 from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_server.object_types import Changes, ObjectTypes
 from arcor2_server.settings import ServerSettings
-from arcor2_server.storage import Storage
+from arcor2_server.storage import AssetStore, Storage
 from tests.server.core.serving import ServerProcess, running, talking
 
 LAMP = '''
@@ -58,8 +58,13 @@ async def storage(tmp_path: Path) -> AsyncIterator[Storage]:
 
 
 @pytest.fixture
-async def types(storage: Storage) -> ObjectTypes:
-    registry = ObjectTypes(storage)
+async def assets(tmp_path: Path) -> AssetStore:
+    return await AssetStore.open(tmp_path / "assets")
+
+
+@pytest.fixture
+async def types(storage: Storage, assets: AssetStore) -> ObjectTypes:
+    registry = ObjectTypes(storage, assets)
     await registry.load()
     return registry
 
@@ -172,6 +177,112 @@ async def test_model_belongs_to_its_type(types: ObjectTypes, storage: Storage) -
     assert changes.updated[0].object_model == ObjectModel.of(Sphere("Crate", 0.5))
 
 
+CRATE = "from arcor2_hw.objects import CollisionObject\n\n\nclass Crate(CollisionObject):\n    _ABSTRACT = False\n"
+
+
+async def content() -> AsyncIterator[bytes]:
+    yield b"mesh"
+
+
+async def test_a_type_without_its_collision_model_is_disabled(types: ObjectTypes, storage: Storage) -> None:
+    await types.add(ObjectTypeSource("Crate", CRATE, model=ObjectModel.of(Box("Crate", 1, 2, 3))))
+    await storage.delete_model("Crate")
+    (crate,) = (await types.refresh()).updated
+    assert (crate.disabled, crate.problem) == (True, "its collision model Crate is missing")
+    await storage.put_model(Box("Crate", 1, 2, 3))
+    (crate,) = (await types.refresh()).updated
+    assert (crate.disabled, crate.problem) == (False, UNSET)
+
+
+async def test_a_type_without_its_mesh_is_disabled_until_it_comes(types: ObjectTypes, assets: AssetStore) -> None:
+    mesh = ObjectModel.of(Mesh("Crate", "crate.stl"))
+    crate = await types.add(ObjectTypeSource("Crate", CRATE, model=mesh))
+    assert crate.disabled
+    assert "crate.stl" in str(crate.problem)
+    revision = types.revision
+    await assets.put(content(), "other.stl")
+    assert not await types.refresh()
+    await assets.put(content(), "crate.stl")
+    assert not types.up_to_date
+    (crate,) = (await types.refresh()).updated
+    assert (crate.disabled, crate.object_model) == (False, mesh)
+    assert types.revision > revision
+    await assets.delete("crate.stl")
+    (crate,) = (await types.refresh()).updated
+    assert crate.disabled
+
+
+ARM = """
+from arcor2_hw.objects import Robot
+
+
+class Arm(Robot):
+    _ABSTRACT = False
+    urdf_package_name = "arm.zip"
+
+    def get_end_effectors_ids(self): return set()
+    def get_end_effector_pose(self, end_effector): ...
+    def robot_joints(self, include_gripper=False): return []
+    def grippers(self): return set()
+    def suctions(self): return set()
+"""
+
+
+async def test_a_robots_description_is_named_only_while_it_is_there(types: ObjectTypes, assets: AssetStore) -> None:
+    await types.add(ObjectTypeSource("Arm", ARM))
+    assert types.robot_meta("Arm").urdf_package_filename is UNSET
+    await assets.put(content(), "arm.zip")
+    await types.refresh()
+    assert types.robot_meta("Arm").urdf_package_filename == "arm.zip"
+    assert [robot.type for robot in types.robot_metas() if robot.urdf_package_filename is not UNSET] == ["Arm"]
+    await assets.delete("arm.zip")
+    await types.refresh()
+    assert types.robot_meta("Arm").urdf_package_filename is UNSET
+
+
+async def test_inheritance_over_uploaded_and_installed_types(types: ObjectTypes, storage: Storage) -> None:
+    """An uploaded type may derive from an installed one, and from an uploaded one that does."""
+    entry = types.type_code("BarcodeReader").entry_point
+    module, _, name = entry.partition(":")
+    base = f"from {module} import {name}\n\n\nclass DoorReader({name}):\n    _ABSTRACT = False\n"
+    door = await types.add(ObjectTypeSource("DoorReader", base))
+    mixed = """
+from .door_reader import DoorReader
+from .loud import Loud
+
+
+class LoudReader(Loud, DoorReader):
+    pass
+"""
+    loud = """
+from arcor2.data.common import ActionMetadata
+
+
+class Loud:
+    def beep(self, *, an: str | None = None) -> None:
+        '''Beep.'''
+
+    beep.__action__ = ActionMetadata()
+"""
+    await types.add(ObjectTypeSource("LoudReader", mixed))
+    assert types.meta("LoudReader").disabled, "its mixin is not there yet"
+    await storage.put_object_type(ObjectTypeSource("Loud", loud))
+    assert [meta.type for meta in (await types.refresh()).updated] == ["LoudReader"]
+    reader = types.meta("LoudReader")
+    assert (door.disabled, door.base, door.abstract) == (False, "BarcodeReader", False)
+    assert (reader.disabled, reader.base, reader.settings) == (
+        False,
+        "DoorReader",
+        types.meta("BarcodeReader").settings,
+    )
+    assert types.bases("LoudReader")[:2] == ["DoorReader", "BarcodeReader"]
+    origins = {action.name: action.origins for action in types.actions("LoudReader")}
+    assert origins.pop("beep") is UNSET
+    assert origins
+    assert set(origins.values()) == {"BarcodeReader"}
+    assert [code.name for code in types.type_codes(["LoudReader"])] == ["DoorReader", "Loud", "LoudReader"]
+
+
 async def test_broken_source_disables_the_type_and_says_where(types: ObjectTypes) -> None:
     meta = await types.add(ObjectTypeSource("Broken", "class Broken(\n"))
     assert meta.disabled
@@ -199,9 +310,9 @@ async def test_code_comes_with_what_it_needs_first(types: ObjectTypes, storage: 
     assert flow.version
 
 
-async def test_types_come_back_after_a_restart(types: ObjectTypes, storage: Storage) -> None:
+async def test_types_come_back_after_a_restart(types: ObjectTypes, storage: Storage, assets: AssetStore) -> None:
     await types.add(ObjectTypeSource("Lamp", LAMP))
-    again = ObjectTypes(storage)
+    again = ObjectTypes(storage, assets)
     await again.load()
     assert again.metas() == types.metas()
     assert await again.refresh() == Changes(), "what was there at the start is no news"
@@ -262,6 +373,11 @@ def twin(model: dict[str, object]) -> dict[str, object]:
         {"type": "Thing", "base": "CollisionObject", "object_model": SPHERE},
         {"type": "Thing", "base": "CollisionObject", "object_model": {"type": "None"}},
         {"type": "Ball", "base": "CollisionObject", "object_model": {"type": "Sphere"}},
+        {
+            "type": "Ball",
+            "base": "CollisionObject",
+            "object_model": {"type": "Mesh", "mesh": {"id": "Ball", "asset_id": "not_there.stl"}},
+        },
     ],
 )
 async def test_new_type_that_makes_no_sense(server: ServerProcess, new: dict[str, object]) -> None:
