@@ -199,6 +199,7 @@ class Device:
             if control:
                 self.require_not_lost(method)
                 self.take_control()
+                self.lane_for(method).check_wanted()  # taking control may last, and a stop come meanwhile
             return bound(**keywords)
 
         return Job(method, run, notify=notify), deadline_of(bound)

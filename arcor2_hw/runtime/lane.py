@@ -157,6 +157,18 @@ class Lane:
             waiting.finish(None, Cancelled(f"{self.device}: {waiting.method} was stopped before it began"))
         return current
 
+    def check_wanted(self) -> None:
+        """Raise Cancelled when the call that runs was stopped or given up. On the lane, before it begins to act.
+
+        What overtakes a stop from now on counts from now on.
+        """
+        job = self._current
+        if job is None:
+            return
+        job.since = time.monotonic()
+        if job.ended or job.epoch != self._epoch:
+            raise Cancelled(f"{self.device}: {job.method} was stopped before it began")
+
     # -------------------------------------------------------------------------------- state
     @property
     def current(self) -> Job | None:

@@ -149,6 +149,31 @@ def test_a_command_that_overtakes_the_stop_is_stopped_too(host: HostProcess, tmp
     assert (tmp_path / "notes").read_text().count("stop") == 2
 
 
+def test_a_stop_while_control_is_taken_lets_nothing_begin(host: HostProcess, tmp_path: Path) -> None:
+    # Longer than a second stop would wait; and this device knows of no stop from before its motion.
+    taking = """
+    def control_owner(self):
+        return None
+
+    def take_control(self) -> None:
+        self.note("taking")
+        time.sleep(0.5)
+"""
+    source = DEVICE.replace('self.note("move")', 'self.note("move"); self.stopped.clear()') + taking
+    notes = tmp_path / "notes"
+    host.send(open_scene([type_code("Device", source)], scene_object("a", "Device", file=str(notes))))
+    host.expect(m.SceneOpened)
+    host.send(m.Call(77, "obj_a", "move", control=True))
+    while "taking" not in notes.read_text():
+        time.sleep(0.001)
+    host.send(m.StopMotion(99))
+    error = host.answer(77)
+    assert error.code == "cancelled"
+    time.sleep(0.6)  # control is taken by now
+    assert "move" not in notes.read_text()
+    assert host.call("obj_a", "quick") == "quick"
+
+
 def test_twenty_slow_devices_come_up_at_once(host: HostProcess) -> None:
     began = time.monotonic()
     _open(host, *(f"d{n}" for n in range(20)), connect_takes=0.5)
