@@ -56,7 +56,7 @@ class BarcodeReaderBench(Bench):
         return self.wire.address
 
     def _build(self, port: str) -> BarcodeReader:
-        return BarcodeReader("reader_id", "reader", settings=BarcodeReaderSettings(port, answer_timeout=0.25))
+        return BarcodeReader("reader_id", "reader", settings=BarcodeReaderSettings(port, answer_timeout=0.5))
 
     def make(self) -> BarcodeReader:
         return self._build(self.address)

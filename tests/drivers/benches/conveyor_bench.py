@@ -25,10 +25,16 @@ belt.move_by(20.0, 0.3)
 
 COUNTS = 10000.0
 """Counts of the drive for a metre of belt."""
+BUSY = 1000
+"""ms without our heartbeat that the drive bears: the most that the driver allows, as the machine may be busy."""
 
 
 def build(address: str, **settings: Any) -> Conveyor:
-    return Conveyor("belt_id", "belt", ConveyorSettings(f"socket://{address}", counts_per_metre=COUNTS, **settings))
+    return Conveyor(
+        "belt_id",
+        "belt",
+        ConveyorSettings(f"socket://{address}", counts_per_metre=COUNTS, heartbeat_ms=BUSY, **settings),
+    )
 
 
 class ConveyorBench(Bench):

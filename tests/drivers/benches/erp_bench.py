@@ -37,7 +37,7 @@ class ErpServiceBench(Bench):
         return str(self.fake.ready["url"])
 
     def _build(self, url: str) -> ErpService:
-        settings = ErpSettings(url, outbox=self.folder.name, request_timeout=0.5, longest_pause=1.0, poll=0.1)
+        settings = ErpSettings(url, outbox=self.folder.name, request_timeout=1.0, longest_pause=1.0, poll=0.1)
         return ErpService("erp_id", "planning", settings)
 
     def make(self) -> ErpService:

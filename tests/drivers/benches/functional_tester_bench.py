@@ -20,7 +20,7 @@ from arcor2_drivers.functional_tester.functional_tester import FunctionalTester
 from arcor2_drivers.functional_tester.settings import FunctionalTesterSettings
 from arcor2_hw.data.geometry import Pose
 host, port = sys.argv[1].rsplit(":", 1)
-settings = FunctionalTesterSettings(host, int(port), watchdog_ms=600, request_timeout=0.2)
+settings = FunctionalTesterSettings(host, int(port), watchdog_ms=1000, request_timeout=0.25)
 tester = FunctionalTester("id", "orphan", Pose(), None, settings=settings)
 tester.connect()
 tester.take_control()
@@ -30,7 +30,7 @@ tester.test()
 
 def build(address: str) -> FunctionalTester:
     host, _, port = address.rpartition(":")
-    settings = FunctionalTesterSettings(host, int(port), watchdog_ms=600, request_timeout=0.2)
+    settings = FunctionalTesterSettings(host, int(port), watchdog_ms=1000, request_timeout=0.25)
     return FunctionalTester("tester_id", "tester", Pose(), None, settings=settings)
 
 

@@ -14,7 +14,7 @@ from arcor2_hw.testing.frames import ModbusTcp
 from arcor2_hw.testing.tcp_wire import TcpWire
 from tests.fakes.conftest import FakeProcess
 
-QUICK: dict[str, Any] = {"watchdog_ms": 400, "request_timeout": 0.1}
+QUICK: dict[str, Any] = {"watchdog_ms": 1000, "request_timeout": 0.25}
 LONG = 20.0  # s, of a pulse
 
 ORPHAN_IO = """
@@ -22,7 +22,7 @@ import sys
 from arcor2_drivers.remote_io.remote_io import RemoteIO
 from arcor2_drivers.remote_io.settings import RemoteIOSettings
 host, port = sys.argv[1].rsplit(":", 1)
-settings = RemoteIOSettings(host, int(port), watchdog_ms=400, request_timeout=0.1, points="valve=DO4")
+settings = RemoteIOSettings(host, int(port), watchdog_ms=1000, request_timeout=0.25, points="valve=DO4")
 block = RemoteIO("id", "orphan", settings)
 block.connect()
 block.take_control()
@@ -33,7 +33,7 @@ import sys
 from arcor2_drivers.remote_io.settings import TowerLightSettings
 from arcor2_drivers.remote_io.tower_light import TowerLight
 host, port = sys.argv[1].rsplit(":", 1)
-settings = TowerLightSettings(host, int(port), watchdog_ms=400, request_timeout=0.1, green="DO0", buzzer="DO4")
+settings = TowerLightSettings(host, int(port), watchdog_ms=1000, request_timeout=0.25, green="DO0", buzzer="DO4")
 light = TowerLight("id", "orphan", settings)
 light.connect()
 light.take_control()
