@@ -2,27 +2,26 @@
 
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
-from importlib.metadata import version
 from typing import Any, cast
 
-from litestar import Litestar, Request, Response, Router, WebSocket, get, websocket
-from litestar.exceptions import MethodNotAllowedException, NotFoundException
-from litestar.exceptions.responses import create_exception_response
-from litestar.openapi import OpenAPIConfig
-from litestar.openapi.plugins import JsonRenderPlugin
+from litestar import Litestar, Request, Response, WebSocket, websocket
+from litestar.exceptions import HTTPException, MethodNotAllowedException, NotFoundException
 
 from arcor2_hw.data.role import Role
 from arcor2_server.access import Access, role_needed
 from arcor2_server.build.service import BuildService
 from arcor2_server.cell.online import OnlineCell
+from arcor2_server.classic import SOCKET
+from arcor2_server.collisions import CollisionWorld
 from arcor2_server.endpoint import Endpoint
 from arcor2_server.execution import Execution
+from arcor2_server.execution_socket import execution_endpoint
 from arcor2_server.hub import Hub
 from arcor2_server.locks import Locks
 from arcor2_server.object_types import ObjectTypes
 from arcor2_server.origin import own_pages_only
-from arcor2_server.rest import ROUTES
-from arcor2_server.rest.answers import OPEN, ROLE
+from arcor2_server.rest import routes
+from arcor2_server.rest.answers import ROLE, http_refusal
 
 # Imported for their handlers.
 from arcor2_server.rpc import (  # noqa: F401
@@ -66,6 +65,7 @@ async def running_services(settings: ServerSettings) -> AsyncIterator[Services]:
         types = ObjectTypes(storage, assets)
         await types.load()
         services = Services(
+            collisions=CollisionWorld(settings.scene_inflation),
             settings=settings,
             access=Access(settings),
             hub=hub,
@@ -85,6 +85,7 @@ async def running_services(settings: ServerSettings) -> AsyncIterator[Services]:
         services.cell = OnlineCell(services)
         services.execution = Execution(services)
         services.build = BuildService(services)
+        stack.push_async_callback(services.type_news.close)
         locks.tree = services.session
         locks.stored = _is_known(services)
         stack.push_async_callback(services.cell.close)
@@ -101,43 +102,40 @@ def _is_known(services: Services) -> Callable[[str], Awaitable[bool]]:
     return known
 
 
-@get("/healthz/ready", opt={ROLE: Role.OPERATOR, OPEN: True}, status_code=200, media_type="text/plain")
-async def ready() -> Response[str]:
-    """Answer 200 as soon as requests are served."""
-    return Response("")
-
-
 @websocket(["/", "/{path:path}"], opt={ROLE: Role.OPERATOR})
-async def arserver(socket: WebSocket[Any, Any, Any]) -> None:
-    """Speak the ARCOR2 protocol; each request declares its own least role."""
-    await socket.app.state.endpoint.serve(socket)
+async def sockets(socket: WebSocket[Any, Any, Any]) -> None:
+    """Speak the ARCOR2 protocol: at /execution or at its classic port as the Execution service, else as ARServer.
+
+    Each request declares its own least role.
+    """
+    state = socket.app.state
+    port = (socket.scope.get("server") or ("", None))[1]
+    own_port = state.services.settings.classic_ports.get(SOCKET)
+    endpoint = state.execution if socket.url.path == "/execution" or port == own_port else state.endpoint
+    await endpoint.serve(socket)
 
 
 def no_such_route(request: Request[Any, Any, Any], error: MethodNotAllowedException) -> Response[Any]:
     """Answer 404 where only the websocket is: Litestar takes that for a route without the method."""
     allowed = {name.lower(): value for name, value in (error.headers or {}).items()}.get("allow")
     if allowed in (None, "websocket"):
-        return create_exception_response(request, NotFoundException())
-    return create_exception_response(request, error)
+        return http_refusal(request, NotFoundException("There is no such route."))
+    return http_refusal(request, error)
 
 
 def create_app(services: Services) -> Litestar:
     """Make the application around parts that are up."""
-    endpoint = Endpoint(services)
+    endpoint, of_execution = Endpoint(services), execution_endpoint(services)
     app = Litestar(
-        route_handlers=[ready, arserver, *ROUTES],
+        route_handlers=[sockets, *routes()],
         guards=[own_pages_only, role_needed],
-        openapi_config=OpenAPIConfig(
-            title="ARCOR2-HW",
-            version=version("arcor2-hw"),
-            openapi_router=Router("/openapi", route_handlers=[], opt={ROLE: Role.OPERATOR}),
-            render_plugins=[JsonRenderPlugin()],
-        ),
-        exception_handlers={MethodNotAllowedException: no_such_route},
-        on_shutdown=[endpoint.close],
+        openapi_config=None,
+        exception_handlers={MethodNotAllowedException: no_such_route, HTTPException: http_refusal},
+        on_shutdown=[endpoint.close, of_execution.close],
         logging_config=None,
     )
     app.state.access = services.access
     app.state.endpoint = endpoint
+    app.state.execution = of_execution
     app.state.services = services
     return app

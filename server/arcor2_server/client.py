@@ -5,10 +5,12 @@ import enum
 import itertools
 import time
 from collections import deque
+from collections.abc import Callable
 from typing import Final, Protocol
 
 import structlog
 
+from arcor2_hw.data.events import Event
 from arcor2_hw.data.role import Role
 from arcor2_server.settings import ServerSettings
 from arcor2_server.tokens import Token
@@ -63,6 +65,10 @@ class Client:
         self.role: Role = Role.OPERATOR
         self.token: Token | None = None
         """What let it in, where a token did."""
+        self.greeting: Callable[[], list[Event]] = list
+        """Gives what it is sent when it is let in."""
+        self.events: frozenset[str] | None = None
+        """The events that it gets, None for all."""
         self.admitted = False
         """Until then it is sent no event, and only Authenticate is served."""
         self._wire = wire

@@ -11,6 +11,7 @@ import structlog
 from litestar import WebSocket
 from msgspec import UNSET, Raw, Struct
 
+from arcor2_hw.data.events import Event
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import RPCS, Request, Response, Rpc
 from arcor2_hw.exceptions import Arcor2Error, StorageError
@@ -82,6 +83,14 @@ def routes() -> dict[str, Route]:
     return table
 
 
+class Speech(Struct, frozen=True):
+    """What an endpoint serves: requests, what a client is sent first, and which events it gets (None: all)."""
+
+    routes: dict[str, Route]
+    greeting: Callable[[], list[Event]]
+    events: frozenset[str] | None = None
+
+
 class _SocketWire:
     """A client's connection: the ASGI socket for closing, the protocol below it for the rest."""
 
@@ -103,11 +112,12 @@ class _SocketWire:
 class Endpoint:
     """Serves all connections of one server."""
 
-    def __init__(self, services: Services) -> None:
+    def __init__(self, services: Services, speech: Speech | None = None) -> None:
         self._services = services
         self._settings = services.settings
         self._hub = services.hub
-        self._routes = routes()
+        self._speech = speech or Speech(routes(), services.greeting)
+        self._routes = self._speech.routes
         self._tasks: set[asyncio.Task[None]] = set()
         self._watch: asyncio.Task[None] | None = None
 
@@ -130,11 +140,13 @@ class Endpoint:
                 await writer
                 return
             client.address = address
+            client.greeting = self._speech.greeting
+            client.events = self._speech.events
             if admission.role is not None:
                 client.admit(admission.role, admission.token)
-                for event in self._services.greeting():
+                for event in client.greeting():
                     self._hub.send(client, event)
-                self._hub.add(client)
+                self._hub.add(client, client.events)
             else:
                 loop = asyncio.get_running_loop()
                 deadline = loop.call_later(AUTHENTICATE_WITHIN, self._expect_admitted, client)

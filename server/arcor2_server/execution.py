@@ -84,6 +84,10 @@ class Execution:
         """Give the ActionStateBefore of the action that runs, or that the program is paused before, as it was sent."""
         return self._before
 
+    def state_and_info(self) -> tuple[Event, bytes | None]:
+        """Give the present PackageState, and the PackageInfo as it was sent while a program runs."""
+        return self._state_event(), self._info
+
     def greeting(self) -> list[Event]:
         """Give the events that tell a new connection of the running program; none when none runs."""
         if self._info is None:

@@ -16,18 +16,22 @@ class Hub:
 
     def __init__(self) -> None:
         self.clients: set[Client] = set()
+        self._only: dict[Client, frozenset[str]] = {}
         self._subscribers: dict[str, set[Client]] = {}
         self.on_leave: list[Callable[[Client], None]] = []
         self.main_screen = make_event("ShowMainScreen", ShowMainScreenData(MainScreen.SCENES_LIST))
         """What a client sees that connects while nothing is open: the last ShowMainScreen, without `highlight`."""
 
-    def add(self, client: Client) -> None:
-        """Take in a connection."""
+    def add(self, client: Client, only: frozenset[str] | None = None) -> None:
+        """Take in a connection; `only` are the events that it gets, None for all."""
         self.clients.add(client)
+        if only is not None:
+            self._only[client] = only
 
     def remove(self, client: Client) -> None:
         """Forget a connection, and tell those who keep something for it (subscriptions)."""
         self.clients.discard(client)
+        self._only.pop(client, None)
         for subscribers in self._subscribers.values():
             subscribers.discard(client)
         for forget in self.on_leave:
@@ -54,9 +58,14 @@ class Hub:
         declared = EVENTS[name]
         least = declared.role
         to = self._subscribers.get(name, set()) & self.clients if declared.additional else self.clients
-        for client in tuple(to):
+        for client in self._hearing(name, to):
             if client is not besides and client.role >= least:
                 client.put(message)
+
+    def _hearing(self, name: str, clients: set[Client]) -> tuple[Client, ...]:
+        if not self._only:
+            return tuple(clients)
+        return tuple(client for client in clients if name in self._only.get(client, (name,)))
 
     def send(self, client: Client, event: Event) -> None:
         """Send an event to one client."""
@@ -70,6 +79,6 @@ class Hub:
         """
         least = EVENTS[name].role
         stream = f"{name}/{key}"
-        for client in tuple(self.clients if clients is None else clients & self.clients):
+        for client in self._hearing(name, self.clients if clients is None else clients & self.clients):
             if client.role >= least:
                 client.put_newest(stream, message)

@@ -22,6 +22,7 @@ from cyclopts import Parameter, validators
 from arcor2_hw.data.cell import read_cell
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound, StorageError
+from arcor2_server import classic
 from arcor2_server import logging as server_logging
 from arcor2_server.access import is_loopback
 from arcor2_server.cli.status import ExitStatus
@@ -56,6 +57,8 @@ def serve(
     insecure: bool = False,
     legacy_listen: str | None = None,
     legacy_role: LegacyRole = "operator",
+    classic_ports: Annotated[bool, Parameter(negative="")] = False,
+    openapi: Annotated[bool, Parameter(negative="")] = False,
     log_level: str = "info",
 ) -> int:
     """Serve the websocket and REST interfaces until SIGTERM or Ctrl-C.
@@ -83,9 +86,15 @@ def serve(
         A second HOST:PORT, without TLS, for clients that can send no token.
     legacy_role
         What those clients may do.
+    classic_ports
+        Listen also on the port that each service of the original ARCOR2 has, as its ARCOR2_* variables say.
+    openapi
+        Print the OpenAPI document of the REST interfaces and end.
     log_level
         What is logged on standard error: debug, info, warning or error.
     """
+    if openapi:
+        return _print_openapi()
     # Start-up makes much that stays and little that goes: collecting would only look at it again and again.
     gc.disable()
     try:
@@ -96,7 +105,13 @@ def serve(
     try:
         legacy = None if legacy_listen is None else _legacy(legacy_listen, legacy_role)
         settings = ServerSettings.from_environment(
-            host=host, port=port, data_dir=data_dir, cell=here, insecure=insecure or None, legacy=legacy
+            host=host,
+            port=port,
+            data_dir=data_dir,
+            cell=here,
+            insecure=insecure or None,
+            legacy=legacy,
+            classic_ports=classic.classic_ports() if classic_ports else None,
         )
         server_logging.set_up(log_level)
     except (InvalidData, KeyError) as error:
@@ -109,10 +124,11 @@ def serve(
         ):
             check_access(settings)
             listener = sockets.enter_context(contextlib.closing(listen(settings.host, settings.port)))
+            settings, classic_listeners = _bind_classic(settings, sockets)
             settings, legacy_listener = _bind_legacy(settings, sockets)
             certificate = _certificate(settings, tls, self_signed)
             with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
-                runner.run(run(settings, listener, legacy_listener, certificate))
+                runner.run(run(settings, [listener, *classic_listeners], legacy_listener, certificate))
     except CannotServe as error:
         sys.stderr.write(f"arcor2-hw serve: {error}\n")
         return error.status
@@ -138,6 +154,29 @@ def _legacy(address: str, role: LegacyRole) -> LegacyListener:
     if not host or not port.isdigit() or int(port) > 0xFFFF:
         raise InvalidData(f"--legacy-listen {address!r} is not HOST:PORT")
     return LegacyListener(host.strip("[]"), int(port), Role[role.upper()])
+
+
+def _print_openapi() -> int:
+    from arcor2_server.rest.documents import document
+
+    sys.stdout.buffer.write(msgspec.json.format(msgspec.json.encode(document()), indent=2) + b"\n")
+    return ExitStatus.OK
+
+
+def _bind_classic(
+    settings: ServerSettings, sockets: contextlib.ExitStack
+) -> tuple[ServerSettings, list[socket.socket]]:
+    """Bind the classic ports, and have the real ones in the settings."""
+    listeners, ports = [], {}
+    for service, port in settings.classic_ports.items():
+        ports[service] = port
+        if port == settings.port and port:
+            continue  # all is served there
+        listener = sockets.enter_context(contextlib.closing(listen(settings.host, port)))
+        listeners.append(listener)
+        ports[service] = listener.getsockname()[1]
+        log.info("classic port", service=service, port=ports[service])
+    return msgspec.structs.replace(settings, classic_ports=ports), listeners
 
 
 def _bind_legacy(
@@ -171,11 +210,11 @@ def _certificate(
 
 async def run(
     settings: ServerSettings,
-    listener: socket.socket,
+    listeners: list[socket.socket],
     legacy: socket.socket | None = None,
     certificate: tuple[Path, Path] | None = None,
 ) -> None:
-    """Serve at sockets that are bound, by TLS on the first where there is a certificate.
+    """Serve at sockets that are bound, by TLS on all but `legacy` where there is a certificate; the first is told.
 
     StorageError when the data cannot be used.
     """
@@ -195,12 +234,12 @@ async def run(
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, server.end)
         try:
-            await server.serve(sockets=[listener])
+            await server.serve(sockets=listeners)
         except OSError as error:
             # Between our bind and this, another program began to listen there.
             if error.errno != errno.EADDRINUSE:
                 raise
-            raise _no_port(settings.host, listener.getsockname()[1], error) from error
+            raise _no_port(settings.host, listeners[0].getsockname()[1], error) from error
 
 
 def configuration(

@@ -1,16 +1,27 @@
-"""The REST routes: each declares the least role that may use it."""
+"""The REST operations of all services; each declares the least role that may use it."""
 
 from typing import Final
 
 from litestar.handlers import HTTPRouteHandler
 
-from arcor2_server.rest.devices import devices
-from arcor2_server.rest.object_types import delete_object_type, object_type, object_types, put_object_type
-
-ROUTES: Final[list[HTTPRouteHandler]] = [
-    devices,
+# Imported for their operations.
+from arcor2_server.rest import (  # noqa: F401
+    assets,
+    build,
+    documents,
+    execution,
+    general,
+    models,
     object_types,
-    object_type,
-    put_object_type,
-    delete_object_type,
-]
+    projects,
+    scenes,
+)
+from arcor2_server.rest.operations import OPERATIONS, route
+
+
+def routes() -> list[HTTPRouteHandler]:
+    """Make the routes of one application."""
+    return [route(declared) for declared in OPERATIONS]
+
+
+__all__: Final = ["OPERATIONS", "routes"]

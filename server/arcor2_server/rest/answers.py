@@ -1,18 +1,29 @@
-"""How a route answers: JSON by msgspec, errors as the protocol's WebApiError, and the key for the least role."""
+"""What a route answers: JSON by msgspec, errors as the protocol's WebApiError; the keys of a route's options."""
 
 from typing import Any, Final
 
 import msgspec
 from litestar import MediaType, Request, Response
+from litestar.exceptions import HTTPException
 
 from arcor2_hw.data.base import Data
-from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound
-from arcor2_server.services import Services
+from arcor2_hw.exceptions import (
+    Arcor2Error,
+    Conflict,
+    InvalidData,
+    InvalidPackage,
+    InvalidProject,
+    NotFound,
+    StorageError,
+)
+from arcor2_server.storage.assets import TooLarge
 
 ROLE: Final = "role"
 """The key of a route's `opt` under which it declares the least role that may use it."""
 OPEN: Final = "open"
 """The key of a route's `opt` that says that it asks nobody for a token: it tells nothing."""
+SERVICE: Final = "service"
+"""The key of a route's `opt` that names the service it belongs to."""
 
 _encode = msgspec.json.Encoder().encode
 
@@ -26,10 +37,34 @@ class WebApiError(Data, frozen=True):
     description: str
 
 
-def services_of(request: Request[Any, Any, Any]) -> Services:
-    """Give the parts of the server."""
-    services: Services = request.app.state.services
-    return services
+class InternalError(Arcor2Error):
+    """Something nobody foresaw."""
+
+    code = "internal"
+
+
+class Unsupported(Arcor2Error):
+    """The body is of another media type than the route takes."""
+
+    code = "unsupported_media_type"
+
+
+_STATUS: Final[dict[type[Arcor2Error], tuple[int, str]]] = {
+    TooLarge: (413, "Argument"),
+    Unsupported: (415, "Argument"),
+    StorageError: (500, "General"),
+    InternalError: (500, "General"),
+    NotFound: (404, "NotFound"),
+    InvalidPackage: (400, "InvalidPackage"),
+    InvalidData: (400, "Argument"),
+    Conflict: (409, "Conflict"),
+    InvalidProject: (409, "InvalidProject"),
+}
+"""Status and `type` of the answer by kind of error, the first that fits: existing clients tell them by the type."""
+_ABSENT: Final = frozenset({"calibration_unavailable"})
+"""Codes that say that the part of the system that would answer is not there."""
+_STATES: Final = {"Execution": "PackageRunState"}
+"""The type of an error of state, where a service has one of its own."""
 
 
 def answer(content: Any, status: int = 200) -> Response[bytes]:
@@ -38,7 +73,24 @@ def answer(content: Any, status: int = 200) -> Response[bytes]:
 
 
 def refusal(service: str, error: Arcor2Error) -> Response[bytes]:
-    """Answer an error of ours: 404 for what is not there, 400 for what has a wrong form, 409 for the rest."""
-    status = 404 if isinstance(error, NotFound) else 400 if isinstance(error, InvalidData) else 409
-    kind = {404: "NotFound", 400: "Argument"}.get(status, "General")
-    return answer(WebApiError(service, str(error), kind, error.detail), status)
+    """Answer an error of ours: 404 for what is not there, 400 for what has a wrong form, 409 for a wrong state."""
+    otherwise = (503, "General") if error.code in _ABSENT else (409, _STATES.get(service, "General"))
+    status, name = next((found for kind, found in _STATUS.items() if isinstance(error, kind)), otherwise)
+    return answer(WebApiError(service, _printable(str(error)), name, _printable(error.detail)), status)
+
+
+def http_refusal(request: Request[Any, Any, Any], error: HTTPException) -> Response[bytes]:
+    """Answer what is refused before a route is reached: no such route, no token, too large."""
+    service = "ARCOR2-HW"
+    if "route_handler" in request.scope:
+        service = request.route_handler.opt.get(SERVICE, service)
+    name = {404: "NotFound", 400: "Argument", 413: "Argument", 405: "Argument"}.get(error.status_code, "General")
+    refused = answer(WebApiError(service, error.detail, name, ""), error.status_code)
+    for header, value in (error.headers or {}).items():
+        refused.headers[header] = value
+    return refused
+
+
+def _printable(text: str) -> str:
+    """Half a surrogate pair can be read but not sent back."""
+    return text if text.isascii() else text.encode(errors="replace").decode()

@@ -68,8 +68,8 @@ async def authenticate(context: Context, args: AuthenticateArgs) -> Authenticate
     was_in = client.admitted
     client.admit(token.role, token)
     if not was_in:
-        context.events_to_caller += services.greeting()
-        services.hub.add(client)
+        context.events_to_caller += client.greeting()
+        services.hub.add(client, client.events)
     return AuthenticateData(token.name, token.role.name.lower())
 
 

@@ -1,0 +1,51 @@
+"""The ports on which the original has its services, from the same variables (protocol, section 1)."""
+
+import os
+from collections.abc import Mapping
+from typing import Final
+from urllib.parse import urlsplit
+
+from arcor2_hw.exceptions import InvalidData
+
+SOCKET: Final = "Execution websocket"
+_NUMBERS: Final = {
+    "Storage": ("ARCOR2_STORAGE_SERVICE_PORT", 10000),
+    "Scene": ("ARCOR2_SCENE_SERVICE_PORT", 5013),
+    "Execution": ("ARCOR2_EXECUTION_PROXY_PORT", 5009),
+}
+_ADDRESSES: Final = {
+    "Build": ("ARCOR2_BUILD_URL", 5008),
+    SOCKET: ("ARCOR2_EXECUTION_URL", 6790),
+    "Calibration": ("ARCOR2_CALIBRATION_URL", 5014),
+}
+
+
+def classic_ports(environment: Mapping[str, str] = os.environ) -> dict[str, int]:
+    """Give the port of each service. InvalidData naming the variable that has none, or one that two services have."""
+    ports = {name: _number(environment, variable, default) for name, (variable, default) in _NUMBERS.items()} | {
+        name: _of_address(environment, variable, default) for name, (variable, default) in _ADDRESSES.items()
+    }
+    fixed = [port for port in ports.values() if port]
+    if twice := sorted(name for name, port in ports.items() if fixed.count(port) > 1):
+        raise InvalidData(f"{' and '.join(twice)} cannot have the same port.")
+    return ports
+
+
+def _number(environment: Mapping[str, str], variable: str, default: int) -> int:
+    text = environment.get(variable) or str(default)
+    if not text.isdecimal() or int(text) > 0xFFFF:
+        raise InvalidData(f"{variable}={text!r} is no port.")
+    return int(text)
+
+
+def _of_address(environment: Mapping[str, str], variable: str, default: int) -> int:
+    text = environment.get(variable)
+    if not text:
+        return default
+    try:
+        port = urlsplit(text).port
+    except ValueError:
+        port = None
+    if port is None:
+        raise InvalidData(f"{variable}={text!r} has no port.")
+    return port

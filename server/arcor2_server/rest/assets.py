@@ -1,0 +1,84 @@
+"""Assets over REST: files that come and go as streams (protocol, section 13)."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from typing import IO
+
+from msgspec import UNSET
+
+from arcor2_hw.data.base import Data, Timestamp, Unset
+from arcor2_hw.data.role import Role
+from arcor2_server.rest.operations import MIB, Binary, Upload, operation
+from arcor2_server.rest.scenes import STORAGE, check_id
+from arcor2_server.services import Services
+from arcor2_server.storage import Asset
+from arcor2_server.storage.assets import CHUNK, MAX_ASSET
+
+
+class AssetQuery(Data, frozen=True):
+    """The id (one is made where none is given), a remark, and whether one of that id is replaced."""
+
+    id: str | Unset = UNSET
+    description: str | Unset = UNSET
+    upsert: bool = False
+
+
+class AssetInfo(Data, frozen=True):
+    """What is known of an asset."""
+
+    id: str
+    created: Timestamp
+    modified: Timestamp
+    file_name: str | Unset = UNSET
+    description: str | Unset = UNSET
+
+
+def _info(asset: Asset) -> AssetInfo:
+    return AssetInfo(asset.id, asset.created, asset.modified, asset.file_name, asset.description)
+
+
+async def _pieces(file: IO[bytes]) -> AsyncIterator[bytes]:
+    while chunk := await asyncio.to_thread(file.read, CHUNK):
+        yield chunk
+
+
+@operation("POST", "/assets", STORAGE, Role.TECHNICIAN, file="assetData", limit=MAX_ASSET + MIB)
+async def post_asset(services: Services, query: AssetQuery, upload: Upload) -> AssetInfo:
+    """Take in a file, a mesh or a robot's description."""
+    key = None if isinstance(query.id, Unset) else query.id
+    if key is not None:
+        check_id(key, "asset")
+    asset = await services.assets.put(
+        _pieces(upload.file),
+        key,
+        file_name=upload.filename or UNSET,
+        description=query.description,
+        upsert=query.upsert,
+    )
+    return _info(asset)
+
+
+@operation("GET", "/assets/info", STORAGE, Role.OPERATOR)
+async def list_assets(services: Services) -> list[AssetInfo]:
+    """List the assets."""
+    return [_info(asset) for asset in services.assets.infos()]
+
+
+@operation("GET", "/assets/{asset_id}/exists", STORAGE, Role.OPERATOR)
+async def asset_exists(services: Services, asset_id: str) -> bool:
+    """Tell whether there is such an asset."""
+    return services.assets.exists(asset_id)
+
+
+@operation("GET", "/assets/{asset_id}/data", STORAGE, Role.OPERATOR, media_type="application/octet-stream")
+async def asset_data(services: Services, asset_id: str) -> Binary:
+    """Give the content of an asset."""
+    asset = services.assets.info(asset_id)
+    name = asset.id if isinstance(asset.file_name, Unset) else asset.file_name
+    return Binary(services.assets.read(asset), "application/octet-stream", name, asset.size)
+
+
+@operation("DELETE", "/assets/{asset_id}", STORAGE, Role.TECHNICIAN)
+async def delete_asset(services: Services, asset_id: str) -> None:
+    """Delete an asset; a type that needs it has a problem from then on."""
+    await services.assets.delete(asset_id)

@@ -1,0 +1,200 @@
+"""The OpenAPI documents: one of all operations, and one of each service; made from what the operations declare."""
+
+import functools
+import typing
+from collections.abc import Iterable
+from importlib.metadata import version
+from typing import Any, Final
+
+import msgspec
+
+from arcor2_hw.data.role import Role
+from arcor2_server.rest.answers import WebApiError
+from arcor2_server.rest.naming import camel
+from arcor2_server.rest.operations import OPERATIONS, Operation, operation
+from arcor2_server.services import Services
+from arcor2_server.settings import ServerSettings
+
+OPENAPI: Final = "3.0.3"
+_REFERENCE: Final = "#/components/schemas/{name}"
+_TIMESTAMP: Final = r"^\d{4}-"
+
+
+def document(service: str = "") -> dict[str, Any]:
+    """Give the document of one service, or of all."""
+    chosen = [one for one in OPERATIONS if service in ("", one.service)]
+    schemas, components = _schemas(chosen)
+    paths: dict[str, dict[str, Any]] = {}
+    for one in chosen:
+        paths.setdefault(one.path, {})[one.method.lower()] = _operation(one, schemas)
+    return {
+        "openapi": OPENAPI,
+        "info": {"title": f"ARCOR2-HW {service}".strip(), "version": version("arcor2-hw")},
+        "paths": paths,
+        "components": {
+            "schemas": components,
+            "securitySchemes": {"token": {"type": "http", "scheme": "bearer"}},
+        },
+    }
+
+
+def _types(one: Operation) -> Iterable[tuple[Any, bool]]:
+    """Give the types of an operation, and whether their fields keep their names."""
+    if "body" in one.takes:
+        yield one.takes["body"], False
+    if one.media_type == "application/json" and one.gives not in (None, type(None)):
+        # A union of Structs without tags has no schema of its own.
+        for part in typing.get_args(one.gives) if _is_union(one.gives) else (one.gives,):
+            yield part, one.plain
+
+
+def _is_union(kind: Any) -> bool:
+    return isinstance(kind, typing.get_origin(int | str) or ()) or type(kind).__name__ == "UnionType"
+
+
+Schemas = dict[tuple[str, bool], dict[str, Any]]
+
+
+def _schemas(chosen: list[Operation]) -> tuple[Schemas, dict[str, Any]]:
+    """Give the schemas of all types, by their representation, and the components that they refer to."""
+    schemas: Schemas = {}
+    components: dict[str, Any] = {}
+    wanted = [pair for one in chosen for pair in _types(one)] + [(WebApiError, False)]
+    queries = [one.takes["query"] for one in chosen if "query" in one.takes]
+    for plain in (False, True):
+        kinds = list({str(kind): kind for kind, is_plain in wanted if is_plain is plain}.values())
+        made, parts = msgspec.json.schema_components(kinds, ref_template=_REFERENCE)
+        for kind, schema in zip(kinds, made, strict=True):
+            schemas[str(kind), plain] = _lowered(schema, plain)
+        for name, part in parts.items():
+            components[name] = _lowered(part, plain)
+    for query in queries:
+        made, parts = msgspec.json.schema_components([query], ref_template=_REFERENCE)
+        schemas[str(query), True] = _lowered(parts[query.__name__], True)
+    return schemas, components
+
+
+def _lowered(schema: Any, plain: bool) -> Any:
+    """Give a schema of JSON Schema 2020-12 as OpenAPI 3.0 has it, with the names of fields as on the wire."""
+    if isinstance(schema, list):
+        return [_lowered(item, plain) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    lowered: dict[str, Any] = {}
+    for key, value in schema.items():
+        match key:
+            case "properties":
+                lowered[key] = {name if plain else camel(name): _lowered(item, plain) for name, item in value.items()}
+            case "required":
+                lowered[key] = [name if plain else camel(name) for name in value]
+            case "const":
+                lowered["enum"] = [value]
+            case "anyOf" if {"type": "null"} in value:
+                others = [_lowered(item, plain) for item in value if item != {"type": "null"}]
+                lowered |= {"nullable": True} | (others[0] if len(others) == 1 else {"anyOf": others})
+            case "default" | "enum":
+                lowered[key] = value
+            case _:
+                lowered[key] = _lowered(value, plain)
+    if str(lowered.get("pattern", "")).startswith(_TIMESTAMP):
+        lowered["format"] = "date-time"
+    if lowered.get("required") == []:
+        del lowered["required"]
+    if "$ref" in lowered and len(lowered) > 1:
+        reference = lowered.pop("$ref")
+        lowered["allOf"] = [{"$ref": reference}]
+    return lowered
+
+
+def _operation(one: Operation, schemas: Schemas) -> dict[str, Any]:
+    text = (one.handler.__doc__ or "").strip()
+    made: dict[str, Any] = {
+        "tags": [one.service],
+        "operationId": one.handler.__name__,
+        "summary": text.splitlines()[0],
+        "description": f"{' '.join(text.split())} Least role: {Role(one.role).name.lower()}.",
+        "parameters": [
+            {"name": name, "in": "path", "required": True, "schema": {"type": "string"}} for name in one.path_names
+        ]
+        + list(_query(one, schemas)),
+        "responses": _responses(one, schemas),
+    }
+    if not one.open:
+        made["security"] = [{"token": []}, {}]
+    if "body" in one.takes:
+        schema = schemas[str(one.takes["body"]), False]
+        made["requestBody"] = {"required": True, "content": {"application/json": {"schema": schema}}}
+    elif one.file:
+        properties: dict[str, Any] = {one.file: {"type": "string", "format": "binary"}}
+        properties |= {name: {"type": "string", "description": "JSON"} for name in one.parts}
+        schema = {"type": "object", "required": [one.file, *one.parts], "properties": properties}
+        made["requestBody"] = {"required": True, "content": {"multipart/form-data": {"schema": schema}}}
+    return made
+
+
+def _query(one: Operation, schemas: Schemas) -> Iterable[dict[str, Any]]:
+    if "query" not in one.takes:
+        return
+    schema = schemas[str(one.takes["query"]), True]
+    required = schema.get("required", [])
+    for name, part in schema["properties"].items():
+        yield {"name": name, "in": "query", "required": name in required, "schema": part}
+
+
+def _responses(one: Operation, schemas: Schemas) -> dict[str, Any]:
+    good: dict[str, Any] = {"description": "Done."}
+    if one.media_type == "application/json":
+        good["content"] = {"application/json": {"schema": _given(one, schemas)}}
+    elif one.media_type != "text/plain":
+        good["content"] = {one.media_type: {"schema": {"type": "string", "format": "binary"}}}
+    refused = {"application/json": {"schema": schemas[str(WebApiError), False]}}
+    reasons = {"default": "Refused: the body says why."}
+    if one.takes.keys() & {"query", "body", "upload"}:
+        reasons["400"] = "What was sent has a wrong form."
+    if not one.open:
+        reasons |= {"401": "A token is needed.", "403": "The role is too low."}
+    if one.path_names or one.takes.keys() & {"query", "body"}:
+        reasons["404"] = "Something that is named does not exist."
+    reasons["409"] = "It cannot be done in the present state."
+    return {"200": good} | {
+        status: {"description": text, "content": refused} for status, text in sorted(reasons.items())
+    }
+
+
+def _given(one: Operation, schemas: Schemas) -> dict[str, Any]:
+    if one.gives in (None, type(None)):
+        return {"type": "string", "enum": ["ok"]}
+    if _is_union(one.gives):
+        return {"oneOf": [schemas[str(part), one.plain] for part in typing.get_args(one.gives)]}
+    return schemas[str(one.gives), one.plain]
+
+
+# ------------------------------------------------------------------------------------------------ routes
+_kept = functools.lru_cache(maxsize=16)(document)
+
+
+def service_at(settings: ServerSettings, port: int) -> str:
+    """Give the service that has a classic port of its own, "" for the port of all."""
+    services = {one.service for one in OPERATIONS}
+    return next((name for name, own in settings.classic_ports.items() if own == port and name in services), "")
+
+
+SERVER: Final = "ARCOR2-HW"
+
+
+@operation("GET", "/openapi", SERVER, Role.OPERATOR, plain=True)
+async def openapi() -> dict[str, Any]:
+    """Give the OpenAPI document of all services."""
+    return _kept()
+
+
+@operation("GET", "/openapi/openapi.json", SERVER, Role.OPERATOR, plain=True)
+async def openapi_file() -> dict[str, Any]:
+    """Give the OpenAPI document of all services."""
+    return _kept()
+
+
+@operation("GET", "/swagger/api/swagger.json", SERVER, Role.OPERATOR, plain=True)
+async def swagger(services: Services, port: int) -> dict[str, Any]:
+    """Give the OpenAPI document of all services; on a classic port, of the service that has it."""
+    return _kept(service_at(services.settings, port))

@@ -1,0 +1,250 @@
+"""The Execution service over REST: packages, the program that runs, and the tables of the original (section 16)."""
+
+import asyncio
+import enum
+import os
+from collections.abc import AsyncIterator
+from typing import IO, Any, Final
+
+import msgspec
+from msgspec import field
+
+from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset, new_id
+from arcor2_hw.data.events import ChangeType
+from arcor2_hw.data.package import PackageStateEnum, PackageSummary
+from arcor2_hw.data.role import Role
+from arcor2_hw.exceptions import InvalidData
+from arcor2_server.packages import MAX_UPLOAD
+from arcor2_server.rest.build import ZIP
+from arcor2_server.rest.operations import MIB, Binary, Upload, operation
+from arcor2_server.rpc.registry import make_event
+from arcor2_server.services import Services
+from arcor2_server.storage.beside import Beside, ExecutionToken
+
+EXECUTION = "Execution"
+LONGEST_NAME: Final = 100
+
+
+class SummaryProject(Data, frozen=True):
+    """The project of a package."""
+
+    id: str
+    name: str
+    description: str
+
+
+class SummaryPackage(Data, frozen=True):
+    """One package."""
+
+    id: str
+    name: str | Unset = UNSET
+    created: Timestamp | Unset = UNSET
+    executed: Timestamp | Unset = UNSET
+    project: SummaryProject | Unset = UNSET
+
+
+class ExecutionState(enum.StrEnum):
+    """How the proxy of the original names the states."""
+
+    UNDEFINED = "Undefined"
+    RUNNING = "Running"
+    COMPLETED = "Completed"
+    FAULTED = "Faulted"
+    PAUSED = "Paused"
+    PENDING = "Pending"
+
+
+class ExecutionInfo(Data, frozen=True):
+    """The state of the program, and what an action in progress, or paused before, uses of action points."""
+
+    state: ExecutionState
+    active_package_id: str | Unset = UNSET
+    exception_message: str | Unset = UNSET
+    action_point_ids: list[str] | Unset = UNSET
+
+
+class BreakpointsQuery(Data, frozen=True):
+    """Ids of action points: the name may stand several times."""
+
+    breakpoints: list[str] = field(default_factory=list)
+
+
+class DebugQuery(Data, frozen=True, rename="camel"):
+    """Whether the program is paused before its first action."""
+
+    break_on_first_action: bool = False
+
+
+class NameQuery(Data, frozen=True):
+    """A name."""
+
+    name: str
+
+
+class AccessQuery(Data, frozen=True):
+    """Whether the token has access."""
+
+    access: bool
+
+
+# ------------------------------------------------------------------------------------------------ packages
+def _summary(package: PackageSummary) -> SummaryPackage:
+    project = package.project_meta
+    return SummaryPackage(
+        package.id,
+        package.package_meta.name,
+        package.package_meta.built,
+        package.package_meta.executed,
+        UNSET if isinstance(project, Unset) else SummaryProject(project.id, project.name, project.description),
+    )
+
+
+@operation("GET", "/packages", EXECUTION, Role.OPERATOR)
+async def list_packages(services: Services) -> list[SummaryPackage]:
+    """List the packages."""
+    return [_summary(package) for package in await services.execution.list()]
+
+
+@operation("POST", "/packages/{id}", EXECUTION, Role.PROGRAMMER, file="executionPackage", limit=MAX_UPLOAD + MIB)
+async def upload_package(services: Services, id: str, upload: Upload) -> None:  # noqa: A002 - the protocol's name
+    """Take in a package as a zip, in place of one of that id."""
+    summary = await services.execution.take(id, upload.file)
+    services.hub.broadcast(make_event("PackageChanged", summary, ChangeType.ADD))
+
+
+@operation("GET", "/packages/{id}", EXECUTION, Role.OPERATOR, media_type=ZIP)
+async def download_package(services: Services, id: str) -> Binary:  # noqa: A002
+    """Give a package as a zip."""
+    file = await asyncio.to_thread(services.execution.packages.zipped, id)
+    return Binary(_pieces(file), ZIP, f"{id}.zip", os.fstat(file.fileno()).st_size)
+
+
+async def _pieces(file: IO[bytes]) -> AsyncIterator[bytes]:
+    with file:
+        while chunk := await asyncio.to_thread(file.read, MIB):
+            yield chunk
+
+
+@operation("DELETE", "/packages/{id}", EXECUTION, Role.ADVANCED_USER)
+async def delete_package(services: Services, id: str) -> None:  # noqa: A002
+    """Delete a package that does not run, with its breakpoints."""
+    summary = await services.execution.delete(id)
+    await Beside(services.storage).forget_breakpoints(id)
+    services.hub.broadcast(make_event("PackageChanged", summary, ChangeType.REMOVE))
+
+
+# ------------------------------------------------------------------------------------------------ the program
+@operation("PUT", "/packages/{id}/start", EXECUTION, Role.OPERATOR)
+async def start_package(services: Services, id: str) -> None:  # noqa: A002
+    """Run a package."""
+    await services.execution.run(id)
+
+
+@operation("PUT", "/packages/{id}/breakpoints", EXECUTION, Role.OPERATOR)
+async def put_breakpoints(services: Services, id: str, query: BreakpointsQuery) -> None:  # noqa: A002
+    """Keep the action points at which a package pauses when it is debugged."""
+    await asyncio.to_thread(services.execution.packages.directory, id)
+    await Beside(services.storage).put_breakpoints(id, query.breakpoints)
+
+
+@operation("GET", "/packages/{id}/breakpoints", EXECUTION, Role.OPERATOR)
+async def get_breakpoints(services: Services, id: str) -> list[str]:  # noqa: A002
+    """Give the action points at which a package pauses when it is debugged."""
+    await asyncio.to_thread(services.execution.packages.directory, id)
+    return await Beside(services.storage).breakpoints(id)
+
+
+@operation("PUT", "/packages/{id}/debug", EXECUTION, Role.OPERATOR)
+async def debug_package(services: Services, id: str, query: DebugQuery) -> None:  # noqa: A002
+    """Run a package with its breakpoints."""
+    breakpoints = await Beside(services.storage).breakpoints(id)
+    await services.execution.run(id, query.break_on_first_action, breakpoints)
+
+
+@operation("PUT", "/packages/stop", EXECUTION, Role.OPERATOR)
+async def stop_package(services: Services) -> None:
+    """Stop the program."""
+    services.execution.stop()
+
+
+@operation("PUT", "/packages/pause", EXECUTION, Role.OPERATOR)
+async def pause_package(services: Services) -> None:
+    """Pause the program before its next action."""
+    services.execution.pause()
+
+
+@operation("PUT", "/packages/resume", EXECUTION, Role.OPERATOR)
+async def resume_package(services: Services) -> None:
+    """Let the paused program go on."""
+    services.execution.resume()
+
+
+@operation("PUT", "/packages/step", EXECUTION, Role.OPERATOR)
+async def step_package(services: Services) -> None:
+    """Let the paused program go on for one action."""
+    services.execution.step()
+
+
+class _Before(msgspec.Struct):
+    class Data(msgspec.Struct):
+        action_point_ids: list[str] | Unset = UNSET
+
+    data: Data
+
+
+_STATES: Final = {
+    PackageStateEnum.UNDEFINED: ExecutionState.UNDEFINED,
+    PackageStateEnum.RUNNING: ExecutionState.RUNNING,
+    PackageStateEnum.PAUSED: ExecutionState.PAUSED,
+    PackageStateEnum.STOPPED: ExecutionState.COMPLETED,
+}
+
+
+@operation("GET", "/packages/state", EXECUTION, Role.OPERATOR)
+async def execution_state(services: Services) -> ExecutionInfo:
+    """Give the state of the program."""
+    execution = services.execution
+    state = _STATES.get(execution.state, ExecutionState.PENDING)
+    error: str | Unset = UNSET
+    if state is ExecutionState.COMPLETED and execution.last_error is not None:
+        state, error = ExecutionState.FAULTED, execution.last_error.message
+    points: Any = UNSET
+    if (before := execution.action_in_progress) is not None:
+        points = msgspec.json.decode(before, type=_Before).data.action_point_ids
+    return ExecutionInfo(state, execution.package_id or UNSET, error, points)
+
+
+# ------------------------------------------------------------------------------------------------ tokens
+@operation("POST", "/tokens/create", EXECUTION, Role.PROGRAMMER)
+async def create_token(services: Services, query: NameQuery) -> ExecutionToken:
+    """Put an entry into the table of the original, which lets nobody in: `arcor2-hw token add` makes real tokens."""
+    if not query.name or len(query.name) > LONGEST_NAME or not query.name.isprintable():
+        raise InvalidData(f"A token needs a name of 1 to {LONGEST_NAME} printable characters.")
+    token = ExecutionToken(new_id("tkn"), query.name)
+    await Beside(services.storage).put_token(token)
+    return token
+
+
+@operation("GET", "/tokens", EXECUTION, Role.PROGRAMMER)
+async def list_tokens(services: Services) -> list[ExecutionToken]:
+    """Give the table of the original."""
+    return await Beside(services.storage).tokens()
+
+
+@operation("DELETE", "/tokens/{id}", EXECUTION, Role.PROGRAMMER)
+async def delete_token(services: Services, id: str) -> None:  # noqa: A002
+    """Delete an entry."""
+    await Beside(services.storage).delete_token(id)
+
+
+@operation("PUT", "/tokens/{id}/access", EXECUTION, Role.PROGRAMMER)
+async def put_access(services: Services, id: str, query: AccessQuery) -> None:  # noqa: A002
+    """Set the flag of an entry."""
+    beside = Beside(services.storage)
+    await beside.put_token(msgspec.structs.replace(await beside.token(id), access=query.access))
+
+
+@operation("GET", "/tokens/{id}/access", EXECUTION, Role.PROGRAMMER)
+async def get_access(services: Services, id: str) -> bool:  # noqa: A002
+    """Give the flag of an entry."""
+    return (await Beside(services.storage).token(id)).access

@@ -1,0 +1,20 @@
+"""Routes of no service: readiness, devices."""
+
+from arcor2_hw.data.role import Role
+from arcor2_server.cell.devices import DeviceStatus
+from arcor2_server.rest.operations import operation
+from arcor2_server.services import Services
+
+SERVER = "ARCOR2-HW"
+
+
+@operation("GET", "/healthz/ready", SERVER, Role.OPERATOR, open=True, media_type="text/plain")
+async def ready() -> str:
+    """Answer 200 as soon as requests are served."""
+    return ""
+
+
+@operation("GET", "/api/devices", SERVER, Role.OPERATOR, plain=True)
+async def devices(services: Services) -> list[DeviceStatus]:
+    """Give connection, health, alarms and owner of control of each device; empty when nothing is in operation."""
+    return services.execution.devices() or services.cell.devices()

@@ -1,0 +1,247 @@
+"""How a REST operation is declared: once, by its function, from which come both the route and its OpenAPI."""
+
+import asyncio
+import inspect
+import math
+import secrets
+import typing
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from dataclasses import dataclass, field
+from typing import IO, Any, Final, Literal, TypeVar
+from urllib.parse import quote
+
+import msgspec
+import structlog
+from litestar import Request, Response
+from litestar.datastructures import UploadFile
+from litestar.enums import HttpMethod
+from litestar.exceptions import HTTPException
+from litestar.handlers import HTTPRouteHandler
+from litestar.response import Stream
+
+from arcor2_hw.data.role import Role
+from arcor2_hw.exceptions import Arcor2Error, InvalidData
+from arcor2_server.rest.answers import OPEN, ROLE, SERVICE, InternalError, Unsupported, answer, refusal
+from arcor2_server.rest.naming import camelized, camelized_names, snake, snaked
+
+log = structlog.get_logger(__name__)
+F = TypeVar("F", bound=Callable[..., Awaitable[Any]])
+
+MIB: Final = 1024 * 1024
+LARGEST_BODY: Final = 16 * MIB
+"""Bytes of a JSON body, as of a message of the websocket."""
+BESIDE: Final = 256 * 1024
+"""Bytes of a JSON body beyond which it is read beside the event loop."""
+
+
+class Binary(msgspec.Struct, frozen=True):
+    """An answer that is no JSON: bytes, or pieces of which `size` bytes come together."""
+
+    content: bytes | AsyncIterator[bytes]
+    media_type: str
+    filename: str
+    size: int | None = None
+
+
+class Upload(msgspec.Struct):
+    """The file of a multipart body, on disk when it is large; `fields` are the other parts."""
+
+    file: IO[bytes]
+    filename: str
+    fields: dict[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Operation:
+    """One operation. The handler's own parameters say what it takes: `services`, `query` (a Struct), `body` (a type
+    that msgspec reads), `upload`, `port` (on which it
+    was asked); all others are parts of the path.
+    """
+
+    method: Literal["GET", "PUT", "POST", "DELETE"]
+    path: str
+    service: str
+    role: Role
+    handler: Callable[..., Awaitable[Any]]
+    takes: Mapping[str, Any]
+    gives: Any
+    file: str = ""
+    """The name of the part of a multipart body that is the file."""
+    parts: tuple[str, ...] = ()
+    """The names of further parts that have to be there."""
+    limit: int = LARGEST_BODY
+    plain: bool = False
+    """The answer keeps snake_case: so do those of the original that came late."""
+    open: bool = False
+    media_type: str = "application/json"
+    """Of the answer."""
+    path_names: tuple[str, ...] = field(default=())
+
+
+SPECIAL: Final = frozenset({"services", "query", "body", "upload", "port"})
+"""Parameters of a handler that are no parts of the path."""
+OPERATIONS: Final[list[Operation]] = []
+
+
+def operation(
+    method: Literal["GET", "PUT", "POST", "DELETE"], path: str, service: str, role: Role, **more: Any
+) -> Callable[[F], F]:
+    """Declare an operation; `more` are the further attributes of Operation."""
+
+    def register(handler: F) -> F:
+        hints = typing.get_type_hints(handler, include_extras=True)
+        gives = hints.pop("return")
+        names = tuple(name for name in hints if name not in SPECIAL)
+        if set(names) != {part[1:-1] for part in path.split("/") if part.startswith("{")}:
+            raise TypeError(f"{method} {path}: the path and the parameters of {handler} differ")
+        OPERATIONS.append(
+            Operation(method, path, service, role, handler, hints, gives, path_names=names, **more),
+        )
+        return handler
+
+    return register
+
+
+def route(declared: Operation) -> HTTPRouteHandler:
+    """Make the route of an operation."""
+
+    async def handle(request: Request[Any, Any, Any]) -> Response[Any]:
+        uploads: list[UploadFile] = []
+        try:
+            given = await _arguments(declared, request, uploads)
+            return _response(declared, await declared.handler(**given))
+        except Arcor2Error as error:
+            if error.detail:
+                log.info("request refused", path=declared.path, reason=str(error)[:1000], detail=error.detail[:1000])
+            return refusal(declared.service, error)
+        except (HTTPException, asyncio.CancelledError):
+            raise
+        except Exception:
+            reference = secrets.token_hex(4)
+            log.exception("request failed", method=declared.method, path=declared.path, reference=reference)
+            trouble = InternalError(f"An error inside the server: see its log, reference {reference}.")
+            return refusal(declared.service, trouble)
+        finally:
+            for upload in uploads:
+                await upload.close()
+
+    handle.__name__ = declared.handler.__name__
+    handle.__doc__ = inspect.getdoc(declared.handler)
+    options = {ROLE: declared.role, SERVICE: declared.service} | ({OPEN: True} if declared.open else {})
+    return HTTPRouteHandler(
+        "/".join(f"{part[:-1]}:str}}" if part.startswith("{") else part for part in declared.path.split("/")),
+        http_method=HttpMethod(declared.method),
+        status_code=200,
+        opt=options,
+        request_max_body_size=declared.limit,
+        include_in_schema=False,
+    )(handle)
+
+
+async def _arguments(declared: Operation, request: Request[Any, Any, Any], uploads: list[UploadFile]) -> dict[str, Any]:
+    given: dict[str, Any] = {name: request.path_params[name] for name in declared.path_names}
+    for name, kind in declared.takes.items():
+        if name == "services":
+            given[name] = request.app.state.services
+        elif name == "port":
+            given[name] = (request.scope.get("server") or ("", 0))[1]
+        elif name == "query":
+            given[name] = _query(kind, request)
+        elif name == "body":
+            given[name] = await _body(kind, request)
+        elif name == "upload":
+            given[name] = await _upload(declared, request, uploads)
+    return given
+
+
+def _query(kind: Any, request: Request[Any, Any, Any]) -> Any:
+    """Read the query; both spellings of a name are taken, and what is not known is nobody's business."""
+    fields = {field.name: field for field in msgspec.structs.fields(kind)}
+    values: dict[str, Any] = {}
+    for key, value in request.query_params.multi_items():
+        name = snake(key)
+        if name not in fields:
+            continue
+        if _is_list(fields[name].type):
+            # Existing clients repeat the name, or separate by commas.
+            values.setdefault(fields[name].encode_name, []).extend(part for part in value.split(",") if part)
+        else:
+            values[fields[name].encode_name] = value
+    try:
+        read = msgspec.convert(values, kind, strict=False)
+    except msgspec.ValidationError as error:
+        raise InvalidData(f"The query is wrong: {error}.") from None
+    for name in fields:
+        value = getattr(read, name)
+        for each in value if isinstance(value, list) else (value,):
+            if isinstance(each, float) and not math.isfinite(each):
+                raise InvalidData(f"The query is wrong: {name} is no finite number.")
+    return read
+
+
+def _is_list(kind: Any) -> bool:
+    return typing.get_origin(kind) is list or any(typing.get_origin(one) is list for one in typing.get_args(kind))
+
+
+async def _body(kind: Any, request: Request[Any, Any, Any]) -> Any:
+    media_type = request.content_type[0]
+    # Without a type it is taken for what it has to be.
+    if media_type and media_type != "application/json" and not media_type.endswith("+json"):
+        raise Unsupported(f"The body has to be application/json, not {media_type[:80]}.")
+    content = await request.body()
+    if len(content) > BESIDE:
+        return await asyncio.to_thread(_decoded, content, kind)
+    return _decoded(content, kind)
+
+
+def _decoded(content: bytes, kind: Any) -> Any:
+    try:
+        value = snaked(msgspec.json.decode(content))
+        if b"\\u" in content:
+            msgspec.json.encode(value)  # half a surrogate pair can be read, but neither kept nor sent back
+        return msgspec.convert(value, kind)
+    except (msgspec.DecodeError, RecursionError, UnicodeError) as error:
+        raise InvalidData(f"The body is wrong: {camelized_names(str(error))}.") from None
+
+
+async def _upload(declared: Operation, request: Request[Any, Any, Any], uploads: list[UploadFile]) -> Upload:
+    if request.content_type[0] != "multipart/form-data":
+        raise Unsupported(f"The body has to be multipart/form-data with the file {declared.file}.")
+    try:
+        form = await request.form()
+    except UnicodeDecodeError:
+        raise InvalidData("A part of the body is neither text nor a file with a name.") from None
+    parts = dict(form.multi_items())
+    uploads += [part for _, part in form.multi_items() if isinstance(part, UploadFile)]
+    for name in declared.parts:
+        if name not in parts:
+            raise InvalidData(f"The body has no part {name}.")
+    file = parts.get(declared.file)
+    if isinstance(file, str):
+        # A part without a file name, that could be read as text.
+        file = UploadFile("application/octet-stream", "", file.encode())
+        uploads.append(file)
+    if not isinstance(file, UploadFile):
+        raise InvalidData(f"The body has no file {declared.file}.")
+    texts: dict[str, str] = {}
+    for name, part in parts.items():
+        if isinstance(part, str):
+            texts[name] = part
+        elif name in declared.parts:
+            texts[name] = (await part.read(LARGEST_BODY)).decode(errors="replace")
+    return Upload(typing.cast("IO[bytes]", file.file), file.filename, texts)
+
+
+def _response(declared: Operation, given: Any) -> Response[Any]:
+    if isinstance(given, Binary):
+        # RFC 6266: the name in UTF-8, since it may be anything.
+        headers = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(given.filename, safe='')}"}
+        if isinstance(given.content, bytes):
+            return Response(given.content, media_type=given.media_type, headers=headers)
+        if given.size is not None:
+            headers["Content-Length"] = str(given.size)
+        return Stream(given.content, media_type=given.media_type, headers=headers)
+    if declared.media_type != "application/json":
+        return Response(given, media_type=declared.media_type)
+    builtins = msgspec.to_builtins("ok" if given is None else given)
+    return answer(builtins if declared.plain else camelized(builtins))

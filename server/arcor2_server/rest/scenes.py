@@ -1,0 +1,60 @@
+"""Scenes over REST (protocol, section 13)."""
+
+from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
+from arcor2_hw.data.role import Role
+from arcor2_hw.data.scene import Scene
+from arcor2_hw.exceptions import InvalidData, NotFound
+from arcor2_server.rest.operations import operation
+from arcor2_server.services import Services
+
+STORAGE = "Storage"
+LONGEST_ID = 255
+
+
+class IdDesc(Data, frozen=True):
+    """One entry of a list."""
+
+    id: str
+    name: str
+    created: Timestamp
+    modified: Timestamp
+    description: str | Unset = UNSET
+
+
+def check_id(key: str, what: str) -> None:
+    """Refuse an id under which nothing could be asked for later; InvalidData."""
+    if not key or len(key) > LONGEST_ID or not key.isprintable() or "/" in key or key in (".", ".."):
+        raise InvalidData(
+            f"{key[:80]!r} cannot be the id of a {what}: 1 to {LONGEST_ID} printable characters, no slash."
+        )
+
+
+@operation("GET", "/scenes", STORAGE, Role.OPERATOR)
+async def list_scenes(services: Services) -> list[IdDesc]:
+    """List the saved scenes."""
+    return [
+        IdDesc(one.id, one.name, str(one.created), str(one.modified), one.description or UNSET)
+        for one in await services.storage.scenes()
+    ]
+
+
+@operation("GET", "/scenes/{scene_id}", STORAGE, Role.OPERATOR)
+async def get_scene(services: Services, scene_id: str) -> Scene:
+    """Give a saved scene."""
+    return await services.storage.scene(scene_id)
+
+
+@operation("PUT", "/scenes", STORAGE, Role.TECHNICIAN)
+async def put_scene(services: Services, body: Scene) -> Timestamp:
+    """Save a scene, new or changed; answers the time. All object types in it have to be known."""
+    check_id(body.id, "scene")
+    for placed in body.objects:
+        if not services.types.known(placed.type):
+            raise NotFound(f"The object {placed.name} is of a type {placed.type!r}, which there is not.")
+    return str((await services.storage.put_scene(body)).modified)
+
+
+@operation("DELETE", "/scenes/{scene_id}", STORAGE, Role.TECHNICIAN)
+async def delete_scene(services: Services, scene_id: str) -> None:
+    """Delete a saved scene; its projects then cannot be opened."""
+    await services.storage.delete_scene(scene_id)

@@ -1,0 +1,37 @@
+"""What the tests of REST say again and again."""
+
+import contextlib
+from collections.abc import AsyncIterator
+from typing import Any
+
+import httpx
+
+from arcor2_server.app import create_app
+from arcor2_server.services import Services
+
+
+@contextlib.asynccontextmanager
+async def asking(services: Services) -> AsyncIterator[httpx.AsyncClient]:
+    """Give what asks the parts of a server over REST, without a network between."""
+    transport = httpx.ASGITransport(create_app(services))  # type: ignore[arg-type]
+    async with httpx.AsyncClient(transport=transport, base_url="http://127.0.0.1:6789") as client:
+        yield client
+
+
+def granted(answer: httpx.Response) -> Any:
+    """Give the JSON of an answer that is no refusal."""
+    assert answer.status_code == 200, answer.text
+    assert answer.headers["content-type"] == "application/json"
+    return answer.json()
+
+
+def refused(answer: httpx.Response, status: int, kind: str, *words: str) -> str:
+    """Give the message of a refusal in the protocol's form."""
+    assert answer.status_code == status, answer.text
+    assert answer.headers["content-type"] == "application/json"
+    error = answer.json()
+    assert set(error) == {"service", "message", "type", "description"}
+    assert error["type"] == kind, error
+    for word in words:
+        assert word in error["message"], error
+    return str(error["message"])

@@ -1,0 +1,48 @@
+"""The server's parts in this process, and its REST without a network between."""
+
+import asyncio
+from collections.abc import AsyncIterator, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import httpx
+import psutil
+import pytest
+import pytest_asyncio
+
+from arcor2_server.app import running_services
+from arcor2_server.services import Services
+from arcor2_server.settings import ServerSettings
+from tests.server.core.serving import ServerProcess, until
+from tests.server.rest.asking import asking
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def services(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Services]:
+    """All parts, for the tests of a module."""
+    directory: Path = tmp_path_factory.mktemp("rest")
+    # What comes up later belongs to all tests of the module, not to the one that happens to run then.
+    with ThreadPoolExecutor(1) as executor:
+        asyncio.get_running_loop().set_default_executor(executor)
+        async with running_services(ServerSettings(data_dir=directory)) as parts:
+            parts.cell.hosts.prepare()
+            await until(lambda: psutil.Process().children())
+            yield parts
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def http(services: Services) -> AsyncIterator[httpx.AsyncClient]:
+    """What asks them."""
+    async with asking(services) as client:
+        yield client
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServerProcess]:
+    """A server of its own process, with a spare host."""
+    process = ServerProcess(tmp_path_factory.mktemp("server") / "data")
+    with asyncio.Runner() as runner:
+        runner.run(process.start())
+        runner.run(until(lambda: psutil.Process(process.process.pid).children()))
+        yield process
+        assert runner.run(process.stop()) == 0

@@ -1,0 +1,335 @@
+"""The Storage service over REST: what is put is there, in camelCase, and what is wrong is refused."""
+
+import asyncio
+from typing import Any
+
+import httpx
+import msgspec
+import pytest
+
+from arcor2_hw.data.project import Project
+from arcor2_hw.data.scene import Scene
+from arcor2_server import type_news
+from arcor2_server.rest.naming import camelized, snaked
+from arcor2_server.services import Services
+from tests.server.build import workplace
+from tests.server.rest.asking import granted, refused
+
+pytestmark = pytest.mark.asyncio(loop_scope="module")
+
+POSE = {"position": {"x": 1.0, "y": 2.0, "z": 3.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+
+
+def scene(key: str, *types: str) -> dict[str, Any]:
+    objects = [{"name": f"object_{n}", "type": name, "id": f"obj_{n}"} for n, name in enumerate(types)]
+    return {"id": key, "name": key, "description": "text", "objects": objects}
+
+
+def project(key: str, of: str) -> dict[str, Any]:
+    return {"id": key, "name": key, "sceneId": of, "hasLogic": False}
+
+
+def camel(document: Scene | Project) -> Any:
+    return camelized(msgspec.to_builtins(document))
+
+
+# ------------------------------------------------------------------------------------------------ names
+async def test_a_name_goes_there_and_back() -> None:
+    value = {"size_x": [{"object_id": {"pt1": 1, "is_valid": None}}]}
+    assert camelized(value) == {"sizeX": [{"objectId": {"pt1": 1, "isValid": None}}]}
+    assert snaked(camelized(value)) == snaked(value) == value
+
+
+# ------------------------------------------------------------------------------------------------ scenes
+async def test_a_scene_comes_and_goes(http: httpx.AsyncClient) -> None:
+    stamp = granted(await http.put("/scenes", json=scene("scn_a", "FlowActions")))
+    stored = granted(await http.get("/scenes/scn_a"))
+    assert (stored["modified"], stored["created"]) == (stamp, stamp)
+    assert stored["objects"] == [{"name": "object_0", "type": "FlowActions", "parameters": [], "id": "obj_0"}]
+    stored["intModified"] = stamp
+    later = granted(await http.put("/scenes", json=stored))
+    again = granted(await http.get("/scenes/scn_a"))
+    assert (again["created"], again["modified"]) == (stamp, later)
+    assert later > stamp
+    assert "intModified" not in again
+    (listed,) = [one for one in granted(await http.get("/scenes")) if one["id"] == "scn_a"]
+    assert listed == {"id": "scn_a", "name": "scn_a", "created": stamp, "modified": later, "description": "text"}
+    granted(await http.delete("/scenes/scn_a"))
+    refused(await http.get("/scenes/scn_a"), 404, "NotFound", "scn_a")
+    refused(await http.delete("/scenes/scn_a"), 404, "NotFound")
+
+
+async def test_a_scene_needs_known_types(http: httpx.AsyncClient) -> None:
+    refused(await http.put("/scenes", json=scene("scn_b", "NoSuchType")), 404, "NotFound", "NoSuchType")
+    refused(await http.get("/scenes/scn_b"), 404, "NotFound")
+
+
+async def test_a_large_project_comes_back_as_it_was(http: httpx.AsyncClient) -> None:
+    whole = msgspec.structs.replace(workplace.scene(), objects=[])
+    granted(await http.put("/scenes", json=camel(whole)))
+    granted(await http.put("/projects", json=camel(workplace.project())))
+    # Whoever made his client from the original's OpenAPI sends snake_case: it is taken too.
+    stored = granted(await http.get(f"/projects/{workplace.project().id}"))
+    granted(await http.put("/projects", json=msgspec.to_builtins(workplace.project())))
+    again = granted(await http.get(f"/projects/{workplace.project().id}"))
+    for document in (stored, again):
+        back = msgspec.convert(snaked(document), Project)
+        untimed = msgspec.structs.replace(back, created=msgspec.UNSET, modified=msgspec.UNSET)
+        assert untimed == msgspec.structs.replace(
+            workplace.project(), created=msgspec.UNSET, modified=msgspec.UNSET, int_modified=msgspec.UNSET
+        )
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        b"",
+        b"{",
+        b"[]",
+        b"null",
+        b'{"name": "x"}',
+        b'{"name": null, "id": "scn_x"}',
+        b'{"name": "x", "id": "a/b"}',
+        b'{"name": "x", "id": ".."}',
+        b'{"name": "x", "id": "scn_x", "objects": {}}',
+        b'{"name": "\\ud800", "id": "scn_x"}',
+        b'{"name": "x", "id": "scn_x", "modified": "yesterday"}',
+        b'{"name": "x", "id": "scn_x", "objects": ' + b"[" * 100_000,
+        b"\xff",
+    ],
+)
+async def test_what_is_no_scene(http: httpx.AsyncClient, body: bytes) -> None:
+    refused(await http.put("/scenes", content=body), 400, "Argument")
+    refused(await http.get("/scenes/scn_x"), 404, "NotFound")
+
+
+async def test_another_media_type_and_too_much(http: httpx.AsyncClient) -> None:
+    xml = {"Content-Type": "application/xml"}
+    refused(await http.put("/scenes", content=b"<scene/>", headers=xml), 415, "Argument", "application/xml")
+    refused(await http.post("/assets", json={}), 415, "Argument", "multipart")
+    refused(await http.put("/scenes", content=b" " * (16 * 1024 * 1024 + 1)), 413, "Argument")
+
+
+async def test_no_route(http: httpx.AsyncClient) -> None:
+    refused(await http.get("/nowhere"), 404, "NotFound")
+    answer = await http.post("/scenes", json={})
+    refused(answer, 405, "Argument")
+    assert "PUT" in answer.headers["allow"]
+
+
+# ------------------------------------------------------------------------------------------------ projects
+async def test_a_project_comes_and_goes_with_what_is_beside_it(http: httpx.AsyncClient) -> None:
+    granted(await http.put("/scenes", json=scene("scn_p")))
+    refused(await http.put("/projects", json=project("pro_a", "scn_nowhere")), 404, "NotFound", "scn_nowhere")
+    stamp = granted(await http.put("/projects", json=project("pro_a", "scn_p")))
+    assert granted(await http.get("/projects/pro_a"))["modified"] == stamp
+    assert [one["modified"] for one in granted(await http.get("/projects")) if one["id"] == "pro_a"] == [stamp]
+
+    for path in ("/projects/pro_a", "/projects/none"):
+        refused(await http.get(f"{path}/sources"), 404, "NotFound")
+    granted(await http.put("/projects/sources", json={"id": "pro_a", "script": "print('ß')\n"}))
+    assert granted(await http.get("/projects/pro_a/sources")) == {"id": "pro_a", "script": "print('ß')\n"}
+    refused(await http.put("/projects/sources", json={"id": "none", "script": ""}), 404, "NotFound")
+
+    parameters = [{"name": "speed", "type": "double", "value": "0.5", "id": "pco_1", "displayName": "Speed"}]
+    overrides = [{"id": "obj_1", "parameters": [{"name": "port", "type": "string", "value": '"x"'}]}]
+    for path, value in (("parameters", parameters), ("object-parameters", overrides)):
+        assert granted(await http.get(f"/projects/pro_a/{path}")) == []
+        granted(await http.put(f"/projects/pro_a/{path}", json=value))
+        assert granted(await http.get(f"/projects/pro_a/{path}")) == value
+        refused(await http.get(f"/projects/none/{path}"), 404, "NotFound")
+        refused(await http.put(f"/projects/none/{path}", json=value), 404, "NotFound")
+        refused(await http.put(f"/projects/pro_a/{path}", json={}), 400, "Argument")
+    assert granted(await http.get("/projects/pro_a"))["parameters"] == [], "beside the document, not inside of it"
+
+    query = {"project_id": "pro_a", "new_project_name": "copy", "newDescription": "mine", "newProjectId": "pro_b"}
+    copy = granted(await http.put("/projects/clone", params=query))
+    assert (copy["id"], copy["name"], copy["description"], copy["sceneId"]) == ("pro_b", "copy", "mine", "scn_p")
+    assert granted(await http.get("/projects/pro_b/parameters")) == parameters
+    assert granted(await http.get("/projects/pro_b/object-parameters")) == overrides
+    assert granted(await http.get("/projects/pro_b/sources"))["script"] == "print('ß')\n"
+    refused(await http.put("/projects/clone", params=query), 409, "Conflict", "pro_b")
+    refused(await http.put("/projects/clone", params=query | {"project_id": "none"}), 404, "NotFound")
+    refused(await http.put("/projects/clone", params={"project_id": "pro_a"}), 400, "Argument", "new_project_name")
+    made = granted(await http.put("/projects/clone", params={"project_id": "pro_a", "new_project_name": "third"}))
+    assert made["id"].startswith("pro_")
+
+    granted(await http.delete("/projects/pro_a"))
+    for path in ("", "/sources", "/parameters", "/object-parameters"):
+        refused(await http.get(f"/projects/pro_a{path}"), 404, "NotFound")
+    granted(await http.put("/projects", json=project("pro_a", "scn_p")))
+    assert granted(await http.get("/projects/pro_a/parameters")) == [], "what was beside the old one is gone with it"
+
+
+# ------------------------------------------------------------------------------------------------ models
+MODELS: list[tuple[str, dict[str, Any]]] = [
+    ("box", {"sizeX": 1.0, "sizeY": 2.0, "sizeZ": 3.0}),
+    ("cylinder", {"radius": 1.0, "height": 2.0}),
+    ("sphere", {"radius": 1.5}),
+    ("mesh", {"assetId": "chair", "focusPoints": [POSE]}),
+]
+
+
+@pytest.mark.parametrize(("kind", "sizes"), MODELS)
+async def test_a_model_comes_and_goes(http: httpx.AsyncClient, kind: str, sizes: dict[str, Any]) -> None:
+    body = {"id": f"a_{kind}"} | sizes
+    granted(await http.put(f"/models/{kind}", json=body))
+    for name in (kind, kind.capitalize()):
+        assert granted(await http.get(f"/models/a_{kind}/{name}")) == body
+    assert {"id": f"a_{kind}", "type": kind.capitalize()} in granted(await http.get("/models"))
+    assert (body in granted(await http.get("/models/meshes"))) == (kind == "mesh")
+    other = "box" if kind != "box" else "sphere"
+    refused(await http.get(f"/models/a_{kind}/{other}"), 404, "NotFound", other)
+    refused(await http.get(f"/models/a_{kind}/pyramid"), 400, "Argument", "pyramid")
+    # One model per id: one of another kind takes its place.
+    replacement = {"id": f"a_{kind}"} | dict(MODELS)[other]
+    granted(await http.put(f"/models/{other}", json=replacement))
+    refused(await http.get(f"/models/a_{kind}/{kind}"), 404, "NotFound")
+    assert granted(await http.get(f"/models/a_{kind}/{other}")) == replacement
+    granted(await http.delete(f"/models/a_{kind}"))
+    refused(await http.delete(f"/models/a_{kind}"), 404, "NotFound")
+    refused(await http.get(f"/models/a_{kind}/{other}"), 404, "NotFound")
+
+
+async def test_a_model_has_a_size(http: httpx.AsyncClient) -> None:
+    refused(await http.put("/models/sphere", json={"id": "ball", "radius": 0}), 400, "Argument", "radius")
+    refused(await http.put("/models/box", json={"id": "crate", "sizeX": 1.0, "sizeY": 1.0}), 400, "Argument", "sizeZ")
+
+
+# ------------------------------------------------------------------------------------------------ object types
+LAMP = """
+from arcor2_hw.objects import CollisionObject
+
+
+class {name}(CollisionObject):
+    \"\"\"Gives light.\"\"\"
+
+    _ABSTRACT = False
+"""
+
+
+def lamp(name: str, **more: Any) -> dict[str, Any]:
+    return {"id": name, "name": name, "source": LAMP.format(name=name)} | more
+
+
+async def test_an_object_type_comes_and_goes(http: httpx.AsyncClient, services: Services) -> None:
+    with_model = lamp("Lamp", description="text", model={"id": "Lamp", "type": "Sphere"})
+    refused(await http.put("/object-types", json=with_model), 404, "NotFound", "Lamp")
+    granted(await http.put("/models/sphere", json={"id": "Lamp", "radius": 0.2}))
+    refused(await http.put("/object-types", json=lamp("Lamp", model={"id": "Lamp", "type": "Box"})), 400, "Argument")
+    stamp = granted(await http.put("/object-types", json=with_model))
+    assert granted(await http.get("/object-types/Lamp")) == with_model | {"created": stamp, "modified": stamp}
+    assert services.types.meta("Lamp").description == "Gives light."
+    assert services.types.meta("Lamp").object_model.sphere.radius == 0.2  # type: ignore[union-attr]
+    assert "Lamp" in [one["id"] for one in granted(await http.get("/object-types"))]
+    # A stored scene may use it, and it can be deleted all the same: the lists then name the problem.
+    granted(await http.put("/scenes", json=scene("scn_lamp", "Lamp")))
+    granted(await http.delete("/object-types/Lamp"))
+    assert not services.types.known("Lamp")
+    refused(await http.get("/object-types/Lamp"), 404, "NotFound")
+    refused(await http.delete("/object-types/Lamp"), 404, "NotFound")
+
+
+async def test_a_module_that_is_no_type_is_taken(http: httpx.AsyncClient, services: Services) -> None:
+    mixin = {"id": "Colours", "name": "Colours", "source": "class Colours:\n    RED = 1\n"}
+    granted(await http.put("/object-types", json=mixin))
+    assert granted(await http.get("/object-types/Colours"))["source"] == mixin["source"]
+    assert not services.types.known("Colours")
+    granted(await http.delete("/object-types/Colours"))
+
+
+@pytest.mark.parametrize("name", ["Generic", "FlowActions", "not a name", "class", "", "a" * 300 + "!"])
+async def test_a_name_that_cannot_be_uploaded(http: httpx.AsyncClient, name: str) -> None:
+    refused(await http.put("/object-types", json=lamp(name)), 400, "Argument")
+
+
+async def test_an_installed_type_is_not_deleted_and_a_source_has_an_end(http: httpx.AsyncClient) -> None:
+    refused(await http.delete("/object-types/FlowActions"), 400, "Argument", "FlowActions")
+    huge = lamp("Huge") | {"source": "#" * (1024 * 1024 + 1)}
+    refused(await http.put("/object-types", json=huge), 413, "Argument", "Huge")
+    refused(await http.put("/object-types", json=lamp("One") | {"name": "Other"}), 400, "Argument")
+
+
+async def test_a_series_of_uploads_is_told_once(
+    http: httpx.AsyncClient, services: Services, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[tuple[str, list[str]]] = []
+
+    def note(event: Any) -> None:
+        told.append((str(event.change_type), [meta.type for meta in event.data]))
+
+    async def end_of(*bodies: dict[str, Any]) -> None:
+        """Send all, none of which may be told of, and wait until it is quiet."""
+        before = len(told)
+        monkeypatch.setattr(type_news, "QUIET", 600)
+        for body in bodies:
+            granted(await http.put("/object-types", json=body))
+        assert len(told) == before
+        monkeypatch.setattr(type_news, "QUIET", 0.01)
+        granted(await http.put("/object-types", json=bodies[-1]))
+        await asyncio.sleep(0.5)
+
+    await services.type_news.close()
+    await services.types.refresh()
+    monkeypatch.setattr(services.hub, "broadcast", note)
+    # One that comes twice is not two pieces of news.
+    await end_of(lamp("LampA"), lamp("LampB"), lamp("LampC"), lamp("LampB"))
+    assert told == [("add", ["LampA", "LampB", "LampC"])]
+
+    monkeypatch.setattr(type_news, "QUIET", 600)
+    granted(await http.delete("/object-types/LampC"))
+    granted(await http.put("/object-types", json=lamp("LampD")))
+    granted(await http.delete("/object-types/LampD"))
+    granted(await http.put("/models/sphere", json={"id": "LampA", "radius": 1}))
+    await end_of(lamp("LampA", model={"id": "LampA", "type": "Sphere"}))
+    assert told[1:] == [("remove", ["LampC"]), ("update", ["LampA"])], "LampD came and went: no news"
+
+    # Who opens a scene, or asks for a list, is told before: nothing is left for the timer.
+    monkeypatch.setattr(type_news, "QUIET", 0.05)
+    granted(await http.put("/object-types", json=lamp("LampE")))
+    changes = await services.types.refresh()
+    assert [meta.type for meta in changes.added] == ["LampE"]
+    await asyncio.sleep(0.3)
+    assert len(told) == 3
+
+
+# ------------------------------------------------------------------------------------------------ assets
+async def test_an_asset_comes_and_goes(http: httpx.AsyncClient) -> None:
+    content = bytes(range(256)) * 20_000
+    file = {"assetData": ("../ärm.stl", content, "model/stl")}
+    info = granted(await http.post("/assets", params={"id": "chair", "description": "a chair"}, files=file))
+    assert (info["id"], info["fileName"], info["description"]) == ("chair", "../ärm.stl", "a chair")
+    assert set(info) == {"id", "fileName", "description", "created", "modified"}
+    assert granted(await http.get("/assets/info")) == [info]
+    assert granted(await http.get("/assets/chair/exists")) is True
+    answer = await http.get("/assets/chair/data")
+    assert (answer.status_code, answer.headers["content-type"]) == (200, "application/octet-stream")
+    assert answer.content == content
+    assert answer.headers["content-length"] == str(len(content))
+    assert answer.headers["content-disposition"] == "attachment; filename*=UTF-8''..%2F%C3%A4rm.stl"
+
+    refused(await http.post("/assets", params={"id": "chair"}, files=file), 409, "Conflict", "chair")
+    # The name of the file may be missing, and content that is text stays what it is.
+    newer = granted(await http.post("/assets?id=chair&upsert=true", files={"assetData": (None, b"solid")}))
+    assert newer["created"] == info["created"]
+    assert newer["modified"] > info["modified"]
+    assert (await http.get("/assets/chair/data")).content == b"solid"
+    made = granted(await http.post("/assets", files=file))
+    assert len(granted(await http.get("/assets/info"))) == 2
+    granted(await http.delete(f"/assets/{made['id']}"))
+    granted(await http.delete("/assets/chair"))
+    assert granted(await http.get("/assets/chair/exists")) is False
+    for refusal in (await http.delete("/assets/chair"), await http.get("/assets/chair/data")):
+        refused(refusal, 404, "NotFound", "chair")
+
+
+async def test_what_is_no_asset(http: httpx.AsyncClient) -> None:
+    refused(await http.post("/assets", files={"other": ("x", b"x")}), 400, "Argument", "assetData")
+    refused(await http.post("/assets", files={"assetData": (None, b"\xff\xfe")}), 400, "Argument", "name")
+    refused(await http.post("/assets?id=a%2Fb", files={"assetData": ("x", b"x")}), 400, "Argument")
+    refused(await http.post("/assets?upsert=perhaps", files={"assetData": ("x", b"x")}), 400, "Argument", "upsert")
+    broken = {"Content-Type": "multipart/form-data; boundary=here"}
+    for body in (b"", b"--here", b"--here\r\nContent-Disposition: form-data\r\n\r\nx", b"nothing of the kind"):
+        refused(await http.post("/assets", content=body, headers=broken), 400, "Argument")
+    refused(await http.post("/assets", content=b"", headers={"Content-Type": "multipart/form-data"}), 400, "Argument")
+    assert granted(await http.get("/assets/info")) == []
