@@ -27,7 +27,12 @@ class IntEnum(enum.IntEnum):
 def action(method: F, /) -> F: ...
 @overload
 def action(
-    *, composite: bool = False, hidden: bool = False, deadline: float | None = DEFAULT_DEADLINE
+    *,
+    composite: bool = False,
+    hidden: bool = False,
+    deadline: float | None = DEFAULT_DEADLINE,
+    category: str = "",
+    icon: str = "",
 ) -> Callable[[F], F]: ...
 
 
@@ -38,11 +43,14 @@ def action(
     composite: bool = False,
     hidden: bool = False,
     deadline: float | None = DEFAULT_DEADLINE,
+    category: str = "",  # noqa: ARG001 - read from the source
+    icon: str = "",  # noqa: ARG001
 ) -> F | Callable[[F], F]:
     """Mark a method as an action.
 
     composite: it may call other actions. hidden: it is not offered to users.
     deadline: seconds after which the call is given up as failed; None for one that ends only when it is stopped.
+    category, icon: how the editor shows it, where that is not as its type has it.
     """
 
     def mark(function: F) -> F:

@@ -100,11 +100,12 @@ class ParameterType(abc.ABC):
 
 
 class Extra(Data, frozen=True):
-    """What an action says of a parameter beside its type: an inclusive range, or a closed list."""
+    """What an action says of a parameter beside its type: an inclusive range and the unit, or a closed list."""
 
     minimum: int | float | Unset = UNSET
     maximum: int | float | Unset = UNSET
     allowed_values: list[int | str] | Unset = UNSET
+    unit: str | Unset = UNSET
 
 
 def extra_of(meta: ParameterMeta | None) -> Extra:

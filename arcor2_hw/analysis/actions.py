@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from docstring_parser import DocstringStyle, ParseError
 from docstring_parser import parse as parse_docstring
+from msgspec.structs import replace
 
 from arcor2_hw.actions.json_values import encode
 from arcor2_hw.actions.parameter_types import Extra, ParameterType
@@ -13,13 +14,16 @@ from arcor2_hw.analysis.constants import EnumMember, constant, enum_members
 from arcor2_hw.analysis.hierarchy import Hierarchy
 from arcor2_hw.analysis.hints import parameter_type_of, results, without_none
 from arcor2_hw.analysis.module import ClassInfo, FunctionNode
+from arcor2_hw.analysis.presentation import of_action, of_type
 from arcor2_hw.analysis.source import Broken, sendable
 from arcor2_hw.analysis.symbols import External, framework_name
+from arcor2_hw.analysis.units import unit_in
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.object_type import ActionMetadata, ObjectAction, ParameterMeta
 from arcor2_hw.exceptions import InvalidData
 
 _LITERALS: Final = {"boolean": bool, "integer": int, "double": float, "string": str}
+NUMBERS: Final = ("integer", "double")
 _NOT_ORDINARY: Final = ("builtins.staticmethod", "builtins.classmethod", "builtins.property")
 
 
@@ -57,18 +61,21 @@ class ActionReader:
         Hidden ones are left out; so are what our bases only offer: abstract methods and hooks.
         """
         result: dict[str, ObjectAction] = {}
+        shown = of_type(seen_from, self._hierarchy)
         for name in sorted(info.members):
             node = info.function(name)
             if node is None:
                 continue
             try:
                 metadata = self.mark(info, name, node)
+                category, icon = of_action(node, info, shown, self._hierarchy)
             except Broken as error:
                 result[name] = ObjectAction(name, disabled=True, problem=str(error.problem))
                 continue
             if metadata is None or metadata.hidden or self._is_offer(info, node):
                 continue
-            result[name] = self._action(info, node, metadata, seen_from)
+            found = self._action(info, node, metadata, seen_from)
+            result[name] = replace(found, category=category, icon=icon)
         return result
 
     def _is_offer(self, info: ClassInfo, node: FunctionNode) -> bool:
@@ -153,7 +160,7 @@ class ActionReader:
                 raise info.problem(f"{node.name}: parameter {name} is not annotated", argument)
             try:
                 kind, enumeration = parameter_type_of(argument.annotation, info.module, info, self._resolver)
-                extra = self._extra(info, kind, enumeration, ranges.get(name))
+                extra = self._extra(info, kind, enumeration, ranges.get(name), descriptions.get(name, ""))
                 default = self.default(info, kind, enumeration, defaults.get(name))
             except Broken as error:
                 raise Broken(
@@ -183,7 +190,12 @@ class ActionReader:
             ) from None
 
     def _extra(
-        self, info: ClassInfo, kind: ParameterType, enumeration: ClassInfo | None, limits: "_Limits | None"
+        self,
+        info: ClassInfo,
+        kind: ParameterType,
+        enumeration: ClassInfo | None,
+        limits: "_Limits | None",
+        description: str,
     ) -> str | Unset:
         try:
             if enumeration is not None:
@@ -191,11 +203,13 @@ class ActionReader:
                 if not members:
                     raise enumeration.problem(f"the enumeration {enumeration.name} has no members")
                 return encode(Extra(allowed_values=list(dict.fromkeys(members.values()))))
-            if limits is None or kind.name not in ("integer", "double"):
+            if kind.name not in NUMBERS:
                 return UNSET
+            if limits is None:
+                return unit_extra(description)
             if {type(limits.low), type(limits.high)} != {_LITERALS[kind.name]}:
                 raise info.problem(f"the range in `assert` has to be of type {kind.name} too", limits.node)
-            return encode(Extra(minimum=limits.low, maximum=limits.high))
+            return encode(Extra(minimum=limits.low, maximum=limits.high, unit=unit_in(description) or UNSET))
         except InvalidData as error:
             raise info.problem(str(error), enumeration.node if enumeration else None) from None
 
@@ -218,6 +232,12 @@ class ActionReader:
             return kind.encode(value)
         except InvalidData as error:
             raise info.problem(f"default: {error}", expression) from None
+
+
+def unit_extra(description: str) -> str | Unset:
+    """Give what is said of a number without a range: its unit, if its description names one."""
+    unit = unit_in(description)
+    return UNSET if unit is None else encode(Extra(unit=unit))
 
 
 class _Limits:

@@ -12,6 +12,7 @@ from arcor2_hw.analysis.actions import ActionReader
 from arcor2_hw.analysis.enumerations import Enumeration, enumerations_of
 from arcor2_hw.analysis.hierarchy import Hierarchy, is_known_library
 from arcor2_hw.analysis.module import ClassInfo, Import, Module
+from arcor2_hw.analysis.presentation import of_type
 from arcor2_hw.analysis.robots import robot_meta
 from arcor2_hw.analysis.settings import SettingsReader
 from arcor2_hw.analysis.source import Broken, Problem, SourceFile, sendable
@@ -289,6 +290,8 @@ class Library:
             problem=UNSET if problem is None else str(problem),
             settings=settings,
         )
+        category, icon = of_type(info, hierarchy)
+        meta = msgspec.structs.replace(meta, category=category, icon=icon)
         direct = hierarchy.bases(info)
         actions = tuple(self._all_actions(info, bases))
         return TypeAnalysis(

@@ -5,7 +5,7 @@ from typing import Final
 
 from arcor2_hw.actions.json_values import encode
 from arcor2_hw.actions.parameter_types import Extra
-from arcor2_hw.analysis.actions import ActionReader, described_parameters
+from arcor2_hw.analysis.actions import NUMBERS, ActionReader, described_parameters, unit_extra
 from arcor2_hw.analysis.constants import enum_members
 from arcor2_hw.analysis.hierarchy import Hierarchy
 from arcor2_hw.analysis.hints import meaning, parameter_type_of, plain, without_none
@@ -111,7 +111,8 @@ class SettingsReader:
             kind, enumeration = parameter_type_of(hint, info.module, info, self._resolver)
             if kind.name not in _KINDS:
                 raise info.problem(f"a setting cannot be of type {kind.name}", hint)
-            extra: str | Unset = UNSET
+            told = "" if isinstance(description, Unset) else description
+            extra = unit_extra(told) if kind.name in NUMBERS else UNSET
             if enumeration is not None:
                 members = enum_members(enumeration, self._resolver) or {}
                 extra = encode(Extra(allowed_values=list(dict.fromkeys(members.values()))))

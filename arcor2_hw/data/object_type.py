@@ -124,7 +124,7 @@ class ActionMetadata(Data, frozen=True):
 
 
 class ObjectAction(Data, frozen=True):
-    """One action of an object type."""
+    """One action of an object type; category and icon are ours, beside the protocol."""
 
     name: str
     description: str | Unset = UNSET
@@ -134,10 +134,12 @@ class ObjectAction(Data, frozen=True):
     returns: list[str] = field(default_factory=list)
     disabled: bool = False
     problem: str | Unset = UNSET
+    category: str | Unset = UNSET
+    icon: str | Unset = UNSET
 
 
 class ObjectTypeMeta(Data, frozen=True):
-    """What clients know of an object type."""
+    """What clients know of an object type; category and icon are ours, beside the protocol."""
 
     type: str
     description: str = ""
@@ -151,6 +153,8 @@ class ObjectTypeMeta(Data, frozen=True):
     problem: str | Unset = UNSET
     settings: list[ParameterMeta] = field(default_factory=list)
     modified: Timestamp | Unset = UNSET
+    category: str | Unset = UNSET
+    icon: str | Unset = UNSET
 
 
 class ObjectTypeSource(Data, frozen=True):

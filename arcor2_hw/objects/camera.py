@@ -32,6 +32,8 @@ class Camera(CollisionObject):
     `max_age`: a picture older than that (s) is an error, not a picture.
     """
 
+    category: ClassVar[str] = "Cameras"
+    icon: ClassVar[str] = "camera"
     max_age: ClassVar[float] = 0.5
 
     def __init__(

@@ -33,6 +33,8 @@ class Generic(abc.ABC):
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {}
     loss_reaction: ClassVar[LossReaction] = LossReaction.holds()
     loss_ends_program: ClassVar[bool] = True
+    category: ClassVar[str] = ""
+    icon: ClassVar[str] = ""
 
     def __init__(self, obj_id: str, name: str, settings: Settings | None = None) -> None:
         self.id = obj_id
@@ -156,6 +158,8 @@ class GenericWithPose(Generic):
 class CollisionObject(GenericWithPose):
     """An object that other things must not run into."""
 
+    category: ClassVar[str] = "Collision objects"
+    icon: ClassVar[str] = "solid"
     mesh_filename: ClassVar[str | None] = None
 
     def __init__(

@@ -76,6 +76,8 @@ class Machine(abc.ABC):
     Class data `states` names the subset that the unit has: at least Stopped, Idle, Execute and Aborted.
     """
 
+    category: ClassVar[str] = "Machines"
+    icon: ClassVar[str] = "machine"
     states: ClassVar[frozenset[MachineState]]
 
     @abc.abstractmethod

@@ -26,6 +26,8 @@ class Robot(GenericWithPose):
     maxima. A method whose body only raises Arcor2NotImplemented counts as not there.
     """
 
+    category: ClassVar[str] = "Robots"
+    icon: ClassVar[str] = "robot"
     robot_type: ClassVar[RobotType] = RobotType.ARTICULATED
     urdf_package_name: ClassVar[str | None] = None
 

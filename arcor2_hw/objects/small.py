@@ -35,6 +35,8 @@ class Gripper(Generic):
     which model it is.
     """
 
+    category: ClassVar[str] = "Grippers"
+    icon: ClassVar[str] = "gripper"
     loss_reaction: ClassVar[LossReaction] = LossReaction.holds()
     tcp: Pose
     mass: float
@@ -59,6 +61,8 @@ class Gripper(Generic):
 class Suction(Generic):
     """A suction cup."""
 
+    category: ClassVar[str] = "Grippers"
+    icon: ClassVar[str] = "suction"
     loss_reaction: ClassVar[LossReaction] = LossReaction.holds()
 
     @abc.abstractmethod
@@ -136,6 +140,9 @@ class HasPoints(Protocol):
 class IOBlock(Generic):
     """A block of named inputs and outputs."""
 
+    category: ClassVar[str] = "Inputs and outputs"
+    icon: ClassVar[str] = "io"
+
     @abc.abstractmethod
     def points(self) -> list[IOPoint]:
         """Give the points."""
@@ -159,6 +166,9 @@ class IOBlock(Generic):
 
 class Axis(Generic):
     """A single driven axis; m or rad as its settings say."""
+
+    category: ClassVar[str] = "Axes"
+    icon: ClassVar[str] = "axis"
 
     @abc.abstractmethod
     def home(self) -> None:
@@ -212,6 +222,9 @@ class NoRead(Data, frozen=True):
 class Reader(Generic):
     """A reader of codes; a code is consumed once."""
 
+    category: ClassVar[str] = "Identification"
+    icon: ClassVar[str] = "reader"
+
     @abc.abstractmethod
     def trigger(self, timeout: float) -> Code | NoRead:
         """Read one code now, within `timeout` s; codes from before do not count."""
@@ -219,6 +232,9 @@ class Reader(Generic):
 
 class Scale(Generic):
     """A scale."""
+
+    category: ClassVar[str] = "Measuring"
+    icon: ClassVar[str] = "scale"
 
     @abc.abstractmethod
     def weigh(self, stable: bool = True) -> Reading[float]:
@@ -235,6 +251,9 @@ class Scale(Generic):
 
 class Printer(Generic):
     """A label printer; a label is never resent blindly."""
+
+    category: ClassVar[str] = "Printers"
+    icon: ClassVar[str] = "printer"
 
     @abc.abstractmethod
     def print(self, label: str) -> str:

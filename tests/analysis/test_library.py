@@ -65,8 +65,10 @@ def test_module_names(name: str, module: str) -> None:
 
 
 def without_texts(value: object) -> object:
+    """Leave out texts, and what we tell beside the protocol."""
     if isinstance(value, dict):
-        return {key: without_texts(each) for key, each in value.items() if key != "description"}
+        left_out = ("description", "category", "icon")
+        return {key: without_texts(each) for key, each in value.items() if key not in left_out}
     return [without_texts(each) for each in value] if isinstance(value, list) else value
 
 

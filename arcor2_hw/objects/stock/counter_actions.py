@@ -16,6 +16,8 @@ class CounterSettings(Settings):
 class CounterActions(Generic):
     """A counter. Place one object for each thing to be counted."""
 
+    category = "Program"
+    icon = "counter"
     _ABSTRACT = False
 
     def __init__(self, obj_id: str, name: str, settings: CounterSettings | None = None) -> None:

@@ -11,6 +11,8 @@ from arcor2_hw.objects import Generic, Settings
 class FlowActions(Generic):
     """Ends a program, waits, and repeats."""
 
+    category = "Program"
+    icon = "flow"
     _ABSTRACT = False
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"wait": "cancel"}
 

@@ -7,6 +7,8 @@ from arcor2_hw.objects import Generic
 class LogicActions(Generic):
     """Compares values and combines truths."""
 
+    category = "Program"
+    icon = "logic"
     _ABSTRACT = False
 
     # ------------------------------------------------------------------------------------ numbers with a fraction

@@ -18,6 +18,8 @@ class RandomSettings(Settings):
 class RandomActions(Generic):
     """Draws numbers and decides by chance."""
 
+    category = "Program"
+    icon = "random"
     _ABSTRACT = False
 
     def __init__(self, obj_id: str, name: str, settings: RandomSettings | None = None) -> None:

@@ -12,6 +12,8 @@ from arcor2_hw.objects import Generic, Settings
 class TimeActions(Generic):
     """Sleeps, tells the time and measures it."""
 
+    category = "Program"
+    icon = "time"
     _ABSTRACT = False
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"sleep": "cancel"}
 

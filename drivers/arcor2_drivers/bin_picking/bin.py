@@ -28,6 +28,8 @@ class Bin(GenericWithPose):
     """
 
     _ABSTRACT = False
+    category = "Containers"
+    icon = "bin"
     loss_reaction: ClassVar[LossReaction] = LossReaction.holds()  # there is no device that could lose us
 
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: BinSettings) -> None:

@@ -24,6 +24,8 @@ class Blister(GenericWithPose):
     """
 
     _ABSTRACT = False
+    category = "Containers"
+    icon = "blister"
     loss_reaction: ClassVar[LossReaction] = LossReaction.holds()  # there is no device that could lose us
 
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: BlisterSettings) -> None:

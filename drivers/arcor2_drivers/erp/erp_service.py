@@ -46,6 +46,8 @@ class ErpService(Generic):
     """A production planning service (ERP): orders in, results out, each exactly once."""
 
     _ABSTRACT = False
+    category = "Services"
+    icon = "service"
     loss_reaction: ClassVar[LossReaction] = LossReaction.continues()  # it plans for others too
     loss_ends_program: ClassVar[bool] = False  # results wait in the outbox; production goes on
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"next_order": "stop", "wait_until_sent": "stop"}

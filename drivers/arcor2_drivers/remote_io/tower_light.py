@@ -56,6 +56,8 @@ class TowerLight(Generic):
     """A tower light at the outputs of a remote I/O block."""
 
     _ABSTRACT = False
+    category = "Signals"
+    icon = "light"
     loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(LONGEST_WATCHDOG / 1000.0)
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"buzz": "stop"}
 

@@ -1,0 +1,70 @@
+"""How the editor shows a type and its actions: category and icon, as the class says."""
+
+import ast
+import re
+from typing import Final, NamedTuple
+
+from arcor2_hw.analysis.constants import constant
+from arcor2_hw.analysis.hierarchy import Hierarchy
+from arcor2_hw.analysis.module import ClassInfo, FunctionNode
+from arcor2_hw.analysis.source import Broken, sendable
+from arcor2_hw.analysis.symbols import framework_name
+from arcor2_hw.data.base import UNSET, Unset
+
+_ICON: Final = re.compile(r"[a-z0-9][a-z0-9_-]{0,39}")
+_LONGEST: Final = 40
+
+
+class Presentation(NamedTuple):
+    """`category`: under which heading something is offered. `icon`: the name of a symbol of the editor."""
+
+    category: str | Unset = UNSET
+    icon: str | Unset = UNSET
+
+
+def of_type(info: ClassInfo, hierarchy: Hierarchy) -> Presentation:
+    """Give what the class data `category` and `icon` say, own or inherited.
+
+    Anything but suitable text is left out, and is no fault: an older type may mean something else by these names.
+    """
+
+    def text(name: str) -> object:
+        try:
+            return hierarchy.attribute(info, name)
+        except Broken:
+            return None
+
+    return Presentation(_category(text("category")), _icon(text("icon")))
+
+
+def of_action(node: FunctionNode, owner: ClassInfo, inherited: Presentation, hierarchy: Hierarchy) -> Presentation:
+    """Give what `@action(category=..., icon=...)` says; what it does not say is as the type has it."""
+    resolver = hierarchy.resolver
+    for decorator in node.decorator_list:
+        if not isinstance(decorator, ast.Call):
+            continue
+        if framework_name(resolver.expression(decorator.func, owner.module, owner)) != "action":
+            continue
+        given = {}
+        for keyword in decorator.keywords:
+            if keyword.arg in ("category", "icon"):
+                given[keyword.arg] = constant(keyword.value, owner.module, owner, resolver)
+        category, icon = _category(given.get("category")), _icon(given.get("icon"))
+        for name, value in (("category", category), ("icon", icon)):
+            if name in given and isinstance(value, Unset):
+                raise owner.problem(f"{node.name}: {given[name]!r:.60} is no {name}", decorator)
+        return Presentation(
+            inherited.category if isinstance(category, Unset) else category,
+            inherited.icon if isinstance(icon, Unset) else icon,
+        )
+    return inherited
+
+
+def _category(value: object) -> str | Unset:
+    if not isinstance(value, str) or not value.strip() or len(value) > _LONGEST or not value.isprintable():
+        return UNSET
+    return sendable(value.strip())
+
+
+def _icon(value: object) -> str | Unset:
+    return value if isinstance(value, str) and _ICON.fullmatch(value) else UNSET
