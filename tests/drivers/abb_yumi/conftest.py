@@ -33,7 +33,7 @@ class FakeYumi:
             stderr=subprocess.DEVNULL,
         )
         assert self.process.stdout is not None
-        assert select.select([self.process.stdout], [], [], 20.0)[0]
+        assert select.select([self.process.stdout], [], [], 60.0)[0]
         line = self.process.stdout.readline()
         assert line.startswith(b"ready "), line
         self.control = BlockingControlClient(msgspec.json.decode(line.removeprefix(b"ready "))["control"])
