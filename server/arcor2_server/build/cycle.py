@@ -223,5 +223,5 @@ class Cycle:
             case [name]:
                 return expressions.assign(name, call)
             case names:
-                target = ast.Tuple([ast.Name(name, ast.Store()) for name in names], ast.Store())
+                target = ast.Tuple([expressions.target(name) for name in names], ast.Store())
                 return ast.Assign([target], call, lineno=0)

@@ -1,24 +1,35 @@
-"""The few kinds of expression that a generated script is made of."""
+"""The few kinds of expression that a generated script is made of; they are shared, so none is ever changed."""
 
 import ast
+from functools import lru_cache
+from typing import Final
+
+_LOAD: Final = ast.Load()
+_STORE: Final = ast.Store()
 
 
+@lru_cache(maxsize=1024)
 def name(name: str) -> ast.Name:
     """Give a variable."""
-    return ast.Name(name, ast.Load())
+    return ast.Name(name, _LOAD)
+
+
+def target(name: str) -> ast.Name:
+    """Give a variable that is assigned to."""
+    return ast.Name(name, _STORE)
 
 
 def assign(name: str, value: ast.expr) -> ast.Assign:
     """Give `name = value`."""
-    return ast.Assign([ast.Name(name, ast.Store())], value, lineno=0)
+    return ast.Assign([target(name)], value, lineno=0)
 
 
+@lru_cache(maxsize=4096)
 def dotted(first: str, parts: tuple[str, ...]) -> ast.expr:
     """Give `first.part.part`."""
-    result: ast.expr = name(first)
-    for part in parts:
-        result = ast.Attribute(result, part, ast.Load())
-    return result
+    if not parts:
+        return name(first)
+    return ast.Attribute(dotted(first, parts[:-1]), parts[-1], _LOAD)
 
 
 def equals(variable: str, value: bool | int | str) -> ast.expr:

@@ -11,6 +11,7 @@ from typing import Final
 
 from arcor2_hw.data.project import ActionPoint, Project
 from arcor2_server.build.naming import Names, class_name
+from arcor2_server.build.style import quoted
 
 _IMPORTED: Final = ("Pose", "Position", "ProjectRobotJoints", "Resources", "ActionPoints")
 _OWN_FIELD: Final = "_res"
@@ -40,12 +41,6 @@ def names_of(project: Project) -> PointNames:
     return result
 
 
-def _text(value: str) -> str:
-    """Give a string as Python would be written by hand."""
-    shown = repr(value)
-    return f'"{shown[1:-1]}"' if shown[0] == "'" and '"' not in shown else shown
-
-
 def _class(name: str, title: str, fields: Sequence[str], properties: Sequence[tuple[str, str, str]]) -> str:
     lines = [
         f"class {name}:",
@@ -73,15 +68,15 @@ def _point(point: ActionPoint, names: PointNames, classes: Names) -> tuple[str, 
     fields: list[str] = []
     if point.orientations:
         name = classes.claim(f"{own}Poses")
-        poses = [(names.poses[o.id][-1], "Pose", f"pose({_text(o.id)})") for o in point.orientations]
+        poses = [(names.poses[o.id][-1], "Pose", f"pose({quoted(o.id)})") for o in point.orientations]
         parts.append(_class(name, f"Poses of {attribute}.", (), poses))
         fields.append(f"self.poses = {name}(res)")
     if point.robot_joints:
         name = classes.claim(f"{own}Joints")
-        joints = [(names.joints[j.id][-1], "ProjectRobotJoints", f"joints({_text(j.id)})") for j in point.robot_joints]
+        joints = [(names.joints[j.id][-1], "ProjectRobotJoints", f"joints({quoted(j.id)})") for j in point.robot_joints]
         parts.append(_class(name, f"Joints of {attribute}.", (), joints))
         fields.append(f"self.joints = {name}(res)")
-    position = ("position", "Position", f"position({_text(point.id)})")
+    position = ("position", "Position", f"position({quoted(point.id)})")
     parts.append(_class(own, f"Action point {attribute}.", fields, [position]))
     return own, parts
 

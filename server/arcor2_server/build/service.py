@@ -1,7 +1,9 @@
 """The Build service: gathers what a project needs, makes its program, and writes the package."""
 
 import asyncio
-from collections.abc import Iterable
+import contextlib
+import gc
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -89,8 +91,30 @@ def files_of(made_of: Ingredients) -> dict[str, bytes]:
     return files
 
 
+@contextlib.contextmanager
+def _collector_waiting() -> Iterator[None]:
+    """Keep the garbage collector from looking through a growing tree again and again.
+
+    A tree has no cycles and goes by itself; of 10,000 actions it took 0.5 s more, in which nothing else ran either.
+    """
+    if not gc.isenabled():
+        # Another build has it wait, and lets it go on.
+        yield
+        return
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
+
+
 def _document(value: Data) -> bytes:
     return msgspec.json.format(msgspec.json.encode(value), indent=2) + b"\n"
+
+
+def _made(made_of: Ingredients) -> dict[str, bytes]:
+    with _collector_waiting():
+        return files_of(made_of)
 
 
 class BuildService:
@@ -143,10 +167,10 @@ class BuildService:
         made_of = await self.gather(project_id, package_name)
         package_id = new_id("pkg")
         directory = self._services.settings.packages_dir / package_id
-        await asyncio.to_thread(lambda: package.write(files_of(made_of), directory))
+        await asyncio.to_thread(lambda: package.write(_made(made_of), directory))
         return package_id
 
     async def publish(self, project_id: str, package_name: str = "") -> bytes:
         """Give the package of a saved project as a zip."""
         made_of = await self.gather(project_id, package_name)
-        return await asyncio.to_thread(lambda: package.to_zip(files_of(made_of)))
+        return await asyncio.to_thread(lambda: package.to_zip(_made(made_of)))
