@@ -98,6 +98,8 @@ def _lowered(schema: Any, plain: bool) -> Any:
                 lowered[key] = _lowered(value, plain)
     if str(lowered.get("pattern", "")).startswith(_TIMESTAMP):
         lowered["format"] = "date-time"
+    if "type" not in lowered and all(isinstance(value, str) for value in lowered.get("enum", [None])):
+        lowered["type"] = "string"
     if lowered.get("required") == []:
         del lowered["required"]
     if "$ref" in lowered and len(lowered) > 1:

@@ -1,0 +1,295 @@
+"""Build and Execution over REST: a project becomes a package and comes back; a package is run, paused and stopped."""
+
+import asyncio
+import io
+import time
+import zipfile
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.server.core.serving import ServerProcess, Talker, running, talking
+from tests.server.rest.asking import granted, refused
+
+COUNT = """
+import time
+from arcor2_hw.actions import action
+from arcor2_hw.objects import Generic
+
+
+class Counter(Generic):
+    _ABSTRACT = False
+
+    @action
+    def count(self, *, an: str | None = None) -> None:
+        time.sleep(0.02)
+"""
+OBJECT = {"name": "counter", "type": "Counter", "id": "obj_c"}
+SCENE = {"id": "scn_c", "name": "count scene", "objects": [OBJECT]}
+PROJECT = {
+    "id": "pro_c",
+    "name": "count ß",
+    "description": "counts",
+    "sceneId": "scn_c",
+    "actionPoints": [
+        {
+            "name": "point",
+            "id": "acp_1",
+            "position": {"x": 0, "y": 0, "z": 0},
+            "actions": [{"name": "one", "id": "act_1", "type": "obj_c/count", "flows": [{}]}],
+        }
+    ],
+    "logic": [
+        {"id": "lit_1", "start": "START", "end": "act_1"},
+        {"id": "lit_2", "start": "act_1", "end": "END"},
+    ],
+}
+
+
+def base(server: ServerProcess) -> str:
+    return server.url.replace("ws://", "http://")
+
+
+async def prepare(http: httpx.AsyncClient) -> None:
+    granted(await http.put("/object-types", json={"id": "Counter", "name": "Counter", "source": COUNT}))
+    granted(await http.put("/scenes", json=SCENE))
+    granted(await http.put("/projects", json=PROJECT))
+
+
+async def published(http: httpx.AsyncClient, **more: Any) -> bytes:
+    answer = await http.get("/project/publish", params={"projectId": "pro_c"} | more)
+    assert (answer.status_code, answer.headers["content-type"]) == (200, "application/zip"), answer.text
+    return answer.content
+
+
+def as_file(content: bytes) -> dict[str, Any]:
+    return {"executionPackage": ("package.zip", content, "application/zip")}
+
+
+async def until_state(http: httpx.AsyncClient, *wanted: str) -> dict[str, Any]:
+    async with asyncio.timeout(20):
+        while True:
+            info: dict[str, Any] = granted(await http.get("/packages/state"))
+            if info["state"] in wanted:
+                return info
+            await asyncio.sleep(0.02)
+
+
+async def next_of(talker: Talker, name: str, **data: Any) -> dict[str, Any]:
+    """Give the next event of that name and content; others are passed over."""
+    async with asyncio.timeout(20):
+        while True:
+            message = talker.events.pop(0) if talker.events else await talker.receive()
+            if message.get("event") == name and data.items() <= message["data"].items():
+                return message
+
+
+async def test_a_project_becomes_a_package_and_comes_back(server: ServerProcess) -> None:
+    async with httpx.AsyncClient(base_url=base(server)) as http:
+        refused(await http.get("/project/publish", params={"projectId": "none"}), 404, "NotFound", "none")
+        refused(await http.get("/project/publish"), 400, "Argument", "projectId")
+        await prepare(http)
+        answer = await http.get("/project/publish", params={"projectId": "pro_c", "packageName": "ö"})
+        assert answer.headers["content-disposition"] == "attachment; filename*=UTF-8''%C3%B6_package.zip"
+        with zipfile.ZipFile(io.BytesIO(answer.content)) as archive:
+            assert {"script.py", "object_types/counter.py", "data/project.json"} <= set(archive.namelist())
+            assert b"\xc3\xb6" in archive.read("package.json")
+        package = answer.content
+
+        # As it was published it says what is saved: there is nothing to overwrite.
+        assert granted(await http.put("/project/import", files=as_file(package))) == {
+            "sceneId": "scn_c",
+            "projectId": "pro_c",
+        }
+        granted(await http.put("/scenes", json=SCENE | {"description": "other"}))
+        granted(await http.put("/projects", json=PROJECT | {"description": "other"}))
+        message = refused(await http.put("/project/import", files=as_file(package)), 409, "Conflict", "overwriteScene")
+        assert "overwriteProject" in message
+        only_scene = {"overwriteScene": "true"}
+        refused(await http.put("/project/import", params=only_scene, files=as_file(package)), 409, "Conflict")
+        assert granted(await http.get("/scenes/scn_c"))["description"] == "other", "all or nothing"
+        both = only_scene | {"overwriteProject": "true"}
+        granted(await http.put("/project/import", params=both, files=as_file(package)))
+        assert granted(await http.get("/scenes/scn_c"))["description"] == ""
+        assert granted(await http.get("/projects/pro_c"))["description"] == "counts"
+
+        for path in ("/projects/pro_c", "/scenes/scn_c", "/object-types/Counter"):
+            granted(await http.delete(path))
+        granted(await http.put("/project/import", files=as_file(package)))
+        stored = granted(await http.get("/projects/pro_c"))
+        assert [point["actions"][0]["name"] for point in stored["actionPoints"]] == ["one"]
+        assert granted(await http.get("/object-types/Counter"))["source"] == COUNT
+        for bad in (b"", b"no zip", package[:200]):
+            refused(await http.put("/project/import", files=as_file(bad)), 400, "InvalidPackage")
+        refused(
+            await http.put("/project/import", params={"overwriteScene": "2"}, files=as_file(package)), 400, "Argument"
+        )
+
+
+async def test_a_package_is_sent_fetched_and_deleted(server: ServerProcess) -> None:
+    async with httpx.AsyncClient(base_url=base(server)) as http, talking(server.url) as talker:
+        await prepare(http)
+        package = await published(http, packageName="count it")
+        granted(await http.post("/packages/pkg_a", files=as_file(package)))
+        event = await next_of(talker, "PackageChanged", id="pkg_a")
+        assert event["change_type"] == "add"
+        (listed,) = [one for one in granted(await http.get("/packages")) if one["id"] == "pkg_a"]
+        assert listed == {
+            "id": "pkg_a",
+            "name": "count it",
+            "created": listed["created"],
+            "project": {"id": "pro_c", "name": "count ß", "description": "counts"},
+        }
+        answer = await http.get("/packages/pkg_a")
+        assert answer.headers["content-type"] == "application/zip"
+        with zipfile.ZipFile(io.BytesIO(answer.content)) as back, zipfile.ZipFile(io.BytesIO(package)) as sent:
+            assert {name: back.read(name) for name in back.namelist()} == {
+                name: sent.read(name) for name in sent.namelist()
+            }
+
+        granted(await http.put("/packages/pkg_a/breakpoints", params={"breakpoints": ["acp_1", "acp_2", "acp_1"]}))
+        assert granted(await http.get("/packages/pkg_a/breakpoints")) == ["acp_1", "acp_2"]
+        granted(await http.delete("/packages/pkg_a"))
+        event = await next_of(talker, "PackageChanged", id="pkg_a")
+        assert event["change_type"] == "remove"
+        for refusal in (
+            await http.get("/packages/pkg_a"),
+            await http.delete("/packages/pkg_a"),
+            await http.get("/packages/pkg_a/breakpoints"),
+            await http.put("/packages/pkg_a/breakpoints", params={"breakpoints": ["acp_1"]}),
+            await http.put("/packages/pkg_a/start"),
+            await http.put("/packages/pkg_a/debug"),
+        ):
+            refused(refusal, 404, "NotFound", "pkg_a")
+        granted(await http.post("/packages/pkg_a", files=as_file(package)))
+        assert granted(await http.get("/packages/pkg_a/breakpoints")) == [], "they went with the old one"
+
+        for bad in (b"no zip", zipped({"readme.txt": b""}), zipped({"../script.py": b""})):
+            refused(await http.post("/packages/pkg_b", files=as_file(bad)), 400, "InvalidPackage")
+        for key in ("..", "a%2Fb", ".hidden", "%00"):
+            assert (await http.post(f"/packages/{key}", files=as_file(package))).status_code in (400, 404, 405)
+        assert [one["id"] for one in granted(await http.get("/packages"))] == ["pkg_a"]
+
+
+def zipped(files: dict[str, bytes]) -> bytes:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, content in files.items():
+            archive.writestr(name, content)
+    return buffer.getvalue()
+
+
+async def test_a_program_is_run_paused_stepped_and_stopped(server: ServerProcess) -> None:
+    async with httpx.AsyncClient(base_url=base(server)) as http:
+        await prepare(http)
+        granted(await http.post("/packages/pkg_r", files=as_file(await published(http))))
+        for command in ("stop", "pause", "resume", "step"):
+            refused(await http.put(f"/packages/{command}"), 409, "PackageRunState")
+        granted(await http.put("/packages/pkg_r/start"))
+        info = await until_state(http, "Running")
+        assert info["activePackageId"] == "pkg_r"
+        refused(await http.put("/packages/pkg_r/start"), 409, "PackageRunState")
+        refused(await http.delete("/packages/pkg_r"), 409, "PackageRunState")
+        refused(await http.post("/packages/pkg_r", files=as_file(await published(http))), 409, "PackageRunState")
+        granted(await http.put("/packages/pause"))
+        await until_state(http, "Paused")
+        granted(await http.put("/packages/step"))
+        await until_state(http, "Paused")
+        granted(await http.put("/packages/resume"))
+        await until_state(http, "Running")
+        granted(await http.put("/packages/stop"))
+        assert await until_state(http, "Completed") == {"state": "Completed", "activePackageId": "pkg_r"}
+        (listed,) = [one for one in granted(await http.get("/packages")) if one["id"] == "pkg_r"]
+        assert listed["executed"] > listed["created"]
+
+        granted(await http.put("/packages/pkg_r/debug", params={"breakOnFirstAction": "true"}))
+        await until_state(http, "Paused")
+        granted(await http.put("/packages/stop"))
+        await until_state(http, "Completed")
+        # A point that is not in the project: the program cannot begin.
+        granted(await http.put("/packages/pkg_r/breakpoints", params={"breakpoints": "acp_nowhere"}))
+        granted(await http.put("/packages/pkg_r/debug"))
+        info = await until_state(http, "Faulted")
+        assert "acp_nowhere" in info["exceptionMessage"]
+
+
+async def test_an_upload_of_a_hundred_megabytes_does_not_stop_the_others(server: ServerProcess) -> None:
+    mesh = bytes(100_000_000)
+    content = zipped({"script.py": b"", "data/mesh.bin": mesh})  # not compressed
+    async with httpx.AsyncClient(base_url=base(server), timeout=60) as http:
+        # On a thread: to put a body of that size together takes this process a while too.
+        url = base(server) + "/packages/pkg_big"
+        upload = asyncio.create_task(asyncio.to_thread(httpx.post, url, files=as_file(content), timeout=60))
+        slowest = 0.0
+        while not upload.done():
+            started = time.monotonic()
+            granted(await http.get("/packages/state"))
+            slowest = max(slowest, time.monotonic() - started)
+            await asyncio.sleep(0.02)
+        granted(upload.result())
+        assert slowest < 2.0
+        with zipfile.ZipFile(io.BytesIO((await http.get("/packages/pkg_big")).content)) as back:
+            assert back.getinfo("data/mesh.bin").file_size == len(mesh)
+        granted(await http.delete("/packages/pkg_big"))
+
+
+async def test_the_table_of_tokens(server: ServerProcess) -> None:
+    async with httpx.AsyncClient(base_url=base(server)) as http:
+        assert granted(await http.get("/tokens")) == []
+        token = granted(await http.post("/tokens/create", params={"name": "line 1"}))
+        assert (token["name"], token["access"]) == ("line 1", False)
+        path = f"/tokens/{token['id']}"
+        granted(await http.put(f"{path}/access", params={"access": "true"}))
+        assert granted(await http.get(f"{path}/access")) is True
+        assert granted(await http.get("/tokens")) == [token | {"access": True}]
+        refused(await http.put(f"{path}/access"), 400, "Argument", "access")
+        refused(await http.post("/tokens/create", params={"name": ""}), 400, "Argument")
+        granted(await http.delete(path))
+        for refusal in (
+            await http.delete(path),
+            await http.get(f"{path}/access"),
+            await http.put(f"{path}/access", params={"access": "true"}),
+        ):
+            refused(refusal, 404, "NotFound")
+
+
+PICTURE = {"image": ("picture.jpg", b"\xff\xd8\xff", "image/jpeg")}
+CAMERA: dict[str, Any] = {"fx": 1, "fy": 1, "cx": 1, "cy": 1, "distCoefs": [0, 0, 0, 0, 0]}
+
+
+@pytest.mark.parametrize("path", ["/calibrate/camera", "/markers/corners"])
+async def test_calibration_says_that_it_is_not_there(server: ServerProcess, path: str) -> None:
+    async with httpx.AsyncClient(base_url=base(server)) as http:
+        answer = await http.put(path, params=CAMERA, files=PICTURE)
+        refused(answer, 503, "General", "calibration")
+        refused(await http.put(path, params=CAMERA | {"distCoefs": [0]}, files=PICTURE), 400, "Argument", "distCoefs")
+        refused(await http.put(path, params={"fx": 1}, files=PICTURE), 400, "Argument")
+        refused(await http.put(path, params=CAMERA), 415, "Argument")
+
+
+async def test_calibration_of_a_robot_says_that_it_is_not_there(server: ServerProcess) -> None:
+    async with httpx.AsyncClient(base_url=base(server)) as http:
+        args = (
+            '{"robotJoints": [{"name": "j1", "value": 1}], "robotPose": {}, "cameraPose": {}, "urdfUri": "arm.zip",'
+            ' "cameraParameters": {"fx": 1, "fy": 1, "cx": 1, "cy": 1, "distCoefs": [0, 0, 0, 0]}}'
+        )
+        refused(await http.put("/calibrate/robot", files=PICTURE, data={"args": args}), 503, "General", "calibration")
+        as_a_file = PICTURE | {"args": ("args.json", args.encode(), "application/json")}
+        refused(await http.put("/calibrate/robot", files=as_a_file), 503, "General")
+        refused(await http.put("/calibrate/robot", files=PICTURE), 400, "Argument", "args")
+        refused(await http.put("/calibrate/robot", files=PICTURE, data={"args": "{}"}), 400, "Argument", "robotJoints")
+
+
+async def test_tables_outlive_the_server(tmp_path: Any) -> None:
+    async with running(tmp_path / "data") as first, httpx.AsyncClient(base_url=base(first)) as http:
+        await prepare(http)
+        token = granted(await http.post("/tokens/create", params={"name": "x"}))
+        granted(await http.post("/packages/pkg_a", files=as_file(await published(http))))
+        granted(await http.put("/packages/pkg_a/breakpoints", params={"breakpoints": "acp_1"}))
+        granted(await http.post("/assets?id=chair", files={"assetData": ("chair.stl", b"solid")}))
+    async with running(tmp_path / "data") as second, httpx.AsyncClient(base_url=base(second)) as http:
+        assert granted(await http.get("/tokens")) == [token]
+        assert granted(await http.get("/packages/pkg_a/breakpoints")) == ["acp_1"]
+        assert (await http.get("/assets/chair/data")).content == b"solid"
+        assert [one["id"] for one in granted(await http.get("/object-types"))] == ["Counter"]

@@ -1,0 +1,199 @@
+"""The ports of the original, and the Execution service's own websocket."""
+
+import asyncio
+import json
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from websockets.asyncio.client import ClientConnection, connect
+
+from arcor2_hw.data.role import Role
+from arcor2_hw.exceptions import InvalidData
+from arcor2_server.classic import SOCKET, classic_ports
+from arcor2_server.execution_socket import EVENTS, REQUESTS
+from arcor2_server.tokens import TokenFile
+from tests.server.core.serving import ServerProcess, Talker, running, talking
+from tests.server.rest.asking import granted
+from tests.server.rest.test_rest_build_and_run import as_file, base, prepare, published
+
+ANY = {
+    "ARCOR2_STORAGE_SERVICE_PORT": "0",
+    "ARCOR2_SCENE_SERVICE_PORT": "0",
+    "ARCOR2_EXECUTION_PROXY_PORT": "0",
+    "ARCOR2_BUILD_URL": "http://127.0.0.1:0",
+    "ARCOR2_EXECUTION_URL": "ws://127.0.0.1:0",
+    "ARCOR2_CALIBRATION_URL": "http://127.0.0.1:0",
+}
+
+
+def test_they_come_from_the_environment() -> None:
+    assert classic_ports({}) == {
+        "Storage": 10000,
+        "Scene": 5013,
+        "Execution": 5009,
+        "Build": 5008,
+        SOCKET: 6790,
+        "Calibration": 5014,
+    }
+    given = {
+        "ARCOR2_SCENE_SERVICE_PORT": "1",
+        "ARCOR2_BUILD_URL": "http://build:2/",
+        "ARCOR2_EXECUTION_URL": "ws://x:3",
+    }
+    ports = classic_ports(given)
+    assert (ports["Scene"], ports["Build"], ports[SOCKET], ports["Storage"]) == (1, 2, 3, 10000)
+
+
+@pytest.mark.parametrize(
+    ("variable", "value"),
+    [
+        ("ARCOR2_SCENE_SERVICE_PORT", "many"),
+        ("ARCOR2_SCENE_SERVICE_PORT", "70000"),
+        ("ARCOR2_SCENE_SERVICE_PORT", "-1"),
+        ("ARCOR2_BUILD_URL", "http://build"),
+        ("ARCOR2_BUILD_URL", "http://build:port"),
+        ("ARCOR2_EXECUTION_URL", "ws://x:99999"),
+    ],
+)
+def test_what_is_no_port_names_its_variable(variable: str, value: str) -> None:
+    with pytest.raises(InvalidData, match=variable):
+        classic_ports({variable: value})
+
+
+def test_two_services_cannot_have_one_port() -> None:
+    with pytest.raises(InvalidData, match="Execution and Scene"):
+        classic_ports({"ARCOR2_SCENE_SERVICE_PORT": "5009"})
+
+
+def ports_of(server: ServerProcess) -> dict[str, int]:
+    """Read from the log which ports there are."""
+    told = (json.loads(line) for line in server.log.read_text().splitlines() if line.startswith("{"))
+    return {line["service"]: line["port"] for line in told if line["event"] == "classic port"}
+
+
+async def test_each_service_is_at_its_port(tmp_path: Path) -> None:
+    async with running(tmp_path / "data", "--classic-ports", **ANY) as server:
+        ports = ports_of(server)
+        assert set(ports) == {"Storage", "Scene", "Execution", "Build", SOCKET, "Calibration"}
+        routes = {
+            "Storage": "/scenes",
+            "Scene": "/system/running",
+            "Execution": "/packages/state",
+            "Build": "/healthz/ready",
+            "Calibration": "/healthz/ready",
+        }
+        async with httpx.AsyncClient() as http:
+            for service, path in routes.items():
+                at = f"http://127.0.0.1:{ports[service]}"
+                assert (await http.get(at + path)).status_code == 200, service
+                described = granted(await http.get(at + "/swagger/api/swagger.json"))
+                assert {
+                    tag for one in described["paths"].values() for each in one.values() for tag in each["tags"]
+                } == {service}
+            everything = granted(await http.get(base(server) + "/swagger/api/swagger.json"))
+            assert {"/scenes", "/collisions", "/project/publish", "/packages", "/markers/corners"} <= set(
+                everything["paths"]
+            )
+        # A websocket there is ARServer's, but at the Execution service's port.
+        async with talking(f"ws://127.0.0.1:{ports['Storage']}") as talker:
+            await talker.granted("SystemInfo")
+        async with connect(f"ws://127.0.0.1:{ports[SOCKET]}") as socket:
+            executing = Talker(socket)
+            await executing.event("PackageState")
+            assert await executing.granted("Version") == {"version": "1.2.0"}
+
+
+async def test_a_taken_port_is_named(tmp_path: Path) -> None:
+    blocker = await asyncio.start_server(lambda _reader, writer: writer.close(), "127.0.0.1", 0)
+    port = blocker.sockets[0].getsockname()[1]
+    async with blocker:
+        server = ServerProcess(tmp_path / "data", "--classic-ports", **ANY | {"ARCOR2_STORAGE_SERVICE_PORT": str(port)})
+        with pytest.raises(AssertionError, match=f"{port}.* is taken"):
+            await server.start()
+        await server.stop()
+
+
+# ------------------------------------------------------------------------------------------------ the websocket
+async def entered(socket: ClientConnection) -> Talker:
+    talker = Talker(socket)
+    state = await talker.event("PackageState")
+    assert state["data"] == {"state": "undefined"}
+    return talker
+
+
+async def collected(talker: Talker, until: dict[str, Any]) -> list[str]:
+    """Give the names of the events up to one with that data."""
+    names = []
+    async with asyncio.timeout(30):
+        while True:
+            message = talker.events.pop(0) if talker.events else await talker.receive()
+            names.append(message["event"])
+            if message.get("data", {}).items() >= until.items():
+                return names
+
+
+async def test_it_serves_packages_and_nothing_else(tmp_path: Path) -> None:
+    async with (
+        running(tmp_path / "data") as server,
+        httpx.AsyncClient(base_url=base(server)) as http,
+        connect(f"{server.url}/execution") as socket,
+        talking(server.url, "ann") as editor,
+    ):
+        execution = await entered(socket)
+        assert await execution.granted("Version") == {"version": "1.2.0"}
+        for name in ("SystemInfo", "RegisterUser", "ListScenes", "NewScene", "NoSuchThing"):
+            assert name in await execution.refused(name)
+        assert "Version" in await editor.refused("Version")
+        # What goes on in the editor is none of its business.
+        await editor.granted("NewScene", {"name": "scene"})
+        await editor.granted("CloseScene", {"force": True})
+        await prepare(http)
+        granted(await http.post("/packages/pkg_a", files=as_file(await published(http))))
+        assert await collected(execution, {"id": "pkg_a"}) == ["PackageChanged"]
+        (listed,) = await execution.granted("ListPackages")
+        assert listed["id"] == "pkg_a"
+
+        await execution.granted("RunPackage", {"id": "pkg_a", "start_paused": False})
+        order = await collected(execution, {"action_id": "act_1"})
+        assert order[:3] == ["PackageState", "PackageState", "PackageInfo"]
+        assert order[3] == "ActionStateBefore"
+        async with connect(f"{server.url}/execution") as second:
+            late = Talker(second)
+            assert (await late.event("PackageState"))["data"] == {"state": "running", "package_id": "pkg_a"}
+            assert (await late.event("PackageInfo"))["data"]["package_id"] == "pkg_a"
+        await execution.granted("PausePackage")
+        await collected(execution, {"state": "paused"})
+        await execution.granted("StepAction")
+        await collected(execution, {"state": "paused"})
+        await execution.granted("ResumePackage")
+        await collected(execution, {"state": "running"})
+        await execution.granted("StopPackage")
+        names = set(await collected(execution, {"state": "stopped"}))
+        await execution.granted("RenamePackage", {"package_id": "pkg_a", "new_name": "other"})
+        await execution.granted("DeletePackage", {"id": "pkg_a"})
+        assert await execution.granted("ListPackages") == []
+        names |= {event["event"] for event in execution.events} | set(order)
+        assert names <= EVENTS, "ShowMainScreen is for ARServer's clients"
+
+
+def test_it_is_what_the_protocol_says(spec: Path) -> None:
+    protocol = json.loads((spec / "protocol.json").read_text())
+    assert {*REQUESTS, "Version"} == set(protocol["execution_rpcs"])
+    assert set(protocol["execution_events"]) == EVENTS
+
+
+async def test_it_asks_for_a_token_too(tmp_path: Path) -> None:
+    _, secret = TokenFile(tmp_path / "data").add("line", Role.OPERATOR)
+    async with running(tmp_path / "data") as server:
+        async with connect(f"{server.url}/execution") as socket:
+            talker = Talker(socket)
+            assert "Authenticate" in await talker.refused("Version")
+            await talker.granted("Authenticate", {"token": secret})
+            await talker.event("PackageState")
+            assert await talker.granted("ListPackages") == []
+            refusal = await talker.refused("UploadPackage", {"id": "pkg_a", "data": ""})
+            assert "programmer" in refusal
+        async with connect(f"{server.url}/execution?token={secret}") as socket:
+            await entered(socket)
