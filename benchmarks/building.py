@@ -24,13 +24,16 @@ from arcor2_hw.data.project import (
     ProjectLogicIf,
 )
 from arcor2_hw.data.scene import Scene, SceneObject
-from arcor2_server.build.service import BuildService
+from arcor2_server.build.candidates import Candidates
+from arcor2_server.build.reading import from_script
+from arcor2_server.build.script import from_logic
+from arcor2_server.build.service import BuildService, Ingredients
 from arcor2_server.object_types import ObjectTypes
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import AssetStore, Storage
 from benchmarks.figures import Figure, Report, median
 
-SIZES: Final = (250, 500, 1000, 2000)
+SIZES: Final = (250, 500, 1000, 2000, 10_000)
 ROUNDS: Final = 9
 _SOURCE: Final = '''"""A machine that is only built for, never run."""
 
@@ -85,7 +88,7 @@ def project(size: int) -> Project:
 
 
 async def build(report: Report) -> None:
-    """Report the time of a build of 1,000 actions, with the times of other sizes beside it."""
+    """Report the times of builds, and of the way back from the script."""
     with tempfile.TemporaryDirectory() as directory:
         settings = ServerSettings(data_dir=Path(directory))
         storage = await Storage.open(settings)
@@ -100,6 +103,7 @@ async def build(report: Report) -> None:
             for size in SIZES:
                 await storage.put_project(project(size))
             await service.build(f"pro_{SIZES[0]}", "warm")
+            reading = [_read_back(await service.gather("pro_1000"), types) for _ in range(ROUNDS)]
             for _ in range(ROUNDS):
                 for size in SIZES:
                     begin = time.perf_counter()
@@ -110,6 +114,20 @@ async def build(report: Report) -> None:
     medians = {size: median(samples) for size, samples in times.items()}
     note = ", ".join(f"{size} actions {value:.0f} ms" for size, value in medians.items())
     report.add(Figure("build_1000_ms", medians[1000], ROUNDS, note))
+    report.add(Figure("build_10000_ms", medians[10_000], ROUNDS))
+    report.add(Figure("read_script_1000_ms", median(reading), ROUNDS))
+
+
+def _read_back(made_of: Ingredients, types: ObjectTypes) -> float:
+    """Give the time, ms, in which a script becomes the project that it was made from."""
+    facts = Candidates(types.files(), {}).facts(made_of.scene)
+    source = from_logic(made_of.scene, made_of.project, facts)
+    begin = time.perf_counter()
+    back = from_script(source, made_of.scene, made_of.project, facts)
+    elapsed = (time.perf_counter() - begin) * 1e3
+    if back != made_of.project:
+        raise RuntimeError("the script did not become the project again")
+    return elapsed
 
 
 if __name__ == "__main__":
