@@ -26,7 +26,7 @@ class OakDBench(Bench):
         self.do = self.fake.control.do
         self.do("scene", things=[BOARD])
         first = self.make()
-        first.connect(20.0)  # Open3D is loaded for the first that looks
+        first.connect(60.0)  # Open3D is loaded for the first that looks
         first.disconnect()
 
     def end(self) -> None:
