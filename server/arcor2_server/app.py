@@ -27,7 +27,10 @@ from arcor2_server.rest.answers import ROLE, http_refusal
 from arcor2_server.rpc import (  # noqa: F401
     action_points,
     actions,
+    aiming,
     build,
+    calibration,
+    cameras,
     copying,
     execution,
     general,
@@ -39,10 +42,12 @@ from arcor2_server.rpc import (  # noqa: F401
     object_types,
     orientations,
     parameters,
+    perpendicular,
     project,
     robot,
     scene,
     scene_objects,
+    temporary,
 )
 from arcor2_server.services import Services
 from arcor2_server.session import Session

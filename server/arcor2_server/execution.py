@@ -50,6 +50,8 @@ class Execution:
         self.state = S.UNDEFINED
         self.package_id = ""
         self.stop_within = STOP_WITHIN
+        self.reserved = False
+        """Whether a project is closed only for the time of its program."""
         self.last_error: m.ErrorData | None = None
         """What ended the last program, None when it ended as meant or was stopped."""
         self._services = services
@@ -57,6 +59,7 @@ class Execution:
         self._info: bytes | None = None
         self._before: bytes | None = None
         self._board = DeviceBoard(lambda data: services.hub.broadcast(make_event("ObjectState", data)))
+        self._over: asyncio.Future[None] | None = None
         self._killing: asyncio.TimerHandle | None = None
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -68,8 +71,8 @@ class Execution:
 
     @property
     def busy(self) -> bool:
-        """Tell whether a program holds devices: from its start until it has stopped."""
-        return self.state not in _IDLE
+        """Tell whether nothing else may be opened or run: from a program's start until what follows it is over."""
+        return self.reserved or self.state not in _IDLE
 
     def devices(self) -> list[DeviceStatus]:
         """Give what the devices of the running program say of themselves."""
@@ -134,12 +137,25 @@ class Execution:
         asyncio.get_running_loop().call_soon(self._services.hub.broadcast, event)
 
     def _require_not_used(self, package_id: str) -> None:
-        if self.busy and package_id == self.package_id:
+        if self.state not in _IDLE and package_id == self.package_id:
             raise RequestRefused("This package is running: stop it first.")
 
     # -------------------------------------------------------------------------------- commands
     async def run(self, package_id: str, start_paused: bool = False, breakpoints: Iterable[str] = ()) -> None:
         """Begin to run a package: `started` is told at once, the rest as it happens."""
+        self._require_not_reserved()
+        await self._run(package_id, start_paused, breakpoints)
+
+    async def run_through(self, package_id: str, start_paused: bool, breakpoints: Iterable[str]) -> None:
+        """Run a package and wait for its end, after which clients are not sent to the list of packages."""
+        over = self._over = asyncio.get_running_loop().create_future()
+        try:
+            await self._run(package_id, start_paused, breakpoints)
+            await over
+        finally:
+            self._over = None
+
+    async def _run(self, package_id: str, start_paused: bool, breakpoints: Iterable[str]) -> None:
         self._require_idle()
         directory = await asyncio.to_thread(self.packages.directory, package_id)
         self._require_idle()
@@ -160,8 +176,12 @@ class Execution:
         self._spawn(self._begin(message), "program start")
         self._spawn(self._note_run(package_id), "note of the run")
 
+    def _require_not_reserved(self) -> None:
+        if self.reserved:
+            raise RequestRefused("A project is being run: wait until it is open again, or stop it.")
+
     def _require_idle(self) -> None:
-        if self.busy:
+        if self.state not in _IDLE:
             raise RequestRefused(f"A package is {self.state.value}: stop it first.")
         if self._services.cell.state.value != "stopped":
             raise RequestRefused("The scene is online: stop it first, its devices are in use.")
@@ -297,8 +317,11 @@ class Execution:
             self._killing.cancel()
             self._killing = None
         self._enter(S.STOPPED)
-        screen = ShowMainScreenData(MainScreen.PACKAGES_LIST, self.package_id)
-        self._services.hub.broadcast(make_event("ShowMainScreen", screen))
+        if self._over is None:
+            screen = ShowMainScreenData(MainScreen.PACKAGES_LIST, self.package_id)
+            self._services.hub.broadcast(make_event("ShowMainScreen", screen))
+        elif not self._over.done():
+            self._over.set_result(None)
         self._services.cell.hosts.prepare()
 
     def _spawn(self, work: Coroutine[Any, Any, None], name: str) -> None:

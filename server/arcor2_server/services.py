@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from arcor2_server.aiming import Aiming
+from arcor2_server.calibration import Calibration, NoCalibration, RunningCalibrations
 from arcor2_server.collisions import CollisionWorld
 from arcor2_server.kept import KeptAnswers
 from arcor2_server.type_news import TypeNews
@@ -30,6 +32,7 @@ class Services:
     storage: saved documents. assets: meshes and the like. types: what is known of object types.
     session: the open scene or project.
     cell: the scene when online. execution: packages and the running program. build: project to package.
+    calibration: poses from pictures. calibrations: what is being calibrated. aiming: who points a robot at an object.
     collisions: what is in the way. type_news: object types that clients have to be told of. kept: encoded answers.
     """
 
@@ -45,6 +48,9 @@ class Services:
     cell: "OnlineCell"
     execution: "Execution"
     build: "BuildService"
+    calibration: Calibration = field(default_factory=NoCalibration)
+    calibrations: RunningCalibrations = field(default_factory=RunningCalibrations)
+    aiming: Aiming = field(default_factory=Aiming)
     collisions: CollisionWorld = field(default_factory=CollisionWorld)
     type_news: TypeNews = field(default_factory=TypeNews)
     kept: KeptAnswers = field(default_factory=KeptAnswers)

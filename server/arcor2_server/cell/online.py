@@ -87,6 +87,12 @@ class OnlineCell:
         """Give the connections of the scene's objects; none while it is offline."""
         return self._board.states() if self.state is not SceneStateEnum.STOPPED else []
 
+    async def settled(self) -> SceneStateEnum:
+        """Wait until the scene neither comes up nor goes down; gives its state then."""
+        while self._task is not None:
+            await asyncio.wait([self._task])
+        return self.state
+
     def _tell(self, state: SceneStateEnum, message: str = "") -> None:
         self.state = state
         log.info("scene", state=state.value, reason=message)

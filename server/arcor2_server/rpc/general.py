@@ -76,7 +76,11 @@ async def authenticate(context: Context, args: AuthenticateArgs) -> Authenticate
 @rpc("RegisterUser")
 async def register_user(context: Context, args: RegisterUserArgs) -> None:
     """Log in at this connection."""
-    context.events_to_caller += await context.services.users.register(context.client, args.user_name)
+    services, name = context.services, args.user_name
+    context.events_to_caller += await services.users.register(context.client, name)
+    aim = services.aiming.of(name, services.session.document)
+    if aim is not None and not services.locks.holds(name, aim.object_id):
+        services.aiming.end(name)
 
 
 @rpc("SubscribeEvents")

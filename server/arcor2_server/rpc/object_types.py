@@ -2,13 +2,15 @@
 
 import ast
 
+import msgspec
 from msgspec import UNSET, Raw
 
 from arcor2_hw.data.base import Unset, is_valid_name
 from arcor2_hw.data.events import ChangeType, Event
 from arcor2_hw.data.object_type import Mesh, Models, ObjectTypeMeta, ObjectTypeSource
-from arcor2_hw.data.rpc import DeleteObjectTypesData, IdArgs, TypeArgs
-from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.data.parameter import IdValue
+from arcor2_hw.data.rpc import ActionParamValuesArgs, DeleteObjectTypesData, IdArgs, TypeArgs
+from arcor2_hw.exceptions import Arcor2Error, InvalidData
 from arcor2_hw.runtime.messages import TypeCode
 from arcor2_server.hub import encode
 from arcor2_server.locks import ADDING_OBJECT
@@ -181,3 +183,46 @@ async def _check_unused(context: Context, name: str) -> None:
         raise RequestRefused(f"The object type {name} is used in the open scene {opened.name}.")
     if scenes := await _scenes_with(context, name):
         raise RequestRefused(f"The object type {name} is used in the scenes {', '.join(sorted(scenes))}.")
+
+
+# ------------------------------------------------------------------------------------------------ dynamic values
+@rpc("ActionParamValues")
+async def action_param_values(context: Context, args: ActionParamValuesArgs) -> list[str]:
+    """Give the values that a parameter may take now, as the live object knows them."""
+    services = context.services
+    services.session.require_scene_open()
+    async with services.locks.read(context.user, args.id):
+        services.cell.require_online()
+        obj = services.session.scene_object(args.id)
+        dynamic: dict[str, tuple[str, set[str]]] = await services.cell.ask(
+            dict[str, tuple[str, set[str]]], obj.id, "DYNAMIC_PARAMS"
+        )
+        if args.param_id not in dynamic:
+            raise RequestRefused(f"{obj.name} offers no values for a parameter {args.param_id}.")
+        method, parents = dynamic[args.param_id]
+        given = [parent.id for parent in args.parent_params]
+        if sorted(given) != sorted(parents):
+            needed = ", ".join(sorted(parents)) or "no other one"
+            raise RequestRefused(f"The values of {args.param_id} depend on {needed}: give exactly that.")
+        kinds = {
+            parameter.name: parameter.type
+            for action in services.types.actions(obj.type)
+            if any(each.name == args.param_id and each.dynamic_value for each in action.parameters)
+            for parameter in action.parameters
+        }
+        arguments = {parent.id: _parent_value(parent, kinds.get(parent.id, "string")) for parent in args.parent_params}
+        values: list[str] = await services.cell.ask(list[str], obj.id, method, arguments)
+        return list(dict.fromkeys(values))
+
+
+def _parent_value(parent: IdValue, kind: str) -> Raw:
+    """Give the value of a parent parameter as JSON: as it stands, or as text that existing clients send bare."""
+    try:
+        value = msgspec.json.decode(parent.value)
+    except msgspec.DecodeError as error:
+        if kind not in ("string", "string_enum"):
+            raise InvalidData(f"The parameter {parent.id}: {parent.value[:80]} is no {kind}.") from error
+        value = parent.value
+    if kind in ("string", "string_enum") and not isinstance(value, str):
+        value = parent.value
+    return Raw(msgspec.json.encode(value))

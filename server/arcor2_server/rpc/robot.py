@@ -30,6 +30,7 @@ from arcor2_hw.data.rpc import (
     MoveToJointsArgs,
     MoveToPoseArgs,
     RegisterForRobotEventArgs,
+    SetEefPerpendicularToWorldArgs,
     StepAxis,
     StepMode,
     StepRobotEefArgs,
@@ -60,7 +61,8 @@ async def _reading(context: Context, robot_id: str) -> AsyncIterator[OnlineCell]
         yield services.cell
 
 
-def _require_online(context: Context, robot_id: str) -> OnlineCell:
+def require_robot_online(context: Context, robot_id: str) -> OnlineCell:
+    """Give the cell when it is online and the object is a robot; else RequestRefused, NotFound."""
     services = context.services
     services.session.require_scene_open()
     services.cell.require_online()
@@ -130,10 +132,11 @@ async def register_for_robot_event(context: Context, args: RegisterForRobotEvent
 async def inverse_kinematics(context: Context, args: InverseKinematicsArgs) -> list[Joint]:
     """Give joints that reach a pose."""
     async with _reading(context, args.robot_id):
-        return await _inverse(context, args)
+        return await solve_inverse(context, args)
 
 
-async def _inverse(context: Context, args: InverseKinematicsArgs) -> list[Joint]:
+async def solve_inverse(context: Context, args: InverseKinematicsArgs) -> list[Joint]:
+    """Give joints that reach a pose; RequestRefused when the robot cannot compute that, CellError when none do."""
     cell = context.services.cell
     arguments: dict[str, Any] = cell.arm(args.robot_id, optional(args.arm_id))
     require_feature(context.services, args.robot_id, "inverse_kinematics")
@@ -160,11 +163,12 @@ async def forward_kinematics(context: Context, args: ForwardKinematicsArgs) -> P
 
 
 # ------------------------------------------------------------------------------------------------ motion
-def _begin(
+def begin_motion(
     context: Context, robot_id: str, method: str, arguments: Mapping[str, Any], event: str, told: Told, lock: str = ""
 ) -> None:
     """Answer, tell the start, and move; `lock` is the user whose lock on the robot ends with the motion."""
     services = context.services
+    require_not_moving(services, robot_id)  # another request may have been quicker
     services.cell.moving.add(robot_id)
     context.emit(event, told(MoveEventType.START, UNSET))
 
@@ -186,14 +190,17 @@ async def _locked_for_motion(context: Context, robot_id: str) -> AsyncIterator[N
     user = context.user
     await services.locks.acquire(user, robot_id)
     try:
-        _require_online(context, robot_id)
+        require_robot_online(context, robot_id)
         yield
     except BaseException:
         services.locks.release(user, robot_id)
         raise
 
 
-def _pose_motion(args: MoveToPoseArgs | StepRobotEefArgs, target: Pose) -> tuple[dict[str, Any], Told]:
+def pose_motion(
+    args: MoveToPoseArgs | StepRobotEefArgs | SetEefPerpendicularToWorldArgs, target: Pose
+) -> tuple[dict[str, Any], Told]:
+    """Give the arguments of a move to a pose without the arm, and what makes its events."""
     arguments = {
         "end_effector_id": args.end_effector_id,
         "target_pose": target,
@@ -224,9 +231,9 @@ async def move_to_pose(context: Context, args: MoveToPoseArgs) -> None:
             present.position if isinstance(args.position, Unset) else args.position,
             present.orientation if isinstance(args.orientation, Unset) else args.orientation,
         )
-        arguments, told = _pose_motion(args, target)
+        arguments, told = pose_motion(args, target)
         arguments |= services.cell.arm(args.robot_id, arm_id)
-        _begin(context, args.robot_id, "move_to_pose", arguments, "RobotMoveToPose", told, context.user)
+        begin_motion(context, args.robot_id, "move_to_pose", arguments, "RobotMoveToPose", told, context.user)
 
 
 @rpc("MoveToJoints")
@@ -242,7 +249,7 @@ async def move_to_joints(context: Context, args: MoveToJointsArgs) -> None:
         def told(phase: MoveEventType, message: str | Unset) -> RobotMoveToJointsData:
             return RobotMoveToJointsData(phase, args.robot_id, args.joints, args.safe, message, args.arm_id)
 
-        _begin(context, args.robot_id, "move_to_joints", arguments, "RobotMoveToJoints", told, context.user)
+        begin_motion(context, args.robot_id, "move_to_joints", arguments, "RobotMoveToJoints", told, context.user)
 
 
 @rpc("MoveToActionPoint")
@@ -251,7 +258,7 @@ async def move_to_action_point(context: Context, args: MoveToActionPointArgs) ->
     services = context.services
     services.session.require_project_open()
     async with services.locks.auto(context.user, args.robot_id):
-        _require_online(context, args.robot_id)
+        require_robot_online(context, args.robot_id)
         require_speed(args.speed)
         if isinstance(args.orientation_id, Unset) == isinstance(args.joints_id, Unset):
             raise RequestRefused("Give either an orientation or joints.")
@@ -273,7 +280,7 @@ async def _to_joints(context: Context, args: MoveToActionPointArgs, joints_id: s
     def told(phase: MoveEventType, message: str | Unset) -> RobotMoveToActionPointJointsData:
         return RobotMoveToActionPointJointsData(phase, args.robot_id, joints_id, args.safe, message, args.arm_id)
 
-    _begin(context, args.robot_id, "move_to_joints", arguments, "RobotMoveToActionPointJoints", told)
+    begin_motion(context, args.robot_id, "move_to_joints", arguments, "RobotMoveToActionPointJoints", told)
 
 
 async def _to_orientation(context: Context, args: MoveToActionPointArgs, orientation_id: str) -> None:
@@ -296,14 +303,14 @@ async def _to_orientation(context: Context, args: MoveToActionPointArgs, orienta
             phase, args.robot_id, end_effector, orientation_id, args.safe, args.linear, message, args.arm_id
         )
 
-    _begin(context, args.robot_id, "move_to_pose", arguments, "RobotMoveToActionPointOrientation", told)
+    begin_motion(context, args.robot_id, "move_to_pose", arguments, "RobotMoveToActionPointOrientation", told)
 
 
 @rpc("StepRobotEef")
 async def step_robot_eef(context: Context, args: StepRobotEefArgs) -> None:
     """Move an end effector by a step along, or about, an axis."""
     services, arm_id = context.services, optional(args.arm_id)
-    cell = _require_online(context, args.robot_id)
+    cell = require_robot_online(context, args.robot_id)
     services.locks.require_held(context.user, args.robot_id)
     require_speed(args.speed)
     await require_ready(services, args.robot_id, "move_to_pose", arm_id)
@@ -314,12 +321,12 @@ async def step_robot_eef(context: Context, args: StepRobotEefArgs) -> None:
         question = InverseKinematicsArgs(
             args.robot_id, args.end_effector_id, target, avoid_collisions=args.safe, arm_id=args.arm_id
         )
-        await _inverse(context, question)
+        await solve_inverse(context, question)
     if context.dry_run:
         return
-    arguments, told = _pose_motion(args, target)
+    arguments, told = pose_motion(args, target)
     arguments |= cell.arm(args.robot_id, arm_id)
-    _begin(context, args.robot_id, "move_to_pose", arguments, "RobotMoveToPose", told)
+    begin_motion(context, args.robot_id, "move_to_pose", arguments, "RobotMoveToPose", told)
 
 
 def _base(cell: OnlineCell, args: StepRobotEefArgs) -> Orientation:
@@ -349,7 +356,7 @@ def _stepped(args: StepRobotEefArgs, present: Pose, frame: Orientation) -> Pose:
 async def stop_robot(context: Context, args: StopRobotArgs) -> None:
     """Stop a robot that moves, past whatever it does."""
     services = context.services
-    cell = _require_online(context, args.robot_id)
+    cell = require_robot_online(context, args.robot_id)
     require_feature(services, args.robot_id, "stop")
     acting = cell.running_action is not None and cell.running_action.object_id == args.robot_id
     if args.robot_id not in cell.moving and not acting:
@@ -361,7 +368,7 @@ async def stop_robot(context: Context, args: StopRobotArgs) -> None:
 async def hand_teaching_mode(context: Context, args: HandTeachingModeArgs) -> None:
     """Make a robot movable by hand, or stiff again."""
     services = context.services
-    cell = _require_online(context, args.robot_id)
+    cell = require_robot_online(context, args.robot_id)
     services.locks.require_held(context.user, args.robot_id)
     arm = cell.arm(args.robot_id, optional(args.arm_id))
     require_feature(services, args.robot_id, "hand_teaching")

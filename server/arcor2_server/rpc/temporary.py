@@ -1,0 +1,154 @@
+"""The request that runs the open project as a package of its own, and opens it again afterwards (protocol, 12.6)."""
+
+import asyncio
+import contextlib
+from collections.abc import Collection
+
+import structlog
+
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.events import ChangeType, Event, MainScreen, OpenProjectData, SceneStateEnum, ShowMainScreenData
+from arcor2_hw.data.project import Project
+from arcor2_hw.data.rpc import TemporaryPackageArgs
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.rpc.registry import Context, RequestRefused, make_event, rpc
+from arcor2_server.services import Services
+from arcor2_server.session.checks import project_problems
+
+log = structlog.get_logger(__name__)
+
+
+@rpc("TemporaryPackage")
+async def temporary_package(context: Context, args: TemporaryPackageArgs) -> None:
+    """Run the open project, which is closed meanwhile; answered once the package is built."""
+    built: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+    breakpoints = () if isinstance(args.breakpoints, Unset) else args.breakpoints
+    services = context.services
+    services.cell.spawn(_Run(services, args.start_paused, breakpoints).whole(built), "temporary package")
+    await built
+
+
+def _settle(built: "asyncio.Future[None]", error: Exception | None = None) -> None:
+    """Let the request be answered, unless nobody waits any more."""
+    if built.done():
+        return
+    if error is None:
+        built.set_result(None)
+    else:
+        built.set_exception(error)
+
+
+class _Run:
+    """One run, from the check whether it is allowed to the project being open again."""
+
+    def __init__(self, services: Services, start_paused: bool, breakpoints: Collection[str]) -> None:
+        self._services = services
+        self._start_paused = start_paused
+        self._breakpoints = breakpoints
+        self._package = ""
+        self._online = False
+
+    async def whole(self, built: "asyncio.Future[None]") -> None:
+        """Do it all; `built` gets the moment in which the request can be answered, or why it is refused.
+
+        One task from the checks to the closed project, so that it keeps everybody else out without a gap.
+        """
+        try:
+            async with self._services.locks.exclusive():
+                project = await self._build()
+                self._services.execution.reserved = True
+                _settle(built)
+                await asyncio.sleep(0)  # the answer goes out first
+                await self._close()
+        except Exception as error:
+            self._services.execution.reserved = False
+            if not built.done():
+                _settle(built, error)
+                return
+            log.exception("project not run")
+            await self._discard_package()
+            return
+        except BaseException:
+            built.cancel()
+            await self._discard_package()
+            raise
+        try:
+            await self._run()
+            await self._delete()
+            await self._open_again(project)
+        except BaseException:  # the server ends
+            await self._discard_package()
+            raise
+        finally:
+            self._services.execution.reserved = False
+        if self._online and self._services.session.project is not None:
+            try:
+                await self._services.cell.begin_start()
+            except Arcor2Error as error:
+                log.warning("scene not started again", reason=str(error))
+
+    async def _discard_package(self) -> None:
+        """Delete the package without a word: nobody was told of it, or nobody is there any more."""
+        if self._package:
+            with contextlib.suppress(Arcor2Error):
+                await asyncio.to_thread(self._services.execution.packages.delete, self._package)
+
+    def _tell(self, event: Event) -> None:
+        self._services.hub.broadcast(event)
+
+    async def _build(self) -> Project:
+        services = self._services
+        project = services.session.require_project()
+        if services.session.has_changes:
+            raise RequestRefused(f"{project.name} has changes that are not saved: save it first.")
+        if services.execution.busy:
+            raise RequestRefused("A program is running: stop it first.")
+        if services.cell.running_action is not None:
+            raise RequestRefused("An action is running: wait for it, or cancel it.")
+        if services.cell.state not in (SceneStateEnum.STOPPED, SceneStateEnum.STARTED):
+            raise RequestRefused(f"The scene is {services.cell.state.value}: wait until that is over.")
+        name = f"Temporary package for project '{project.name}'."
+        self._package = await services.build.build(project.id, name)
+        return project
+
+    async def _close(self) -> None:
+        services = self._services
+        self._online = services.cell.online
+        if self._online:
+            await services.cell.begin_stop()
+            await services.cell.settled()
+        ids = [item.id for item in services.session.document.items()]
+        await services.session.discard()
+        services.locks.drop(ids)
+        self._tell(make_event("ProjectClosed"))
+        summary = await asyncio.to_thread(services.execution.packages.summary, self._package)
+        self._tell(make_event("PackageChanged", summary, ChangeType.ADD))
+
+    async def _run(self) -> None:
+        try:
+            await self._services.execution.run_through(self._package, self._start_paused, self._breakpoints)
+        except Arcor2Error as error:
+            log.warning("temporary package not run", package=self._package, reason=str(error))
+
+    async def _delete(self) -> None:
+        try:
+            summary = await self._services.execution.delete(self._package)
+        except Arcor2Error as error:
+            log.warning("temporary package not deleted", package=self._package, reason=str(error))
+        else:
+            self._tell(make_event("PackageChanged", summary, ChangeType.REMOVE))
+
+    async def _open_again(self, project: Project) -> None:
+        """Open the project as it is saved now; without it, clients get the list of projects."""
+        services, session = self._services, self._services.session
+        try:
+            project = await services.storage.project(project.id)
+            scene = await services.storage.scene(project.scene_id)
+            if problems := project_problems(scene, project, services.types):
+                raise RequestRefused(" ".join(problems))
+            await session.show(scene, project)
+        except Arcor2Error as error:
+            log.warning("project not opened again", project=project.name, reason=str(error))
+            self._tell(make_event("ShowMainScreen", ShowMainScreenData(MainScreen.PROJECTS_LIST, project.id)))
+            return
+        self._tell(make_event("OpenProject", OpenProjectData(scene, project)))

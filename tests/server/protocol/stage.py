@@ -1,0 +1,154 @@
+"""A whole server in this process, without its socket: real storage, analysis, cell hosts, packages."""
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+from typing import Any
+
+from arcor2_hw.data.base import UNSET
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.object_type import Mesh, ObjectModel, ObjectTypeSource
+from arcor2_server.app import running_services
+from arcor2_server.endpoint import Endpoint
+from arcor2_server.services import Services
+from arcor2_server.settings import ServerSettings
+from tests.server.protocol import devices
+from tests.server.session.desk import Person, Refused
+
+PATIENCE = 20.0
+"""Seconds; the machine may be busy."""
+
+ORIGIN = {"position": {"x": 0, "y": 0, "z": 0}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}
+FOCUS_POINTS = [Pose(Position(*point)) for point in ((0, 0, 0), (0.2, 0, 0), (0, 0.1, 0), (0.2, 0.1, 0.05))]
+
+TYPES = {
+    "Arm": devices.ARM,
+    "DumbArm": devices.DUMB_ARM,
+    "TwoArms": devices.TWO_ARMS,
+    "Eye": devices.EYE,
+    "BlindEye": devices.BLIND_EYE,
+    "Part": devices.PART,
+    "Plain": devices.PART.replace("class Part", "class Plain"),
+    "Thin": devices.PART.replace("class Part", "class Thin"),
+    "Chooser": devices.CHOOSER,
+}
+MODELS = {
+    "Part": Mesh("Part", "part.stl", FOCUS_POINTS),
+    "Thin": Mesh("Thin", "part.stl", [Pose(Position(step / 10)) for step in range(4)]),
+}
+
+
+class Actor(Person):
+    """A client whose messages can be looked at before they are taken."""
+
+    @property
+    def waiting(self) -> list[dict[str, Any]]:
+        return self._messages
+
+
+class Stage:
+    """What a test speaks to."""
+
+    def __init__(self, services: Services) -> None:
+        self.services = services
+        self.endpoint = Endpoint(services)
+        self.ids: dict[str, str] = {}
+        self._people: list[Actor] = []
+
+    async def newcomer(self) -> Actor:
+        """Let somebody connect; what he is greeted with is not taken."""
+        person = Actor(self)  # type: ignore[arg-type]
+        self._people.append(person)
+        return person
+
+    async def person(self, name: str = "") -> Actor:
+        person = await self.newcomer()
+        if name:
+            await person.ask("RegisterUser", user_name=name)
+        else:
+            await person.ask("SystemInfo")  # the greeting has come then
+        person.take()
+        return person
+
+    async def close(self) -> None:
+        await asyncio.gather(*(person.leave() for person in self._people))
+        await self.endpoint.close()
+
+    async def place(self, person: Actor, **objects: str) -> None:
+        """Make a scene of objects by name and type; their ids are kept in `ids`."""
+        await person.ask("NewScene", name="scene")
+        for name, kind in objects.items():
+            pose: dict[str, Any] = {} if kind in ("Chooser", "TimeActions", "RandomActions") else {"pose": ORIGIN}
+            await person.ask("AddObjectToScene", name=name, type=kind, **pose)
+        scene = self.services.session.require_scene()
+        self.ids |= {obj.name: obj.id for obj in scene.objects}
+        person.take()
+
+    async def start(self, person: Actor) -> None:
+        await person.ask("StartScene")
+        await happens(person, "SceneState", state="started")
+        person.take()
+
+    async def stop(self, person: Actor) -> None:
+        await person.ask("StopScene")
+        await happens(person, "SceneState", state="stopped")
+        person.take()
+
+
+async def until(condition: Callable[[], bool]) -> None:
+    """Poll with a deadline."""
+    async with asyncio.timeout(PATIENCE):
+        while not condition():
+            await asyncio.sleep(0.005)
+
+
+async def happens(person: Actor, event: str, **data: Any) -> dict[str, Any]:
+    """Wait for an event with such data among what was not taken yet; gives its data."""
+    found: list[dict[str, Any]] = []
+
+    def there() -> bool:
+        found[:] = [
+            message["data"]
+            for message in person.waiting
+            if message.get("event") == event and all(message["data"].get(key) == value for key, value in data.items())
+        ]
+        return bool(found)
+
+    await until(there)
+    return found[0]
+
+
+async def refused(person: Actor, request: str, /, **args: Any) -> str:
+    """Send a request that must be refused; gives why. Nobody may be told anything."""
+    person.take()
+    try:
+        await person.ask(request, **args)
+    except Refused as error:
+        assert person.events() == [], request
+        return str(error)
+    raise AssertionError(f"{request} was granted")
+
+
+async def _nothing_much() -> AsyncIterator[bytes]:
+    """Give the content of an asset that nobody reads here."""
+    yield b"content"
+
+
+@contextlib.asynccontextmanager
+async def open_stage(directory: Path, *types: str, **settings: Any) -> AsyncIterator[Stage]:
+    """Bring up a server with the named types uploaded."""
+    given: dict[str, Any] = {"lock_retries": 2, "lock_retry_wait": 0.02, "streaming_period": 0.05} | settings
+    async with running_services(ServerSettings(data_dir=directory, **given)) as services:
+        for asset in ("part.stl", "arm.zip") if types else ():
+            await services.assets.put(_nothing_much(), asset)
+        for name in types:
+            model = MODELS.get(name)
+            wrapped = UNSET if model is None else ObjectModel.of(model)
+            meta = await services.types.add(ObjectTypeSource(name, TYPES[name].lstrip(), model=wrapped))
+            assert not meta.disabled, meta.problem
+        stage = Stage(services)
+        try:
+            yield stage
+        finally:
+            await stage.close()

@@ -1,0 +1,228 @@
+"""Requests to cameras, and those that find out where cameras and robots stand."""
+
+import asyncio
+import io
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PIL import Image
+
+from arcor2_hw.data.camera import CameraParameters, Corner, EstimatedPose, MarkerCorners
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.exceptions import Arcor2Error, NotFound
+from arcor2_server.calibration import RobotView
+from tests.server.protocol.stage import Actor, Stage, happens, open_stage, refused
+
+PARAMETERS = {"fx": 600, "fy": 610, "cx": 320, "cy": 240, "dist_coefs": [0, 0, 0, 0]}
+FOUND = Pose(Position(1, 2, 3), Orientation(0, 0, 1, 0))
+
+
+class Service:
+    """A calibration service that answers what it is told to, and keeps what it was asked."""
+
+    def __init__(self) -> None:
+        self.asked: list[Any] = []
+        self.refusal: Arcor2Error | None = None
+        self.go = asyncio.Event()
+        self.go.set()
+
+    async def _take(self, *asked: Any) -> None:
+        self.asked.append(asked)
+        await self.go.wait()
+        if self.refusal is not None:
+            raise self.refusal
+
+    async def camera_pose(self, parameters: CameraParameters, image: bytes, *, inverse: bool = False) -> EstimatedPose:
+        await self._take(parameters, image, inverse)
+        return EstimatedPose(FOUND, 0.75)
+
+    async def marker_corners(self, parameters: CameraParameters, image: bytes) -> list[MarkerCorners]:
+        await self._take(parameters, image)
+        return [MarkerCorners(10, [Corner(1, 2), Corner(3, 2), Corner(3, 4), Corner(1, 4)])]
+
+    async def robot_pose(self, view: RobotView, depth: bytes) -> Pose:
+        await self._take(view, depth)
+        return FOUND
+
+
+async def ready(stage: Stage, **objects: str) -> tuple[Actor, Service]:
+    alice = await stage.person("alice")
+    await stage.place(alice, **objects)
+    await stage.start(alice)
+    service = stage.services.calibration = Service()
+    return alice, service
+
+
+def process(actor: Actor, name: str) -> list[tuple[str, bool]]:
+    """Give the states of a process that were told, and whether each had a message."""
+    told = [message["data"] for message in actor.waiting if message.get("event") == "ProcessState"]
+    assert {data["id"] for data in told} <= {name}
+    return [(data["state"], "message" in data) for data in told]
+
+
+async def test_a_camera_gives_its_picture_and_parameters(tmp_path: Path) -> None:
+    async with open_stage(tmp_path, "Eye", "BlindEye", "Part") as stage:
+        alice, bob = await stage.person("alice"), await stage.person("bob")
+        stranger = await stage.person()
+        for name in ("CameraColorImage", "CameraColorParameters"):
+            assert "No scene is open" in await refused(stranger, name, id="x")
+        await stage.place(alice, eye="Eye", blind="BlindEye", part="Part")
+        eye, blind, part = (stage.ids[name] for name in ("eye", "blind", "part"))
+        await alice.lock(eye)
+        for name in ("CameraColorImage", "CameraColorParameters"):
+            assert "not logged in" in await refused(stranger, name, id=eye)
+            assert "lock" in await refused(bob, name, id=eye)
+            assert "offline" in await refused(alice, name, id=eye)
+        await alice.ask("WriteUnlock", object_id=eye)
+        await stage.start(alice)
+        for item in (eye, blind, part):
+            await alice.lock(item)
+
+        picture = Image.open(io.BytesIO((await alice.ask("CameraColorImage", id=eye)).encode("latin-1")))
+        assert (picture.format, picture.size) == ("JPEG", (64, 48))
+        red = picture.getpixel((30, 20))
+        assert isinstance(red, tuple)
+        assert red[0] > 240 > 20 > max(red[1:])
+        assert await alice.ask("CameraColorParameters", id=eye) == PARAMETERS
+
+        for name in ("CameraColorImage", "CameraColorParameters"):
+            assert "part is not a camera" in await refused(alice, name, id=part)
+            assert "lock" in await refused(bob, name, id=eye)
+        assert "does not know its parameters" in await refused(alice, "CameraColorParameters", id=blind)
+
+
+@pytest.mark.parametrize("request_name", ["GetCameraPose", "MarkersCorners"])
+async def test_pictures_of_clients_go_to_the_calibration_service(tmp_path: Path, request_name: str) -> None:
+    async with open_stage(tmp_path) as stage:
+        stranger = await stage.person()
+        args: dict[str, Any] = {"camera_parameters": PARAMETERS, "image": "\xff\xd8\x00picture"}
+        assert "No calibration service" in await refused(stranger, request_name, **args)
+        service = stage.services.calibration = Service()
+        if request_name == "GetCameraPose":
+            answer = await stranger.ask(request_name, **args, inverse=True)
+            assert answer["quality"] == 0.75
+            assert answer["pose"]["position"] == {"x": 1, "y": 2, "z": 3}
+            assert service.asked[0][2] is True
+        else:
+            (seen,) = await stranger.ask(request_name, **args)
+            assert seen["marker_id"] == 10
+            assert seen["corners"][2] == {"x": 3, "y": 4}
+        parameters, image = service.asked[0][:2]
+        assert parameters.fy == 610
+        assert image == b"\xff\xd8\x00picture"
+        # What the original never answered: a picture that is none.
+        assert "no picture" in await refused(stranger, request_name, **args | {"image": "€"})
+        assert "empty" in await refused(stranger, request_name, **args | {"image": ""})
+        assert len(service.asked) == 1
+        service.refusal = NotFound("No marker is seen.")
+        assert await refused(stranger, request_name, **args) == "No marker is seen."
+
+
+async def test_a_camera_is_put_where_its_picture_says(tmp_path: Path) -> None:
+    async with open_stage(tmp_path, "Eye", "BlindEye", "Part") as stage:
+        alice, service = await ready(stage, eye="Eye", blind="BlindEye", part="Part")
+        bob, stranger = await stage.person("bob"), await stage.person()
+        eye = stage.ids["eye"]
+        assert "does not know its parameters" in await refused(alice, "CalibrateCamera", id=stage.ids["blind"])
+        assert "not a camera" in await refused(alice, "CalibrateCamera", id=stage.ids["part"])
+        assert "not logged in" in await refused(stranger, "CalibrateCamera", id=eye)
+        assert "lock" in await refused(alice, "CalibrateCamera", id=eye)
+        await alice.lock(eye)
+        bob.take()
+
+        service.go.clear()
+        await alice.ask("CalibrateCamera", id=eye)
+        assert [message.get("event") or message["response"] for message in alice.take()] == [
+            "CalibrateCamera",
+            "ProcessState",
+        ]
+        assert "calibrated already" in await refused(alice, "CalibrateCamera", id=eye)
+        service.go.set()
+        await happens(bob, "ProcessState", state="finished")
+        assert process(bob, "CameraCalibration") == [("started", False), ("finished", False)]
+        assert bob.names() == ["ProcessState", "SceneObjectChanged/update", "ProcessState"]
+        parameters, image, inverse = service.asked[0]
+        assert parameters.cx == 320
+        assert image.startswith(b"\xff\xd8")
+        assert not inverse
+        placed = stage.services.session.scene_object(eye)
+        assert placed.pose == FOUND
+        raw = await stage.services.cell.ask(Pose, eye, "pose")
+        assert raw == FOUND, "the live camera has moved too"
+
+        service.refusal = NotFound("No marker is seen.")
+        await alice.ask("CalibrateCamera", id=eye)
+        failed = await happens(bob, "ProcessState", state="failed")
+        assert failed["message"] == "No marker is seen."
+        assert bob.names() == ["ProcessState", "ProcessState"]
+        await alice.ask("WriteUnlock", object_id=eye)
+        await stage.stop(alice)
+        assert "offline" in await refused(alice, "CalibrateCamera", id=eye)
+        await alice.ask("CloseScene", force=True)
+        assert "No scene is open" in await refused(alice, "CalibrateCamera", id=eye)
+
+
+async def test_without_a_service_a_calibration_fails_as_when_it_is_down(tmp_path: Path) -> None:
+    async with open_stage(tmp_path, "Eye") as stage:
+        alice = await stage.person("alice")
+        await stage.place(alice, eye="Eye")
+        await stage.start(alice)
+        await alice.lock(stage.ids["eye"])
+        await alice.ask("CalibrateCamera", id=stage.ids["eye"])
+        failed = await happens(alice, "ProcessState", state="failed")
+        assert failed["id"] == "CameraCalibration"
+        assert "No calibration service" in failed["message"]
+
+
+async def test_a_robot_is_put_where_a_camera_sees_it(tmp_path: Path) -> None:
+    async with open_stage(tmp_path, "Arm", "DumbArm", "Eye", "Part") as stage:
+        alice, service = await ready(stage, part="Part", arm="Arm", dumb="DumbArm", eye="Eye")
+        bob, carol = await stage.person("bob"), await stage.person("carol")
+        arm, eye, part, dumb = (stage.ids[name] for name in ("arm", "eye", "part", "dumb"))
+        assert "not a robot" in await refused(alice, "CalibrateRobot", robot_id=part)
+        assert "not a camera" in await refused(alice, "CalibrateRobot", robot_id=arm, camera_id=part)
+        assert "lock" in await refused(alice, "CalibrateRobot", robot_id=arm)
+        await alice.lock(arm)
+        await alice.lock(dumb)
+        assert "no model" in await refused(alice, "CalibrateRobot", robot_id=dumb)
+        await bob.lock(eye)
+        assert "lock" in await refused(alice, "CalibrateRobot", robot_id=arm)
+        await bob.ask("WriteUnlock", object_id=eye)
+        alice.take()
+        carol.take()
+
+        service.go.clear()
+        await alice.ask("CalibrateRobot", robot_id=arm)  # the first camera of the scene
+        while not service.asked:
+            await asyncio.sleep(0.005)
+        assert "lock" in await refused(bob, "WriteLock", object_id=eye), "the camera is kept until the end"
+        assert "is moving" in await refused(alice, "CalibrateRobot", robot_id=arm)
+        assert "is moving" in await refused(
+            alice,
+            "StepRobotEef",
+            robot_id=arm,
+            end_effector_id="tip",
+            axis="x",
+            what="position",
+            mode="world",
+            step=0.1,
+        )
+        service.go.set()
+        await happens(carol, "ProcessState", state="finished")
+        assert process(carol, "RobotCalibration") == [("started", False), ("finished", False)]
+        assert carol.names() == ["ProcessState", "SceneObjectChanged/update", "ProcessState"]
+        view, depth = service.asked[0]
+        assert [joint.value for joint in view.robot_joints[:3]] == [0, 0, 1], "it went to its calibration pose"
+        assert view.urdf_uri == "arm.zip"
+        picture = Image.open(io.BytesIO(depth))
+        assert (picture.format, picture.mode, picture.getpixel((3, 3))) == ("PNG", "I;16", 1500)
+        assert stage.services.session.scene_object(arm).pose == FOUND
+        await bob.lock(eye)
+        await bob.ask("WriteUnlock", object_id=eye)
+
+        service.refusal = NotFound("The robot is not seen.")
+        await alice.ask("CalibrateRobot", robot_id=arm, camera_id=eye, move_to_calibration_pose=False)
+        failed = await happens(alice, "ProcessState", state="failed")
+        assert failed == {"id": "RobotCalibration", "state": "failed", "message": "The robot is not seen."}
+        await bob.lock(eye)

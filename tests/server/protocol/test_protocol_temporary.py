@@ -1,0 +1,167 @@
+"""The open project is run as a package of its own, and is open again afterwards."""
+
+import asyncio
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from arcor2_hw.exceptions import StorageError
+from tests.server.protocol.stage import Actor, Stage, happens, open_stage, refused, until
+
+CLOSED = ["ProjectClosed", "PackageChanged/add", "PackageState started", "PackageState running", "PackageInfo"]
+OPENED = ["PackageState stopping", "PackageState stopped", "PackageChanged/remove", "OpenProject"]
+
+
+def story(actor: Actor) -> list[str]:
+    """Give what was told, in short, without the single actions."""
+    told = []
+    for event in actor.events():
+        name, data = event["event"], event.get("data", {})
+        if name in ("PackageState", "SceneState"):
+            told.append(f"{name} {data['state']}")
+        elif not name.startswith("ActionState"):
+            told.append("/".join(filter(None, (name, event.get("change_type")))))
+    return told
+
+
+async def project(stage: Stage, actor: Actor, *, seconds: str = "0.05") -> str:
+    """Make and save a project that waits again and again; gives the action's id."""
+    await stage.place(actor, time="TimeActions")
+    await actor.ask("SaveScene")
+    scene = stage.services.session.require_scene()
+    await actor.ask("NewProject", scene_id=scene.id, name="round")
+    await actor.ask("AddActionPoint", name="ap", position={"x": 0, "y": 0, "z": 0})
+    point = stage.services.session.require_project().action_points[0].id
+    flows = [{"type": "default", "outputs": []}]
+    parameters = [{"name": "seconds", "type": "double", "value": seconds}]
+    kind = f"{stage.ids['time']}/sleep"
+    await actor.ask("AddAction", action_point_id=point, name="nap", type=kind, parameters=parameters, flows=flows)
+    (action,) = stage.services.session.require_project().action_points[0].actions
+    await actor.ask("AddLogicItem", start="START", end=action.id)
+    await actor.ask("AddLogicItem", start=action.id, end="END")
+    await actor.ask("SaveProject")
+    return action.id
+
+
+async def test_a_project_runs_and_is_open_again(tmp_path: Path) -> None:
+    async with open_stage(tmp_path) as stage:
+        alice, bob, stranger = await stage.person("alice"), await stage.person("bob"), await stage.person()
+        assert "No scene is open" in await refused(stranger, "TemporaryPackage")
+        action = await project(stage, alice)
+        opened = stage.services.session.require_project()
+        await alice.lock(opened.action_points[0].id)
+        assert "lock" in await refused(stranger, "TemporaryPackage")
+        await alice.ask("WriteUnlock", object_id=opened.action_points[0].id)
+        await alice.ask("AddActionPoint", name="more", position={"x": 0, "y": 0, "z": 0})
+        assert "not saved" in await refused(stranger, "TemporaryPackage")
+        await alice.ask("SaveProject")
+        saved = stage.services.session.require_project()
+        for person in (alice, bob, stranger):
+            person.take()
+
+        # Nobody has to be logged in for it.
+        await stranger.ask("TemporaryPackage")
+        assert "response" in stranger.take()[0], "the answer comes before all events"
+        before = await happens(bob, "ActionStateBefore")
+        assert before == {"action_id": action, "parameters": ["0.05"]}
+        (package,) = await alice.ask("ListPackages")
+        assert package["package_meta"]["name"] == "Temporary package for project 'round'."
+        for name, args in (
+            ("NewScene", {"name": "x"}),
+            ("OpenScene", {"id": saved.scene_id}),
+            ("OpenProject", {"id": saved.id}),
+            ("RunPackage", {"id": package["id"]}),
+            ("DeletePackage", {"id": package["id"]}),
+        ):
+            with pytest.raises(Exception, match=r"run|program"):
+                await alice.ask(name, **args)
+        await alice.ask("StopPackage")
+        again = await happens(bob, "OpenProject")
+        assert again["project"]["id"] == saved.id
+        assert len(again["project"]["action_points"]) == 2
+        assert story(bob) == CLOSED + OPENED
+        assert await alice.ask("ListPackages") == []
+        assert not stage.services.session.has_changes
+        await alice.ask("AddActionPoint", name="another", position={"x": 0, "y": 0, "z": 0})
+
+
+async def test_a_scene_that_is_online_is_so_again(tmp_path: Path) -> None:
+    async with open_stage(tmp_path) as stage:
+        alice = await stage.person("alice")
+        action = await project(stage, alice)
+        await stage.start(alice)
+        await alice.ask("TemporaryPackage", start_paused=True)
+        await happens(alice, "PackageState", state="paused")
+        await alice.ask("StepAction")
+        await happens(alice, "ActionStateAfter", action_id=action)
+        await until(lambda: stage.services.execution.state.value == "paused")
+        await alice.ask("StopPackage")
+        await happens(alice, "OpenProject")
+        await happens(alice, "SceneState", state="started")
+        told = story(alice)
+        assert told[:3] == ["SceneState stopping", "SceneState stopped", "ProjectClosed"]
+        assert told[-3:] == ["OpenProject", "SceneState starting", "SceneState started"]
+        assert "ShowMainScreen" not in told
+        await stage.stop(alice)
+
+
+async def test_a_program_that_cannot_start_gives_the_project_back(tmp_path: Path) -> None:
+    async with open_stage(tmp_path) as stage:
+        alice = await stage.person("alice")
+        await project(stage, alice)
+        alice.take()
+        await alice.ask("TemporaryPackage", breakpoints=["acp_none"])
+        await happens(alice, "OpenProject")
+        told = story(alice)
+        assert "ProjectException" in told
+        assert told[-3:] == ["PackageState stopped", "PackageChanged/remove", "OpenProject"]
+        await alice.ask("CloseProject")
+
+
+async def test_a_project_that_is_gone_meanwhile_leads_to_the_list(tmp_path: Path) -> None:
+    async with open_stage(tmp_path) as stage:
+        alice = await stage.person("alice")
+        await project(stage, alice)
+        key = stage.services.session.require_project().id
+        await alice.ask("TemporaryPackage", start_paused=True)
+        await happens(alice, "PackageState", state="paused")
+        await alice.ask("DeleteProject", id=key)
+        alice.take()
+        await alice.ask("StopPackage")
+        screen = await happens(alice, "ShowMainScreen")
+        assert screen == {"what": "ProjectsList", "highlight": key}
+        await until(lambda: not stage.services.execution.busy)
+        await alice.ask("NewScene", name="next")
+
+
+async def test_a_project_that_cannot_be_built_stays_open(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    async with open_stage(tmp_path) as stage:
+        alice = await stage.person("alice")
+        await project(stage, alice)
+
+        async def full(*_: Any) -> str:
+            raise StorageError("The disk is full.")
+
+        with monkeypatch.context() as patch:
+            patch.setattr(stage.services.build, "build", full)
+            assert await refused(alice, "TemporaryPackage") == "The disk is full."
+        assert stage.services.session.project is not None
+        assert not stage.services.execution.busy
+        # All at once: one of them runs it, the others are refused.
+        outcomes = await asyncio.gather(*(alice.ask("TemporaryPackage") for _ in range(3)), return_exceptions=True)
+        assert sum(outcome is None for outcome in outcomes) == 1
+        await happens(alice, "PackageState", state="running")
+        await alice.ask("StopPackage")
+        await happens(alice, "OpenProject")
+
+
+async def test_a_server_that_ends_meanwhile_leaves_no_package(tmp_path: Path) -> None:
+    async with open_stage(tmp_path) as stage:
+        alice = await stage.person("alice")
+        await project(stage, alice)
+        await alice.ask("TemporaryPackage")
+        await happens(alice, "ActionStateBefore")
+        packages = stage.services.settings.packages_dir
+        assert len(list(packages.glob("pkg_*"))) == 1
+    assert list(packages.glob("pkg_*")) == []
