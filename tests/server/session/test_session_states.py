@@ -62,6 +62,8 @@ def example(of: Any) -> Any:
             return 1.0
         case msgspec.inspect.BoolType():
             return True
+        case msgspec.inspect.IntType():
+            return 0
         case msgspec.inspect.StrType():
             return "x"
     raise TypeError(info)
