@@ -150,15 +150,20 @@ class LockTable:
                 freed |= self._free_write(user, item)
         return sorted(freed)
 
-    def drop(self, ids: Iterable[str]) -> None:
-        """Forget all locks on ids that were removed; the event that removes them implies it."""
+    def drop(self, ids: Iterable[str]) -> dict[str, list[str]]:
+        """Forget all locks on ids that were removed; the event that removes them implies it.
+
+        Gives what else became free, by owner: the rest of a tree that was locked by an id which is gone.
+        """
+        ids = list(ids)
+        freed: dict[str, set[str]] = {}
         for item in ids:
             root_id = self._where.pop(item, None)
             for user, reads in list(self._reads.items()):
                 if item in reads:
                     self._reads[user] = [read for read in reads if read != item]
-            for held in self._announced.values():
-                held.pop(item, None)
+            for user, held in self._announced.items():
+                freed.setdefault(user, set()).update(held.pop(item, ()))
                 for covered in held.values():
                     covered.discard(item)
             if root_id is not None and (root := self._roots.get(root_id)) is not None:
@@ -167,6 +172,8 @@ class LockTable:
                     root.tree = root.tree and bool(root.writers)
                 self._tidy(root_id)
         self._notify()
+        rest = {user: found.difference(ids, *self._announced[user].values()) for user, found in freed.items()}
+        return {user: sorted(found) for user, found in rest.items() if found}
 
     def move_root(self, ids: Iterable[str], new_root: str) -> None:
         """Move the locks of ids (an action point and all below it) to the tree that they now belong to."""

@@ -17,7 +17,7 @@ from arcor2_hw.data.rpc import (
     UpdateActionPointUsingRobotArgs,
 )
 from arcor2_server.locks import PROJECT
-from arcor2_server.rpc.editing import commit, eef_pose, optional, require_free, require_held, tell, unlock
+from arcor2_server.rpc.editing import commit, drop_locks, eef_pose, optional, require_free, require_held, tell, unlock
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
 from arcor2_server.session.changes import Change, Kind
 from arcor2_server.session.checks import check_name
@@ -180,7 +180,7 @@ async def remove_action_point(context: Context, args: IdArgs) -> None:
         changes.append(document.remove(Kind.POINT, point.id))
         if await commit(context, changes):
             context.emit("ActionPointChanged", point, ChangeType.REMOVE)
-            services.locks.drop([point.id, *(item.id for item in owned)])
+            drop_locks(context, point.id, *(item.id for item in owned))
 
 
 def _check_unneeded(document: Document, point: BareActionPoint) -> None:

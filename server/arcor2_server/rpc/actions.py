@@ -7,7 +7,7 @@ from arcor2_hw.data.events import ChangeType
 from arcor2_hw.data.project import Action, BareAction
 from arcor2_hw.data.rpc import AddActionArgs, IdArgs, RenameActionArgs, UpdateActionArgs
 from arcor2_hw.exceptions import InvalidData
-from arcor2_server.rpc.editing import commit, require_free, require_held, tell, unlock
+from arcor2_server.rpc.editing import commit, drop_locks, require_free, require_held, tell, unlock
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
 from arcor2_server.session.changes import Kind
 from arcor2_server.session.checks import (
@@ -102,4 +102,4 @@ async def remove_action(context: Context, args: IdArgs) -> None:
             raise RequestRefused(f"A result of {action.name} is used by {who}: change that first.")
         if await commit(context, [document.remove(Kind.ACTION, action.id)]):
             context.emit("ActionChanged", BareAction(action.name, action.type, action.id), ChangeType.REMOVE)
-            services.locks.drop([action.id])
+            drop_locks(context, action.id)

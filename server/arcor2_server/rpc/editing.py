@@ -25,6 +25,12 @@ def unlock(context: Context, *ids: str) -> None:
         context.emit("ObjectsUnlocked", LockData(freed, context.user))
 
 
+def drop_locks(context: Context, *ids: str) -> None:
+    """Forget the locks of what was removed; what else was locked with it is told to be free."""
+    for owner, freed in context.services.locks.drop(ids).items():
+        context.emit("ObjectsUnlocked", LockData(freed, owner))
+
+
 def require_held(context: Context, item: str, *, tree: bool = False) -> None:
     """RequestRefused unless the caller is logged in and holds the write lock."""
     context.services.locks.require_held(context.user, item, tree=tree)

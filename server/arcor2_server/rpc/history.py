@@ -18,6 +18,7 @@ from arcor2_hw.data.rpc import (
 )
 from arcor2_server.locks import Locked
 from arcor2_server.rpc.change_events import tell_changes
+from arcor2_server.rpc.editing import drop_locks
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
 from arcor2_server.session.aftermath import uses_object
 from arcor2_server.session.changes import OF_SCENE, Change, Edit, How, Kind, net
@@ -128,8 +129,8 @@ async def _make(context: Context, changes: Sequence[Change], after: int, request
         return session.revision
     revision = session.revision + 1
     await session.commit(user, changes, request, how, after)
-    _settle(context, document, changes)
     tell_changes(context, changes)
+    _settle(context, document, changes)
     return revision
 
 
@@ -184,7 +185,7 @@ def _settle(context: Context, document: Document, changes: Sequence[Change]) -> 
             services.session.removed_types.add(change.before.type)
         if change.kind is Kind.POINT and document.find(Kind.POINT, change.id) is not None:
             services.locks.move_root([change.id, *document.tree_of(change.id)], document.root_of(change.id))
-    services.locks.drop([change.id for change in changes if change.after is None])
+    drop_locks(context, *(change.id for change in changes if change.after is None))
 
 
 # ---------------------------------------------------------------------------------------------- what was edited

@@ -13,7 +13,7 @@ from arcor2_hw.data.rpc import (
     UpdateActionPointJointsUsingRobotArgs,
 )
 from arcor2_hw.exceptions import InvalidData
-from arcor2_server.rpc.editing import commit, optional, require_free, require_held, tell
+from arcor2_server.rpc.editing import commit, drop_locks, optional, require_free, require_held, tell
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
 from arcor2_server.session.changes import Kind
 from arcor2_server.session.checks import check_name
@@ -97,4 +97,4 @@ async def remove_joints(context: Context, args: RemoveActionPointJointsArgs) -> 
     changes = [document.remove(Kind.JOINTS, value.id)]
     if await commit(context, changes):
         tell(context, changes, "JointsChanged", ChangeType.REMOVE)
-        context.services.locks.drop([value.id])
+        drop_locks(context, value.id)

@@ -16,7 +16,7 @@ from arcor2_hw.data.rpc import (
     UpdateActionPointOrientationArgs,
     UpdateActionPointOrientationUsingRobotArgs,
 )
-from arcor2_server.rpc.editing import commit, eef_pose, require_free, require_held, tell
+from arcor2_server.rpc.editing import commit, drop_locks, eef_pose, require_free, require_held, tell
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
 from arcor2_server.session.changes import Kind
 from arcor2_server.session.checks import check_name
@@ -115,4 +115,4 @@ async def remove_orientation(context: Context, args: RemoveActionPointOrientatio
         changes = [document.remove(Kind.ORIENTATION, value.id)]
         if await commit(context, changes):
             tell(context, changes, "OrientationChanged", ChangeType.REMOVE)
-            services.locks.drop([value.id])
+            drop_locks(context, value.id)

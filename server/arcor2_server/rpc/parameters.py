@@ -17,7 +17,7 @@ from arcor2_hw.data.rpc import (
 from arcor2_hw.data.scene import SceneObjectOverride
 from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_server.locks import PROJECT
-from arcor2_server.rpc.editing import commit, require_free, require_held, tell, unlock
+from arcor2_server.rpc.editing import commit, drop_locks, require_free, require_held, tell, unlock
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
 from arcor2_server.session.changes import Change, Kind
 from arcor2_server.session.checks import check_project_parameter, check_setting
@@ -69,7 +69,7 @@ async def remove_project_parameter(context: Context, args: RemoveProjectParamete
         changes = [document.remove(Kind.PARAMETER, args.id)]
         if await commit(context, changes):
             tell(context, changes, "ProjectParameterChanged", ChangeType.REMOVE)
-            services.locks.drop([args.id])
+            drop_locks(context, args.id)
 
 
 # ---------------------------------------------------------------------------------------------- overrides

@@ -22,7 +22,7 @@ from arcor2_hw.data.rpc import (
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_server.locks import ADDING_OBJECT, SCENE
-from arcor2_server.rpc.editing import commit, eef_pose, require_free, require_held, tell, unlock
+from arcor2_server.rpc.editing import commit, drop_locks, eef_pose, require_free, require_held, tell, unlock
 from arcor2_server.rpc.object_types import require_mesh
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
 from arcor2_server.session.aftermath import VIRTUAL, uses_object
@@ -106,7 +106,7 @@ async def remove_from_scene(context: Context, args: RemoveFromSceneArgs) -> None
         if await commit(context, changes):
             session.removed_types.add(obj.type)
             tell(context, changes, "SceneObjectChanged", ChangeType.REMOVE)
-            services.locks.drop([args.id])
+            drop_locks(context, args.id)
 
 
 @rpc("UpdateObjectParameters")

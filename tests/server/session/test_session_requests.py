@@ -450,3 +450,18 @@ async def test_requests_of_a_stranger_and_without_a_document(desk: Desk, alice: 
     await alice.ask("CloseScene", force=True)
     with pytest.raises(Refused, match="program is running"):
         await alice.ask("NewScene", name="scene")
+
+
+async def test_what_was_locked_with_a_tree_is_free_when_its_place_in_it_goes(
+    alice: Person, bob: Person, work: Work
+) -> None:
+    await work.project("root")
+    root = work.point("root")
+    below = await work.add_point("below", root)
+    await alice.lock(below, tree=True)
+    bob.take()
+    await alice.ask("RemoveActionPoint", id=below)
+    events = bob.events()
+    assert [event["event"] for event in events] == ["ActionPointChanged", "ObjectsUnlocked"]
+    assert events[1]["data"] == {"object_ids": [root], "owner": "alice"}
+    await bob.lock(root)
