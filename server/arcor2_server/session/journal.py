@@ -319,6 +319,7 @@ def _extend_log(connection: sqlite3.Connection) -> None:
     try:
         with connection:
             connection.execute("begin immediate")
+            connection.execute("drop table if exists extent")  # of a server that was killed just here
             connection.execute("create table extent (content blob)")
             connection.execute("insert into extent values (zeroblob(?))", (CHECKPOINT_PAGES * 4096,))
         with connection:

@@ -112,6 +112,23 @@ async def test_a_restart_goes_on_where_it_was(tmp_path: Path) -> None:
         assert desk.session.scene is None
 
 
+async def test_a_start_that_was_killed_leaves_nothing_behind(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    async with open_desk(tmp_path):
+        pass
+    connection = sqlite3.connect(tmp_path / "journal.sqlite")
+    connection.execute("create table extent (content blob)")
+    connection.close()
+    capsys.readouterr()
+    async with open_desk(tmp_path) as desk:
+        await open_project(await desk.person("alice"))
+    assert "no room" not in capsys.readouterr().out
+    connection = sqlite3.connect(tmp_path / "journal.sqlite")
+    assert connection.execute("select count(*) from sqlite_master where name = 'extent'").fetchone() == (0,)
+    connection.close()
+
+
 async def test_a_new_scene_survives_without_ever_being_saved(tmp_path: Path) -> None:
     async with open_desk(tmp_path) as desk:
         alice = await desk.person("alice")
