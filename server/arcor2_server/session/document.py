@@ -332,6 +332,33 @@ class Document:
         """Give the logic items that arrive at END or an action."""
         return [self._items[Kind.LOGIC][i].value for i in self._arriving.get(end, ())]
 
+    def leads_to(self, origin: str, target: str, without: str = "") -> bool:
+        """Tell whether the logic leads from one action to another when the item `without` is left out.
+
+        Searched from both ends in turns: it is over when the shorter side is, which where a step is added at the
+        beginning or the end of a long program is at once.
+        """
+        items = self._items[Kind.LOGIC]
+        seen, other_seen = {origin}, {target}
+        waiting, other_waiting = [origin], [target]
+        forward = True
+        while waiting and other_waiting:
+            place = waiting.pop()
+            for key in (self._leaving if forward else self._arriving).get(place, ()):
+                if key == without:
+                    continue
+                value = items[key].value
+                following = action_of(value.end if forward else value.start)
+                if following in other_seen:
+                    return True
+                if following not in seen:
+                    seen.add(following)
+                    waiting.append(following)
+            seen, other_seen = other_seen, seen
+            waiting, other_waiting = other_waiting, waiting
+            forward = not forward
+        return False
+
     def users_of(self, target_id: str) -> list[Action | LogicItem]:
         """Give the actions with a parameter that refers to this id, and the logic items with a condition on it."""
         actions, logic = self._items[Kind.ACTION], self._items[Kind.LOGIC]

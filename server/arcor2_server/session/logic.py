@@ -38,7 +38,7 @@ def check_logic_item(
         _check_condition(document, meta_of, item.condition)
         if any(_same(item.condition, other.condition) for other in siblings):
             raise InvalidData(f"Another step from {_name(document, start)} has the same condition.")
-    if loops and start != START and end != END and _reaches(document, end, start, item.id):
+    if loops and start != START and end != END and document.leads_to(end, start, item.id):
         raise InvalidData(f"The step from {_name(document, start)} to {_name(document, end)} would close a loop.")
 
 
@@ -128,19 +128,3 @@ def _check_condition(document: Document, meta_of: Callable[[Action], ObjectActio
     if type(value) is not kind:
         wanted = {bool: "true or false", int: "an integer", str: "a text in quotes"}[kind]
         raise InvalidData(f"A condition on {outputs[index]} compares with {wanted}, not with {condition.value[:40]}.")
-
-
-def _reaches(document: Document, origin: str, target: str, without: str) -> bool:
-    """Tell whether the logic leads from one action to another when the item `without` is left out."""
-    waiting, seen = [origin], {origin}
-    while waiting:
-        for item in document.outgoing(waiting.pop()):
-            if item.id == without:
-                continue
-            following = action_of(item.end)
-            if following == target:
-                return True
-            if following not in seen:
-                seen.add(following)
-                waiting.append(following)
-    return False

@@ -1,0 +1,65 @@
+"""The lists of saved documents: what is wrong with each, looked for only where something changed."""
+
+from typing import Any
+
+import pytest
+
+from tests.server.session.desk import Desk, Person
+from tests.server.session.work import Work
+
+
+class Reads:
+    """Counts which documents are read from the storage."""
+
+    def __init__(self, desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.read: list[str] = []
+        for name in ("scene", "project"):
+            monkeypatch.setattr(desk.services.storage, name, self._counting(getattr(desk.services.storage, name)))
+
+    def _counting(self, read: Any) -> Any:
+        async def counted(key: str) -> Any:
+            self.read.append(key.partition("_")[0])
+            return await read(key)
+
+        return counted
+
+    def taken(self) -> list[str]:
+        taken, self.read = self.read, []
+        return taken
+
+
+async def test_only_what_changed_is_looked_at_again(desk: Desk, alice: Person, monkeypatch: pytest.MonkeyPatch) -> None:
+    work = Work(alice)
+    project = await work.project("p")
+    scene = desk.session.require_scene().id
+    await work.add_action(work.point("p"), "act")
+    await alice.ask("SaveProject")
+    await alice.ask("CloseProject")
+    for number in range(3):
+        await alice.ask("CopyProject", source_id=project, target_name=f"copy {number}")
+    reads = Reads(desk, monkeypatch)
+    listed = await alice.ask("ListProjects")
+    assert [entry.get("problems") for entry in listed] == [None] * 4
+    assert reads.taken().count("pro") == 4
+    assert await alice.ask("ListProjects") == listed
+    assert reads.taken() == []
+    await alice.ask("UpdateProjectDescription", project_id=project, new_description="other")
+    reads.taken()
+    assert [entry["description"] for entry in await alice.ask("ListProjects")] == ["", "", "", "other"]
+    assert reads.taken() == ["pro", "scn"]
+    # A scene that changed concerns all its projects.
+    await alice.ask("OpenScene", id=scene)
+    await alice.ask("RemoveFromScene", id=work.object("time"), force=True)
+    await desk.services.storage.put_scene(desk.session.require_scene())
+    reads.taken()
+    assert all(entry["problems"] for entry in await alice.ask("ListProjects"))
+    assert reads.taken().count("pro") == 4
+    await alice.ask("CloseScene", force=True)
+    # So does a type that is gone.
+    del desk.types._metas["WeighingMachine"]
+    desk.types.revision += 1
+    assert "WeighingMachine" in (await alice.ask("ListScenes"))[0]["problems"][0]
+    assert all("WeighingMachine" in str(entry["problems"]) for entry in await alice.ask("ListProjects"))
+    await alice.ask("DeleteProject", id=project)
+    assert len(await alice.ask("ListProjects")) == 3
+    assert len(desk.services.kept.problems["ListProjects"]) == 3
