@@ -1,0 +1,428 @@
+"""Two or three clients edit at random, lock, undo, leave and come back; what each knows from events is what there is.
+
+MACHINE_EXAMPLES=500 makes it a long run (with `--timeout 0`), which also looks for the shortest way to a failure.
+"""
+
+import asyncio
+import os
+import shutil
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from hypothesis import HealthCheck, Phase, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+
+from arcor2_hw.data.project import Action
+from arcor2_server.session.changes import Kind
+from arcor2_server.session.checks import action_meta, project_problems
+from arcor2_server.session.logic import check_logic_item
+from tests.server.machine.picture import Picture
+from tests.server.machine.requests import EDITS, SCENE_EDITS, Draw, Request
+from tests.server.session.desk import Desk, Person, Refused, open_desk
+from tests.server.session.work import Work
+
+NAMES = ("alice", "bob", "carol")
+LIMIT = 60
+"""Edits that the journal keeps: few enough that a long run outlives them."""
+
+users = st.integers(0, len(NAMES) - 1)
+numbers = st.tuples(st.integers(0, 11), st.integers(0, 11), st.integers(0, 11))
+edits = st.sampled_from(sorted(EDITS))
+parts = st.tuples(edits, numbers, st.sampled_from(["", "", "", "Undo", "Redo"]))
+
+Flat = dict[tuple[str, str], Any]
+
+
+def flat(picture: Picture) -> Flat:
+    """Everything by kind and id, so that states can be compared thing by thing."""
+    found: Flat = {}
+    for kind, content in picture.shown().items():
+        if kind in ("scene", "project"):
+            found[kind, ""] = content
+        else:
+            found |= {(kind, key): value for key, value in content.items()}
+    return found
+
+
+class Client:
+    """A connection with what it knows."""
+
+    def __init__(self, desk: Desk, name: str) -> None:
+        self.name = name
+        self.person = Person(desk)
+        self.picture = Picture()
+        self.events = 0
+
+    def look(self) -> None:
+        for event in self.person.events():
+            self.events += 1
+            self.picture.see(event)
+
+
+class Edits(RuleBasedStateMachine):
+    """The server's parts run in this process on an event loop of their own; each rule lets it run."""
+
+    template: Path
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.runner = asyncio.Runner()
+        self.directory = Path(tempfile.mkdtemp(prefix="machine-"))
+        self.clients: dict[str, Client] = {}
+        self.states: dict[int, Flat] = {}
+        self.saved: Flat = {}
+
+    # ------------------------------------------------------------------------------------------ the server
+    @initialize(count=st.integers(2, 3))
+    def begin(self, count: int) -> None:
+        self.directory.rmdir()
+        shutil.copytree(self.template, self.directory)
+        self.runner.run(self._open())
+        for name in NAMES[:count]:
+            self.join(NAMES.index(name))
+        self.ask("alice", "OpenProject", id=self.project_id)
+        self._opened()
+
+    async def _open(self) -> None:
+        self.context = open_desk(self.directory, history_limit=LIMIT)
+        self.desk = await self.context.__aenter__()
+        projects = await self.desk.services.storage.projects()
+        self.project_id, self.scene_id = projects[0].id, projects[0].scene_id
+
+    async def _close(self) -> None:
+        for client in self.clients.values():
+            await client.person.leave()
+        self.clients.clear()
+        await self.context.__aexit__(None, None, None)
+
+    def teardown(self) -> None:
+        if hasattr(self, "desk"):
+            self.runner.run(self._close())
+        self.runner.close()
+        shutil.rmtree(self.directory, ignore_errors=True)
+
+    @property
+    def session(self) -> Any:
+        return self.desk.session
+
+    def there_is(self) -> Flat:
+        return flat(Picture.of(self.session.scene, self.session.project))
+
+    def _opened(self) -> None:
+        """What is open now is what is saved, and has no history."""
+        self.saved = self.there_is()
+        self.states = {self.session.revision: self.saved}
+
+    # ------------------------------------------------------------------------------------------ requests
+    def ask(self, who: str, request: str, **args: Any) -> Any:
+        return self.runner.run(self._ask(who, request, **args))
+
+    async def _ask(self, who: str, request: str, /, *, dry_run: bool = False, **args: Any) -> Any:
+        try:
+            return await self.clients[who].person.ask(request, dry_run=dry_run, **args)
+        except Refused as error:
+            refusal = error
+        assert "inside the server" not in str(refusal), f"{request} {args}: {refusal}"
+        return refusal
+
+    def who(self, number: int) -> str:
+        present = sorted(self.clients)
+        return present[number % len(present)]
+
+    def note(self) -> None:
+        self.states[self.session.revision] = self.there_is()
+
+    def single(self, who: str, request: str, **args: Any) -> Any:
+        """Ask; what is refused, or only asked whether it would be granted, changes and tells nothing."""
+        revision, before = self.session.revision, self.there_is()
+        self.look()
+        heard = {client.name: client.events for client in self.clients.values()}
+        answer = self.ask(who, request, **args)
+        if isinstance(answer, Refused) or args.get("dry_run"):
+            self.look()
+            assert (self.session.revision, self.there_is()) == (revision, before), (request, answer)
+            assert heard == {client.name: client.events for client in self.clients.values()}, (request, answer)
+        if self.session.revision != revision:
+            assert self.session.revision == revision + 1, request
+            self.note()
+        return answer
+
+    def look(self) -> None:
+        for client in self.clients.values():
+            client.look()
+
+    # ------------------------------------------------------------------------------------------ edits
+    def edit(self, who: str, wanted: Request, *, keep: bool, dry_run: bool) -> None:
+        request, args, lock, tree = wanted
+        if lock:
+            self.ask(who, "WriteLock", object_id=lock, lock_tree=tree)
+        self.single(who, request, dry_run=dry_run, **args)
+        if lock and not keep:
+            self.ask(who, "WriteUnlock", object_id=lock)
+
+    @precondition(lambda self: self.session.project is not None)
+    @rule(number=users, kind=edits, chosen=numbers, keep=st.booleans(), dry_run=st.integers(0, 9))
+    def edit_project(self, number: int, kind: str, chosen: Any, keep: bool, dry_run: int) -> None:
+        wanted = EDITS[kind](Draw(self.session, chosen))
+        self.edit(self.who(number), wanted, keep=keep and dry_run > 5, dry_run=dry_run == 0)
+
+    @precondition(lambda self: self.session.project is not None)
+    @rule(number=users, kinds=st.lists(edits, min_size=2, max_size=3), chosen=numbers)
+    def build(self, number: int, kinds: list[str], chosen: Any) -> None:
+        for kind in ["add point", "add action", *kinds]:
+            self.edit(self.who(number), EDITS[kind](Draw(self.session, chosen)), keep=False, dry_run=False)
+            chosen = (chosen[0] + 1, chosen[1] + 1, chosen[2] + 1)
+
+    @precondition(lambda self: self.session.scene is not None and self.session.project is None)
+    @rule(number=users, kind=st.sampled_from(sorted(SCENE_EDITS)), chosen=numbers)
+    def edit_scene(self, number: int, kind: str, chosen: Any) -> None:
+        self.edit(self.who(number), SCENE_EDITS[kind](Draw(self.session, chosen)), keep=False, dry_run=False)
+
+    @precondition(lambda self: self.session.project is not None)
+    @rule(parts=st.lists(parts, min_size=2, max_size=5))
+    def edit_together(self, parts: list[Any]) -> None:
+        async def together() -> None:
+            wanted = [(EDITS[kind](Draw(self.session, chosen)), what) for kind, chosen, what in parts]
+            asked = []
+            for number, ((request, args, _, _), what) in enumerate(wanted):
+                if what:
+                    request, args = what, {}
+                asked.append(self._ask(self.who(number), request, **args))
+            await asyncio.gather(*asked)
+
+        before = self.session.revision
+        self.runner.run(together())
+        for revision in range(before + 1, self.session.revision):
+            self.states.pop(revision, None)
+        self.note()
+
+    # ------------------------------------------------------------------------------------------ back
+    @precondition(lambda self: self.session.scene is not None)
+    @rule(number=users, times=st.integers(1, 3), redo=st.booleans(), dry_run=st.integers(0, 9))
+    def undo(self, number: int, times: int, redo: bool, dry_run: int) -> None:
+        who = self.who(number)
+        for request in ["Undo"] * times + ["Redo"] * (times if redo else 0):
+            before = self.session.revision
+            answer = self.single(who, request, dry_run=dry_run == 0)
+            if not isinstance(answer, Refused) and dry_run:
+                self.taken_back(before, answer["number"])
+
+    @precondition(lambda self: self.session.scene is not None)
+    @rule(number=users, back=st.integers(1, 8))
+    def undo_one_further_back(self, number: int, back: int) -> None:
+        before = self.session.revision
+        answer = self.single(self.who(number), "Undo", number=before - back)
+        if not isinstance(answer, Refused):
+            self.taken_back(before, before - back)
+
+    def taken_back(self, before: int, number: int) -> None:
+        """What the edit touched is as before it; everything else is as it was."""
+        edit = self.session.history.find(number)
+        if edit is None or number not in self.states or number - 1 not in self.states:
+            return
+        old, made = self.states[number - 1], self.states[number]
+        touched = {key for key in old.keys() | made.keys() if old.get(key) != made.get(key)}
+        expected = {key: value for key, value in self.states[before].items() if key not in touched}
+        assert self.there_is() == expected | {key: old[key] for key in touched if key in old}
+
+    @precondition(lambda self: self.session.scene is not None)
+    @rule(number=users, back=st.integers(0, 12))
+    def restore_revision(self, number: int, back: int) -> None:
+        revision = self.session.revision - back
+        answer = self.single(self.who(number), "RestoreRevision", revision=revision)
+        if not isinstance(answer, Refused) and revision in self.states:
+            assert self.there_is() == self.states[revision]
+
+    # ------------------------------------------------------------------------------------------ locks, coming and going
+    @precondition(lambda self: self.session.project is not None)
+    @rule(number=users, chosen=numbers, tree=st.booleans(), read=st.booleans(), give_back=st.booleans())
+    def lock(self, number: int, chosen: Any, tree: bool, read: bool, give_back: bool) -> None:
+        draw = Draw(self.session, chosen)
+        item = [draw.point(draw.x), draw.action(draw.x), draw.project.id][draw.y % 3]
+        if read:
+            self.ask(self.who(number), "ReadUnlock" if give_back else "ReadLock", object_id=item)
+        elif give_back:
+            for held in self.desk.services.locks.written_by(self.who(number)):
+                self.ask(self.who(number), "WriteUnlock", object_id=held)
+        else:
+            self.ask(self.who(number), "WriteLock", object_id=item, lock_tree=tree)
+
+    @precondition(lambda self: len(self.clients) > 1)
+    @rule(number=users)
+    def leave(self, number: int) -> None:
+        client = self.clients.pop(self.who(number))
+        self.runner.run(client.person.leave())
+
+    @precondition(lambda self: hasattr(self, "desk"))
+    @rule(number=users)
+    def join(self, number: int) -> None:
+        name = NAMES[number]
+        if name in self.clients:
+            return
+
+        async def come() -> None:
+            self.clients[name] = Client(self.desk, name)
+            await self._ask(name, "RegisterUser", user_name=name)
+
+        self.runner.run(come())
+        self.look()
+
+    @rule(number=users)
+    def lock_time_out(self, number: int) -> None:
+        """The locks of one who left are given back after a while."""
+        if NAMES[number] not in self.clients and NAMES[number] in self.desk.services.users._releases:
+            self.desk.services.users._releases[NAMES[number]].cancel()
+            self.desk.services.users._release(NAMES[number])
+
+    # ------------------------------------------------------------------------------------------ whole documents
+    def give_locks_back(self) -> None:
+        for number in range(len(NAMES)):
+            self.lock_time_out(number)
+        for who in sorted(self.clients):
+            for held in self.desk.services.locks.written_by(who):
+                assert not isinstance(self.ask(who, "WriteUnlock", object_id=held), Refused)
+            for held in list(self.desk.services.locks._reads.get(who, ())):
+                self.ask(who, "ReadUnlock", object_id=held)
+        assert self.desk.services.locks.locked_roots() == []
+
+    def stored(self) -> Flat:
+        async def read() -> Picture:
+            storage = self.desk.services.storage
+            project = None if self.session.project is None else await storage.project(self.session.project.id)
+            return Picture.of(await storage.scene(self.session.scene.id), project)
+
+        return flat(self.runner.run(read()))
+
+    @precondition(lambda self: self.session.scene is not None)
+    @rule(number=users)
+    def save(self, number: int) -> None:
+        self.give_locks_back()
+        request = "SaveScene" if self.session.project is None else "SaveProject"
+        answer = self.single(self.who(number), request)
+        assert isinstance(answer, Refused) is (request == "SaveProject" and self.there_is() == self.saved)
+        self.saved = self.there_is()
+        assert self.stored() == self.saved
+
+    @rule(number=users, scene=st.booleans())
+    def close_and_open(self, number: int, scene: bool) -> None:
+        self.give_locks_back()
+        who = self.who(number)
+        if self.session.scene is not None:
+            answer = self.ask(who, "CloseScene" if self.session.project is None else "CloseProject", force=True)
+            assert not isinstance(answer, Refused), answer
+            self.look()
+        request, document = ("OpenScene", self.scene_id) if scene else ("OpenProject", self.project_id)
+        answer = self.ask(who, request, id=document)
+        # A project does not open on a scene from which something it needs was removed by force.
+        if isinstance(answer, Refused):
+            answer = self.ask(who, "OpenScene", id=self.scene_id)
+            assert not isinstance(answer, Refused), answer
+        self._opened()
+
+    @rule()
+    def crash(self) -> None:
+        """The files as they are on the disk now are all that a server which is killed leaves."""
+        there_was, changed = self.there_is(), self.session.has_changes
+        history = list(self.session.history)
+        left = Path(tempfile.mkdtemp(prefix="machine-")) / "data"
+        _copy_at_one_moment(self.directory, left)
+        present = sorted(self.clients)
+        self.runner.run(self._close())
+        shutil.rmtree(self.directory)
+        shutil.move(left, self.directory)
+        left.parent.rmdir()
+        self.runner.run(self._open())
+        assert (self.there_is(), self.session.has_changes) == (there_was, changed)
+        assert list(self.session.history) == history
+        assert self.desk.services.locks.locked_roots() == []
+        for name in present:
+            self.join(NAMES.index(name))
+
+    # ------------------------------------------------------------------------------------------ what always holds
+    @invariant()
+    def everybody_knows_what_there_is(self) -> None:
+        if not hasattr(self, "desk"):
+            return
+        there_is = self.there_is()
+        self.look()
+        for client in self.clients.values():
+            assert flat(client.picture) == there_is, client.name
+        assert self.session.has_changes is (there_is != self.saved)
+
+    @invariant()
+    def everybody_knows_who_locked_what(self) -> None:
+        if not hasattr(self, "desk") or self.session.project is None:
+            return
+        locks = self.desk.services.locks
+        for client in self.clients.values():
+            for key, owner in client.picture.locks.items():
+                if owner != client.name and key != self.session.project.id and self._is_there(key):
+                    assert locks.writer_of(key) == owner, (client.name, key, owner)
+            for owner, ids in locks.announced().items():
+                if owner != client.name:
+                    assert not [key for key in ids if client.picture.locks.get(key) != owner], (client.name, owner)
+
+    def _is_there(self, key: str) -> bool:
+        return any(self.session.document.find(kind, key) is not None for kind in Kind)
+
+    @invariant()
+    def what_there_is_holds_together(self) -> None:
+        if not hasattr(self, "desk") or (project := self.session.project) is None:
+            return
+        document, types = self.session.document, self.desk.types
+
+        def meta_of(action: Action) -> Any:
+            return action_meta(action, document, types)
+
+        assert project_problems(self.session.scene, project, types) == []
+        for item in project.logic:
+            check_logic_item(document, meta_of, item)
+        assert project.has_logic or not project.logic
+
+
+def _copy_at_one_moment(source: Path, target: Path) -> None:
+    """Copy files while nothing is written to them: the journal's thread tidies up after what it acknowledged."""
+    while True:
+        before = _written(source)
+        if before[1] < time.time() - 0.02:  # a file system tells times apart by a few milliseconds
+            shutil.copytree(source, target)
+            if _written(source) == before:
+                return
+            shutil.rmtree(target)
+        time.sleep(0.005)
+
+
+def _written(directory: Path) -> tuple[list[tuple[str, int, int]], float]:
+    """Give the files with sizes and times, and when the last of them was written, s."""
+    stats = [(file.name, file.stat()) for file in sorted(directory.rglob("*")) if file.is_file()]
+    return [(name, s.st_size, s.st_mtime_ns) for name, s in stats], max(s.st_mtime for _, s in stats)
+
+
+async def _template(directory: Path) -> None:
+    async with open_desk(directory) as desk:
+        alice = await desk.person("alice")
+        await Work(alice).project("base")
+        await alice.ask("SaveProject")
+        await alice.ask("CloseProject")
+
+
+def test_random_edits(tmp_path: Path) -> None:
+    Edits.template = tmp_path / "template"
+    Edits.template.mkdir()
+    asyncio.run(_template(Edits.template))
+    case = Edits.TestCase()
+    long_run = "MACHINE_EXAMPLES" in os.environ
+    case.settings = settings(
+        max_examples=int(os.environ.get("MACHINE_EXAMPLES", "16")),
+        stateful_step_count=60 if long_run else 40,
+        deadline=None,
+        database=None,
+        suppress_health_check=list(HealthCheck),
+        # Looking for the shortest way to a failure may take minutes.
+        phases=list(Phase) if long_run else [Phase.generate],
+        print_blob=True,
+    )
+    case.runTest()
