@@ -19,7 +19,7 @@ PROGRAMS: Final = {"left": "Arcor2Left", "right": "Arcor2Right"}
 """Names of the programs as they are loaded from the .pgf files."""
 FRESH: Final = 0.8
 """Seconds: how old a position may be. A look takes six requests, each of which may take ten ms and more."""
-FIRST_WITHIN: Final = 1.0
+FIRST_WITHIN: Final = 1.5
 """Seconds the first answer of a session may take: it costs two requests, by digest authentication."""
 AT_REST: Final = 2e-3
 """rad/s below which a joint counts as standing."""

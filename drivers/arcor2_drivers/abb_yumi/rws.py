@@ -3,6 +3,7 @@
 import contextlib
 import logging
 import math
+import ssl
 import threading
 import time
 from collections.abc import Iterator
@@ -16,6 +17,9 @@ REQUEST_TIMEOUT: Final = 1.0
 """Seconds a request may take: the web server of an IRC5 answers within some ten ms, seldom in hundreds."""
 
 Fields = dict[str, str]
+
+_NO_TLS: Final = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+"""Trusts nobody and is never used; without it every new client reads the certificates of the system, 20 ms long."""
 
 logging.getLogger("httpx").setLevel(logging.WARNING)  # it tells of every request otherwise, sixty a second
 
@@ -100,6 +104,7 @@ class Rws:
                     auth=httpx.DigestAuth(self._user, self._password),
                     cookies=self._cookies,
                     trust_env=False,
+                    verify=_NO_TLS,
                 )
             try:
                 answer = client.request(
