@@ -1,0 +1,107 @@
+"""Every operation is asked with what its document allows, and with what it does not: no 500, nothing undocumented."""
+
+import asyncio
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+import schemathesis
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from schemathesis import GenerationMode
+from schemathesis.checks import not_a_server_error
+from schemathesis.specs.openapi.checks import (
+    content_type_conformance,
+    response_schema_conformance,
+    status_code_conformance,
+)
+
+from arcor2_server.app import create_app, running_services
+from arcor2_server.rest import OPERATIONS
+from arcor2_server.rest.operations import Operation
+from arcor2_server.settings import ServerSettings
+from tests.server.core.serving import until
+
+EXAMPLES = 12
+"""For each of some seventy operations."""
+
+
+class Loop:
+    """An event loop on a thread of its own, where the parts of the server live: schemathesis itself knows none."""
+
+    def __init__(self, directory: Path) -> None:
+        self._directory = directory
+        self._loop = asyncio.new_event_loop()
+        self._up = threading.Event()
+        self._end = asyncio.Event()
+        self._thread = threading.Thread(target=self._run, name="server")
+        self.app: Any = None
+
+    def _run(self) -> None:
+        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
+            runner.run(self._serve())
+
+    async def _serve(self) -> None:
+        self._loop.set_default_executor(ThreadPoolExecutor(1))
+        async with running_services(ServerSettings(data_dir=self._directory)) as services:
+            services.cell.hosts.prepare()
+            await until(lambda: psutil.Process().children())
+            self.app = create_app(services)
+            self._up.set()
+            await self._end.wait()
+
+    def __enter__(self) -> "Loop":
+        self._thread.start()
+        assert self._up.wait(30)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._loop.call_soon_threadsafe(self._end.set)
+        self._thread.join(20)
+
+    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
+        """Be the ASGI application, for whatever loop asks."""
+        theirs = asyncio.get_running_loop()
+
+        async def take() -> Any:
+            return await asyncio.wrap_future(asyncio.run_coroutine_threadsafe(receive(), theirs))
+
+        async def give(message: Any) -> None:
+            await asyncio.wrap_future(asyncio.run_coroutine_threadsafe(send(message), theirs))
+
+        work = asyncio.run_coroutine_threadsafe(self.app(scope, take, give), self._loop)
+        await asyncio.wrap_future(work)
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Loop]:
+    with Loop(tmp_path_factory.mktemp("schemathesis")) as loop:
+        yield loop
+
+
+@pytest.fixture(scope="module")
+def api(server: Loop) -> Any:
+    return schemathesis.openapi.from_asgi("/openapi", server)
+
+
+CONFORMING = [content_type_conformance, response_schema_conformance, status_code_conformance]
+
+
+@pytest.mark.parametrize("declared", OPERATIONS, ids=lambda one: f"{one.method} {one.path}")
+def test_whatever_is_asked_gets_an_answer_of_the_stated_form(api: Any, declared: Operation) -> None:
+    operation = api[declared.path][declared.method]
+    # The Calibration service, which is not there, is not there with 503.
+    checks = CONFORMING if declared.service == "Calibration" else [*CONFORMING, not_a_server_error]
+
+    @settings(max_examples=EXAMPLES, deadline=None, database=None, derandomize=True, suppress_health_check=HealthCheck)
+    @given(st.one_of([operation.as_strategy(mode) for mode in GenerationMode]))
+    def ask(case: Any) -> None:
+        answer = case.call_and_validate(checks=checks)
+        if answer.status_code >= 400:
+            assert set(answer.json()) == {"service", "message", "type", "description"}
+
+    ask()
