@@ -11,9 +11,11 @@ import gc
 import logging
 import random
 import resource
+import statistics
 import sys
 import threading
 import time
+from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -41,7 +43,8 @@ ASKED_EACH: Final = 0.02
 STEADY: Final = 1.0
 """s, and up to another half by chance, between being back and being lost again."""
 QUIET: Final = 3.0
-"""s in which what only ends belatedly ends, before it is counted."""
+"""s in which what only ends belatedly ends, and what is held is counted."""
+QUIET_TRIES: Final = 5
 
 ONLINE: Final = (Connection.ONLINE, Connection.BACK)
 
@@ -161,31 +164,40 @@ class Trial:
         return [sample for samples in self.samples.values() for sample in samples]
 
 
-Held = dict[str, set[str]]
+Held = dict[str, Counter[str]]
 
 
 def held() -> Held:
-    """Give the threads (by the system's number: also those of libraries), descriptors and tasks of this process."""
+    """Count the threads (also those of libraries), descriptors and tasks of this process, each by what it is."""
     names = {thread.native_id: thread.name for thread in threading.enumerate()}
-    threads = {f"{each.name} {names.get(int(each.name), 'of a library')}" for each in Path("/proc/self/task").iterdir()}
-    descriptors = set()
+    threads = Counter(names.get(int(each.name), "of a library") for each in Path("/proc/self/task").iterdir())
+    descriptors: Counter[str] = Counter()
     for each in Path("/proc/self/fd").iterdir():
         with contextlib.suppress(OSError):  # the one of this very look
-            descriptors.add(f"{each.name} {each.readlink()}")
+            descriptors[str(each.readlink()).partition(":")[0]] += 1
     found = [each for each in gc.get_objects() if issubclass(type(each), asyncio.Task)]
-    tasks = {f"{id(each)} {each.get_name()}" for each in found if not each.done()}
+    tasks = Counter(getattr(each.get_coro(), "__qualname__", "") for each in found if not each.done())
     return {"threads": threads, "descriptors": descriptors, "tasks": tasks}
 
 
-def settled() -> Held:
-    """Give what is held at the quietest moment of a few seconds."""
-    found: list[Held] = []
-    until = time.monotonic() + QUIET
-    while time.monotonic() < until:
-        gc.collect()
-        found.append(held())
-        time.sleep(0.1)
-    return {kind: min((each[kind] for each in found), key=len) for kind in found[0]}
+def settled(trials: list[Trial]) -> Held:
+    """Give what is held most of the time in a few seconds in which every driver is online.
+
+    Not the least: a line that a busy machine lets be lost and opened anew just then holds less.
+    """
+    for _ in range(QUIET_TRIES):
+        found: list[Held] = []
+        online = True
+        until = time.monotonic() + QUIET
+        while time.monotonic() < until:
+            gc.collect()
+            found.append(held())
+            online = online and all(trial.line.device.connection in ONLINE for trial in trials)
+            time.sleep(0.1)
+        if online:
+            break
+    usual = {kind: statistics.mode(each[kind].total() for each in found) for kind in found[0]}
+    return {kind: next(each[kind] for each in found if each[kind].total() == usual[kind]) for kind in found[0]}
 
 
 def through(trials: list[Trial], cycles: int) -> tuple[Held, Held, str]:
@@ -199,7 +211,7 @@ def through(trials: list[Trial], cycles: int) -> tuple[Held, Held, str]:
             with contextlib.ExitStack() as quiet:
                 for trial in trials:
                     quiet.enter_context(trial.asking.held())
-                counted.append(settled())
+                counted.append(settled(trials))
                 memory.append(resident())
     return counted[0], counted[-1], f"{memory[0]:.0f} to {memory[-1]:.0f} MiB resident"
 
@@ -212,10 +224,10 @@ def resident() -> float:
 
 def grown(first: Held, last: Held) -> tuple[int, str]:
     """Give how many more there are, each kind by itself, and which are new."""
-    more = {kind: max(0, len(last[kind]) - len(first[kind])) for kind in first}
-    counts = ", ".join(f"{len(first[kind])} to {len(last[kind])} {kind}" for kind in first)
-    new = sorted(each for kind, n in more.items() if n for each in last[kind] - first[kind])
-    return sum(more.values()), counts + (f"; new: {'; '.join(new[:8])}" if new else "")
+    more = {kind: max(0, last[kind].total() - first[kind].total()) for kind in first}
+    counts = ", ".join(f"{first[kind].total()} to {last[kind].total()} {kind}" for kind in first)
+    new = [f"{n} {what}" for kind in first if more[kind] for what, n in (last[kind] - first[kind]).items()]
+    return sum(more.values()), counts + (f"; more: {', '.join(new)}" if new else "")
 
 
 def table(trials: list[Trial]) -> None:
