@@ -7,7 +7,6 @@ import asyncio
 import os
 import shutil
 import tempfile
-import time
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ from arcor2_hw.data.project import Action
 from arcor2_server.session.changes import Kind
 from arcor2_server.session.checks import action_meta, project_problems
 from arcor2_server.session.logic import check_logic_item
+from tests.server.machine.crash_copy import copy_at_one_moment
 from tests.server.machine.picture import Picture
 from tests.server.machine.requests import EDITS, SCENE_EDITS, Draw, Request
 from tests.server.session.desk import Desk, Person, Refused, open_desk
@@ -328,7 +328,7 @@ class Edits(RuleBasedStateMachine):
         there_was, changed = self.there_is(), self.session.has_changes
         history = list(self.session.history)
         left = Path(tempfile.mkdtemp(prefix="machine-")) / "data"
-        _copy_at_one_moment(self.directory, left)
+        copy_at_one_moment(self.directory, left)
         present = sorted(self.clients)
         self.runner.run(self._close())
         shutil.rmtree(self.directory)
@@ -381,24 +381,6 @@ class Edits(RuleBasedStateMachine):
         for item in project.logic:
             check_logic_item(document, meta_of, item)
         assert project.has_logic or not project.logic
-
-
-def _copy_at_one_moment(source: Path, target: Path) -> None:
-    """Copy files while nothing is written to them: the journal's thread tidies up after what it acknowledged."""
-    while True:
-        before = _written(source)
-        if before[1] < time.time() - 0.02:  # a file system tells times apart by a few milliseconds
-            shutil.copytree(source, target)
-            if _written(source) == before:
-                return
-            shutil.rmtree(target)
-        time.sleep(0.005)
-
-
-def _written(directory: Path) -> tuple[list[tuple[str, int, int]], float]:
-    """Give the files with sizes and times, and when the last of them was written, s."""
-    stats = [(file.name, file.stat()) for file in sorted(directory.rglob("*")) if file.is_file()]
-    return [(name, s.st_size, s.st_mtime_ns) for name, s in stats], max(s.st_mtime for _, s in stats)
 
 
 async def _template(directory: Path) -> None:

@@ -1,0 +1,183 @@
+"""Undo where others edit too: what is refused, whom it names, and the locks."""
+
+import asyncio
+
+import pytest
+
+from arcor2_hw.data.role import Role
+from tests.server.session.desk import Desk, Person, Refused
+from tests.server.session.edits import make, refused
+from tests.server.session.work import ORIGIN, Work
+
+
+@pytest.fixture
+def work(alice: Person) -> Work:
+    return Work(alice)
+
+
+async def test_only_ones_own_edits_are_taken_back(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+    await work.project("a", "b")
+    a, b = work.point("a"), work.point("b")
+    await make(alice, ("RenameActionPoint", {"action_point_id": a, "new_name": "a2"}, a, False), {})
+    await bob.lock(b)
+    await bob.ask("RenameActionPoint", action_point_id=b, new_name="b2")
+    await alice.ask("Undo")
+    assert {work.point("a"), work.point("b2")} == {a, b}
+    await bob.ask("Undo")
+    assert {work.point("a"), work.point("b")} == {a, b}
+    # What others do meanwhile does not end what one can redo; what one does oneself ends it.
+    await bob.ask("AddActionPoint", name="c", position=ORIGIN)
+    await alice.ask("Redo")
+    assert work.point("a2") == a
+    await alice.ask("Undo")
+    await alice.ask("AddActionPoint", name="d", position=ORIGIN)
+    with pytest.raises(Refused, match="nothing"):
+        await alice.ask("Redo")
+    with pytest.raises(Refused, match="bob"):
+        await alice.ask("Undo", number=desk.session.revision - 3)
+
+
+async def test_refused_naming_who_changed_it_since(alice: Person, bob: Person, work: Work) -> None:
+    await work.project("p")
+    p = work.point("p")
+    await make(alice, ("RenameActionPoint", {"action_point_id": p, "new_name": "q"}, p, False), {})
+    await bob.lock(p, tree=True)
+    await bob.ask("UpdateActionPointPosition", action_point_id=p, new_position={"x": 9.0, "y": 0.0, "z": 0.0})
+    await bob.ask("WriteUnlock", object_id=p)
+    assert "bob" in (text := await refused(alice))
+    assert "UpdateActionPointPosition" in text
+    # Once that is taken back too, nothing stands against it.
+    await bob.ask("Undo")
+    await alice.ask("Undo")
+    assert work.point("p") == p
+
+
+async def test_refused_where_others_build_on_it(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+    await work.project()
+    builder = Work(bob)
+    p = await work.add_point("p")
+    below = await builder.add_point("below", p)
+    assert "bob" in await refused(alice)
+    await bob.ask("RemoveActionPoint", id=below)
+    action = await builder.add_action(p, "act")
+    assert "bob" in await refused(alice)
+    await bob.ask("RemoveAction", id=action)
+    await alice.ask("Undo")
+    # A name that was taken meanwhile.
+    await builder.add_point("p")
+    assert "bob" in await refused(alice, "Redo")
+    await bob.ask("Undo")
+    await alice.ask("Redo")
+    # A step to an action, a result that is used.
+    one = await work.add_action(p, "one")
+    await bob.ask("AddLogicItem", start="START", end=one)
+    assert "bob" in await refused(alice)
+    await alice.lock(one)
+    await alice.ask("WriteUnlock", object_id=one)
+    await bob.ask("Undo")
+    await alice.ask("Undo")
+    # The parent is gone.
+    await bob.ask("RemoveActionPoint", id=p)
+    assert "bob" in await refused(alice, "Redo")
+
+
+async def test_refused_where_the_logic_would_not_hold(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+    await work.project("p")
+    p = work.point("p")
+    a, b, c = [await work.add_action(p, name) for name in ("a", "b", "c")]
+    await alice.ask("AddLogicItem", start=a, end=b)
+    await alice.ask("RemoveLogicItem", logic_item_id=desk.session.document.outgoing(a)[0].id)
+    await bob.ask("AddLogicItem", start=b, end=c)
+    await bob.ask("AddLogicItem", start=c, end=a)
+    text = await refused(alice)
+    assert "loop" in text
+    assert "bob" in text
+    await bob.ask("Undo")
+    await bob.ask("AddLogicItem", start=a, end=c)
+    text = await refused(alice)
+    assert "condition" in text
+    assert "bob" in text
+    await bob.ask("UpdateProjectHasLogic", project_id=desk.session.require_project().id, new_has_logic=False)
+    assert "bob" in await refused(alice)
+
+
+async def test_refused_while_others_hold_locks(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+    await work.project("p")
+    p = work.point("p")
+    below = await work.add_point("below", p)
+    await make(alice, ("RenameActionPoint", {"action_point_id": p, "new_name": "q"}, p, False), {})
+    await bob.lock(p)
+    assert "bob" in await refused(alice)
+    await bob.ask("WriteUnlock", object_id=p)
+    # A new name moves nothing: what hangs on the point may be locked. A move takes it along.
+    await bob.lock(below)
+    await alice.ask("Undo")
+    await bob.ask("WriteUnlock", object_id=below)
+    await alice.lock(p, tree=True)
+    await alice.ask("UpdateActionPointPosition", action_point_id=p, new_position={"x": 1.0, "y": 0.0, "z": 0.0})
+    await alice.ask("WriteUnlock", object_id=p)
+    await bob.lock(below)
+    assert "bob" in await refused(alice)
+    assert "bob" in await refused(alice, "RestoreRevision", revision=desk.session.revision - 1)
+    await bob.ask("WriteUnlock", object_id=below)
+    await bob.ask("ReadLock", object_id=below)
+    assert "bob" in await refused(alice)
+    await bob.ask("ReadUnlock", object_id=below)
+    # Ones own locks are no hindrance, and stay.
+    await alice.lock(p, tree=True)
+    await alice.ask("Undo")
+    assert desk.services.locks.written_by("alice") == [p]
+    await alice.ask("WriteUnlock", object_id=p)
+    assert desk.services.locks.locked_roots() == []
+
+
+async def test_locks_follow_what_goes_and_what_hangs_elsewhere(
+    desk: Desk, alice: Person, bob: Person, work: Work
+) -> None:
+    await work.project("a", "b")
+    a, b = work.point("a"), work.point("b")
+    await make(
+        alice, ("UpdateActionPointParent", {"action_point_id": a, "new_parent_id": b}, a, False), {}
+    )  # fmt: skip
+    await alice.lock(a)
+    await alice.ask("Undo")
+    await bob.lock(b, tree=True)  # what was below it is not any more
+    with pytest.raises(Refused, match="alice"):
+        await bob.ask("WriteLock", object_id=a)
+    await bob.ask("WriteUnlock", object_id=b)
+    p = await work.add_point("p")
+    await alice.lock(p)
+    await alice.ask("Undo")
+    assert desk.services.locks.written_by("alice") == [a]
+    await alice.ask("WriteUnlock", object_id=a)
+    await alice.ask("SaveProject")
+
+
+async def test_two_undos_at_once_take_back_two_edits(desk: Desk, alice: Person, work: Work) -> None:
+    await work.project("p")
+    p = work.point("p")
+    for name in ("q", "r", "s"):
+        await make(alice, ("RenameActionPoint", {"action_point_id": p, "new_name": name}, p, False), {})
+    answers = await asyncio.gather(alice.ask("Undo"), alice.ask("Undo"))
+    assert answers[0]["number"] == answers[1]["number"] + 1
+    assert work.point("q") == p
+
+
+async def test_who_is_not_logged_in_is_refused(alice: Person, stranger: Person, work: Work) -> None:
+    with pytest.raises(Refused, match="open"):
+        await alice.ask("Undo")
+    await work.project("p")
+    for request, args in (("Undo", {}), ("Redo", {}), ("RestoreRevision", {"revision": 0})):
+        with pytest.raises(Refused, match="logged in"):
+            await stranger.ask(request, **args)
+    assert (await stranger.ask("History"))["revision"] == 1
+
+
+async def test_taking_back_needs_the_role_of_the_edit(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+    await work.project("p")
+    await alice.ask("AddProjectParameter", name="x", type="double", value="0.5")
+    (client,) = [client for client in desk.services.hub.clients if client.user == "alice"]
+    client.role = Role.STANDARD_USER
+    assert "advanced user" in (await refused(alice)).replace("_", " ")
+    assert "advanced user" in (await refused(alice, "RestoreRevision", revision=0)).replace("_", " ")
+    await alice.ask("Undo", number=desk.session.revision - 1)
