@@ -11,7 +11,7 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Final
 
-from benchmarks import building, buses, camera, hung, operation, recovery, requests, robot, stops
+from benchmarks import analysing, building, buses, camera, hung, operation, recovery, requests, robot, stops
 from benchmarks.figures import Report
 
 LONG: Final = "--long"
@@ -19,6 +19,7 @@ ROOMS: Final[dict[str, Callable[[Report, Path], Awaitable[None]]]] = {
     "requests": requests.run,
     "operation": operation.run,
     "building": lambda report, _: building.build(report),
+    "analysing": lambda report, _: analysing.analyse(report),
     "robot": robot.run,
     "buses": buses.run,
     "camera": camera.run,

@@ -1,7 +1,8 @@
 """Methods as actions (protocol, 9.3 and 9.4)."""
 
 import ast
-import inspect
+import functools
+from collections.abc import Mapping
 from typing import Any, Final
 
 from docstring_parser import DocstringStyle, ParseError
@@ -33,6 +34,7 @@ class ActionReader:
     def __init__(self, hierarchy: Hierarchy) -> None:
         self._hierarchy = hierarchy
         self._resolver = hierarchy.resolver
+        self._known_marks: dict[ClassInfo, list[tuple[FunctionNode, ActionMetadata | Broken]]] = {}
 
     # -------------------------------------------------------------------------------- which methods are actions
     def mark(self, owner: ClassInfo, name: str, node: FunctionNode) -> ActionMetadata | None:
@@ -62,21 +64,36 @@ class ActionReader:
         """
         result: dict[str, ObjectAction] = {}
         shown = of_type(seen_from, self._hierarchy)
+        for node, metadata in self._marked(info):
+            try:
+                if isinstance(metadata, Broken):
+                    raise metadata
+                category, icon = of_action(node, info, shown, self._hierarchy)
+            except Broken as error:
+                result[node.name] = ObjectAction(node.name, disabled=True, problem=str(error.problem))
+                continue
+            found = self._action(info, node, metadata, seen_from)
+            result[node.name] = replace(found, category=category, icon=icon)
+        return result
+
+    def _marked(self, info: ClassInfo) -> list[tuple[FunctionNode, ActionMetadata | Broken]]:
+        """Give the methods of a class that are actions to be told of, by name; or what is wrong with their mark."""
+        if info in self._known_marks:
+            return self._known_marks[info]
+        marked: list[tuple[FunctionNode, ActionMetadata | Broken]] = []
         for name in sorted(info.members):
             node = info.function(name)
             if node is None:
                 continue
             try:
                 metadata = self.mark(info, name, node)
-                category, icon = of_action(node, info, shown, self._hierarchy)
             except Broken as error:
-                result[name] = ObjectAction(name, disabled=True, problem=str(error.problem))
+                marked.append((node, error))
                 continue
-            if metadata is None or metadata.hidden or self._is_offer(info, node):
-                continue
-            found = self._action(info, node, metadata, seen_from)
-            result[name] = replace(found, category=category, icon=icon)
-        return result
+            if metadata is not None and not metadata.hidden and not self._is_offer(info, node):
+                marked.append((node, metadata))
+        self._known_marks[info] = marked
+        return marked
 
     def _is_offer(self, info: ClassInfo, node: FunctionNode) -> bool:
         if self._hierarchy.is_hook_only(node, info):
@@ -87,7 +104,7 @@ class ActionReader:
     def _action(
         self, info: ClassInfo, node: FunctionNode, metadata: ActionMetadata, seen_from: ClassInfo
     ) -> ObjectAction:
-        text = ast.get_docstring(node)
+        text = ast.get_docstring(node, clean=False)
         description: str | Unset = sendable(text.strip().partition("\n")[0]) if text and text.strip() else UNSET
         parameters: list[ParameterMeta] = []
         returns: list[str] = []
@@ -270,8 +287,9 @@ def _ranges(node: FunctionNode) -> dict[str, _Limits]:
     return result
 
 
-def described_parameters(docstring: str | None) -> dict[str, str]:
-    """Give what a docstring says of each parameter; in any of the usual styles."""
+@functools.lru_cache(maxsize=1024)
+def described_parameters(docstring: str | None) -> Mapping[str, str]:
+    """Give what a docstring, indented as it is, says of each parameter; in any of the usual styles."""
     if not docstring:
         return {}
     if ":param" in docstring:
@@ -283,7 +301,7 @@ def described_parameters(docstring: str | None) -> dict[str, str]:
     else:
         return {}
     try:
-        parsed = parse_docstring(inspect.cleandoc(docstring), style)
+        parsed = parse_docstring(docstring, style)
     except ParseError:
         return {}
     return {p.arg_name: sendable(p.description) for p in parsed.params if p.description}

@@ -18,6 +18,8 @@ class Hierarchy:
     def __init__(self, resolver: Resolver) -> None:
         self.resolver = resolver
         self._lineages: dict[ClassInfo, Lineage] = {}
+        self._ours: dict[ClassInfo, frozenset[str]] = {}
+        self._offered: dict[ClassInfo, list[str]] = {}
         self._underway: list[ClassInfo] = []
 
     def bases(self, info: ClassInfo) -> "list[ClassInfo | External]":
@@ -79,7 +81,9 @@ class Hierarchy:
 
     def derives_from(self, info: ClassInfo, name: str) -> bool:
         """Tell whether our base `name` is the class itself or an ancestor."""
-        return any(framework_name(each) == name for each in self.lineage(info))
+        if info not in self._ours:
+            self._ours[info] = frozenset(found for each in self.lineage(info) if (found := framework_name(each)))
+        return name in self._ours[info]
 
     def find(self, info: ClassInfo, name: str) -> tuple[ClassInfo, Binding] | None:
         """Give the class that binds a member as it is seen from `info`, and the binding."""
@@ -145,15 +149,21 @@ class Hierarchy:
         symbol = self.resolver.expression(raised.func if isinstance(raised, ast.Call) else raised, owner.module, owner)
         return framework_name(symbol) == "Arcor2NotImplemented"
 
+    def _offers(self, base: ClassInfo) -> list[str]:
+        """Give the optional methods that one of our bases declares."""
+        if base not in self._offered:
+            self._offered[base] = [
+                name
+                for name, member in base.members.items()
+                if not name.startswith("_")
+                and isinstance(member, ast.FunctionDef)
+                and not self.is_abstract(member, base)
+            ]
+        return self._offered[base]
+
     def implemented_hooks(self, info: ClassInfo) -> frozenset[str]:
         """Give the optional methods of our bases that the type, or an ancestor of its own, really implements."""
-        offered = {
-            name
-            for each in self.ancestors(info)
-            if is_framework(each)
-            for name, member in each.members.items()
-            if not name.startswith("_") and isinstance(member, ast.FunctionDef) and not self.is_abstract(member, each)
-        }
+        offered = {name for each in self.ancestors(info) if is_framework(each) for name in self._offers(each)}
         result = set()
         for name in offered:
             found = self.method(info, name)

@@ -59,7 +59,7 @@ class SettingsReader:
             if decorator is None or framework_name(each) is not None:
                 continue
             after = _keyword(decorator, "kw_only")
-            descriptions = described_parameters(ast.get_docstring(each.node))
+            descriptions = described_parameters(ast.get_docstring(each.node, clean=False))
             for name, member in each.members.items():
                 if not isinstance(member, Value) or member.annotation is None:
                     continue
