@@ -13,7 +13,7 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint
 from tests.server.session.desk import Desk, Person, trace
 
-ID = re.compile(r"\b(?:scn|obj|pro|acp|ori|joi|act|lit|pco)_[0-9a-f]{32}\b")
+ID = re.compile(r"\b(?:scn|obj|pro|acp|ori|joi|act|lit|pco|pkg)_[0-9a-f]{32}\b")
 
 
 class Mapping:
