@@ -108,23 +108,23 @@ class Session:
                 self._apply(edit)
 
     async def _find_unsaved(self) -> None:
-        """Compare with what is saved: the journal does not keep what changes were made since when."""
+        """Compare with what is saved: the journal need not know of the last save, nor what was changed since when."""
+        storage, scene, project = self._services.storage, self.require_scene(), self.project
+        saved, saved_project = Scene(name="", id=scene.id), None
         try:
-            saved = Document.of(*await self._saved())
-        except (NotFound, StorageError) as error:
+            saved = await storage.scene(scene.id)
+            self._scene_times = replace(Times.of(saved), changed=self._scene_times.changed)
+            if project is not None:
+                saved_project = await storage.project(project.id)
+                self._project_times = replace(Times.of(saved_project), changed=self._project_times.changed)
+        except NotFound:
+            pass  # it was never saved, or is deleted
+        except StorageError as error:
             log.warning("what is open cannot be compared with what is saved", reason=str(error))
-            saved = Document()
-        self._unsaved = Unsaved.between(saved, self.document)
+        self._unsaved = Unsaved.between(Document.of(saved, saved_project), self.document)
         self._scene_times = _settled(self._scene_times, differs=self._unsaved.scene)
         self._project_times = _settled(self._project_times, differs=self._unsaved.project)
         self._forget_snapshots()
-
-    async def _saved(self) -> tuple[Scene, Project | None]:
-        storage, scene, project = self._services.storage, self.require_scene(), self.project
-        saved = await storage.scene(scene.id) if self._scene_times.modified else Scene(name="", id=scene.id)
-        if project is None or not self._project_times.modified:
-            return saved, None
-        return saved, await storage.project(project.id)
 
     def _name(self, kind: Kind) -> str | None:
         return next((item.value.name for item in self.document.of_kind(kind)), None)
@@ -333,7 +333,8 @@ class Session:
             saved = await self._save(storage.put_project(self.require_project()), scene=False)
             self._project_times = _settled(self._project_times, differs=self._unsaved.project, saved=saved)
             self._forget_snapshots()
-        await self._rebase(forget=self._number - self._limit)
+        # Not waited for: what a restart finds saved is compared with what the journal leads to.
+        self._shorten()
 
     async def _save(self, put: Awaitable[BareScene | BareProject], *, scene: bool) -> BareScene | BareProject:
         # An edit that comes while the storage is writing is not saved yet.

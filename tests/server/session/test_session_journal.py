@@ -269,3 +269,20 @@ async def test_a_caller_who_goes_away_does_not_take_his_edit_with_him(desk: Desk
     await add_point(alice, "later")
     assert point_names(desk) == ["p0", "last", "later"]
     assert not desk.session._pending
+
+
+async def test_a_crash_right_after_saving_leaves_it_saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    async with open_desk(tmp_path) as desk:
+        alice = await desk.person("alice")
+        await open_project(alice)
+        monkeypatch.setattr(desk.session, "_shorten", lambda: None)  # the journal never learns of it
+        await alice.ask("SaveProject")
+        saved = await desk.services.storage.project(desk.session.require_project().id)
+    async with open_desk(tmp_path) as desk:
+        assert not desk.session.has_changes
+        assert desk.session.project == saved
+        alice = await desk.person("alice")
+        await alice.ask("Undo")
+        assert desk.session.has_changes
+        await alice.ask("CloseProject", force=True)
+        assert (await alice.ask("GetProject", id=saved.id))["modified"] == saved.modified
