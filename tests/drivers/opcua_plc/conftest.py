@@ -42,7 +42,7 @@ class Beside:
         return self.result
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def one_fake() -> Iterator[FakeProcess]:
     fake = FakeProcess("opcua_plc", "--time-scale", "5")
     fake.truth()  # opens the control channel, which lives as long
@@ -52,7 +52,7 @@ def one_fake() -> Iterator[FakeProcess]:
 
 @pytest.fixture
 def fake(one_fake: FakeProcess) -> FakeProcess:
-    """A PLC as switched on; one process serves the tests of a file."""
+    """A PLC as switched on; one process serves all files, for it takes 2 s of a processor to start."""
     one_fake.control.do("heal")
     one_fake.control.do("restart")
     return one_fake
