@@ -58,12 +58,15 @@ class _Wire(asyncio.Protocol):
         self.host: CellHost | None = None
         self._buffer = bytearray()
         self.transport: asyncio.Transport | None = None
+        self.pieces = 0
+        """How often something has come."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self.transport = cast("asyncio.Transport", transport)
 
     def data_received(self, data: bytes) -> None:
         host, buffer = self.host, self._buffer
+        self.pieces += 1
         buffer += data
         if host is None:
             return  # `start` looks again
@@ -237,7 +240,11 @@ class CellHost:
         try:
             await asyncio.wait({waiting, lost}, return_when=asyncio.FIRST_COMPLETED)
             # What it said last is still on its way when the process is gone; the exit status when the socket is.
-            await asyncio.wait({waiting if lost.done() else lost}, timeout=LAST_WORDS)
+            heard = -1
+            while not (lost.done() and waiting.done()) and heard != self._wire.pieces:
+                # A busy server may have much to take in yet.
+                heard = self._wire.pieces
+                await asyncio.wait({waiting if lost.done() else lost}, timeout=LAST_WORDS)
             if not waiting.done():
                 self._tell_end("the cell host closed its connection")
                 _, late = await asyncio.wait({waiting}, timeout=GOES_WITHIN)

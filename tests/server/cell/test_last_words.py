@@ -1,0 +1,47 @@
+"""What a host said before it ended is heard, however long a busy server takes to read it."""
+
+import asyncio
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from arcor2_hw.runtime import messages as m
+from arcor2_server.cell import host as host_module
+from arcor2_server.cell.host import CellHost, _Wire
+
+
+class Listener:
+    def __init__(self) -> None:
+        self.heard: list[str] = []
+
+    def host_said(self, host: CellHost, message: Any) -> None:
+        self.heard.append(message.text)
+
+    def host_silent(self, host: CellHost, silent: bool) -> None:
+        raise AssertionError
+
+    def host_ended(self, host: CellHost, reason: str) -> None:
+        self.heard.append(reason)
+
+
+@pytest.mark.parametrize("closes", [True, False])
+async def test_all_is_heard_before_the_end_is_told(monkeypatch: pytest.MonkeyPatch, closes: bool) -> None:
+    monkeypatch.setattr(host_module, "LAST_WORDS", 0.8)
+
+    async def wait() -> int:
+        return 0
+
+    process: Any = SimpleNamespace(pid=1, returncode=0, wait=wait)
+    wire, listener = _Wire(), Listener()
+    wire.host = host = CellHost(process, wire)
+    host.user = listener
+    watching = asyncio.create_task(host._watch_end())
+    for n in range(4):
+        await asyncio.sleep(0.3)
+        wire.data_received(m.encode(m.LogLine("info", str(n))))
+    if closes:
+        wire.connection_lost(None)
+    # A socket that somebody else keeps open and says nothing on does not keep the end from being told.
+    await asyncio.wait_for(watching, 10)
+    assert listener.heard == ["0", "1", "2", "3", "the cell host ended"]
