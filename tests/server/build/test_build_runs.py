@@ -1,0 +1,195 @@
+"""Built packages run in a real cell host: long ones, and those whose script is written by hand."""
+
+import itertools
+import os
+import re
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from arcor2_hw.data.geometry import Orientation, Position
+from arcor2_hw.data.project import END, START, ActionPoint, NamedOrientation, Project
+from arcor2_hw.exceptions import InvalidProject
+from arcor2_server.build import package
+from arcor2_server.build.service import files_of
+from tests.server.build import hub, workplace
+from tests.server.build.conftest import make_code
+from tests.server.cell.conftest import Server, serving
+
+ROOT = Path(__file__).parents[3]
+PAGE = (ROOT / "docs" / "reference" / "scripts.md").read_text()
+BY_HAND = re.findall(r"^```python\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)[0]
+COUNT = 1000
+
+
+def by_hand() -> Project:
+    """Give the workplace's project without logic and without actions, as one that is programmed by hand."""
+    points = [replace(point, actions=[]) for point in workplace.project().action_points]
+    return replace(workplace.project(), has_logic=False, logic=[], action_points=points)
+
+
+async def build(directory: Path, project: Project, source: str | None = None) -> dict[str, bytes]:
+    """Give the files of a package that a hub makes of a stored project."""
+    with pytest.MonkeyPatch.context() as patch:
+        async with hub.opened(directory / "hub", make_code(directory), patch) as services:
+            await services.storage.put_scene(workplace.scene())
+            await services.storage.put_project(project)
+            if source is not None:
+                await services.storage.put_project_source(project.id, source)
+            return files_of(await services.build.gather(project.id))
+
+
+async def upload(server: Server, files: dict[str, bytes]) -> None:
+    directory = server.services.settings.packages_dir
+    package.write(files, directory / "pkg_1")
+
+
+def long_project() -> Project:
+    """Give a chain of distinct actions, each on a point of its own; the last one ends the program."""
+    points, names = [], []
+    for n in range(COUNT):
+        key = f"ori_{n}"
+        name = f"drop {n}" if n % 2 else f"place {n}"
+        names.append(name)
+        given = (
+            (("position", "position", f'"acp_{n}"'), ("height", "double", f"0.{n + 1}"))
+            if n % 2
+            else (("pose", "pose", f'"{key}"'),)
+        )
+        one = workplace.action(name, f"obj_robot/{name.split()[0]}", *given)
+        orientations = [NamedOrientation("default", Orientation(), key)]
+        points.append(ActionPoint(f"p{n}", Position(n / 1000), id=f"acp_{n}", orientations=orientations, actions=[one]))
+    points[-1].actions.append(workplace.action("finish", "obj_flow/finish"))
+    order = [START, *names, "finish", END]
+    logic = [workplace.step(start, end) for start, end in itertools.pairwise(order)]
+    return replace(workplace.project(), action_points=points, logic=logic)
+
+
+async def ended(server: Server) -> None:
+    await server.client.event("ShowMainScreen")
+
+
+@serving()
+async def test_a_thousand_distinct_actions_run(server: Server) -> None:
+    project = long_project()
+    await upload(server, await build(server.services.settings.data_dir, project))
+    client = server.client
+    seen: list[dict[str, Any]] = []
+    put = client.put
+
+    def keep(message: bytes) -> None:
+        put(message)
+        seen.append(client.got[-1])
+
+    client.put = keep  # type: ignore[method-assign]
+    await server.ask("RunPackage", {"id": "pkg_1"})
+    await ended(server)
+    failures = [event for event in seen if event["event"] == "ProjectException"]
+    assert not failures, (len(seen), seen[-3:])
+    before = [event["data"] for event in seen if event["event"] == "ActionStateBefore"]
+    assert [data["action_id"] for data in before] == [a.id for point in project.action_points for a in point.actions]
+    # Each had the parameters of its own point, none those of another one.
+    assert [data.get("action_point_ids") for data in before[:-1:2]] == [[f"acp_{n}"] for n in range(0, COUNT, 2)]
+    assert before[1]["parameters"][1] == "0.2"
+
+
+@serving()
+async def test_a_script_by_hand_runs_and_is_debugged(server: Server) -> None:
+    files = await build(server.services.settings.data_dir, by_hand(), BY_HAND)
+    assert files["script.py"].decode() == BY_HAND
+    await upload(server, files)
+    client = server.client
+    await server.ask("RunPackage", {"id": "pkg_1", "start_paused": True, "breakpoints": ["acp_good"]})
+    first = await client.event("ActionStateBefore")
+    assert first == {"parameters": ["2.5", "2"]}  # without actions in the project there is no id to tell
+    await client.state("paused", "PackageState")
+    await server.ask("StepAction")
+    second = await client.event("ActionStateBefore")
+    assert second["action_point_ids"] == ["acp_feeder"]
+    await client.state("paused", "PackageState")
+    await server.ask("ResumePackage")
+    # The pose that the script has lifted still belongs to its action point, where a breakpoint is.
+    placed = await client.event("ActionStateBefore", lambda data: data.get("action_point_ids") == ["acp_good"])
+    await client.state("paused", "PackageState")
+    assert '"z":0.18' in placed["parameters"][0]
+    await server.ask("ResumePackage")
+    dropped = await client.event("ActionStateBefore", lambda data: data["parameters"][1:] == ["0.2"])
+    assert '"x"' in dropped["parameters"][0]
+    await ended(server)
+    assert server.services.execution.last_error is None
+
+
+@serving()
+async def test_a_script_by_hand_that_fails_and_one_that_is_stopped(server: Server) -> None:
+    body = BY_HAND.replace("    good = 0\n", "    robot.pick(aps.feeder.poses.default, grip=Grip.SOFT)\n    good = 0\n")
+    await upload(server, await build(server.services.settings.data_dir, by_hand(), body))
+    await server.ask("RunPackage", {"id": "pkg_1"})
+    told = await server.client.event("ProjectException")
+    assert told["type"] == "AssertionError"
+    assert "robot" in told["message"]
+    await ended(server)
+
+    (server.services.settings.packages_dir / "pkg_1" / "script.py").write_text(
+        BY_HAND.replace("    good = 0\n", "    while True:\n        robot.drop(aps.good.position, 0.1)\n").split(
+            "    for _ in range"
+        )[0]
+        + BY_HAND[BY_HAND.index("\n\nif __name__") :]
+    )
+    await server.ask("RunPackage", {"id": "pkg_1"})
+    await server.client.event("ActionStateBefore")
+    await server.ask("StopPackage")
+    await ended(server)
+    assert server.services.execution.last_error is None
+
+
+async def test_a_script_by_hand_is_checked_before_a_build(tmp_path: Path) -> None:
+    with pytest.raises(InvalidProject, match=r"script\.py, line 3"):
+        await build(tmp_path, by_hand(), "a = 1\n\nb = (\n")
+
+
+async def test_an_editor_and_a_type_checker_know_what_a_script_works_with(
+    tmp_path: Path, pytestconfig: pytest.Config
+) -> None:
+    directory = tmp_path / "package"
+    package.write(await build(tmp_path, by_hand(), BY_HAND), directory)
+    wrong = {
+        "aps.feeder.poses.defautl": '"FeederPoses" has no attribute "defautl"',
+        "aps.feder": '"ActionPoints" has no attribute "feder"',
+        "robot.place(aps.good.position)": 'incompatible type "Position"; expected "Pose"',
+        "robot.pick(aps.feeder.poses.default, grip='firm')": 'incompatible type "str"; expected "Grip"',
+        "robot.fly()": '"Arm" has no attribute "fly"',
+        "res.pose(1)": 'incompatible type "int"; expected "str"',
+    }
+    head = """
+        from action_points import ActionPoints
+        from arcor2_hw.runtime.resources import Resources
+        from object_types.arm import Arm
+
+
+        def use(res: Resources, aps: ActionPoints, robot: Arm) -> None:
+    """
+    lines = "".join(f"    {line}\n" for line in wrong)
+    (directory / "wrong.py").write_text(textwrap.dedent(head).strip() + "\n" + lines)
+    assert pytestconfig.cache is not None
+    done = subprocess.run(
+        [
+            *(sys.executable, "-m", "mypy", "--strict", "--config-file=", "--no-error-summary"),
+            *("--cache-dir", str(pytestconfig.cache.mkdir("mypy_packages")), "--explicit-package-bases"),
+            *("script.py", "action_points.py", "object_types", "wrong.py"),
+        ],
+        cwd=directory,
+        env={**os.environ, "MYPYPATH": f"{directory}:{ROOT}"},
+        capture_output=True,
+        text=True,
+        timeout=110,
+    )
+    told = [line for line in done.stdout.splitlines() if ": error: " in line]
+    assert len(told) == len(wrong), done.stdout + done.stderr
+    for line, text in zip(told, wrong.values(), strict=True):
+        assert line.startswith("wrong.py:")
+        assert text in line
