@@ -16,6 +16,7 @@ from schemathesis import GenerationMode
 from schemathesis.checks import not_a_server_error
 from schemathesis.specs.openapi.checks import (
     content_type_conformance,
+    negative_data_rejection,
     response_schema_conformance,
     status_code_conformance,
 )
@@ -26,7 +27,7 @@ from arcor2_server.rest.operations import Operation
 from arcor2_server.settings import ServerSettings
 from tests.server.core.serving import until
 
-EXAMPLES = 12
+EXAMPLES = 8
 """For each of some seventy operations."""
 
 
@@ -88,7 +89,7 @@ def api(server: Loop) -> Any:
     return schemathesis.openapi.from_asgi("/openapi", server)
 
 
-CONFORMING = [content_type_conformance, response_schema_conformance, status_code_conformance]
+CONFORMING = [content_type_conformance, negative_data_rejection, response_schema_conformance, status_code_conformance]
 
 
 @pytest.mark.parametrize("declared", OPERATIONS, ids=lambda one: f"{one.method} {one.path}")
