@@ -10,7 +10,7 @@ from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, Not
 from arcor2_hw.objects.observing import Observing
 
 from .frames import Configuration, RobTarget, pose_from, to_radians
-from .rws import Fields, Rws
+from .rws import FIRST_WITHIN, Fields, Rws
 from .settings import ARMS, YumiSettings
 
 TASKS: Final = {"left": "T_ROB_L", "right": "T_ROB_R"}
@@ -19,8 +19,6 @@ PROGRAMS: Final = {"left": "Arcor2Left", "right": "Arcor2Right"}
 """Names of the programs as they are loaded from the .pgf files."""
 FRESH: Final = 0.8
 """Seconds: how old a position may be. A look takes six requests, each of which may take ten ms and more."""
-FIRST_WITHIN: Final = 1.5
-"""Seconds the first answer of a session may take: it costs two requests, by digest authentication."""
 AT_REST: Final = 2e-3
 """rad/s below which a joint counts as standing."""
 

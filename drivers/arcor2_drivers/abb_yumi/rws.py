@@ -15,6 +15,8 @@ from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, Devic
 
 REQUEST_TIMEOUT: Final = 1.0
 """Seconds a request may take: the web server of an IRC5 answers within some ten ms, seldom in hundreds."""
+FIRST_WITHIN: Final = 1.5
+"""Seconds the first answer of a session may take: it costs two requests, by digest authentication."""
 
 Fields = dict[str, str]
 
@@ -36,6 +38,7 @@ class Rws:
         self._client: httpx.Client | None = None
         self._lock = threading.Lock()
         self._until = math.inf
+        self._fresh = True
 
     @contextlib.contextmanager
     def all_until(self, moment: float) -> Iterator[None]:
@@ -59,7 +62,7 @@ class Rws:
             with contextlib.suppress(DeviceError):
                 self._ask("GET", "/logout", {}, None, timeout)
         self.close()
-        self._cookies = httpx.Cookies()
+        self._cookies, self._fresh = httpx.Cookies(), True
 
     def get(self, path: str, timeout: float = REQUEST_TIMEOUT, **query: str) -> list[Fields]:
         """Give the states of a resource, each with `_type` and `_title`.
@@ -94,6 +97,8 @@ class Rws:
             self._lock.release()
 
     def _ask(self, method: str, path: str, query: Fields, body: Fields | None, timeout: float) -> httpx.Response:
+        if self._fresh:  # digest authentication asks twice
+            timeout = max(timeout, FIRST_WITHIN)
         until = min(time.monotonic() + timeout, self._until)
         timeout = max(until - time.monotonic(), 0.01)
         with self._turn(timeout):
@@ -120,6 +125,7 @@ class Rws:
                 raise DeviceTimeout(f"{self.who} did not answer {path} within {timeout:.2g} s") from e
             except httpx.HTTPError as e:
                 raise ConnectionLost(f"the connection to {self.who} broke", f"{path}: {e}") from e
+        self._fresh = False
         if answer.status_code >= 400:
             raise self._refusal(answer, path)
         return answer

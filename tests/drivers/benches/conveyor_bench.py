@@ -26,6 +26,8 @@ belt.move_by(20.0, 0.3)
 
 COUNTS = 10000.0
 """Counts of the drive for a metre of belt."""
+OPERATIONAL = 5
+"""NMT state (CiA 301) of a drive that is controlled."""
 BUSY = 1000
 """ms without our heartbeat that the drive bears: the most that the driver allows, as the machine may be busy."""
 
@@ -131,6 +133,8 @@ class ConveyorBench(Bench):
 
     def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
         assert isinstance(device, Conveyor)
+        # NMT commands are confirmed by nobody: the start of the node may still be under way.
+        self.fake.control.wait_until(lambda truth: truth["nmt"] == OPERATIONAL)
         return {
             "a place beyond the belt": lambda: device.move_by(200.0, 0.3),
             "a speed above the highest": lambda: device.move_by(0.1, 0.6),
