@@ -8,12 +8,14 @@ from litestar.handlers import HTTPRouteHandler
 from arcor2_server.rest import (  # noqa: F401
     assets,
     build,
+    calibration,
     documents,
     execution,
     general,
     models,
     object_types,
     projects,
+    scene,
     scenes,
 )
 from arcor2_server.rest.operations import OPERATIONS, route

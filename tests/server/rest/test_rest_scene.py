@@ -1,0 +1,131 @@
+"""The Scene service: what is in the way, which lines are free, where an object stands."""
+
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.object_type import Box, ObjectModel, ObjectTypeSource
+from arcor2_hw.data.scene import Scene, SceneObject
+from arcor2_server.app import running_services
+from arcor2_server.settings import ServerSettings
+from tests.server.core.serving import until
+from tests.server.rest.asking import asking, granted, refused
+
+pytestmark = pytest.mark.asyncio(loop_scope="module")
+
+ORIGIN = {"position": {"x": 0, "y": 0, "z": 0}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}
+
+
+def at(x: float, y: float = 0.0, z: float = 0.0) -> dict[str, Any]:
+    return ORIGIN | {"position": {"x": x, "y": y, "z": z}}
+
+
+def line(*points: tuple[float, float, float]) -> dict[str, Any]:
+    return {f"pt{n}": dict(zip("xyz", point, strict=True)) for n, point in enumerate(points, 1)}
+
+
+async def test_models_are_put_in_and_taken_out(http: httpx.AsyncClient) -> None:
+    assert granted(await http.get("/collisions")) == []
+    box: dict[str, Any] = {"boxId": "crate", "sizeX": 1, "sizeY": 1, "sizeZ": 1}
+    assert granted(await http.put("/collisions/box", params=box, json=at(2))) == "ok"
+    granted(await http.put("/collisions/sphere", params={"sphereId": "ball", "radius": 0.5}, json=at(5)))
+    tube: dict[str, Any] = {"cylinderId": "tube", "radius": 0.5, "height": 1}
+    granted(await http.put("/collisions/cylinder", params=tube, json=at(8)))
+    granted(await http.put("/collisions/mesh", params={"meshId": "chair", "meshFileId": "chair.stl"}, json=at(9)))
+    assert granted(await http.get("/collisions")) == ["ball", "chair", "crate", "tube"]
+
+    through_all = line((0, 0, 0), (10, 0, 0))
+    assert granted(await http.put("/utils/line-safe", json=through_all)) == {"safe": False, "object_id": "crate"}
+    back = line((10, 0, 0), (0, 0, 0))
+    assert granted(await http.put("/utils/line-safe", json=back)) == {"safe": False, "object_id": "tube"}
+    granted(await http.delete("/collisions/crate"))
+    refused(await http.delete("/collisions/crate"), 404, "NotFound", "crate")
+    assert granted(await http.put("/utils/line-safe", json=through_all))["object_id"] == "ball"
+    # Put in again elsewhere, it is there and not here.
+    granted(await http.put("/collisions/sphere", params={"sphereId": "ball", "radius": 0.5}, json=at(5, 3)))
+    assert granted(await http.put("/utils/line-safe", json=through_all))["object_id"] == "tube"
+
+    assert granted(await http.get("/system/running")) is False
+    granted(await http.put("/system/start"))
+    assert granted(await http.get("/system/running")) is True
+    granted(await http.put("/system/stop"))
+    assert granted(await http.get("/system/running")) is False
+    assert granted(await http.get("/collisions")) == []
+    assert granted(await http.put("/utils/line-safe", json=through_all)) == {"safe": True}
+
+
+@pytest.mark.parametrize(
+    ("path", "params", "body", "word"),
+    [
+        ("box", {"boxId": "x", "sizeX": 1, "sizeY": 1}, ORIGIN, "sizeZ"),
+        ("box", {"sizeX": 1, "sizeY": 1, "sizeZ": 1}, ORIGIN, "boxId"),
+        ("box", {"boxId": "x", "sizeX": 1, "sizeY": 1, "sizeZ": -1}, ORIGIN, "size_z"),
+        ("box", {"boxId": "x", "sizeX": "wide", "sizeY": 1, "sizeZ": 1}, ORIGIN, "sizeX"),
+        ("sphere", {"sphereId": "x", "radius": "nan"}, ORIGIN, "radius"),
+        ("sphere", {"sphereId": "x", "radius": "inf"}, ORIGIN, "radius"),
+        ("sphere", {"sphereId": "", "radius": 1}, ORIGIN, "id"),
+        ("cylinder", {"cylinderId": "x", "radius": 1, "height": 0}, ORIGIN, "height"),
+        ("mesh", {"meshId": "x"}, ORIGIN, "meshFileId"),
+        ("sphere", {"sphereId": "x", "radius": 1}, {"orientation": {"x": 0, "y": 0, "z": 0, "w": 0}}, "quaternion"),
+        ("sphere", {"sphereId": "x", "radius": 1}, {"position": {"x": None}}, "position"),
+    ],
+)
+async def test_what_is_no_model(http: httpx.AsyncClient, path: str, params: Any, body: Any, word: str) -> None:
+    refused(await http.put(f"/collisions/{path}", params=params, json=body), 400, "Argument", word)
+    assert granted(await http.get("/collisions")) == []
+
+
+CRATE = """
+from arcor2_hw.objects import CollisionObject
+
+
+class Crate(CollisionObject):
+    _ABSTRACT = False
+"""
+
+
+async def test_what_stands_in_the_scene_that_is_online_is_in_the_way(http: httpx.AsyncClient, tmp_path: Path) -> None:
+    async with running_services(ServerSettings(data_dir=tmp_path)) as services, asking(services) as own:
+        await services.types.add(ObjectTypeSource("Crate", CRATE, model=ObjectModel.of(Box("Crate", 1, 1, 1))))
+        placed = SceneObject("crate", "Crate", Pose(Position(3.0)), id="obj_crate")
+        await services.session.show(Scene("scene", objects=[placed], id="scn_1"))
+        assert granted(await own.get("/collisions")) == []
+        assert granted(await own.get("/system/running")) is False
+        await services.cell.begin_start()
+        await until(lambda: services.cell.online)
+        assert granted(await own.get("/collisions")) == ["obj_crate"]
+        assert granted(await own.get("/system/running")) is True
+        answer = granted(await own.put("/utils/line-safe", json=line((0, 0, 0), (10, 0, 0))))
+        assert answer == {"safe": False, "object_id": "obj_crate"}
+        granted(await own.put("/system/stop"))
+        assert granted(await own.get("/collisions")) == ["obj_crate"], "it is still there"
+        await services.cell.begin_stop()
+        await until(lambda: services.cell.state.value == "stopped")
+        assert granted(await own.get("/collisions")) == []
+
+
+async def test_where_an_object_stands(http: httpx.AsyncClient) -> None:
+    real = Pose(Position(0.4, -0.2, 0.1), Orientation.from_rotation_vector(0.3, -1.2, 2.0))
+    on_mesh = [Position(0, 0, 0), Position(0.2, 0, 0), Position(0, 0.3, 0), Position(0.1, 0.1, 0.2)]
+    touched = [real.position + point.rotated(real.orientation) for point in on_mesh]
+
+    def points(of: list[Position]) -> list[dict[str, float]]:
+        return [{"x": p.x, "y": p.y, "z": p.z} for p in of]
+
+    body = {"meshFocusPoints": points(on_mesh), "robotSpacePoints": points(touched)}
+    found = granted(await http.put("/utils/focus", json=body))
+    position, turned = Position(**found["position"]), Orientation(**found["orientation"])
+    assert position.distance_to(real.position) < 1e-9
+    assert turned.angle_to(real.orientation) < 1e-7
+    for few in (body | {"meshFocusPoints": points(on_mesh[:3])}, {name: part[:2] for name, part in body.items()}):
+        refused(await http.put("/utils/focus", json=few), 400, "Argument", "points")
+    in_a_line = [{"x": x, "y": 0, "z": 0} for x in (0, 1, 2)]
+    refused(
+        await http.put("/utils/focus", json={"meshFocusPoints": in_a_line, "robotSpacePoints": in_a_line}),
+        400,
+        "Argument",
+        "line",
+    )
