@@ -1,0 +1,172 @@
+"""Every request and event of the protocol, and the tests that show its effect, its events and its refusals.
+
+What the recorded sessions and the state matrix hold is counted from them; for the rest the table names a test, which
+has to be there and to speak of it. Nothing of protocol.json may be left over.
+"""
+
+import ast
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.server.protocol.recorded import session
+from tests.server.protocol.test_protocol_traces import DIFFERENT, SESSIONS
+from tests.server.session.desk import SPEC
+
+TESTS = Path(__file__).resolve().parents[2]
+PROTOCOL: dict[str, Any] = json.loads((SPEC / "protocol.json").read_text())
+MATRIX: dict[str, dict[str, str]] = json.loads((SPEC / "state_matrix.json").read_text())
+
+EDITING = "server/protocol/test_protocol_editing.py"
+VALUES = "server/protocol/test_protocol_values.py"
+CAMERAS = "server/protocol/test_protocol_cameras.py"
+AIMING = "server/protocol/test_protocol_aiming.py"
+ONLINE = "server/cell/test_online_scene.py"
+RUNNING = "server/cell/test_execution.py"
+REQUESTS = "server/session/test_session_requests.py"
+ON_THE_WIRE = "server/core/test_users_and_locks_on_the_wire.py"
+
+GRANTED = {
+    "ActionParamValues": f"{VALUES}::test_a_live_object_offers_values",
+    "AddActionPointJointsUsingRobot": f"{EDITING}::test_orientations_and_joints_by_a_robot",
+    "AddOverride": f"{VALUES}::test_overrides_apply_online_and_in_the_package",
+    "CalibrateCamera": f"{CAMERAS}::test_a_camera_is_put_where_its_picture_says",
+    "CalibrateRobot": f"{CAMERAS}::test_a_robot_is_put_where_a_camera_sees_it",
+    "CameraColorImage": f"{CAMERAS}::test_a_camera_gives_its_picture_and_parameters",
+    "CameraColorParameters": f"{CAMERAS}::test_a_camera_gives_its_picture_and_parameters",
+    "CancelAction": f"{ONLINE}::test_cancel",
+    "DeleteOverride": f"{VALUES}::test_overrides_apply_online_and_in_the_package",
+    "GetCameraPose": f"{CAMERAS}::test_pictures_of_clients_go_to_the_calibration_service",
+    "GetProject": f"{EDITING}::test_steps_of_the_logic_are_changed",
+    "GetRobotArms": f"{EDITING}::test_robots_with_several_arms_and_hand_teaching",
+    "GetScene": f"{EDITING}::test_settings_and_models_of_a_scene",
+    "HandTeachingMode": f"{EDITING}::test_robots_with_several_arms_and_hand_teaching",
+    "MarkersCorners": f"{CAMERAS}::test_pictures_of_clients_go_to_the_calibration_service",
+    "ObjectAimingAddPoint": f"{AIMING}::test_aiming",
+    "ObjectAimingCancel": f"{AIMING}::test_aiming",
+    "ObjectAimingDone": f"{AIMING}::test_aiming",
+    "ObjectAimingStart": f"{AIMING}::test_aiming",
+    "MoveToJoints": f"{ONLINE}::test_a_motion_from_start_to_end",
+    "OpenProject": f"{EDITING}::test_steps_of_the_logic_are_changed",
+    "PausePackage": f"{RUNNING}::test_pause_step_resume_stop_and_what_each_state_forbids",
+    "ReadLock": f"{ON_THE_WIRE}::test_lock_is_told_to_all_after_the_answer",
+    "ReadUnlock": f"{ON_THE_WIRE}::test_lock_is_told_to_all_after_the_answer",
+    "RemoveActionPointJoints": f"{EDITING}::test_orientations_and_joints_by_a_robot",
+    "RemoveActionPointOrientation": f"{EDITING}::test_orientations_and_joints_by_a_robot",
+    "RemoveFromScene": f"{REQUESTS}::test_an_object_that_projects_use",
+    "RemoveLogicItem": f"{REQUESTS}::test_logic_items_always_tell_of_unlocking",
+    "ResumePackage": f"{RUNNING}::test_pause_step_resume_stop_and_what_each_state_forbids",
+    "SceneObjectUsage": f"{REQUESTS}::test_an_object_that_projects_use",
+    "SetEefPerpendicularToWorld": (
+        "server/protocol/test_protocol_perpendicular.py::test_a_tool_is_turned_down_by_the_least_change"
+    ),
+    "StepAction": f"{RUNNING}::test_pause_step_resume_stop_and_what_each_state_forbids",
+    "StopRobot": f"{ONLINE}::test_stop_robot",
+    "UpdateActionPointOrientationUsingRobot": f"{EDITING}::test_orientations_and_joints_by_a_robot",
+    "UpdateLogicItem": f"{EDITING}::test_steps_of_the_logic_are_changed",
+    "UpdateObjectModel": f"{EDITING}::test_settings_and_models_of_a_scene",
+    "UpdateObjectParameters": f"{EDITING}::test_settings_and_models_of_a_scene",
+    "UpdateOverride": f"{VALUES}::test_overrides_apply_online_and_in_the_package",
+    "UploadPackage": f"{RUNNING}::test_upload_rename_delete",
+}
+"""Where a request is granted that no recorded session shows so: its effect, and the events that it brings."""
+
+REFUSED = {
+    "GetCameraPose": f"{CAMERAS}::test_pictures_of_clients_go_to_the_calibration_service",
+    "MarkersCorners": f"{CAMERAS}::test_pictures_of_clients_go_to_the_calibration_service",
+    "PausePackage": f"{RUNNING}::test_pause_step_resume_stop_and_what_each_state_forbids",
+    "RegisterUser": f"{ON_THE_WIRE}::test_name_is_given_once",
+    "RenamePackage": f"{RUNNING}::test_upload_rename_delete",
+    "ResumePackage": f"{RUNNING}::test_pause_step_resume_stop_and_what_each_state_forbids",
+    "StepAction": f"{RUNNING}::test_pause_step_resume_stop_and_what_each_state_forbids",
+    "StopPackage": f"{RUNNING}::test_pause_step_resume_stop_and_what_each_state_forbids",
+    "TemporaryPackage": "server/protocol/test_protocol_temporary.py::test_a_project_runs_and_is_open_again",
+}
+"""Where a request is refused that neither a recorded session nor the matrix shows so."""
+
+NEVER_REFUSED = {"GetObjectTypes", "GetRobotMeta", "ListPackages", "ListProjects", "ListScenes", "ObjectTypeUsage",
+                 "SystemInfo"}  # fmt: skip
+"""They need nothing and take nothing that could be wrong."""
+
+TOLD = {
+    "ActionCancelled": f"{ONLINE}::test_cancel",
+    "HandTeachingMode": f"{EDITING}::test_robots_with_several_arms_and_hand_teaching",
+    "OverrideUpdated": f"{VALUES}::test_overrides_apply_online_and_in_the_package",
+    "ProcessState": f"{CAMERAS}::test_a_camera_is_put_where_its_picture_says",
+    "ProjectException": f"{RUNNING}::test_an_error_in_the_script_is_told",
+    "RobotMoveToJoints": f"{ONLINE}::test_a_motion_from_start_to_end",
+}
+"""Where an event is told that no recorded session holds."""
+
+NEVER_TOLD = {"Notification"}
+"""Declared and never sent, by the original either (protocol, 8)."""
+
+
+@cache
+def functions(file: str) -> dict[str, set[str]]:
+    """Give the tests of a file with the texts and names that stand in each."""
+    return {
+        node.name: {
+            text
+            for part in ast.walk(node)
+            for text in (getattr(part, "value", None), getattr(part, "id", None), getattr(part, "attr", None))
+            if isinstance(text, str)
+        }
+        for node in ast.walk(ast.parse((TESTS / file).read_text()))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+    }
+
+
+@cache
+def recorded() -> tuple[set[str], set[str], set[str]]:
+    """Give what the sessions that are compared grant, refuse and tell."""
+    granted, refused, events = set(), set(), set()
+    for name in SESSIONS:
+        dry = {line["msg"]["id"]: line["msg"].get("dry_run") for line in session(name) if line["who"].endswith(">")}
+        for message in (line["msg"] for line in session(name)):
+            if "event" in message:
+                events.add(message["event"])
+            elif "response" in message and message["id"] not in DIFFERENT:
+                if not message["result"]:
+                    refused.add(message["response"])
+                elif not dry[message["id"]]:
+                    granted.add(message["response"])
+    return granted, refused, events
+
+
+@pytest.mark.parametrize(
+    ("name", "test"), [*GRANTED.items(), *REFUSED.items(), *TOLD.items()], ids=lambda text: text.rpartition(":")[2]
+)
+def test_the_named_test_is_there_and_speaks_of_it(name: str, test: str) -> None:
+    file, _, function = test.partition("::")
+    texts = functions(file)[function]
+    assert name in texts, f"{test} says nothing of {name}"
+
+
+@pytest.mark.parametrize(("name", "test"), REFUSED.items(), ids=REFUSED)
+def test_the_named_test_looks_for_a_refusal(name: str, test: str) -> None:
+    file, _, function = test.partition("::")
+    assert functions(file)[function] & {"refused", "raises"}, f"{test} refuses {name} nowhere"
+
+
+def test_every_request_is_shown_granted() -> None:
+    granted = recorded()[0] | GRANTED.keys() | CHECKED_BY_ITSELF
+    assert set(PROTOCOL["arserver_rpcs"]) - granted == set()
+    assert GRANTED.keys() & recorded()[0] == set(), "the recorded sessions show these already"
+
+
+CHECKED_BY_ITSELF = {"GetActions", "GetObjectTypes", "GetRobotMeta", "SystemInfo"}
+"""Granted in a session whose answer differs on purpose: what has to be the same of it is compared there."""
+
+
+def test_every_request_is_shown_refused() -> None:
+    in_matrix = {name for rows in MATRIX.values() for name, outcome in rows.items() if outcome.startswith("refused")}
+    shown = recorded()[1] | in_matrix | REFUSED.keys()
+    assert set(PROTOCOL["arserver_rpcs"]) - shown == NEVER_REFUSED
+
+
+def test_every_event_is_shown() -> None:
+    assert set(PROTOCOL["events"]) - recorded()[2] - TOLD.keys() == NEVER_TOLD
