@@ -55,6 +55,7 @@ async def post_asset(services: Services, query: AssetQuery, upload: Upload) -> A
         description=query.description,
         upsert=query.upsert,
     )
+    await services.type_news.taken(services)
     return _info(asset)
 
 
@@ -82,3 +83,4 @@ async def asset_data(services: Services, asset_id: str) -> Binary:
 async def delete_asset(services: Services, asset_id: str) -> None:
     """Delete an asset; a type that needs it has a problem from then on."""
     await services.assets.delete(asset_id)
+    await services.type_news.taken(services)

@@ -1,0 +1,122 @@
+"""Object types that come, change and go while the server runs: what clients are told, and what a scene then runs."""
+
+from typing import Any
+
+import httpx
+
+from tests.server.core.serving import ServerProcess, Talker, talking
+
+SHELF = '''
+from typing import Optional
+
+from arcor2 import DynamicParamTuple
+from arcor2.data.common import ActionMetadata
+from arcor2_object_types.abstract import CollisionObject
+
+from .labels import Labels
+
+
+class Shelf(Labels, CollisionObject):
+    """Holds things."""
+
+    _ABSTRACT = False
+
+    def boards(self) -> set[str]:
+        return {f"{self.label}{number}" for number in range(2)}
+
+    def take(self, board: str, height: float, *, an: Optional[str] = None) -> None:
+        """Takes.
+
+        :param height: how high above it [m]
+        """
+
+    take.__action__ = ActionMetadata()
+    DYNAMIC_PARAMS = {"board": DynamicParamTuple("boards", set())}
+'''
+LABELS = "class Labels:\n    label = 'low'\n"
+MESH = {"id": "Shelf", "assetId": "shelf.stl"}
+
+
+async def following(client: Talker) -> dict[str, Any]:
+    """Give the next event."""
+    return client.events.pop(0) if client.events else await client.receive(30)
+
+
+async def told(client: Talker, *kinds: str) -> dict[str, Any]:
+    """Give the next news of object types; what else is told on the way is let by."""
+    while True:
+        event = await following(client)
+        if event.get("event") == "ChangedObjectTypes":
+            assert event["change_type"] in kinds, event
+            (meta,) = event["data"]
+            found: dict[str, Any] = meta
+            return found
+
+
+async def scene_is(client: Talker, state: str) -> None:
+    while True:
+        event = await following(client)
+        if event.get("event") == "SceneState" and event["data"]["state"] in (state, "stopped"):
+            assert event["data"]["state"] == state, event
+            return
+
+
+async def test_a_type_comes_changes_and_goes(server: ServerProcess) -> None:
+    base = server.url.replace("ws://", "http://")
+    async with talking(server.url, "ann") as ann, httpx.AsyncClient(base_url=base, trust_env=False) as http:
+
+        async def put(route: str, body: dict[str, Any]) -> None:
+            answer = await http.put(route, json=body)
+            assert answer.status_code == 200, answer.text
+
+        async def put_type(name: str, source: str, **more: Any) -> None:
+            await put("/object-types", {"id": name, "name": name, "source": source} | more)
+
+        async def boards() -> set[str]:
+            return set(await ann.granted("ActionParamValues", {"id": shelf, "param_id": "board", "parent_params": []}))
+
+        await put("/models/mesh", MESH)
+        await put_type("Shelf", SHELF, model={"id": "Shelf", "type": "Mesh"})
+        meta = await told(ann, "add")
+        assert meta["disabled"]
+        assert "labels" in meta["problem"]
+        await put_type("Labels", LABELS)
+        meta = await told(ann, "update")
+        assert meta["disabled"]
+        assert "shelf.stl" in meta["problem"]
+        answer = await http.post("/assets?id=shelf.stl", files={"assetData": ("shelf.stl", b"solid")})
+        assert answer.status_code == 200, answer.text
+        meta = await told(ann, "update")
+        assert (meta["disabled"], "problem" in meta, meta["category"]) == (False, False, "Collision objects")
+        actions = {action["name"]: action for action in await ann.granted("GetActions", {"type": "Shelf"})}
+        board, height = actions["take"]["parameters"]
+        assert board["dynamic_value"] is True
+        assert height["extra"] == '{"unit":"m"}'
+
+        await ann.granted("NewScene", {"name": "Store"})
+        pose = {"position": {"x": 1, "y": 0, "z": 0}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}
+        await ann.granted("AddObjectToScene", {"name": "shelf", "type": "Shelf", "pose": pose})
+        while (event := await following(ann)).get("event") != "SceneObjectChanged":
+            pass
+        shelf = event["data"]["id"]
+        await ann.granted("StartScene")
+        await scene_is(ann, "started")
+        assert await boards() == {"low0", "low1"}
+        # What runs is what was read at the start; the next start takes what is there then.
+        await put_type("Labels", LABELS.replace("low", "top"))
+        assert await boards() == {"low0", "low1"}
+        await ann.granted("StopScene")
+        await scene_is(ann, "stopped")
+        await ann.granted("StartScene")
+        await scene_is(ann, "started")
+        assert await boards() == {"top0", "top1"}
+        await ann.granted("StopScene")
+        await scene_is(ann, "stopped")
+
+        await http.delete("/assets/shelf.stl")
+        assert "shelf.stl" in (await told(ann, "update"))["problem"]
+        await ann.granted("CloseScene", {"force": True})
+        await http.delete("/object-types/Shelf")
+        assert (await told(ann, "remove"))["type"] == "Shelf"
+        await ann.refused("GetActions", {"type": "Shelf"})
+        await http.delete("/object-types/Labels")
