@@ -290,7 +290,9 @@ class ObjectTypes:
         """Give types and the uploaded modules that they need, each after those that it needs itself."""
         found: dict[str, None] = {}
         for name in names:
-            for file in self._analysis(name).modules:
+            # A helper or mixin is no type of its own, but its module may be wanted.
+            known = self._known.analyses[name] if name in self._uploaded else self._analysis(name)
+            for file in known.modules:
                 if file.name in self._uploaded:
                     found[file.name] = None
             found[name] = None

@@ -14,8 +14,10 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
+from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.object_type import Box, Mesh, Model3dType, ObjectModel, ObjectTypeSource
-from arcor2_hw.data.project import END, START, Project
+from arcor2_hw.data.project import END, START, ActionPoint, Project
+from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import Conflict, InvalidPackage, InvalidProject, NotFound, StorageError
 from arcor2_server.build import package
 from arcor2_server.build.importing import ImportOptions, import_package
@@ -399,3 +401,86 @@ async def test_a_damaged_zip_is_refused(here: Any, packed: bytes) -> None:
             await import_package(here, torn, ALL)
         except (InvalidPackage, InvalidProject, NotFound):
             continue
+
+
+# ------------------------------------------------------------------------------------------------ what types need
+HELPER = '''"""Sums."""
+
+
+class Sums:
+    """Sums."""
+
+    @staticmethod
+    def total(values: list[int]) -> int:
+        return sum(values)
+'''
+MIXIN = '''"""Counting."""
+
+
+class Counting:
+    """Counts."""
+
+    def counted(self) -> int:
+        return 1
+'''
+BASE = '''"""A base."""
+
+from arcor2_hw.objects import Generic
+
+
+class AbstractTool(Generic):
+    """A base."""
+'''
+TOOL = '''"""A tool."""
+
+from arcor2_hw.actions import action
+
+from .abstract_tool import AbstractTool
+from .counting import Counting
+
+
+class Tool(Counting, AbstractTool):
+    """A tool."""
+
+    _ABSTRACT = False
+
+    @action
+    def use(self, *, an: str | None = None) -> int:
+        """Use."""
+        return self.counted()
+'''
+
+
+async def test_bases_mixins_and_further_modules_go_along_and_come_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sources = {"AbstractTool": BASE, "Counting": MIXIN, "Sums": HELPER, "Tool": TOOL}
+    scene = Scene("s", id="scn_t", objects=[SceneObject("tool", "Tool", id="obj_tool")])
+    points = [ActionPoint("p", Position(), id="acp_t", actions=[workplace.action("use", "obj_tool/use")])]
+    logic = [workplace.step(START, "use"), workplace.step("use", END)]
+    project = Project("p", "scn_t", id="pro_t", action_points=points, logic=logic, project_objects_ids=["Sums"])
+    async with hub.opened(tmp_path / "a", [], monkeypatch) as there:
+        for name, source in sources.items():
+            await there.storage.put_object_type(ObjectTypeSource(name, source))
+        await there.types.refresh()
+        await there.storage.put_scene(scene)
+        await there.storage.put_project(project)
+        published = await there.build.publish("pro_t", "Tools")
+    files = files_in(published)
+    modules = {name for name in files if name.startswith("object_types/")}
+    assert modules == {
+        "object_types/__init__.py",
+        "object_types/abstract_tool.py",
+        "object_types/counting.py",
+        "object_types/sums.py",
+        "object_types/tool.py",
+    }
+    assert json.loads(files["package.json"])["name"] == "Tools"
+    async with hub.opened(tmp_path / "b", [], monkeypatch) as other:
+        await import_package(other, published, NOTHING)
+        assert {one.id: one.source for one in await other.storage.object_types()} == sources
+        assert files_in(await other.build.publish("pro_t", "Tools"))["script.py"] == files["script.py"]
+        # An extra module that is nowhere is named.
+        await other.storage.put_project(replace(project, project_objects_ids=["Gone"]))
+        with pytest.raises(NotFound, match="Gone"):
+            await other.build.publish("pro_t")
