@@ -11,12 +11,27 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Final
 
-from benchmarks import analysing, building, buses, camera, hung, operation, recovery, requests, robot, stops
+from benchmarks import (
+    analysing,
+    building,
+    buses,
+    camera,
+    documents,
+    hung,
+    listeners,
+    operation,
+    recovery,
+    requests,
+    robot,
+    stops,
+)
 from benchmarks.figures import Report
 
 LONG: Final = "--long"
 ROOMS: Final[dict[str, Callable[[Report, Path], Awaitable[None]]]] = {
     "requests": requests.run,
+    "documents": documents.run,
+    "listeners": listeners.run,
     "operation": operation.run,
     "building": lambda report, _: building.build(report),
     "analysing": lambda report, _: analysing.analyse(report),

@@ -59,7 +59,7 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     drained_size: int = 32 * MIB
     requests_in_flight: int = 256
     """Requests of one client that are worked on at once; further ones wait unread."""
-    outgoing_bytes: int = 64 * MIB
+    outgoing_bytes: int = 40 * MIB
     outgoing_messages: int = 20_000
     outgoing_age: float = 10.0
     """A client that takes nothing for so long is closed, as is one with more than the two numbers above waiting."""

@@ -1,0 +1,231 @@
+"""Large documents: what an edit, opening, saving and listing cost."""
+
+import itertools
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+from websockets.asyncio.client import ClientConnection
+
+from benchmarks import serving
+from benchmarks.figures import Figure, Report, median
+from benchmarks.requests import fdatasync_time
+
+IN_FLIGHT = 128
+"""Requests sent at once while a document is filled."""
+_ids = itertools.count(1)
+
+
+def request(request_name: str, /, **args: Any) -> str:
+    return json.dumps({"id": next(_ids), "request": request_name} | ({"args": args} if args else {}))
+
+
+class Author:
+    """Makes documents over a bare websocket."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self.socket = socket
+        self.object = ""
+
+    async def ask(self, name: str, /, **args: Any) -> Any:
+        answer = json.loads(await serving.answer(self.socket, request(name, **args)))
+        assert answer["result"], answer
+        return answer.get("data")
+
+    async def timed(self, name: str, /, **args: Any) -> float:
+        """Give how long the answer took, s."""
+        text = request(name, **args)
+        begin = time.perf_counter()
+        answer = await serving.answer(self.socket, text)
+        spent = time.perf_counter() - begin
+        assert json.loads(answer)["result"], answer
+        return spent
+
+    async def told(self, event: str, request_name: str, /, **args: Any) -> Any:
+        """Ask, and give the data of the event that follows."""
+        await self.socket.send(request(request_name, **args))
+        while True:
+            message = json.loads(await self.socket.recv())
+            assert message.get("result", True), message
+            if message.get("event") == event:
+                return message["data"]
+
+    async def many(self, requests: list[str], event: str) -> list[Any]:
+        """Send many requests, a few at once; gives the data of the events in their order."""
+        found: list[Any] = []
+        for part in _parts(requests):
+            for text in part:
+                await self.socket.send(text)
+            answers = events = 0
+            while answers < len(part) or events < len(part):
+                message = json.loads(await self.socket.recv())
+                if "response" in message:
+                    assert message["result"], message
+                    answers += 1
+                elif message["event"] == event:
+                    events += 1
+                    found.append(message["data"])
+        return found
+
+    async def scene(self) -> str:
+        await self.ask("RegisterUser", user_name="bench")
+        await self.ask("NewScene", name="bench")
+        self.object = (await self.told("SceneObjectChanged", "AddObjectToScene", name="rnd", type="RandomActions"))[
+            "id"
+        ]
+        await self.ask("SaveScene")
+        return str((await self.ask("ListScenes"))[0]["id"])
+
+    async def project(self, scene: str, name: str) -> tuple[str, str]:
+        """Open a new project with one action point; gives the ids of both."""
+        opened = await self.told("OpenProject", "NewProject", scene_id=scene, name=name)
+        position = {"x": 0.0, "y": 0.0, "z": 0.0}
+        point = await self.told("ActionPointChanged", "AddActionPoint", name="ap", position=position)
+        return str(opened["project"]["id"]), str(point["id"])
+
+    def dice(self, point: str, number: int) -> dict[str, Any]:
+        """Arguments of AddAction: one that stores a boolean result."""
+        return {
+            "action_point_id": point,
+            "name": f"action {number}",
+            "type": f"{self.object}/random_bool",
+            "parameters": [{"name": "probability", "type": "double", "value": "0.5"}],
+            "flows": [{"type": "default", "outputs": [f"result_{number}"]}],
+        }
+
+    async def actions(self, point: str, numbers: range) -> list[str]:
+        """Add actions; gives their ids."""
+        made = await self.many([request("AddAction", **self.dice(point, n)) for n in numbers], "ActionChanged")
+        by_name = {action["name"]: action["id"] for action in made}
+        return [str(by_name[f"action {number}"]) for number in numbers]
+
+    async def steps(self, steps: list[dict[str, Any]]) -> None:
+        await self.many([request("AddLogicItem", **step) for step in steps], "LogicItemChanged")
+
+
+def _parts(requests: list[str]) -> list[list[str]]:
+    return [requests[at : at + IN_FLIGHT] for at in range(0, len(requests), IN_FLIGHT)]
+
+
+class Floor:
+    """What a round trip and a flush cost at the same moment, taken off what waits for both."""
+
+    def __init__(self, echo: ClientConnection, directory: Path) -> None:
+        self._echo, self._directory = echo, directory
+        self._echoes: list[float] = []
+        self._syncs: list[float] = []
+
+    async def sample(self) -> None:
+        self._echoes += await serving.round_trips(self._echo, "x" * 300, 10)
+        self._syncs.append(fdatasync_time(self._directory, 10))
+
+    def figure(self, name: str, samples: list[float]) -> Figure:
+        echo, sync = median(self._echoes), median(self._syncs)
+        note = f"answer {median(samples) * 1e3:.3f} ms, echo {echo * 1e3:.3f} ms, fdatasync {sync * 1e3:.3f} ms"
+        return Figure(name, (median(samples) - echo - sync) * 1e3, len(samples), note)
+
+
+async def edits(report: Report, author: Author, scene: str, echo: ClientConnection, directory: Path) -> None:
+    """AddAction into a project of 10,000."""
+    _, point = await author.project(scene, "many actions")
+    await author.actions(point, range(10_000))
+    floor, samples = Floor(echo, directory), []
+    for number in range(10_000, 10_100):
+        samples.append(await author.timed("AddAction", **author.dice(point, number)))
+        if number % 10 == 0:
+            await floor.sample()
+    report.add(floor.figure("add_action_10000_ms", samples))
+    await author.ask("CloseProject", force=True)
+
+
+async def logic(report: Report, author: Author, scene: str, echo: ClientConnection, directory: Path) -> None:
+    """AddLogicItem in front of a chain of 1,000 actions, and of 18 if/else blocks: all behind it is looked at."""
+    _, point = await author.project(scene, "chain")
+    chain = await author.actions(point, range(1_001))
+    links = zip(chain[1:], [*chain[2:], "END"], strict=True)
+    await author.steps([{"start": start, "end": end} for start, end in links])
+    await _close(report, author, "add_logic_item_chain_ms", chain[0], chain[1], Floor(echo, directory))
+    await author.ask("CloseProject", force=True)
+
+    _, point = await author.project(scene, "branches")
+    ids = await author.actions(point, range(3 * 18 + 2))
+    first, last, blocks = ids[0], ids[1], [ids[at : at + 3] for at in range(2, len(ids), 3)]
+    steps = [{"start": last, "end": "END"}]
+    for (dice, *ways), following in zip(blocks, [*(block[0] for block in blocks[1:]), last], strict=True):
+        for way, value in zip(ways, ("true", "false"), strict=True):
+            condition = {"what": f"{dice}/default/0", "value": value}
+            steps += [{"start": dice, "end": way, "condition": condition}, {"start": way, "end": following}]
+    await author.steps(steps)
+    await _close(report, author, "add_logic_item_branches_ms", first, blocks[0][0], Floor(echo, directory))
+    await author.ask("CloseProject", force=True)
+
+
+async def _close(report: Report, author: Author, figure: str, start: str, end: str, floor: Floor) -> None:
+    samples = []
+    for _ in range(50):
+        text = request("AddLogicItem", start=start, end=end)
+        begin = time.perf_counter()
+        await author.socket.send(text)
+        item = ""
+        while not item:
+            message = json.loads(await author.socket.recv())
+            if "response" in message:
+                samples.append(time.perf_counter() - begin)
+                assert message["result"], message
+            elif (message["event"], message.get("change_type")) == ("LogicItemChanged", "add"):
+                item = message["data"]["id"]
+        await author.ask("RemoveLogicItem", logic_item_id=item)
+        await floor.sample()
+    report.add(floor.figure(figure, samples))
+
+
+async def opening(report: Report, author: Author, scene: str) -> None:
+    """OpenProject and SaveProject of 1,000 actions that store results."""
+    project, point = await author.project(scene, "large")
+    await author.actions(point, range(1_000))
+    await author.ask("SaveProject")
+    opened, saved = [], []
+    for number in range(10):
+        await author.ask("UpdateProjectDescription", project_id=project, new_description=str(number))
+        saved.append(await author.timed("SaveProject"))
+        await author.ask("CloseProject")
+        opened.append(await author.timed("OpenProject", id=project))
+    report.add(Figure("open_project_1000_ms", median(opened) * 1e3, len(opened), "to the answer"))
+    report.add(Figure("save_project_1000_ms", median(saved) * 1e3, len(saved), "with its flushes"))
+    await author.ask("CloseProject")
+
+
+async def listing(report: Report, author: Author, scene: str) -> None:
+    """ListProjects of 200, again and after one of them was saved."""
+    project, point = await author.project(scene, "small")
+    await author.actions(point, range(10))
+    await author.ask("SaveProject")
+    await author.ask("CloseProject")
+    for number in range(200 - len(await author.ask("ListProjects"))):
+        await author.ask("CopyProject", source_id=project, target_name=f"copy {number}")
+    assert len(await author.ask("ListProjects")) == 200
+    again = [await author.timed("ListProjects") for _ in range(50)]
+    report.add(Figure("list_projects_200_ms", median(again) * 1e3, len(again)))
+    changed = []
+    for number in range(10):
+        await author.ask("UpdateProjectDescription", project_id=project, new_description=str(number))
+        changed.append(await author.timed("ListProjects"))
+    report.add(Figure("list_projects_200_changed_ms", median(changed) * 1e3, len(changed), "one of them saved before"))
+
+
+async def run(report: Report, directory: Path) -> None:
+    """Measure everything in this room."""
+    async with (
+        serving.server(directory / "documents") as (url, _),
+        serving.echo(directory, 60) as echo_url,
+        serving.socket(url) as socket,
+        serving.socket(echo_url) as echo,
+    ):
+        author = Author(socket)
+        scene = await author.scene()
+        await author.ask("CloseScene")
+        await logic(report, author, scene, echo, directory)
+        await opening(report, author, scene)
+        await listing(report, author, scene)
+        await edits(report, author, scene, echo, directory)
