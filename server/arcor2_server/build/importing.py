@@ -19,7 +19,6 @@ from arcor2_hw.exceptions import Conflict, InvalidPackage, InvalidProject, NotFo
 from arcor2_server.build import package, script, snapshot
 from arcor2_server.build.candidates import Candidates
 from arcor2_server.build.reading import from_script
-from arcor2_server.rpc.object_types import change_events
 from arcor2_server.session.checks import complete_parameters, project_problems
 
 if TYPE_CHECKING:
@@ -345,7 +344,7 @@ async def import_package(services: "Services", data: Path | bytes, options: Impo
 
 
 async def _write(services: "Services", given: Imported, plan: _Plan) -> None:
-    """Save, what others refer to first; then tell clients of the types."""
+    """Save, what others refer to first; clients are told of the types soon after, or when something is opened."""
     storage = services.storage
     for one in plan.types:
         await storage.put_object_type(one)
@@ -355,5 +354,5 @@ async def _write(services: "Services", given: Imported, plan: _Plan) -> None:
         await storage.put_project(given.project)
     if plan.source:
         await storage.put_project_source(given.project.id, given.script)
-    for event in change_events(await services.types.refresh()):
-        services.hub.broadcast(event)
+    if plan.types:
+        await services.type_news.taken(services)

@@ -15,6 +15,7 @@ from arcor2_server.build.service import BuildService
 from arcor2_server.object_types import ObjectTypes, PackageType
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import AssetStore, Storage
+from arcor2_server.type_news import TypeNews
 
 
 @contextlib.asynccontextmanager
@@ -55,6 +56,10 @@ async def opened(
             hub=types.SimpleNamespace(broadcast=told.append, told=told),
         )
         services.build = BuildService(services)
-        yield services
+        services.type_news = TypeNews()
+        try:
+            yield services
+        finally:
+            await services.type_news.close()
     finally:
         await storage.close()
