@@ -11,7 +11,6 @@ from rich.console import Console
 from rich.table import Table
 
 from arcor2_hw.analysis import Library, SourceFile, module_name
-from arcor2_hw.data.base import Unset
 from arcor2_server.cli.package import DEFAULT_URL, Url
 from arcor2_server.cli.status import ExitStatus
 
@@ -42,20 +41,51 @@ def _request(url: str, method: str, path: str, body: Any = None) -> Any:
     raise Failed(ExitStatus.NOT_FOUND if answer.status_code == httpx.codes.NOT_FOUND else ExitStatus.FAILED, text)
 
 
-def _types_in(source: str, path: Path) -> dict[str, str]:
-    """Give the object types that a file declares, with the problem of each (empty: none). It is not imported."""
+def _read(file: Path) -> str:
+    try:
+        return file.read_text()
+    except (OSError, UnicodeDecodeError) as error:
+        raise Failed(ExitStatus.NOT_FOUND, f"{file} cannot be read: {error}") from error
+
+
+def _class_in(source: str, file: Path, name: str | None) -> str:
+    """Choose the class of a file that is brought in: the named one, the file's namesake, or its only object type."""
     try:
         names = [node.name for node in ast.parse(source).body if isinstance(node, ast.ClassDef)]
     except SyntaxError as error:
-        raise Failed(ExitStatus.ANALYSIS_PROBLEMS, f"{path}:{error.lineno}: {error.msg}") from error
-    found = {}
-    for name in names:
-        library = Library()
-        library.add(SourceFile(name, module_name(name), source, str(path)))
+        raise Failed(ExitStatus.ANALYSIS_PROBLEMS, f"{file}:{error.lineno}: {error.msg}") from error
+    if name is None:
+        found = [each for each in names if module_name(each) == file.stem]
+        found = found or [each for each in names if _may_be_placed(SourceFile(each, module_name(each), source))]
+    else:
+        found = [each for each in names if each == name]
+    if len(found) != 1:
+        listed = ", ".join(found or names) or "none"
+        raise Failed(ExitStatus.USAGE, f"say which class of {file} is meant with --name: {listed}")
+    return found[0]
+
+
+def _may_be_placed(file: SourceFile) -> bool:
+    analysis = Library([file]).analyse(file.name)
+    return analysis.is_object_type and not analysis.meta.abstract
+
+
+def _in_order(given: dict[str, SourceFile], url: str) -> list[SourceFile]:
+    """Give files each behind those it needs; Failed when one has a problem, with what the server has taken in too."""
+    library = Library(given.values())
+    if any(library.analyse(name).problem for name in given):
+        for entry in _request(url, "GET", "/object-types"):
+            if entry["id"] not in given:
+                stored = _request(url, "GET", f"/object-types/{entry['id']}")
+                library.add(SourceFile(stored["id"], module_name(stored["id"]), stored["source"]))
+    ordered: dict[str, SourceFile] = {}
+    for name, file in given.items():
         analysis = library.analyse(name)
-        if analysis.is_object_type and not analysis.meta.abstract:
-            found[name] = "" if isinstance(analysis.meta.problem, Unset) else analysis.meta.problem
-    return found
+        if analysis.problem is not None:
+            raise Failed(ExitStatus.ANALYSIS_PROBLEMS, str(analysis.problem))
+        ordered |= {each.name: given[each.name] for each in analysis.modules if each.name in given}
+        ordered[name] = file
+    return list(ordered.values())
 
 
 def _run(command: str, work: Any) -> int:
@@ -69,27 +99,26 @@ def _run(command: str, work: Any) -> int:
 
 @app.command
 def add(
-    file: Path,
-    *,
-    name: Annotated[str | None, Parameter(help="The class, when the file declares several object types.")] = None,
+    *files: Path,
+    name: Annotated[str | None, Parameter(help="The class, when a file declares several object types.")] = None,
     url: Url = DEFAULT_URL,
 ) -> int:
-    """Bring in an object type from a Python file, new or changed. The file is read, not imported."""
+    """Bring in object types from Python files, new or changed. The files are read, not imported.
+
+    Bases, mixins and other modules that they import relatively are given with them, or were brought in before.
+    """
 
     def work() -> None:
-        try:
-            source = file.read_text()
-        except (OSError, UnicodeDecodeError) as error:
-            raise Failed(ExitStatus.NOT_FOUND, f"{file} cannot be read: {error}") from error
-        found = _types_in(source, file)
-        chosen = name if name is not None else next(iter(found)) if len(found) == 1 else None
-        if chosen is None or chosen not in found:
-            listed = ", ".join(found) or "none that may be placed in a scene"
-            raise Failed(ExitStatus.USAGE, f"say which object type of {file} is meant with --name: {listed}")
-        if found[chosen]:
-            raise Failed(ExitStatus.ANALYSIS_PROBLEMS, found[chosen])
-        _request(url, "PUT", "/object-types", {"id": chosen, "name": chosen, "source": source})
-        Console().print(f"{chosen} added")
+        if not files or (name is not None and len(files) > 1):
+            raise Failed(ExitStatus.USAGE, "give the files of the object types; --name only with one file")
+        given: dict[str, SourceFile] = {}
+        for file in files:
+            source = _read(file)
+            chosen = _class_in(source, file, name)
+            given[chosen] = SourceFile(chosen, module_name(chosen), source, str(file))
+        for one in _in_order(given, url):
+            _request(url, "PUT", "/object-types", {"id": one.name, "name": one.name, "source": one.source})
+            Console().print(f"{one.name} added")
 
     return _run("add", work)
 

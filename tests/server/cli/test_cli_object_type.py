@@ -1,0 +1,78 @@
+"""`arcor2-hw object-type`: object types written for ARCOR2, and their bases and mixins, into a running server."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from arcor2_hw.analysis import module_name
+from arcor2_server.cli.status import ExitStatus
+from tests.runtime.older_sources import SOURCES
+from tests.server.core.serving import ServerProcess, running, talking
+
+pytestmark = pytest.mark.timeout(90)
+
+
+def object_type(server: ServerProcess | None, *arguments: str | Path) -> "subprocess.CompletedProcess[str]":
+    url = "ws://127.0.0.1:9" if server is None else server.url
+    return subprocess.run(
+        [sys.executable, "-m", "arcor2_server.cli.main", "object-type", *map(str, arguments), "--url", url],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+@pytest.fixture
+def sources(tmp_path: Path) -> Path:
+    for name, source in SOURCES.items():
+        (tmp_path / f"{module_name(name)}.py").write_text(source)
+    return tmp_path
+
+
+async def test_a_family_of_types_is_brought_in_together_and_one_by_one(sources: Path, tmp_path: Path) -> None:
+    async with running(tmp_path / "data") as server:
+        arm, base, mixin = (sources / f"{name}.py" for name in ("arm_m1", "abstract_arm", "kinematics_mixin"))
+        lonely = object_type(server, "add", arm)
+        assert lonely.returncode == ExitStatus.ANALYSIS_PROBLEMS
+        assert "arm_m1.py:3: the module abstract_arm that it imports does not exist" in lonely.stderr
+        together = object_type(server, "add", arm, base, mixin)
+        assert (together.returncode, together.stderr) == (0, "")
+        assert together.stdout.split() == ["AbstractArm", "added", "KinematicsMixin", "added", "ArmM1", "added"]
+        async with talking(server.url) as client:
+            metas = {meta["type"]: meta for meta in await client.granted("GetObjectTypes")}
+        assert (metas["ArmM1"]["disabled"], metas["ArmM1"]["base"]) == (False, "AbstractArm")
+        # What it needs is there already.
+        arm.write_text(arm.read_text().replace("arm-m1.zip", "arm-m2.zip"))
+        assert object_type(server, "add", arm).returncode == 0
+        listed = object_type(server, "list").stdout
+        assert all(name in listed for name in ("AbstractArm", "ArmM1", "KinematicsMixin"))
+        assert object_type(server, "remove", "KinematicsMixin").returncode == 0
+        assert object_type(server, "remove", "KinematicsMixin").returncode == ExitStatus.NOT_FOUND
+        again = object_type(server, "add", arm)
+        assert again.returncode == ExitStatus.ANALYSIS_PROBLEMS
+        assert "kinematics_mixin" in again.stderr
+
+
+def test_what_makes_no_sense_is_refused(sources: Path) -> None:
+    two = sources / "two.py"
+    two.write_text(
+        "from arcor2_hw.objects import Generic\n\n\n"
+        "class A(Generic):\n    _ABSTRACT = False\n\n\nclass B(A):\n    pass\n"
+    )
+    wrong = sources / "wrong.py"
+    wrong.write_text("class (")
+    cases = (
+        ((two,), ExitStatus.USAGE, "--name: A, B"),
+        ((two, "--name", "C"), ExitStatus.USAGE, "--name: A, B"),
+        ((), ExitStatus.USAGE, "give the files"),
+        ((two, wrong, "--name", "A"), ExitStatus.USAGE, "only with one file"),
+        ((wrong,), ExitStatus.ANALYSIS_PROBLEMS, "wrong.py:1"),
+        ((sources / "nothing.py",), ExitStatus.NOT_FOUND, "nothing.py"),
+        ((two, "--name", "A"), ExitStatus.NO_SERVER, "127.0.0.1:9"),
+    )
+    for arguments, status, words in cases:
+        done = object_type(None, "add", *arguments)
+        assert (done.returncode, words in done.stderr) == (status, True), done.stderr
