@@ -14,6 +14,7 @@ import msgspec
 from msgspec import field
 
 from arcor2_hw.data.base import Data
+from arcor2_hw.data.older_names import OLDER_PACKAGES
 
 FILE: Final = "versions.json"
 _OURS: Final = "arcor2-hw"
@@ -48,7 +49,8 @@ def _distributions() -> dict[str, str]:
 
 def present(imported: Iterable[str]) -> Versions:
     """Give the versions in use here, of the distributions that give the packages `imported`."""
-    foreign = set(imported) - sys.stdlib_module_names - {"arcor2_hw"}
+    # What sources import from ARCOR2 is ours when they run, whatever is installed.
+    foreign = set(imported) - sys.stdlib_module_names - {"arcor2_hw"} - OLDER_PACKAGES
     # Reading what is installed takes 0.1 s the first time, and many packages need none of it.
     known = _distributions() if foreign else {}
     wanted = {known[name] for name in foreign if name in known} - {_OURS}

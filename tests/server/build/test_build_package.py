@@ -233,6 +233,11 @@ def test_compiled_modules_that_stand_alone_have_their_distribution() -> None:
     assert versions.present({"rtde_control", "pymodbus", "json"}).distributions.keys() == {"ur-rtde", "pymodbus"}
 
 
+def test_what_is_ours_in_older_sources_is_no_version_of_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(versions, "_distributions", lambda: {"arcor2": "pymodbus", "arcor2_web": "pymodbus"})
+    assert versions.present({"arcor2", "arcor2_web", "arcor2_object_types"}).distributions == {}
+
+
 def test_a_package_appears_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     sync = os.fsync
     left = iter((None, OSError(28, "No space left on device")))
