@@ -69,8 +69,8 @@ class {ROBOT}(Robot):
 
         :param pose: where to
         :param move_type: how
-        :param velocity: percent
-        :param acceleration: percent
+        :param velocity: how fast
+        :param acceleration: how soon
         :param safe: past obstacles
         """
         assert 0.0 <= velocity <= 100.0

@@ -6,9 +6,13 @@ from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from arcor2_hw.data.base import UNSET
+from arcor2_hw.data.events import EVENTS
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import Mesh, ObjectModel, ObjectTypeSource
+from arcor2_hw.data.rpc import RPCS
 from arcor2_server.app import running_services
 from arcor2_server.endpoint import Endpoint
 from arcor2_server.services import Services
@@ -39,8 +43,57 @@ MODELS = {
 }
 
 
+PARENTS = {
+    "OrientationChanged": {"add"},
+    "JointsChanged": {"add", "update"},
+    "ActionChanged": {"add"},
+    "OverrideUpdated": {"add", "update", "remove"},
+}
+"""Events that name a parent (protocol, 8)."""
+
+
+def faults(message: dict[str, Any]) -> list[str]:
+    """Name what is wrong with a message by the types of the protocol and the rules for events."""
+    found = ["an explicit null"] if _has_null(message) else []
+    if "response" in message:
+        declared, allowed = RPCS[message["response"]].data if message["response"] in RPCS else None, ANSWER
+    else:
+        declared, allowed = EVENTS[message["event"]].data, EVENT
+        if "parent_id" in message and message.get("change_type") not in PARENTS.get(message["event"], ()):
+            found.append("a parent")
+    found += [f"a field {name}" for name in message.keys() - allowed]
+    # A refusal with data names projects or object types instead of the answer.
+    if "data" in message and message.get("result", True):
+        if declared is None:
+            found.append("data")
+        else:
+            try:
+                msgspec.convert(message["data"], declared)
+            except msgspec.ValidationError as error:
+                found.append(str(error))
+    return found
+
+
+ANSWER = {"id", "response", "result", "messages", "data"}
+EVENT = {"event", "change_type", "parent_id", "data"}
+
+
+def _has_null(value: Any) -> bool:
+    match value:
+        case dict():
+            return any(map(_has_null, value.values()))
+        case list():
+            return any(map(_has_null, value))
+    return value is None
+
+
 class Actor(Person):
-    """A client whose messages can be looked at before they are taken."""
+    """A client whose messages can be looked at before they are taken, and which looks at each itself."""
+
+    def _came(self, message: dict[str, Any]) -> None:
+        stage: Any = self.desk
+        stage.faults += [f"{fault} in {message}" for fault in faults(message)]
+        super()._came(message)
 
     @property
     def waiting(self) -> list[dict[str, Any]]:
@@ -54,6 +107,8 @@ class Stage:
         self.services = services
         self.endpoint = Endpoint(services)
         self.ids: dict[str, str] = {}
+        self.faults: list[str] = []
+        """What is wrong with messages that were sent."""
         self._people: list[Actor] = []
 
     async def newcomer(self) -> Actor:
@@ -150,5 +205,6 @@ async def open_stage(directory: Path, *types: str, **settings: Any) -> AsyncIter
         stage = Stage(services)
         try:
             yield stage
+            assert stage.faults == []
         finally:
             await stage.close()
