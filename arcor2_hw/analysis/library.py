@@ -13,6 +13,7 @@ from msgspec import field
 from arcor2_hw.analysis.actions import ActionReader
 from arcor2_hw.analysis.enumerations import Enumeration, enumerations_of
 from arcor2_hw.analysis.hierarchy import Hierarchy, is_known_library
+from arcor2_hw.analysis.keywords import keyword_only
 from arcor2_hw.analysis.module import ClassInfo, Import, Module
 from arcor2_hw.analysis.presentation import of_type
 from arcor2_hw.analysis.robots import robot_meta
@@ -50,7 +51,7 @@ class TypeAnalysis(Data, frozen=True):
     is_object_type: false for a helper or mixin that does not derive from Generic; it is no type for clients.
     robot: None for what is no robot, and for what may not be placed. implemented: the optional methods of our bases
     that it really has. bases: the object types it derives from, nearest first. mixins: classes before its base.
-    enumerations: what its actions take, by action and parameter.
+    enumerations: what its actions take, by action and parameter. keyword_only: parameters that are given by name only.
     modules: the other files it needs, each after those that it needs itself; without ours, and without the packages
     that they merely lie in.
     """
@@ -65,6 +66,7 @@ class TypeAnalysis(Data, frozen=True):
     is_object_type: bool = True
     problem: Problem | None = None
     enumerations: dict[tuple[str, str], Enumeration] = field(default_factory=dict)
+    keyword_only: frozenset[tuple[str, str]] = frozenset()
 
 
 class Library:
@@ -307,6 +309,7 @@ class Library:
             needed,
             problem=problem,
             enumerations=enumerations_of(info, actions, hierarchy),
+            keyword_only=keyword_only(info, actions, hierarchy),
         )
 
     def _type_name(self, info: ClassInfo) -> str | None:

@@ -246,6 +246,10 @@ class ObjectTypes:
         """Give the enumerations that the actions of a type take, by action and parameter."""
         return self._analysis(name).enumerations
 
+    def keyword_only(self, name: str) -> frozenset[tuple[str, str]]:
+        """Give the parameters of a type's actions that are given by name only, by action and parameter."""
+        return self._analysis(name).keyword_only
+
     def robot_metas(self) -> list[RobotMeta]:
         """Give the features of all non-abstract robot types."""
         return list(self._known.robots.values())

@@ -65,5 +65,7 @@ class Candidates:
         for name in {obj.type for obj in scene.objects}:
             found = self.analysis(name)
             module = f"{snapshot.FOLDER}.{module_name(name)}"
-            facts[name] = TypeFacts(module, {one.name: one for one in found.actions}, found.enumerations)
+            facts[name] = TypeFacts(
+                module, {one.name: one for one in found.actions}, found.enumerations, found.keyword_only
+            )
         return facts

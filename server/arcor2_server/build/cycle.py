@@ -177,8 +177,9 @@ class Cycle:
         return kind.expression(parameter, References(self.frame, object_id, enumerations, method))
 
     def _arguments(self, node: int) -> tuple[list[ast.expr], list[ast.keyword]]:
-        """Give positional arguments, and by keyword those behind one that is left to its default."""
-        action, declared = self.flow.actions[node], self.declared[node][3]
+        """Give positional arguments, and by keyword those that have to be, or stand behind one left to its default."""
+        action, (_, type_name, method, declared) = self.flow.actions[node], self.declared[node]
+        by_name = self.frame.types[type_name].keyword_only
         given = {parameter.name: parameter for parameter in action.parameters}
         positional: list[ast.expr] = []
         keywords: list[ast.keyword] = []
@@ -197,7 +198,7 @@ class Cycle:
                     value = self._constant(parameter, meta)
                 case _:
                     value = self._literal(node, parameter, meta)
-            if gap:
+            if gap or (method, meta.name) in by_name:
                 keywords.append(ast.keyword(meta.name, value))
             else:
                 positional.append(value)

@@ -32,11 +32,13 @@ class TypeFacts:
     """What a script needs of one object type.
 
     enumerations: by action and parameter, with the module from which the script imports them.
+    keyword_only: parameters that a call has to give by name, by action and parameter.
     """
 
     module: str
     actions: Mapping[str, ObjectAction]
     enumerations: Mapping[tuple[str, str], Enumeration] = field(default_factory=dict)
+    keyword_only: frozenset[tuple[str, str]] = frozenset()
 
 
 class Frame:

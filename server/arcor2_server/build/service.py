@@ -63,7 +63,7 @@ def _facts(types: ObjectTypes, scene: Scene, project: Project, code: Iterable[Pa
         if one is not None and not one.source:
             # The copy of a driver's folder may be called otherwise; the type's own module gives them all.
             kinds = {key: msgspec.structs.replace(kind, module=module) for key, kind in kinds.items()}
-        facts[name] = TypeFacts(module, used, kinds)
+        facts[name] = TypeFacts(module, used, kinds, types.keyword_only(name))
     return facts
 
 

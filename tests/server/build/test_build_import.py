@@ -486,3 +486,31 @@ async def test_bases_mixins_and_further_modules_go_along_and_come_back(
         await other.storage.put_project(replace(project, project_objects_ids=["Gone"]))
         with pytest.raises(NotFound, match="Gone"):
             await other.build.publish("pro_t")
+
+
+async def test_the_facts_of_a_stored_type_say_which_parameters_have_a_name_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given = "def use(self, part: int, *, force: float = 0.5, an: str | None = None) -> int:"
+    source = TOOL.replace("def use(self, *, an: str | None = None) -> int:", given)
+    assert source != TOOL
+    parameters = (("part", "integer", "1"), ("force", "double", "0.25"))
+    use = workplace.action("use", "obj_tool/use", *parameters)
+    project = Project(
+        "p",
+        "scn_t",
+        id="pro_t",
+        action_points=[ActionPoint("p", Position(), id="acp_t", actions=[use])],
+        logic=[workplace.step(START, "use"), workplace.step("use", END)],
+    )
+    async with hub.opened(tmp_path / "a", [], monkeypatch) as there:
+        for name, text in {"AbstractTool": BASE, "Counting": MIXIN, "Tool": source}.items():
+            await there.storage.put_object_type(ObjectTypeSource(name, text))
+        await there.types.refresh()
+        await there.storage.put_scene(Scene("s", id="scn_t", objects=[SceneObject("tool", "Tool", id="obj_tool")]))
+        await there.storage.put_project(project)
+        published = await there.build.publish("pro_t")
+    assert 'tool.use(1, force=0.25, an="use")' in files_in(published)["script.py"].decode()
+    async with hub.opened(tmp_path / "b", [], monkeypatch) as other:
+        await import_package(other, published, FROM_SCRIPT)
+        assert untimed(await other.storage.project("pro_t")) == project

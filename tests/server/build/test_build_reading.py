@@ -1,5 +1,6 @@
 """A script goes back into the project that it was made from; edited by hand, into the project that it says."""
 
+import dataclasses
 import random
 from pathlib import Path
 from typing import Any
@@ -358,7 +359,11 @@ def test_a_script_of_the_original_is_read() -> None:
         (ABOVE, '        robot.pick(aps.feeder.poses.default, grip=Mode.ONCE, an="x")  #!\n', "one of Grip"),
         (ABOVE, '        robot.pick(aps.feeder.poses.default, force=1.0, an="x")  #!\n', "no parameter force"),
         (ABOVE, '        robot.pick(*aps, an="x")  #!\n', "one by one"),
-        (ABOVE, '        robot.pick(aps.feeder.poses.default, 0.5, Grip.SOFT, 1, an="x")  #!\n', "takes 3 arguments"),
+        (
+            ABOVE,
+            '        robot.pick(aps.feeder.poses.default, 0.5, Grip.SOFT, 1, an="x")  #!\n',
+            "takes 3 arguments without a name",
+        ),
         (ABOVE, '        robot.pick(here, an="x")  #!\n', "here is not known"),
         (ABOVE, '        robot.pick(code, an="x")  #!\n', "pose is pose, but code is string"),
         (ABOVE, '        x = robot.pick(aps.feeder.poses.default, an="x")  #!\n', "gives 0 results, not 1"),
@@ -447,3 +452,16 @@ def test_a_project_without_action_points_has_no_place_for_actions() -> None:
     )
     with pytest.raises(NotUnderstood, match="no action point on which 'a' could lie"):
         from_script(source, workplace.scene(), bare, workplace.FACTS)
+
+
+def test_parameters_that_have_a_name_only() -> None:
+    facts = {**workplace.FACTS, "Arm": replace_facts(frozenset({("pick", "speed"), ("pick", "grip")}))}
+    source = edited((PICK, PICK.replace("grip=", "speed=0.5, grip=")))
+    project = from_script(source, workplace.scene(), workplace.project(), facts)
+    assert from_logic(workplace.scene(), project, facts) == source
+    with pytest.raises(NotUnderstood, match="takes 1 arguments without a name"):
+        from_script(source.replace("speed=0.5", "0.5"), workplace.scene(), workplace.project(), facts)
+
+
+def replace_facts(keyword_only: frozenset[tuple[str, str]]) -> TypeFacts:
+    return dataclasses.replace(workplace.FACTS["Arm"], keyword_only=keyword_only)

@@ -77,17 +77,21 @@ class Values:
         }
 
     # ------------------------------------------------------------------------------------------------ calls
-    def arguments(self, call: ast.Call, declared: ObjectAction) -> dict[str, ast.expr]:
+    def arguments(self, call: ast.Call, declared: ObjectAction, type_name: str) -> dict[str, ast.expr]:
         """Give what is written for each parameter but `an`; NotUnderstood where it does not fit."""
         given: dict[str, ast.expr] = {}
         names = [meta.name for meta in declared.parameters]
-        for name, node in zip(names, call.args, strict=False):
+        by_name = self._frame.types[type_name].keyword_only
+        by_place = [name for name in names if (declared.name, name) not in by_name]
+        for name, node in zip(by_place, call.args, strict=False):
             if isinstance(node, ast.Starred):
                 raise NotUnderstood(node.lineno, "arguments have to be written one by one")
             given[name] = node
-        if len(call.args) > len(names):
-            node = call.args[len(names)]
-            raise NotUnderstood(node.lineno, f"{declared.name} takes {len(names)} arguments; {shown(node)} is too much")
+        if len(call.args) > len(by_place):
+            node, count = call.args[len(by_place)], len(by_place)
+            raise NotUnderstood(
+                node.lineno, f"{declared.name} takes {count} arguments without a name; {shown(node)} is too much"
+            )
         for keyword in call.keywords:
             if keyword.arg is None:
                 raise NotUnderstood(keyword.value.lineno, "arguments have to be written one by one")

@@ -135,7 +135,7 @@ class Ways:
         name = self._name(call)
         if outputs and len(outputs) != len(declared.returns):
             raise NotUnderstood(node.lineno, f"{method} gives {len(declared.returns)} results, not {len(outputs)}")
-        arguments = self._values.arguments(call, declared)
+        arguments = self._values.arguments(call, declared, obj.type)
         number = len(self.calls)
         links = self._links(number, arguments, declared)
         self.calls.append(Call(call.lineno, name, object_id, obj.type, declared, arguments, outputs, links))

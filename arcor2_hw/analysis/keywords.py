@@ -1,0 +1,17 @@
+"""Which parameters of actions have to be given by name."""
+
+from collections.abc import Iterable
+
+from arcor2_hw.analysis.hierarchy import Hierarchy
+from arcor2_hw.analysis.module import ClassInfo
+from arcor2_hw.data.object_type import ObjectAction
+
+
+def keyword_only(info: ClassInfo, actions: Iterable[ObjectAction], hierarchy: Hierarchy) -> frozenset[tuple[str, str]]:
+    """Give the parameters behind a bare `*` of the actions of a class, by action and parameter, without `an`."""
+    found: set[tuple[str, str]] = set()
+    for action in actions:
+        defined = (each.function(action.name) for each in hierarchy.ancestors(info))
+        if (node := next((node for node in defined if node is not None), None)) is not None:
+            found |= {(action.name, argument.arg) for argument in node.args.kwonlyargs if argument.arg != "an"}
+    return frozenset(found)
