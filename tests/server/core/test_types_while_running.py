@@ -120,3 +120,78 @@ async def test_a_type_comes_changes_and_goes(server: ServerProcess) -> None:
         assert (await told(ann, "remove"))["type"] == "Shelf"
         await ann.refused("GetActions", {"type": "Shelf"})
         await http.delete("/object-types/Labels")
+
+
+COUNTER = '''
+from typing import Optional
+
+from arcor2.data.common import ActionMetadata, StrEnum
+from arcor2.exceptions import Arcor2Exception
+from arcor2_object_types.abstract import Generic
+
+
+class Way(StrEnum):
+    UP: str = "up"
+    DOWN: str = "down"
+
+
+class Counter(Generic):
+    """Counts."""
+
+    _ABSTRACT = False
+
+    def __init__(self, obj_id: str, name: str) -> None:
+        super().__init__(obj_id, name)
+        self.value = 0
+
+    def count(self, way: Way, by: int = 1, *, an: Optional[str] = None) -> int:
+        self.value += by if way == Way.UP else -by
+        if self.value > 4:
+            raise Arcor2Exception("It is full.")
+        return self.value
+
+    count.__action__ = ActionMetadata()
+'''
+
+
+async def test_an_older_type_in_a_program_that_is_built_and_run(server: ServerProcess) -> None:
+    async with (
+        talking(server.url, "ann") as ann,
+        httpx.AsyncClient(base_url=server.url.replace("ws://", "http://"), trust_env=False) as http,
+    ):
+
+        async def event(name: str) -> Any:
+            while (found := await following(ann))["event"] != name:
+                pass
+            return found["data"]
+
+        await http.put("/object-types", json={"id": "Counter", "name": "Counter", "source": COUNTER})
+        await told(ann, "add")
+        await ann.granted("NewScene", {"name": "Counting"})
+        scene = (await event("OpenScene"))["scene"]["id"]
+        await ann.granted("AddObjectToScene", {"name": "counter", "type": "Counter"})
+        counter = (await event("SceneObjectChanged"))["id"]
+        await ann.granted("SaveScene")
+        await ann.granted("CloseScene", {"force": False})
+        await ann.granted("NewProject", {"scene_id": scene, "name": "Count", "has_logic": True})
+        project = (await event("OpenProject"))["project"]["id"]
+        await ann.granted("AddActionPoint", {"name": "ap", "position": {"x": 0, "y": 0, "z": 0}})
+        point = (await event("ActionPointChanged"))["id"]
+        parameters = [
+            {"name": "way", "type": "string_enum", "value": '"up"'},
+            {"name": "by", "type": "integer", "value": "2"},
+        ]
+        action = {"action_point_id": point, "name": "count", "type": f"{counter}/count", "parameters": parameters}
+        await ann.granted("AddAction", action | {"flows": [{"type": "default", "outputs": []}]})
+        count = (await event("ActionChanged"))["id"]
+        await ann.granted("AddLogicItem", {"start": "START", "end": count})
+        await ann.granted("AddLogicItem", {"start": count, "end": "END"})
+        await ann.granted("SaveProject")
+        await ann.granted("CloseProject", {"force": False})
+        package = (await ann.granted("BuildProject", {"project_id": project, "package_name": "counting"}))["package_id"]
+        await ann.granted("RunPackage", {"id": package})
+        results = [(await event("ActionStateAfter"))["results"] for _ in range(2)]
+        assert results == [["2"], ["4"]]
+        exception = await event("ProjectException")
+        assert (exception["type"], exception["handled"]) == ("Arcor2Error", True)
+        assert exception["message"].endswith("It is full.")
