@@ -1,10 +1,14 @@
 """The world of collision models: what was put in over REST, what stands in the scene in operation; lines through it."""
 
+import functools
 import math
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Final
 
+import msgspec
+
 from arcor2_hw.data.base import Data, Unset
+from arcor2_hw.data.events import PackageInfoData
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import Box, Cylinder, Models, Sphere
 from arcor2_hw.exceptions import NotFound
@@ -47,18 +51,36 @@ class CollisionWorld:
         self._put.clear()
 
     def everything(self, services: "Services") -> dict[str, Placed]:
-        """Give all models by id: those put in, and those of the objects of the scene that is online."""
+        """Give all models by id: those put in, and those of the objects of the scene in operation."""
         return dict(_standing(services)) | self._put
 
 
 def _standing(services: "Services") -> Iterator[tuple[str, Placed]]:
+    """Give what stands in the scene in operation: the one that is online, or that of the program that runs."""
     scene = services.session.scene
-    if scene is None or not services.cell.online:
-        return
-    for placed in scene.objects:
-        model = services.types.meta(placed.type).object_model
-        if not isinstance(model, Unset) and not isinstance(placed.pose, Unset):
-            yield placed.id, Placed(model.model(), placed.pose)
+    if scene is not None and services.cell.online:
+        for placed in scene.objects:
+            model = services.types.meta(placed.type).object_model
+            if not isinstance(model, Unset) and not isinstance(placed.pose, Unset):
+                yield placed.id, Placed(model.model(), placed.pose)
+    elif (encoded := services.execution.state_and_info()[1]) is not None:
+        yield from _of_program(encoded)
+
+
+@functools.lru_cache(maxsize=1)
+def _of_program(encoded: bytes) -> tuple[tuple[str, Placed], ...]:
+    info = msgspec.json.decode(encoded, type=_InfoEvent).data
+    kinds = info.collision_models
+    models: dict[str, Models] = {one.id: one for one in (*kinds.boxes, *kinds.spheres, *kinds.cylinders, *kinds.meshes)}
+    return tuple(
+        (placed.id, Placed(models[placed.type], placed.pose))
+        for placed in info.scene.objects
+        if placed.type in models and not isinstance(placed.pose, Unset)
+    )
+
+
+class _InfoEvent(msgspec.Struct):
+    data: PackageInfoData
 
 
 # ------------------------------------------------------------------------------------------------ lines

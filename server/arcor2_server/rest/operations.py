@@ -12,7 +12,7 @@ from urllib.parse import quote
 
 import msgspec
 import structlog
-from litestar import Request, Response
+from litestar import MediaType, Request, Response
 from litestar.datastructures import UploadFile
 from litestar.enums import HttpMethod
 from litestar.exceptions import HTTPException
@@ -21,7 +21,7 @@ from litestar.response import Stream
 
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
-from arcor2_server.rest.answers import OPEN, ROLE, SERVICE, InternalError, Unsupported, answer, refusal
+from arcor2_server.rest.answers import OPEN, ROLE, SERVICE, InternalError, Unsupported, refusal
 from arcor2_server.rest.naming import camelized, camelized_names, snake, snaked
 
 log = structlog.get_logger(__name__)
@@ -31,7 +31,7 @@ MIB: Final = 1024 * 1024
 LARGEST_BODY: Final = 16 * MIB
 """Bytes of a JSON body, as of a message of the websocket."""
 BESIDE: Final = 256 * 1024
-"""Bytes of a JSON body beyond which it is read beside the event loop."""
+"""Bytes of JSON beyond which it is read, or written, beside the event loop."""
 
 
 class Binary(msgspec.Struct, frozen=True):
@@ -109,7 +109,7 @@ def route(declared: Operation) -> HTTPRouteHandler:
         uploads: list[UploadFile] = []
         try:
             given = await _arguments(declared, request, uploads)
-            return _response(declared, await declared.handler(**given))
+            return await _response(declared, await declared.handler(**given))
         except Arcor2Error as error:
             if error.detail:
                 log.info("request refused", path=declared.path, reason=str(error)[:1000], detail=error.detail[:1000])
@@ -232,7 +232,7 @@ async def _upload(declared: Operation, request: Request[Any, Any, Any], uploads:
     return Upload(typing.cast("IO[bytes]", file.file), file.filename, texts)
 
 
-def _response(declared: Operation, given: Any) -> Response[Any]:
+async def _response(declared: Operation, given: Any) -> Response[Any]:
     if isinstance(given, Binary):
         # RFC 6266: the name in UTF-8, since it may be anything.
         headers = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(given.filename, safe='')}"}
@@ -243,5 +243,11 @@ def _response(declared: Operation, given: Any) -> Response[Any]:
         return Stream(given.content, media_type=given.media_type, headers=headers)
     if declared.media_type != "application/json":
         return Response(given, media_type=declared.media_type)
-    builtins = msgspec.to_builtins("ok" if given is None else given)
-    return answer(builtins if declared.plain else camelized(builtins))
+    content = msgspec.json.encode("ok" if given is None else given)
+    if not declared.plain:
+        content = await asyncio.to_thread(_renamed, content) if len(content) > BESIDE else _renamed(content)
+    return Response(content, media_type=MediaType.JSON)
+
+
+def _renamed(content: bytes) -> bytes:
+    return msgspec.json.encode(camelized(msgspec.json.decode(content)))

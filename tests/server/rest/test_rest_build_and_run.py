@@ -25,8 +25,16 @@ class Counter(Generic):
     def count(self, *, an: str | None = None) -> None:
         time.sleep(0.02)
 """
+CRATE = """
+from arcor2_hw.objects import CollisionObject
+
+
+class Crate(CollisionObject):
+    _ABSTRACT = False
+"""
+STANDING = {"name": "crate", "type": "Crate", "id": "obj_k", "pose": {"position": {"x": 2, "y": 0, "z": 0}}}
 OBJECT = {"name": "counter", "type": "Counter", "id": "obj_c"}
-SCENE = {"id": "scn_c", "name": "count scene", "objects": [OBJECT]}
+SCENE = {"id": "scn_c", "name": "count scene", "objects": [OBJECT, STANDING]}
 PROJECT = {
     "id": "pro_c",
     "name": "count ß",
@@ -53,6 +61,9 @@ def base(server: ServerProcess) -> str:
 
 async def prepare(http: httpx.AsyncClient) -> None:
     granted(await http.put("/object-types", json={"id": "Counter", "name": "Counter", "source": COUNT}))
+    granted(await http.put("/models/box", json={"id": "Crate", "sizeX": 1, "sizeY": 1, "sizeZ": 1}))
+    crate = {"id": "Crate", "name": "Crate", "source": CRATE, "model": {"id": "Crate", "type": "Box"}}
+    granted(await http.put("/object-types", json=crate))
     granted(await http.put("/scenes", json=SCENE))
     granted(await http.put("/projects", json=PROJECT))
 
@@ -73,6 +84,12 @@ async def until_state(http: httpx.AsyncClient, *wanted: str) -> dict[str, Any]:
             info: dict[str, Any] = granted(await http.get("/packages/state"))
             if info["state"] in wanted:
                 return info
+            await asyncio.sleep(0.02)
+
+
+async def until_in_the_way(http: httpx.AsyncClient, wanted: list[str]) -> None:
+    async with asyncio.timeout(20):
+        while granted(await http.get("/collisions")) != wanted:
             await asyncio.sleep(0.02)
 
 
@@ -189,6 +206,10 @@ async def test_a_program_is_run_paused_stepped_and_stopped(server: ServerProcess
         granted(await http.put("/packages/pkg_r/start"))
         info = await until_state(http, "Running")
         assert info["activePackageId"] == "pkg_r"
+        # What stands in the program's scene is in the way as long as it runs.
+        await until_in_the_way(http, ["obj_k"])
+        line = {"pt1": {"x": 0, "y": 0, "z": 0}, "pt2": {"x": 5, "y": 0, "z": 0}}
+        assert granted(await http.put("/utils/line-safe", json=line)) == {"safe": False, "object_id": "obj_k"}
         refused(await http.put("/packages/pkg_r/start"), 409, "PackageRunState")
         refused(await http.delete("/packages/pkg_r"), 409, "PackageRunState")
         refused(await http.post("/packages/pkg_r", files=as_file(await published(http))), 409, "PackageRunState")
@@ -199,6 +220,7 @@ async def test_a_program_is_run_paused_stepped_and_stopped(server: ServerProcess
         granted(await http.put("/packages/resume"))
         await until_state(http, "Running")
         granted(await http.put("/packages/stop"))
+        await until_in_the_way(http, [])
         assert await until_state(http, "Completed") == {"state": "Completed", "activePackageId": "pkg_r"}
         (listed,) = [one for one in granted(await http.get("/packages")) if one["id"] == "pkg_r"]
         assert listed["executed"] > listed["created"]
@@ -292,4 +314,4 @@ async def test_tables_outlive_the_server(tmp_path: Any) -> None:
         assert granted(await http.get("/tokens")) == [token]
         assert granted(await http.get("/packages/pkg_a/breakpoints")) == ["acp_1"]
         assert (await http.get("/assets/chair/data")).content == b"solid"
-        assert [one["id"] for one in granted(await http.get("/object-types"))] == ["Counter"]
+        assert [one["id"] for one in granted(await http.get("/object-types"))] == ["Counter", "Crate"]
