@@ -37,7 +37,7 @@ class UrSettings(Settings):
     :param tcp_acceleration: acceleration of linear moves, m/s²
     :param joint_acceleration: acceleration of joint moves, rad/s²
     :param stop_deceleration: deceleration of a stop, m/s²
-    :param watchdog_frequency: the controller stops when it is not called that often, Hz
+    :param watchdog_frequency: the controller stops when it is not called that often, Hz; more needs a quiet computer
     :param use_upper_range_registers: leave registers 0 to 23 to a fieldbus, where ur_rtde can
     :param gripper_output: digital output of the gripper, 0 to 17; -1: there is none
     :param part_sensor_input: digital input that tells of a held part, 0 to 17; -1: there is none
@@ -60,7 +60,7 @@ class UrSettings(Settings):
     tcp_acceleration: float = 1.2
     joint_acceleration: float = 1.4
     stop_deceleration: float = 5.0
-    watchdog_frequency: float = 10.0
+    watchdog_frequency: float = 5.0
     use_upper_range_registers: bool = True
     gripper_output: int = 0
     part_sensor_input: int = -1
