@@ -37,13 +37,13 @@ async def ratio(report: Report, url: str, directory: Path, name: str, request: s
     report.add(Figure(name, median(ratios), ROUNDS * PER_ROUND, note))
 
 
-def fdatasync_time(directory: Path, n: int = 200) -> float:
-    """Give the median time of writing 4 KiB and fdatasync, s."""
+def fdatasync_time(directory: Path, n: int = 200, size: int = 4096) -> float:
+    """Give the median time of writing `size` bytes and fdatasync, s."""
     samples = []
     with tempfile.TemporaryFile(dir=directory) as file:
         for _ in range(n):
             begin = time.perf_counter()
-            file.write(b"x" * 4096)
+            file.write(b"x" * size)
             file.flush()
             os.fdatasync(file.fileno())
             samples.append(time.perf_counter() - begin)
