@@ -71,7 +71,8 @@ def _standing(services: "Services") -> Iterator[tuple[str, Placed]]:
 def _of_program(encoded: bytes) -> tuple[tuple[str, Placed], ...]:
     info = msgspec.json.decode(encoded, type=_InfoEvent).data
     kinds = info.collision_models
-    models: dict[str, Models] = {one.id: one for one in (*kinds.boxes, *kinds.spheres, *kinds.cylinders, *kinds.meshes)}
+    every: list[Models] = [*kinds.boxes, *kinds.spheres, *kinds.cylinders, *kinds.meshes]
+    models = {one.id: one for one in every}
     return tuple(
         (placed.id, Placed(models[placed.type], placed.pose))
         for placed in info.scene.objects
