@@ -95,7 +95,7 @@ def _document(files: Mapping[str, bytes], path: str, kind: type[T]) -> T:
 
 def _text(files: Mapping[str, bytes], path: str) -> str:
     try:
-        return files[path].decode()
+        return files[path].decode("utf-8-sig")  # some editors put a mark in front
     except KeyError:
         raise InvalidPackage(f"The package has no {path}.") from None
     except UnicodeDecodeError as error:

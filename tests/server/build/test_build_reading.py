@@ -465,3 +465,25 @@ def test_parameters_that_have_a_name_only() -> None:
 
 def replace_facts(keyword_only: frozenset[tuple[str, str]]) -> TypeFacts:
     return dataclasses.replace(workplace.FACTS["Arm"], keyword_only=keyword_only)
+
+
+def test_scripts_of_odd_shapes_are_refused_or_read_never_a_crash() -> None:
+    sums = "+".join(["1.0"] * 1500)
+    for changes, line in (
+        ((PICK, f'        robot.pick(aps.feeder.poses.default, {sums}, an="pick")\n'), "is no truth value"),
+        ((PICK, f"        {sums}\n"), "the loop has calls"),
+        ((IF_KNOWN, f"        if {sums} == 1:\n"), "a condition is written"),
+    ):
+        with pytest.raises(NotUnderstood, match=line):
+            read(changes)
+    deep = "".join(f"{'    ' * n}        if known == True:\n" for n in range(90)) + "    " * 90 + "        pass\n"
+    assert read((BACK, deep + BACK))  # the same thing asked again and again
+    branches = "".join(f"        elif n == {n}:\n            continue\n" for n in range(1, 400))
+    source = edited(
+        (BACK, f'        n = flow.count(an="count")\n        if n == 0:\n            pass\n{branches}' + BACK)
+    )
+    facts = {**workplace.FACTS}
+    more = {**facts["FlowActions"].actions, "count": ObjectAction("count", returns=["integer"])}
+    facts["FlowActions"] = TypeFacts("object_types.flow_actions", more)
+    project = from_script(source, workplace.scene(), workplace.project(), facts)
+    assert len([step for step in steps_of(project) if step[0] == "count"]) == 401

@@ -17,5 +17,8 @@ class NotUnderstood(InvalidProject):
 
 def shown(node: ast.AST) -> str:
     """Give the text of a piece of a script, shortened, to be quoted."""
-    text = " ".join(ast.unparse(node).split())
+    try:
+        text = " ".join(ast.unparse(node).split())
+    except RecursionError:
+        return "this"
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -204,9 +204,13 @@ class Ways:
         for way in going:
             if way.source == START_NODE:
                 raise NotUnderstood(test.lineno, "there is no result yet to be asked for")
-            if way.taken is not None:
-                raise NotUnderstood(test.lineno, "between one condition and the next there has to be an action")
             self.uses.append(Use(way.source, condition.action, test.lineno, variable))
+            if way.taken is not None:
+                if way.taken[:2] != condition[:2]:
+                    raise NotUnderstood(test.lineno, "between one condition and the next there has to be an action")
+                # The same result is asked again: what it is here is known.
+                (holds if way.taken == condition else others).append(way)
+                continue
             if opposite in way.tried:
                 holds.append(way)
             elif condition in way.tried:
