@@ -76,8 +76,9 @@ class _Run:
             await self._run()
             await self._delete()
             await self._open_again(project)
-        except BaseException:  # the server ends
+        except BaseException:  # the server ends: at its next start the project is open, as it was
             await self._discard_package()
+            await self._open_again(project)
             raise
         finally:
             self._services.execution.reserved = False

@@ -156,7 +156,7 @@ async def test_a_project_that_cannot_be_built_stays_open(tmp_path: Path, monkeyp
         await happens(alice, "OpenProject")
 
 
-async def test_a_server_that_ends_meanwhile_leaves_no_package(tmp_path: Path) -> None:
+async def test_a_server_that_ends_meanwhile_leaves_no_package_and_opens_the_project_next_time(tmp_path: Path) -> None:
     async with open_stage(tmp_path) as stage:
         alice = await stage.person("alice")
         await project(stage, alice)
@@ -165,3 +165,6 @@ async def test_a_server_that_ends_meanwhile_leaves_no_package(tmp_path: Path) ->
         packages = stage.services.settings.packages_dir
         assert len(list(packages.glob("pkg_*"))) == 1
     assert list(packages.glob("pkg_*")) == []
+    async with open_stage(tmp_path) as stage:
+        project_again = stage.services.session.require_project()
+        assert (project_again.name, stage.services.session.has_changes) == ("round", False)
