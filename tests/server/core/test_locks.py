@@ -208,7 +208,7 @@ async def test_exclusive_is_refused_at_once_while_a_client_holds_a_lock(locks: L
 
 async def test_exclusive_waits_for_silent_locks_and_keeps_others_out(locks: Locks) -> None:
     order: list[str] = []
-    entered = asyncio.Event()
+    entered, saving = asyncio.Event(), asyncio.Event()
 
     async def edit() -> None:
         async with locks.auto("ann", "box"):
@@ -219,6 +219,7 @@ async def test_exclusive_waits_for_silent_locks_and_keeps_others_out(locks: Lock
     async def save() -> None:
         async with locks.exclusive():
             order.append("saving")
+            saving.set()
             await asyncio.sleep(0.05)
             # What runs inside may use locks itself.
             async with locks.auto("ann", "SCENE"):
@@ -226,7 +227,7 @@ async def test_exclusive_waits_for_silent_locks_and_keeps_others_out(locks: Lock
             order.append("saved")
 
     async def lock() -> None:
-        await asyncio.sleep(0.07)
+        await saving.wait()
         assert await locks.write_lock("bob", "robot") == ["robot"]
         order.append("locked")
 
