@@ -18,10 +18,11 @@ from arcor2_hw.data.project import Action
 from arcor2_server.session.changes import Kind
 from arcor2_server.session.checks import action_meta, project_problems
 from arcor2_server.session.logic import check_logic_item
+from tests.server.machine.client import Client, Flat, flat
 from tests.server.machine.crash_copy import copy_at_one_moment
 from tests.server.machine.picture import Picture
 from tests.server.machine.requests import EDITS, SCENE_EDITS, Draw, Request
-from tests.server.session.desk import Desk, Person, Refused, open_desk
+from tests.server.session.desk import Refused, open_desk
 from tests.server.session.work import Work
 
 NAMES = ("alice", "bob", "carol")
@@ -32,34 +33,6 @@ users = st.integers(0, len(NAMES) - 1)
 numbers = st.tuples(st.integers(0, 11), st.integers(0, 11), st.integers(0, 11))
 edits = st.sampled_from(sorted(EDITS))
 parts = st.tuples(edits, numbers, st.sampled_from(["", "", "", "Undo", "Redo"]))
-
-Flat = dict[tuple[str, str], Any]
-
-
-def flat(picture: Picture) -> Flat:
-    """Everything by kind and id, so that states can be compared thing by thing."""
-    found: Flat = {}
-    for kind, content in picture.shown().items():
-        if kind in ("scene", "project"):
-            found[kind, ""] = content
-        else:
-            found |= {(kind, key): value for key, value in content.items()}
-    return found
-
-
-class Client:
-    """A connection with what it knows."""
-
-    def __init__(self, desk: Desk, name: str) -> None:
-        self.name = name
-        self.person = Person(desk)
-        self.picture = Picture()
-        self.events = 0
-
-    def look(self) -> None:
-        for event in self.person.events():
-            self.events += 1
-            self.picture.see(event)
 
 
 class Edits(RuleBasedStateMachine):

@@ -1,0 +1,34 @@
+"""A client of the random edits, with what it knows."""
+
+from typing import Any
+
+from tests.server.machine.picture import Picture
+from tests.server.session.desk import Desk, Person
+
+Flat = dict[tuple[str, str], Any]
+
+
+def flat(picture: Picture) -> Flat:
+    """Everything by kind and id, so that states can be compared thing by thing."""
+    found: Flat = {}
+    for kind, content in picture.shown().items():
+        if kind in ("scene", "project"):
+            found[kind, ""] = content
+        else:
+            found |= {(kind, key): value for key, value in content.items()}
+    return found
+
+
+class Client:
+    """A connection with what it knows."""
+
+    def __init__(self, desk: Desk, name: str) -> None:
+        self.name = name
+        self.person = Person(desk)
+        self.picture = Picture()
+        self.events = 0
+
+    def look(self) -> None:
+        for event in self.person.events():
+            self.events += 1
+            self.picture.see(event)
