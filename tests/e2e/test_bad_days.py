@@ -165,6 +165,7 @@ async def test_safeguard_stop_released_moves_nothing_until_a_new_command(cell: C
     assert not isinstance(result.error, Unset)
     assert "safeguard" in result.error.lower()
     await cell.tell("robot", "safeguard_stop", on=False)
+    await until(lambda: at_rest(cell), "the arm to rest, which may still have been slowing down", 0.5)
     await assert_stays(cell, 2.0)
     await start_moving(cell, client, project)
 
