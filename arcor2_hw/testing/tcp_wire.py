@@ -42,7 +42,7 @@ class TcpWire(Wire):
         self._host, self._ports, self._listen_at, self._fixed = host, tuple(ports), listen_at, fixed
         self._listeners: dict[socket.socket, int] = {}
         self._links: dict[socket.socket, tuple[_Link, Side]] = {}
-        self._count = 0
+        self._count = self._resets = 0
         self._thread: threading.Thread | None = None
 
     @property
@@ -109,6 +109,7 @@ class TcpWire(Wire):
     def reset(self) -> None:
         """Send RST on all connections, to both ends."""
         with self._lock:
+            self._resets += 1
             for link in {link for link, _ in self._links.values()}:
                 self._drop(link)
 
@@ -137,6 +138,7 @@ class TcpWire(Wire):
                         self._move(end, events)
 
     def _accept(self, listener: socket.socket) -> None:
+        resets = self._resets
         try:
             driver, _ = listener.accept()
         except OSError:
@@ -151,6 +153,9 @@ class TcpWire(Wire):
         with self._lock:
             self._count += 1
             link = _Link(self._count, driver, device)
+            if resets != self._resets:  # it was being made when the wire was reset, and is reset with the others
+                self._drop(link)
+                return
             for side, end in link.ends.items():
                 end.setblocking(False)
                 with contextlib.suppress(OSError):

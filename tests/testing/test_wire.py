@@ -6,6 +6,7 @@ import select
 import socket
 import tty
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -150,6 +151,21 @@ def test_a_reset_is_told_to_both_ends_and_a_new_connection_is_taken(
             end.recv(9)
     with dial(wire), device.accept()[0]:
         pass
+
+
+def test_a_connection_that_is_being_made_is_reset_too(
+    wire: TcpWire, device: socket.socket, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    connect = socket.create_connection
+
+    def connect_and_reset(*arguments: Any) -> socket.socket:
+        made = connect(*arguments)
+        wire.reset()
+        return made
+
+    monkeypatch.setattr(socket, "create_connection", connect_and_reset)
+    with connect((wire.host, wire.ports[0]), 5.0) as driver, pytest.raises(ConnectionResetError):
+        driver.recv(9)
 
 
 def test_a_device_that_is_not_there_is_a_reset() -> None:
