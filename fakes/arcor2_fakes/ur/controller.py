@@ -1,5 +1,6 @@
 """The controller: power, safety, the program that runs, registers and I/O, advanced one control cycle at a time."""
 
+import abc
 import logging
 import math
 import time
@@ -30,18 +31,18 @@ class Refused(ValueError):
     """The controller does not do that in its present state; the text is the dashboard's answer."""
 
 
-class Program:
+class Program(abc.ABC):
     """Something that plays on the controller."""
 
     name = "program"
     register_offset: int | None = None
     """Where ur_rtde's command registers start; None for a program that has none."""
 
+    @abc.abstractmethod
     def run(self) -> Steps:
         """The program's main thread; it ends when this does."""
-        raise NotImplementedError
 
-    def ended(self) -> None:
+    def ended(self) -> None:  # noqa: B027
         """Called once when the program is over, whatever ended it."""
 
 

@@ -2,48 +2,32 @@
 
 import itertools
 import os
-import select
-import subprocess
-import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import msgspec
 import pytest
 
 from arcor2_drivers.abb_yumi.settings import YumiSettings
 from arcor2_drivers.abb_yumi.yumi import YuMi
-from arcor2_fakes.control import BlockingControlClient
 from arcor2_hw.data.geometry import Pose
+from tests.drivers.doing import Doing as Doing
+from tests.fakes.conftest import FakeProcess
 
 RWS_PORT = 8080
 _numbers = itertools.count(1)
 
 
-class FakeYumi:
+class FakeYumi(FakeProcess):
     """A running fake controller and its control channel."""
 
     def __init__(self, *arguments: str) -> None:
         self.host = f"127.{20 + os.getpid() % 60}.{os.getpid() // 60 % 250}.{next(_numbers)}"
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "arcor2_fakes.abb_yumi", "--host", self.host, *arguments],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-        )
-        assert self.process.stdout is not None
-        assert select.select([self.process.stdout], [], [], 60.0)[0]
-        line = self.process.stdout.readline()
-        assert line.startswith(b"ready "), line
-        self.control = BlockingControlClient(msgspec.json.decode(line.removeprefix(b"ready "))["control"])
+        super().__init__("abb_yumi", "--host", self.host, *arguments)
+        self.truth()  # opens the control channel, which lives as long
 
     def do(self, command: str, **arguments: Any) -> Any:
         return self.control.do(command, **arguments)
-
-    def truth(self) -> dict[str, Any]:
-        found: dict[str, Any] = self.do("truth")
-        return found
 
     def arm(self, arm: str) -> dict[str, Any]:
         found: dict[str, Any] = self.truth()["arms"][arm]
@@ -56,17 +40,6 @@ class FakeYumi:
     def reset(self) -> None:
         self.do("heal")
         self.do("renew")
-
-    def end(self) -> None:
-        self.control.close()
-        self.process.terminate()
-        try:
-            self.process.wait(5.0)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
-        assert self.process.stdout is not None
-        self.process.stdout.close()
 
 
 @pytest.fixture(scope="module")
@@ -105,30 +78,6 @@ def ready(robot: YuMi) -> YuMi:
     """Connected and controlled."""
     robot.take_control()
     return robot
-
-
-class Doing:
-    """A call on a thread of its own; `result` gives its result or raises its error."""
-
-    def __init__(self, call: Callable[..., Any], *arguments: Any, **options: Any) -> None:
-        self._value: Any = None
-        self._error: BaseException | None = None
-
-        def run() -> None:
-            try:
-                self._value = call(*arguments, **options)
-            except BaseException as e:
-                self._error = e
-
-        self._thread = threading.Thread(target=run, daemon=True)
-        self._thread.start()
-
-    def result(self, within: float = 10.0) -> Any:
-        self._thread.join(within)
-        assert not self._thread.is_alive(), f"still busy after {within} s"
-        if self._error is not None:
-            raise self._error
-        return self._value
 
 
 def under_way(fake: FakeYumi, *arms: str) -> None:

@@ -1,6 +1,5 @@
 """Fake servos in a process of their own, and the driver on their line."""
 
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -10,33 +9,10 @@ import pytest
 from arcor2_drivers.two_axis_robot.settings import TwoAxisRobotSettings
 from arcor2_drivers.two_axis_robot.two_axis_robot import TwoAxisRobot
 from arcor2_hw.data.geometry import Pose
+from tests.drivers.doing import Doing as Doing
 from tests.fakes.conftest import FakeProcess, start_fake, wait_for
 
 __all__ = ["start_fake", "wait_for"]
-
-
-class Doing:
-    """A call on a thread of its own; `result` gives its result or raises its error."""
-
-    def __init__(self, call: Callable[..., Any], *arguments: Any, **options: Any) -> None:
-        self._value: Any = None
-        self._error: BaseException | None = None
-
-        def run() -> None:
-            try:
-                self._value = call(*arguments, **options)
-            except BaseException as e:
-                self._error = e
-
-        self._thread = threading.Thread(target=run, daemon=True)
-        self._thread.start()
-
-    def result(self, within: float = 10.0) -> Any:
-        self._thread.join(within)
-        assert not self._thread.is_alive(), f"still busy after {within} s"
-        if self._error is not None:
-            raise self._error
-        return self._value
 
 
 def moving(fake: FakeProcess) -> None:

@@ -3,48 +3,32 @@
 import contextlib
 import itertools
 import os
-import select
-import subprocess
-import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import msgspec
 import pytest
 
 from arcor2_drivers.universal_robots.settings import UrSettings
 from arcor2_drivers.universal_robots.ur5e import UR5e
-from arcor2_fakes.control import BlockingControlClient
 from arcor2_hw.data.geometry import Pose
+from tests.drivers.doing import Doing as Doing
+from tests.fakes.conftest import FakeProcess
 
 HOME = [0.0, -1.5707963267948966, 1.5707963267948966, -1.5707963267948966, -1.5707963267948966, 0.0]
 _numbers = itertools.count(1)
 
 
-class FakeUr:
+class FakeUr(FakeProcess):
     """A running fake controller and its control channel."""
 
     def __init__(self, *arguments: str) -> None:
         self.host = f"127.{100 + os.getpid() % 100}.{os.getpid() // 100 % 250}.{next(_numbers)}"
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "arcor2_fakes.ur", "--host", self.host, "--control", "127.0.0.1:0", *arguments],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-        )
-        assert self.process.stdout is not None
-        assert select.select([self.process.stdout], [], [], 60.0)[0]
-        line = self.process.stdout.readline()
-        assert line.startswith(b"ready "), line
-        self.control = BlockingControlClient(msgspec.json.decode(line.removeprefix(b"ready "))["control"])
+        super().__init__("ur", "--host", self.host, "--control", "127.0.0.1:0", *arguments)
+        self.truth()  # opens the control channel, which lives as long
 
     def do(self, command: str, **arguments: Any) -> Any:
         return self.control.do(command, **arguments)
-
-    def truth(self) -> dict[str, Any]:
-        found: dict[str, Any] = self.do("truth")
-        return found
 
     def reset(self) -> None:
         self.do("heal")
@@ -56,17 +40,6 @@ class FakeUr:
         self.do("speed_slider", fraction=1.0)
         self.control.wait_until(lambda t: not t["moving"] and t["program"] is None)
         self.do("place", q=HOME)
-
-    def end(self) -> None:
-        self.control.close()
-        self.process.terminate()
-        try:
-            self.process.wait(5.0)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
-        assert self.process.stdout is not None
-        self.process.stdout.close()
 
 
 @pytest.fixture(scope="module")
@@ -116,32 +89,6 @@ def ready(robot: UR5e) -> UR5e:
     """Connected and controlled."""
     robot.take_control()
     return robot
-
-
-class Doing:
-    """A call on a thread of its own; `result` gives its result or raises its error."""
-
-    def __init__(self, call: Callable[..., Any], *arguments: Any, **options: Any) -> None:
-        self._value: Any = None
-        self._error: BaseException | None = None
-        self.ended_at = 0.0
-
-        def run() -> None:
-            try:
-                self._value = call(*arguments, **options)
-            except BaseException as e:
-                self._error = e
-            self.ended_at = time.monotonic()
-
-        self._thread = threading.Thread(target=run, daemon=True)
-        self._thread.start()
-
-    def result(self, within: float = 10.0) -> Any:
-        self._thread.join(within)
-        assert not self._thread.is_alive(), f"still busy after {within} s"
-        if self._error is not None:
-            raise self._error
-        return self._value
 
 
 def moving(fake: FakeUr) -> None:

@@ -1,0 +1,32 @@
+"""A call beside the test, on a thread of its own."""
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+
+class Doing:
+    """A call on a thread of its own; `result` gives its result or raises its error."""
+
+    def __init__(self, call: Callable[..., Any], *arguments: Any, **options: Any) -> None:
+        self._value: Any = None
+        self._error: BaseException | None = None
+        self.ended_at = 0.0
+
+        def run() -> None:
+            try:
+                self._value = call(*arguments, **options)
+            except BaseException as e:
+                self._error = e
+            self.ended_at = time.monotonic()
+
+        self._thread = threading.Thread(target=run, daemon=True)
+        self._thread.start()
+
+    def result(self, within: float = 10.0) -> Any:
+        self._thread.join(within)
+        assert not self._thread.is_alive(), f"still busy after {within} s"
+        if self._error is not None:
+            raise self._error
+        return self._value
