@@ -3,17 +3,18 @@
 Arguments and results of calls travel as JSON documents in bytes, exactly as they stand in scenes, projects and events.
 """
 
-import struct
 from typing import Any, Final
 
 import msgspec
 from msgspec import Struct, field
 
+from arcor2_hw import framing
 from arcor2_hw.data.cell import Cell
 from arcor2_hw.data.device import Alarm, Connection, Health
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene, SceneObjectOverride
+from arcor2_hw.framing import PREFIX_SIZE as PREFIX_SIZE
 
 MAX_MESSAGE: Final = 64 * 1024 * 1024
 HEARTBEAT_PERIOD: Final = 0.25
@@ -228,9 +229,6 @@ ServerBound = (
     | LogLine
 )
 
-_PREFIX = struct.Struct("<I")
-PREFIX_SIZE: Final = _PREFIX.size
-
 decode_host_bound: Any = msgspec.msgpack.Decoder(HostBound).decode
 decode_server_bound: Any = msgspec.msgpack.Decoder(ServerBound).decode
 _encode = msgspec.msgpack.Encoder().encode
@@ -238,13 +236,9 @@ _encode = msgspec.msgpack.Encoder().encode
 
 def encode(message: ToHost | ToServer) -> bytes:
     """Give a message with its length in front."""
-    body = _encode(message)
-    return _PREFIX.pack(len(body)) + body
+    return framing.framed(_encode(message))
 
 
 def body_length(prefix: bytes) -> int:
     """Read the length prefix; ValueError beyond MAX_MESSAGE."""
-    (length,) = _PREFIX.unpack(prefix)
-    if length > MAX_MESSAGE:
-        raise ValueError(f"a message of {length} bytes is longer than {MAX_MESSAGE}")
-    return int(length)
+    return framing.body_length(prefix, MAX_MESSAGE)
