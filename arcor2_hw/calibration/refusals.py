@@ -20,6 +20,12 @@ class Reason(enum.StrEnum):
     """A direction is left free: the view, or the set of points, is too symmetric."""
     DEGENERATE = "degenerate"
     """The points or orientations given do not determine a result: on one line, or all alike."""
+    NO_MARKER = "no_marker"
+    """None of the configured markers and boards is in the picture, or none is configured."""
+    BLURRED = "blurred"
+    """The picture is not sharp enough to measure in."""
+    IMPLAUSIBLE = "implausible"
+    """What is seen contradicts what was said: a marker stands elsewhere, or is there twice, or the camera moved."""
 
 
 class CalibrationRefused(Arcor2Error):

@@ -1,0 +1,55 @@
+"""What a camera looks at when it is calibrated: markers and boards, and where they stand. Imports no numerics.
+
+Frames. Camera: the optical frame (x right, y down, z forward). Marker: origin in its middle, x right, y up, z out of it
+towards who looks at it. Board: the same, as if it were one large marker. Lengths in m.
+"""
+
+from typing import Literal
+
+from msgspec import field
+
+from arcor2_hw.data.base import UNSET, Data, Unset
+from arcor2_hw.data.geometry import Pose
+
+MarkerDictionary = Literal[
+    "4x4_50", "4x4_100", "4x4_250", "4x4_1000",
+    "5x5_50", "5x5_100", "5x5_250", "5x5_1000",
+    "6x6_50", "6x6_100", "6x6_250", "6x6_1000",
+    "7x7_50", "7x7_100", "7x7_250", "7x7_1000",
+    "original", "apriltag_16h5", "apriltag_25h9", "apriltag_36h10", "apriltag_36h11", "mip_36h12",
+]  # fmt: skip
+"""ArUco's predefined dictionaries. The protocol's is 4x4_50."""
+
+
+class Marker(Data, frozen=True):
+    """One ArUco marker. pose: in the origin's frame. size: side of its black square; unset: the layout's."""
+
+    marker_id: int
+    pose: Pose
+    size: float | Unset = UNSET
+
+
+class CharucoBoard(Data, frozen=True):
+    """One ChArUco board of columns × rows squares, its markers numbered from `first_id` on.
+
+    square, marker: their sides, m. pose: of the board's middle in the origin's frame. legacy_pattern: printed by OpenCV
+    before 4.6 with an even number of rows (a white square in the upper left corner).
+    """
+
+    columns: int
+    rows: int
+    square: float
+    marker: float
+    dictionary: MarkerDictionary = "4x4_50"
+    first_id: int = 0
+    legacy_pattern: bool = False
+    pose: Pose = field(default_factory=Pose)
+
+
+class Layout(Data, frozen=True):
+    """Which markers and boards stand where. size: side of the markers that state none. dictionary: of the markers."""
+
+    markers: list[Marker] = field(default_factory=list)
+    boards: list[CharucoBoard] = field(default_factory=list)
+    size: float = 0.1
+    dictionary: MarkerDictionary = "4x4_50"
