@@ -7,6 +7,17 @@ from msgspec import Struct, field
 
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.device import Connection
+from arcor2_hw.data.editor import (
+    HistoryChangedData,
+    MovePreviewData,
+    ProjectBreakpoints,
+    ReachabilityData,
+    Run,
+    TaskStateData,
+    TraceEntry,
+    UserPresenceData,
+    ViewState,
+)
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import ObjectTypeMeta
 from arcor2_hw.data.package import CollisionModels, PackageStateEnum, PackageSummary
@@ -326,6 +337,15 @@ EVENTS: Final = {
         EventType("PackageState", PackageStateData, Role.OPERATOR),
         EventType("ProjectException", ProjectExceptionData, Role.OPERATOR),
         EventType("ObjectState", ObjectStateData, Role.OPERATOR, additional=True),
+        EventType("BreakpointsChanged", ProjectBreakpoints, Role.OPERATOR, additional=True),
+        EventType("ExecutionTrace", TraceEntry, Role.OPERATOR, additional=True),
+        EventType("HistoryChanged", HistoryChangedData, Role.OPERATOR, additional=True),
+        EventType("MovePreview", MovePreviewData, Role.OPERATOR, additional=True),
+        EventType("ReachabilityChanged", ReachabilityData, Role.OPERATOR, additional=True),
+        EventType("RunChanged", Run, Role.OPERATOR, additional=True),
+        EventType("TaskState", TaskStateData, Role.OPERATOR, additional=True),
+        EventType("UserPresence", UserPresenceData, Role.OPERATOR, additional=True),
+        EventType("ViewStateChanged", ViewState, Role.OPERATOR, additional=True),
     )
 }
 """Every event of the protocol, and of ours beside it, by name."""

@@ -3,6 +3,7 @@
 from typing import Final
 
 from arcor2_hw.data.camera import CameraParameters, EstimatedPose, MarkerCorners
+from arcor2_hw.data.editor import MovePreview, Presence, ProjectBreakpoints, ReachabilityData, ViewState
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta
 from arcor2_hw.data.package import PackageSummary
@@ -33,6 +34,16 @@ from arcor2_hw.data.rpc.action_points import (
 from arcor2_hw.data.rpc.action_points import UpdateActionPointParentArgs as UpdateActionPointParentArgs
 from arcor2_hw.data.rpc.action_points import UpdateActionPointPositionArgs as UpdateActionPointPositionArgs
 from arcor2_hw.data.rpc.action_points import UpdateActionPointUsingRobotArgs as UpdateActionPointUsingRobotArgs
+from arcor2_hw.data.rpc.editor import GetBreakpointsArgs as GetBreakpointsArgs
+from arcor2_hw.data.rpc.editor import GetExecutionTraceArgs as GetExecutionTraceArgs
+from arcor2_hw.data.rpc.editor import GetExecutionTraceData as GetExecutionTraceData
+from arcor2_hw.data.rpc.editor import GetViewStateArgs as GetViewStateArgs
+from arcor2_hw.data.rpc.editor import ListRunsArgs as ListRunsArgs
+from arcor2_hw.data.rpc.editor import ListRunsData as ListRunsData
+from arcor2_hw.data.rpc.editor import ReachabilityArgs as ReachabilityArgs
+from arcor2_hw.data.rpc.editor import SetBreakpointsArgs as SetBreakpointsArgs
+from arcor2_hw.data.rpc.editor import SetViewStateArgs as SetViewStateArgs
+from arcor2_hw.data.rpc.editor import SetViewStateData as SetViewStateData
 from arcor2_hw.data.rpc.envelope import Request as Request
 from arcor2_hw.data.rpc.envelope import Response as Response
 from arcor2_hw.data.rpc.envelope import Rpc as Rpc
@@ -187,9 +198,20 @@ RPCS: Final = {
         Rpc("ExecuteAction", ExecuteActionArgs, None, Role.STANDARD_USER, dry_run=True),
         Rpc("ForwardKinematics", ForwardKinematicsArgs, Pose, Role.STANDARD_USER),
         Rpc("GetActions", TypeArgs, list[ObjectAction], Role.OPERATOR),
+        Rpc(
+            "GetBreakpoints", GetBreakpointsArgs, ProjectBreakpoints, Role.OPERATOR, args_optional=True, additional=True
+        ),
         Rpc("GetCameraPose", GetCameraPoseArgs, EstimatedPose, Role.TECHNICIAN),
         Rpc("GetEndEffectorPose", GetEndEffectorPoseArgs, Pose, Role.OPERATOR),
         Rpc("GetEndEffectors", GetEndEffectorsArgs, set[str], Role.OPERATOR),
+        Rpc(
+            "GetExecutionTrace",
+            GetExecutionTraceArgs,
+            GetExecutionTraceData,
+            Role.OPERATOR,
+            args_optional=True,
+            additional=True,
+        ),
         Rpc("GetGrippers", GetGrippersArgs, set[str], Role.OPERATOR),
         Rpc("GetObjectTypes", None, list[ObjectTypeMeta], Role.OPERATOR),
         Rpc("GetProject", IdArgs, Project, Role.OPERATOR),
@@ -198,11 +220,13 @@ RPCS: Final = {
         Rpc("GetRobotMeta", None, list[RobotMeta], Role.OPERATOR),
         Rpc("GetScene", IdArgs, Scene, Role.OPERATOR),
         Rpc("GetSuctions", GetSuctionsArgs, set[str], Role.OPERATOR),
+        Rpc("GetViewState", GetViewStateArgs, ViewState, Role.OPERATOR, additional=True),
         Rpc("HandTeachingMode", HandTeachingModeArgs, None, Role.STANDARD_USER, dry_run=True),
         Rpc("History", HistoryArgs, HistoryData, Role.OPERATOR, args_optional=True, additional=True),
         Rpc("InverseKinematics", InverseKinematicsArgs, list[Joint], Role.STANDARD_USER),
         Rpc("ListPackages", None, list[PackageSummary], Role.OPERATOR),
         Rpc("ListProjects", None, list[ListProjectsData], Role.OPERATOR),
+        Rpc("ListRuns", ListRunsArgs, ListRunsData, Role.OPERATOR, args_optional=True, additional=True),
         Rpc("ListScenes", None, list[ListScenesData], Role.OPERATOR),
         Rpc("MarkersCorners", MarkersCornersArgs, list[MarkerCorners], Role.TECHNICIAN),
         Rpc("MoveToActionPoint", MoveToActionPointArgs, None, Role.STANDARD_USER),
@@ -219,7 +243,11 @@ RPCS: Final = {
         Rpc("OpenProject", IdArgs, None, Role.STANDARD_USER),
         Rpc("OpenScene", IdArgs, None, Role.STANDARD_USER),
         Rpc("PausePackage", None, None, Role.OPERATOR),
+        Rpc("PreviewMove", MovePreview, None, Role.STANDARD_USER, additional=True),
         Rpc("ProjectsWithScene", IdArgs, set[str], Role.OPERATOR),
+        Rpc(
+            "Reachability", ReachabilityArgs, list[ReachabilityData], Role.OPERATOR, args_optional=True, additional=True
+        ),
         Rpc("ReadLock", ReadLockArgs, None, Role.OPERATOR),
         Rpc("ReadUnlock", ReadUnlockArgs, None, Role.OPERATOR),
         Rpc("Redo", RedoArgs, UndoData, Role.STANDARD_USER, args_optional=True, dry_run=True, additional=True),
@@ -253,7 +281,9 @@ RPCS: Final = {
         Rpc("SaveProject", None, None, Role.STANDARD_USER, dry_run=True),
         Rpc("SaveScene", None, None, Role.TECHNICIAN, dry_run=True),
         Rpc("SceneObjectUsage", IdArgs, set[str], Role.OPERATOR),
+        Rpc("SetBreakpoints", SetBreakpointsArgs, ProjectBreakpoints, Role.STANDARD_USER, additional=True),
         Rpc("SetEefPerpendicularToWorld", SetEefPerpendicularToWorldArgs, None, Role.STANDARD_USER, dry_run=True),
+        Rpc("SetViewState", SetViewStateArgs, SetViewStateData, Role.OPERATOR, additional=True),
         Rpc("StartScene", None, None, Role.STANDARD_USER, dry_run=True),
         Rpc("StepAction", None, None, Role.OPERATOR),
         Rpc("StepRobotEef", StepRobotEefArgs, None, Role.STANDARD_USER, dry_run=True),
@@ -284,6 +314,7 @@ RPCS: Final = {
         Rpc("UpdateObjectPose", UpdateObjectPoseArgs, None, Role.TECHNICIAN, dry_run=True),
         Rpc("UpdateObjectPoseUsingRobot", UpdateObjectPoseUsingRobotArgs, None, Role.TECHNICIAN),
         Rpc("UpdateOverride", UpdateOverrideArgs, None, Role.ADVANCED_USER, dry_run=True),
+        Rpc("UpdatePresence", Presence, None, Role.OPERATOR, additional=True),
         Rpc("UpdateProjectDescription", UpdateProjectDescriptionArgs, None, Role.STANDARD_USER),
         Rpc("UpdateProjectHasLogic", UpdateProjectHasLogicArgs, None, Role.ADVANCED_USER),
         Rpc("UpdateProjectParameter", UpdateProjectParameterArgs, None, Role.STANDARD_USER, dry_run=True),

@@ -31,17 +31,25 @@ class RenamePackageArgs(Data, frozen=True):
 
 
 class RunPackageArgs(IdArgs, frozen=True):
-    """Arguments of RunPackage."""
+    """Arguments of RunPackage.
+
+    shared_breakpoints: beside `breakpoints`, those that the project has (SetBreakpoints).
+    """
 
     start_paused: bool = False
     breakpoints: set[str] | Unset = UNSET
+    shared_breakpoints: bool | Unset = UNSET
 
 
 class TemporaryPackageArgs(Data, frozen=True):
-    """Arguments of TemporaryPackage."""
+    """Arguments of TemporaryPackage.
+
+    shared_breakpoints: beside `breakpoints`, those that the project has (SetBreakpoints).
+    """
 
     start_paused: bool = False
     breakpoints: set[str] | Unset = UNSET
+    shared_breakpoints: bool | Unset = UNSET
 
 
 class UploadPackageArgs(Data, frozen=True):

@@ -2,7 +2,7 @@
 
 from msgspec import field
 
-from arcor2_hw.data.base import Data
+from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.camera import CameraParameters
 
 
@@ -60,10 +60,14 @@ class RenameArgs(Data, frozen=True):
 
 
 class SubscribeEventsArgs(Data, frozen=True):
-    """Arguments of SubscribeEvents: names of additional events, to be sent to this client or no longer."""
+    """Arguments of SubscribeEvents: names of additional events, to be sent to this client or no longer.
+
+    users: whose view state ViewStateChanged tells, beside that of the user who is logged in here.
+    """
 
     events: set[str]
     send: bool = True
+    users: set[str] | Unset = UNSET
 
 
 class SystemInfoData(Data, frozen=True):

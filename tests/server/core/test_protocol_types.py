@@ -18,7 +18,12 @@ def protocol(spec: Path) -> Any:
     return msgspec.json.decode((spec / "protocol.json").read_bytes())
 
 
-ADDED = {"ObjectTypeMeta": {"category", "icon"}, "ObjectAction": {"category", "icon"}}
+ADDED = {
+    "ObjectTypeMeta": {"category", "icon"},
+    "ObjectAction": {"category", "icon"},
+    "RunPackage.Request.Args": {"shared_breakpoints"},
+    "TemporaryPackage.Request.Args": {"shared_breakpoints"},
+}
 """What we tell beside the protocol (docs/protocol.md); it may be left out."""
 
 
