@@ -1,9 +1,35 @@
 """Frames and tools from touched points: base and user frames, the tip of a tool (TCP) and its orientation."""
 
+import math
 from collections.abc import Sequence
+from typing import Final
 
-from arcor2_hw.calibration.results import TouchedFrame, TouchedOrientation, TouchedTip
+import numpy as np
+import numpy.typing as npt
+
+from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
+from arcor2_hw.calibration.results import Grade, TouchedFrame, TouchedOrientation, TouchedTip
 from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.exceptions import InvalidData
+
+Floats = npt.NDArray[np.float64]
+
+SHORTEST: Final = 0.01
+"""m between points; with less, half a millimetre of touching is 3° of the frame."""
+LEAST_SINE: Final = math.sin(math.radians(10.0))
+"""Of the angle by which three points have to be off one line."""
+FITS: Final = 0.001
+"""m rms up to which touched points agree well."""
+MISFIT: Final = 0.05
+"""Residual over the spread of the points beyond which they are not the points that were meant."""
+ORIENTATION_SPREAD: Final = 0.12
+"""Least singular value, per root of the count, of the tip's equations: some 15° about every axis."""
+TIP_FITS: Final = 0.0005
+TIP_MISFIT: Final = 0.01
+"""m rms beyond which the tip was not on one point."""
+TURN_FITS: Final = math.radians(0.5)
+TURN_MISFIT: Final = math.radians(5.0)
+_MOST: Final = 1000
 
 
 def frame_by_axes(origin: Position, on_x: Position, in_plane: Sequence[Position]) -> TouchedFrame:
@@ -19,13 +45,44 @@ def frame_by_axes(origin: Position, on_x: Position, in_plane: Sequence[Position]
 
     Raises:
         InvalidData: no point in the plane, or a coordinate that is not finite.
-        CalibrationRefused: the points lie on one line or too near each other.
+        CalibrationRefused: the points lie on one line or too near each other, or in no plane.
     """
-    raise NotImplementedError
+    points = _points("touched", [origin, on_x, *in_plane], 3)
+    along = points[1] - points[0]
+    if np.linalg.norm(along) < SHORTEST:
+        raise _too_near("The point on the x axis", "the origin")
+    aside = points[2] - points[0]
+    upward = np.cross(along, aside)
+    if np.linalg.norm(aside) < SHORTEST:
+        raise _too_near("The point in the plane", "the origin")
+    if np.linalg.norm(upward) < LEAST_SINE * np.linalg.norm(along) * np.linalg.norm(aside):
+        raise _on_one_line()
+    checked = len(points) > 3
+    middle = points.mean(axis=0)
+    if checked:
+        _, spread, axes = np.linalg.svd(points - middle, full_matrices=False)
+        normal = axes[2] * math.copysign(1.0, float(axes[2] @ upward))
+    else:
+        spread, normal, middle = np.ones(3), upward / np.linalg.norm(upward), points[0]
+    heights = (points - middle) @ normal
+    x = along - (along @ normal) * normal
+    x /= np.linalg.norm(x)
+    base_from_frame = np.eye(4)
+    base_from_frame[:3, :3] = np.column_stack([x, np.cross(normal, x), normal])
+    base_from_frame[:3, 3] = points[0] - heights[0] * normal
+    residuals = np.abs(heights) if checked else np.zeros(len(points))
+    _refuse_misfit(residuals, points, "The points do not lie in one plane")
+    deviation = 0.0
+    if checked:
+        deviation = float(np.sqrt((heights @ heights) / (len(points) - 3)) / spread[1])
+    return _frame(base_from_frame, residuals, checked, deviation, "Touch a further point of the plane to check it.")
 
 
 def frame_by_points(known: Sequence[Position], touched: Sequence[Position]) -> TouchedFrame:
     """Find a frame in which at least three points are known, from where they were touched: best fit (Kabsch).
+
+    Source: W. Kabsch, "A solution for the best rotation to relate two sets of vectors", Acta Crystallographica A 32
+    (1976), with the sign that keeps the rotation proper.
 
     Args:
         known: points in the frame that is looked for, m.
@@ -35,7 +92,28 @@ def frame_by_points(known: Sequence[Position], touched: Sequence[Position]) -> T
         InvalidData: fewer than three, counts differ, or a coordinate that is not finite.
         CalibrationRefused: the points lie on one line or too near each other, or the two sets have different shapes.
     """
-    raise NotImplementedError
+    if len(known) != len(touched):
+        raise InvalidData(f"{len(known)} points are known and {len(touched)} were touched: each needs the other.")
+    ours, theirs = _points("known", known, 3), _points("touched", touched, 3)
+    for name, points in (("known", ours), ("touched", theirs)):
+        spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+        if spread[0] < SHORTEST:
+            raise _too_near(f"The {name} points", "each other")
+        if spread[1] < LEAST_SINE * spread[0]:
+            raise _on_one_line()
+    a, b = ours - ours.mean(axis=0), theirs - theirs.mean(axis=0)
+    u, _, vt = np.linalg.svd(b.T @ a)
+    rotation = u @ np.diag([1.0, 1.0, math.copysign(1.0, float(np.linalg.det(u @ vt)))]) @ vt
+    errors = b - a @ rotation.T
+    residuals = np.linalg.norm(errors, axis=1)
+    _refuse_misfit(residuals, ours, "What was touched has another shape than the known points")
+    base_from_frame = np.eye(4)
+    base_from_frame[:3, :3] = rotation
+    base_from_frame[:3, 3] = theirs.mean(axis=0) - rotation @ ours.mean(axis=0)
+    variance = float(residuals @ residuals) / (3 * len(ours) - 6)
+    information = np.eye(3) * np.sum(a * a) - a.T @ a
+    deviation = float(np.sqrt(variance / np.linalg.eigvalsh(information)[0]))
+    return _frame(base_from_frame, residuals, True, deviation, "")
 
 
 def tip_by_touches(flange: Sequence[Pose]) -> TouchedTip:
@@ -46,7 +124,56 @@ def tip_by_touches(flange: Sequence[Pose]) -> TouchedTip:
         CalibrationRefused: the orientations are too much alike, or turned about one axis only, or the touches do not
             agree on a point.
     """
-    raise NotImplementedError
+    origins = _points("flange", [pose.position for pose in flange], 4)
+    count = len(origins)
+    # rotation · tip + origin = point, for every pose
+    equations = np.concatenate([np.hstack([pose.orientation.matrix(), -np.eye(3)]) for pose in flange])
+    u, singular, vt = np.linalg.svd(equations, full_matrices=False)
+    least = singular / math.sqrt(count)
+    if least[4] < ORIENTATION_SPREAD:
+        raise CalibrationRefused(
+            "The orientations of the tool are too much alike: turn it by 30° or more between touches.",
+            f"singular values {np.round(least, 3).tolist()}",
+            Reason.DEGENERATE,
+        )
+    if least[5] < ORIENTATION_SPREAD:
+        raise CalibrationRefused(
+            "The tool was turned about one axis only, so that the tip's place along that axis stays open: tilt it"
+            " to another side, too.",
+            f"singular values {np.round(least, 3).tolist()}",
+            Reason.DEGENERATE,
+        )
+    solution = vt.T @ ((u.T @ -origins.reshape(-1)) / singular)
+    errors = (equations @ solution + origins.reshape(-1)).reshape(-1, 3)
+    residuals = np.linalg.norm(errors, axis=1)
+    residual, worst = _rms(residuals), int(np.argmax(residuals))
+    if residual > TIP_MISFIT:
+        raise CalibrationRefused(
+            f"The touches agree on no point: {residual * 1e3:.1f} mm on the average, touch {worst + 1} is worst. Was"
+            " the tip on the same point every time?",
+            f"residuals {np.round(residuals * 1e3, 2).tolist()} mm",
+            Reason.NOT_CONVERGED,
+        )
+    variance = float(residuals @ residuals) / (3 * count - 6)
+    covariance = variance * (vt.T / singular**2 @ vt)[:3, :3]
+    deviation = float(np.sqrt(max(0.0, np.linalg.eigvalsh(covariance)[-1])))
+    good = residual <= TIP_FITS and deviation <= TIP_FITS
+    verdict = (
+        f"The tip is known to {deviation * 1e3:.2f} mm; the {count} touches agree to {residual * 1e3:.2f} mm."
+        if good
+        else f"The tip is known to {deviation * 1e3:.2f} mm only: the {count} touches agree to {residual * 1e3:.2f} mm,"
+        f" touch {worst + 1} is worst. More touches, or orientations that differ more, make it better."
+    )
+    return TouchedTip(
+        position=_position(solution[:3]),
+        point=_position(solution[3:]),
+        grade=Grade.GOOD if good else Grade.USABLE,
+        verdict=verdict,
+        residuals=residuals.tolist(),
+        residual=residual,
+        worst=worst,
+        deviation=deviation,
+    )
 
 
 def orientation_by_alignment(flange: Sequence[Orientation], reference: Orientation) -> TouchedOrientation:
@@ -59,7 +186,29 @@ def orientation_by_alignment(flange: Sequence[Orientation], reference: Orientati
     Raises:
         InvalidData: no orientation. CalibrationRefused: they differ by more than measuring explains.
     """
-    raise NotImplementedError
+    if not 1 <= len(flange) <= _MOST:
+        raise InvalidData(f"A tool's orientation needs 1 to {_MOST} orientations of the flange, not {len(flange)}.")
+    tools = [each.inverted() * reference for each in flange]
+    quaternions = np.array([tuple(tool) for tool in tools])
+    mean = Orientation(*map(float, np.linalg.eigh(quaternions.T @ quaternions)[1][:, -1]))  # Markley's mean
+    residuals = np.array([tool.angle_to(mean) for tool in tools])
+    residual, worst = _rms(residuals), int(np.argmax(residuals))
+    if residuals[worst] > TURN_MISFIT:
+        raise CalibrationRefused(
+            f"The alignments differ by {math.degrees(residuals[worst]):.1f}°; number {worst + 1} is worst."
+            " Was the tool put along the same axes every time?",
+            f"residuals {np.round(np.degrees(residuals), 2).tolist()} °",
+            Reason.NOT_CONVERGED,
+        )
+    checked = len(tools) > 1
+    good = checked and residual <= TURN_FITS
+    if checked:
+        verdict = f"The {len(tools)} alignments agree to {math.degrees(residual):.2f}°."
+    else:
+        verdict = "The tool's orientation follows from one alignment, which nothing checks: align it once more."
+    return TouchedOrientation(
+        mean, Grade.GOOD if good else Grade.USABLE, verdict, residuals.tolist(), residual, worst, checked
+    )
 
 
 def orientation_by_points(flange: Orientation, tip: Position, along_z: Position, on_x: Position) -> TouchedOrientation:
@@ -69,9 +218,93 @@ def orientation_by_points(flange: Orientation, tip: Position, along_z: Position,
         flange: base_from_flange, the same for all three.
         tip: position of the tip, or of the flange, before, in the base, m.
         along_z: after a move along the tool's +z, the way it works.
-        on_x: after a move from `tip` to the side of the tool's +x.
+        on_x: after a move from `tip` to the side of the tool's +x; how far it was off square is the residual.
 
     Raises:
         InvalidData: a number that is not finite. CalibrationRefused: moves too short, or along one line.
     """
-    raise NotImplementedError
+    start, forward, side = _points("tip", [tip, along_z, on_x], 3)
+    z, x = forward - start, side - start
+    for name, move in (("along z", z), ("to the side of x", x)):
+        if np.linalg.norm(move) < SHORTEST:
+            raise _too_near(f"The point {name}", "the first one")
+    z, x = z / np.linalg.norm(z), x / np.linalg.norm(x)
+    off = abs(math.asin(float(np.clip(x @ z, -1.0, 1.0))))
+    if math.cos(off) < LEAST_SINE:
+        raise _on_one_line()
+    x -= (x @ z) * z
+    x /= np.linalg.norm(x)
+    base_from_tool = Orientation.from_matrix(np.column_stack([x, np.cross(z, x), z]))
+    verdict = (
+        f"The tool's z is as moved, x was {math.degrees(off):.1f}° off square to it and was made square;"
+        " nothing else checks them."
+    )
+    return TouchedOrientation(flange.inverted() * base_from_tool, Grade.USABLE, verdict, [off], off, 0, False)
+
+
+# ---------------------------------------------------------------------------------------------------- what they share
+def _points(name: str, points: Sequence[Position], least: int) -> Floats:
+    if not least <= len(points) <= _MOST:
+        raise InvalidData(f"This needs {least} to {_MOST} {name} points, not {len(points)}.")
+    found = np.array([tuple(point) for point in points], dtype=np.float64)
+    if not np.isfinite(found).all():
+        wrong = int(np.argmin(np.isfinite(found).all(axis=1)))
+        raise InvalidData(f"Point {wrong + 1} of the {name} points is not finite.")
+    return found
+
+
+def _too_near(what: str, to: str) -> CalibrationRefused:
+    return CalibrationRefused(
+        f"{what} and {to} are less than {SHORTEST * 1e3:.0f} mm apart: take points farther away.",
+        reason=Reason.DEGENERATE,
+    )
+
+
+def _on_one_line() -> CalibrationRefused:
+    return CalibrationRefused(
+        "The points lie on one line, so that the frame can turn about it: take one that is farther aside.",
+        reason=Reason.DEGENERATE,
+    )
+
+
+def _refuse_misfit(residuals: Floats, points: Floats, what: str) -> None:
+    spread = float(np.linalg.norm(points - points.mean(axis=0), axis=1).max())
+    if _rms(residuals) > MISFIT * spread:
+        raise CalibrationRefused(
+            f"{what}: {_rms(residuals) * 1e3:.1f} mm on the average, point {int(np.argmax(residuals)) + 1} is worst."
+            " Was every point touched, and in this order?",
+            f"residuals {np.round(residuals * 1e3, 2).tolist()} mm",
+            Reason.NOT_CONVERGED,
+        )
+
+
+def _frame(matrix: Floats, residuals: Floats, checked: bool, deviation: float, advice: str) -> TouchedFrame:
+    residual, worst = _rms(residuals), int(np.argmax(residuals))
+    good = checked and residual <= FITS
+    if not checked:
+        verdict = f"The three points determine the frame; nothing checks them. {advice}"
+    elif good:
+        verdict = f"The {len(residuals)} points agree to {residual * 1e3:.2f} mm."
+    else:
+        verdict = (
+            f"The {len(residuals)} points agree to {residual * 1e3:.1f} mm only; point {worst + 1} is"
+            f" {residuals[worst] * 1e3:.1f} mm off: touch it again."
+        )
+    return TouchedFrame(
+        pose=Pose.from_matrix(matrix),
+        grade=Grade.GOOD if good else Grade.USABLE,
+        verdict=verdict,
+        residuals=residuals.tolist(),
+        residual=residual,
+        worst=worst,
+        checked=checked,
+        angle_deviation=deviation,
+    )
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values * values)))
+
+
+def _position(values: Floats) -> Position:
+    return Position(*map(float, values))
