@@ -19,6 +19,8 @@ _METHODS = {
     "inverse_kinematics": "inverse_kinematics",
     "hand_teaching": "set_hand_teaching_mode",
 }
+_OURS = {"jog": ("jog",), "acknowledge_stop": ("acknowledge_protective_stop", "restart_safety")}
+"""Beside the protocol: left out where a type does not have it."""
 
 
 def robot_meta(name: str, info: ClassInfo, hierarchy: Hierarchy) -> RobotMeta:
@@ -31,7 +33,10 @@ def robot_meta(name: str, info: ClassInfo, hierarchy: Hierarchy) -> RobotMeta:
         name,
         _robot_type(info, hierarchy),
         hierarchy.derives_from(info, "MultiArmRobot"),
-        RobotFeatures(**{feature: _has(info, method, hierarchy) for feature, method in _METHODS.items()}),
+        RobotFeatures(
+            **{feature: _has(info, method, hierarchy) for feature, method in _METHODS.items()},
+            **{feature: True for feature, methods in _OURS.items() if any(_has(info, m, hierarchy) for m in methods)},
+        ),
         urdf if isinstance(urdf, str) and urdf else UNSET,
     )
 

@@ -20,6 +20,7 @@ from arcor2_hw.data.editor import (
 )
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import ObjectTypeMeta
+from arcor2_hw.data.operation import ObjectHealthData, RobotHoldData
 from arcor2_hw.data.package import CollisionModels, PackageStateEnum, PackageSummary
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.project import (
@@ -204,17 +205,19 @@ class SceneStateData(Data, frozen=True):
 
 
 class RobotEefData(Data, frozen=True):
-    """What the event RobotEef carries."""
+    """What the event RobotEef carries; `time_ms` (steady clock of the cell) where StreamRobot asked for it."""
 
     robot_id: str
     end_effectors: list[EefPose] = field(default_factory=list)
+    time_ms: float | Unset = UNSET
 
 
 class RobotJointsData(Data, frozen=True):
-    """What the event RobotJoints carries."""
+    """What the event RobotJoints carries; `time_ms` as in RobotEef."""
 
     robot_id: str
     joints: list[Joint]
+    time_ms: float | Unset = UNSET
 
 
 class ActionStateAfterData(Data, frozen=True):
@@ -337,6 +340,8 @@ EVENTS: Final = {
         EventType("PackageState", PackageStateData, Role.OPERATOR),
         EventType("ProjectException", ProjectExceptionData, Role.OPERATOR),
         EventType("ObjectState", ObjectStateData, Role.OPERATOR, additional=True),
+        EventType("ObjectHealth", ObjectHealthData, Role.OPERATOR, additional=True),
+        EventType("RobotHold", RobotHoldData, Role.OPERATOR, additional=True),
         EventType("BreakpointsChanged", ProjectBreakpoints, Role.OPERATOR, additional=True),
         EventType("ExecutionTrace", TraceEntry, Role.OPERATOR, additional=True),
         EventType("HistoryChanged", HistoryChangedData, Role.OPERATOR, additional=True),

@@ -24,7 +24,7 @@ class RobotType(enum.StrEnum):
 
 
 class RobotFeatures(Data, frozen=True):
-    """Which optional methods a robot type implements."""
+    """Which optional methods a robot type implements; the last two are ours, beside the protocol."""
 
     move_to_pose: bool = False
     move_to_joints: bool = False
@@ -32,6 +32,8 @@ class RobotFeatures(Data, frozen=True):
     forward_kinematics: bool = False
     inverse_kinematics: bool = False
     hand_teaching: bool = False
+    jog: bool | Unset = UNSET
+    acknowledge_stop: bool | Unset = UNSET
 
 
 class RobotMeta(Data, frozen=True):

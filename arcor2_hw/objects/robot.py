@@ -137,8 +137,16 @@ class Robot(GenericWithPose):
         joint_velocities: list[float] | None = None,
         frame: Frame = "world",
         valid_for: float = 0.2,
+        end_effector_id: str | None = None,
     ) -> None:
-        """Move with a velocity (m/s and rad/s, or rad/s per joint) that runs out by itself after `valid_for` s."""
+        """Move with a velocity (m/s and rad/s, or rad/s per joint) that runs out by itself after `valid_for` s.
+
+        Called again and again while it shall last, each time with what shall be from then on; gives back at once, and
+        is neither a move in progress nor refused as one beside itself. `joint_velocities` are in the order of
+        `robot_joints()`. `twist` is that of the end effector (None: the robot's only one), in the axes of `frame`;
+        `user` is for drivers whose controller has such a frame. Who calls keeps the speed of the end effector at or
+        below 0.25 m/s, by `forward_kinematics` where joints are given: a type without it keeps that itself.
+        """
         raise Arcor2NotImplemented("jog")
 
     def joint_limits(self) -> dict[str, tuple[float, float]]:
@@ -251,6 +259,18 @@ class MultiArmRobot(Robot):
     def set_hand_teaching_mode(self, enabled: bool, arm_id: str | None = None) -> None:
         """Make an arm movable by hand, or stiff again."""
         raise Arcor2NotImplemented("set_hand_teaching_mode")
+
+    def jog(
+        self,
+        twist: tuple[float, float, float, float, float, float] | None = None,
+        joint_velocities: list[float] | None = None,
+        frame: Frame = "world",
+        valid_for: float = 0.2,
+        end_effector_id: str | None = None,
+        arm_id: str | None = None,
+    ) -> None:
+        """Move one arm with a velocity that runs out by itself."""
+        raise Arcor2NotImplemented("jog")
 
     def move_synchronously(self, targets: dict[str, Pose | list[Joint]], speed: float = 0.25) -> dict[str, MoveResult]:
         """Move several arms so that they start and arrive together; keys are arm ids."""

@@ -88,6 +88,13 @@ from arcor2_hw.data.rpc.object_types import ObjectAimingAddPointData as ObjectAi
 from arcor2_hw.data.rpc.object_types import ObjectAimingStartArgs as ObjectAimingStartArgs
 from arcor2_hw.data.rpc.object_types import UpdateObjectModelArgs as UpdateObjectModelArgs
 from arcor2_hw.data.rpc.object_types import UpdateOverrideArgs as UpdateOverrideArgs
+from arcor2_hw.data.rpc.operation import AcknowledgeStopArgs as AcknowledgeStopArgs
+from arcor2_hw.data.rpc.operation import HoldHandTeachingArgs as HoldHandTeachingArgs
+from arcor2_hw.data.rpc.operation import JogFrame as JogFrame
+from arcor2_hw.data.rpc.operation import JogRobotArgs as JogRobotArgs
+from arcor2_hw.data.rpc.operation import JogRobotData as JogRobotData
+from arcor2_hw.data.rpc.operation import RetryObjectArgs as RetryObjectArgs
+from arcor2_hw.data.rpc.operation import StreamRobotArgs as StreamRobotArgs
 from arcor2_hw.data.rpc.projects import AddActionArgs as AddActionArgs
 from arcor2_hw.data.rpc.projects import AddLogicItemArgs as AddLogicItemArgs
 from arcor2_hw.data.rpc.projects import AddProjectParameterArgs as AddProjectParameterArgs
@@ -145,6 +152,7 @@ from arcor2_hw.data.scene import Scene
 RPCS: Final = {
     rpc.name: rpc
     for rpc in (
+        Rpc("AcknowledgeStop", AcknowledgeStopArgs, None, Role.OPERATOR, additional=True),
         Rpc("ActionParamValues", ActionParamValuesArgs, set[str], Role.STANDARD_USER),
         Rpc("AddAction", AddActionArgs, None, Role.STANDARD_USER, dry_run=True),
         Rpc("AddActionPoint", AddActionPointArgs, None, Role.STANDARD_USER, dry_run=True),
@@ -223,7 +231,9 @@ RPCS: Final = {
         Rpc("GetViewState", GetViewStateArgs, ViewState, Role.OPERATOR, additional=True),
         Rpc("HandTeachingMode", HandTeachingModeArgs, None, Role.STANDARD_USER, dry_run=True),
         Rpc("History", HistoryArgs, HistoryData, Role.OPERATOR, args_optional=True, additional=True),
+        Rpc("HoldHandTeaching", HoldHandTeachingArgs, None, Role.STANDARD_USER, additional=True),
         Rpc("InverseKinematics", InverseKinematicsArgs, list[Joint], Role.STANDARD_USER),
+        Rpc("JogRobot", JogRobotArgs, JogRobotData, Role.STANDARD_USER, additional=True),
         Rpc("ListPackages", None, list[PackageSummary], Role.OPERATOR),
         Rpc("ListProjects", None, list[ListProjectsData], Role.OPERATOR),
         Rpc("ListRuns", ListRunsArgs, ListRunsData, Role.OPERATOR, args_optional=True, additional=True),
@@ -277,6 +287,7 @@ RPCS: Final = {
             additional=True,
         ),
         Rpc("ResumePackage", None, None, Role.OPERATOR),
+        Rpc("RetryObject", RetryObjectArgs, None, Role.STANDARD_USER, additional=True),
         Rpc("RunPackage", RunPackageArgs, None, Role.OPERATOR),
         Rpc("SaveProject", None, None, Role.STANDARD_USER, dry_run=True),
         Rpc("SaveScene", None, None, Role.TECHNICIAN, dry_run=True),
@@ -285,11 +296,13 @@ RPCS: Final = {
         Rpc("SetEefPerpendicularToWorld", SetEefPerpendicularToWorldArgs, None, Role.STANDARD_USER, dry_run=True),
         Rpc("SetViewState", SetViewStateArgs, SetViewStateData, Role.OPERATOR, additional=True),
         Rpc("StartScene", None, None, Role.STANDARD_USER, dry_run=True),
+        Rpc("StartSceneKeepGoing", None, None, Role.STANDARD_USER, dry_run=True, additional=True),
         Rpc("StepAction", None, None, Role.OPERATOR),
         Rpc("StepRobotEef", StepRobotEefArgs, None, Role.STANDARD_USER, dry_run=True),
         Rpc("StopPackage", None, None, Role.OPERATOR),
         Rpc("StopRobot", StopRobotArgs, None, Role.OPERATOR),
         Rpc("StopScene", None, None, Role.STANDARD_USER, dry_run=True),
+        Rpc("StreamRobot", StreamRobotArgs, None, Role.OPERATOR, additional=True),
         Rpc("SubscribeEvents", SubscribeEventsArgs, None, Role.OPERATOR, additional=True),
         Rpc("SystemInfo", None, SystemInfoData, Role.OPERATOR),
         Rpc("TemporaryPackage", TemporaryPackageArgs, None, Role.STANDARD_USER, args_optional=True),

@@ -82,8 +82,11 @@ class UrServiced(UrArm):
         joint_velocities: list[float] | None = None,
         frame: Literal["world", "base", "tool", "user"] = "world",
         valid_for: float = 0.2,
+        end_effector_id: str | None = None,
     ) -> None:
         """Move with a velocity that runs out by itself `valid_for` s from now. Raises OutOfRange, Refused as a move."""
+        if end_effector_id is not None:
+            self._check_end_effector(end_effector_id)
         within(f"{self.name}: valid_for", valid_for, 0.01, 1.0)
         if (twist is None) == (joint_velocities is None):
             raise OutOfRange(f"{self.name}: jog needs either twist or joint_velocities")

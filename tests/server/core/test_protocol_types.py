@@ -21,6 +21,9 @@ def protocol(spec: Path) -> Any:
 ADDED = {
     "ObjectTypeMeta": {"category", "icon"},
     "ObjectAction": {"category", "icon"},
+    "RobotEef.Data": {"time_ms"},
+    "RobotFeatures": {"jog", "acknowledge_stop"},
+    "RobotJoints.Data": {"time_ms"},
     "RunPackage.Request.Args": {"shared_breakpoints"},
     "TemporaryPackage.Request.Args": {"shared_breakpoints"},
 }
