@@ -1,6 +1,6 @@
 """The tables. A document is kept whole as JSON; what lists and look-ups need stands in columns beside it."""
 
-from sqlalchemy import Boolean, ForeignKey, LargeBinary, String, Text
+from sqlalchemy import BigInteger, Boolean, ForeignKey, Integer, LargeBinary, String, Text
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
 
@@ -95,3 +95,34 @@ class BreakpointsRow(Base):
 
     package_id: Mapped[str] = mapped_column(String(255), primary_key=True)
     ids: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class ViewValueRow(Base):
+    """One value of the view state, as JSON. `user` is empty for what all users share, `document` for that of none."""
+
+    __tablename__ = "view_value"
+
+    user: Mapped[str] = mapped_column(String(255), primary_key=True)
+    document: Mapped[str] = mapped_column(String(255), primary_key=True, index=True)
+    key: Mapped[str] = mapped_column(String(255), primary_key=True)
+    value: Mapped[bytes] = mapped_column(LargeBinary)
+    revision: Mapped[int] = mapped_column(BigInteger)
+
+
+class SharedBreakpointsRow(Base):
+    """The breakpoints that users share on a project: ids of action points and actions, as JSON, and who set them."""
+
+    __tablename__ = "shared_breakpoints"
+
+    project_id: Mapped[str] = mapped_column(String(255), primary_key=True)
+    ids: Mapped[bytes] = mapped_column(LargeBinary)
+    user: Mapped[str] = mapped_column(Text, default="")
+
+
+class RunRow(Base):
+    """One run of a package, as JSON."""
+
+    __tablename__ = "run"
+
+    number: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=False)
+    document: Mapped[bytes] = mapped_column(LargeBinary)

@@ -2,7 +2,7 @@
 
 import contextlib
 import sqlite3
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any, Final, Self
@@ -44,6 +44,8 @@ class Storage:
     def __init__(self, engine: AsyncEngine, place: str) -> None:
         self.revision = 0
         self.types_revision = 0
+        self.on_deleted: list[Callable[[str], Awaitable[None]]] = []
+        """Called with the id of a scene or project that was deleted."""
         self._engine = engine
         self._place = place
         self._sessions = async_sessionmaker(engine, expire_on_commit=False)
@@ -113,6 +115,8 @@ class Storage:
         """Delete; NotFound."""
         async with self.writing() as session:
             await session.delete(await self.one(session, SceneRow, key, "scene"))
+        for tell in self.on_deleted:
+            await tell(key)
 
     # ------------------------------------------------------------------------------------------------ projects
     async def projects(self) -> list[BareProject]:
@@ -176,6 +180,8 @@ class Storage:
             row = await self.one(session, ProjectRow, key, "project")
             await session.execute(delete(ProjectSourceRow).where(ProjectSourceRow.id == key))
             await session.delete(row)
+        for tell in self.on_deleted:
+            await tell(key)
 
     async def projects_with_scene(self, scene_id: str) -> list[str]:
         """Give the ids of the saved projects of a scene."""
@@ -314,14 +320,18 @@ class Storage:
             raise self._failed("read", error) from error
 
     @asynccontextmanager
-    async def writing(self) -> AsyncIterator[AsyncSession]:
-        """Give a session in a transaction, which is on disk when it is left; StorageError as above."""
+    async def writing(self, *, documents: bool = True) -> AsyncIterator[AsyncSession]:
+        """Give a session in a transaction, which is on disk when it is left; StorageError as above.
+
+        `documents`: `revision` grows, since answers that are made from documents may be others now.
+        """
         try:
             async with self._sessions() as session, session.begin():
                 yield session
         except SQLAlchemyError as error:
             raise self._failed("write", error) from error
-        self.revision += 1
+        if documents:
+            self.revision += 1
 
     def _failed(self, what: str, error: SQLAlchemyError) -> StorageError:
         cause = getattr(error, "orig", None) or error

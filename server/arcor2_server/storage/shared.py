@@ -1,0 +1,98 @@
+"""What clients share through the server, and the history of runs, in the database."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import msgspec
+from sqlalchemy import delete, func, select
+
+from arcor2_hw.data.editor import Run
+from arcor2_server.storage.models import RunRow, SharedBreakpointsRow, ViewValueRow
+from arcor2_server.storage.store import Storage
+
+
+class SharedData:
+    """All methods may raise StorageError. None of it is a document: lists and answers made from those stay valid."""
+
+    def __init__(self, storage: Storage) -> None:
+        self._storage = storage
+
+    # ------------------------------------------------------------------------------------------------ view state
+    async def newest_revision(self) -> int:
+        """Give the highest revision of a view value, 0 when there is none."""
+        async with self._storage.reading() as session:
+            return await session.scalar(select(func.max(ViewValueRow.revision))) or 0
+
+    async def view(self, user: str, document: str) -> dict[str, bytes]:
+        """Give the values of a view by their keys, as JSON."""
+        where = (ViewValueRow.user == user, ViewValueRow.document == document)
+        async with self._storage.reading() as session:
+            rows = await session.execute(select(ViewValueRow.key, ViewValueRow.value).where(*where))
+            return {row.key: row.value for row in rows}
+
+    async def put_view(self, user: str, document: str, values: Mapping[str, bytes | None], revision: int) -> None:
+        """Write values, None: take them away."""
+        gone = [key for key, value in values.items() if value is None]
+        async with self._storage.writing(documents=False) as session:
+            for key, value in values.items():
+                if value is not None:
+                    row = ViewValueRow(user=user, document=document, key=key, value=value, revision=revision)
+                    await session.merge(row)
+            if gone:
+                where = (ViewValueRow.user == user, ViewValueRow.document == document, ViewValueRow.key.in_(gone))
+                await session.execute(delete(ViewValueRow).where(*where))
+
+    async def oldest_views(self, user: str, beyond: int) -> list[str]:
+        """Give the documents of a user's views but the `beyond` ones that were written last."""
+        written = func.max(ViewValueRow.revision)
+        query = select(ViewValueRow.document).where(ViewValueRow.user == user)
+        async with self._storage.reading() as session:
+            rows = await session.scalars(query.group_by(ViewValueRow.document).order_by(written.desc()).offset(beyond))
+            return list(rows)
+
+    async def forget_views(self, user: str, documents: Iterable[str]) -> None:
+        """Drop a user's views of documents."""
+        where = (ViewValueRow.user == user, ViewValueRow.document.in_(list(documents)))
+        async with self._storage.writing(documents=False) as session:
+            await session.execute(delete(ViewValueRow).where(*where))
+
+    async def forget_document(self, document: str) -> None:
+        """Drop everybody's view of a document that is gone, and its breakpoints."""
+        async with self._storage.writing(documents=False) as session:
+            await session.execute(delete(ViewValueRow).where(ViewValueRow.document == document))
+            await session.execute(delete(SharedBreakpointsRow).where(SharedBreakpointsRow.project_id == document))
+
+    # ------------------------------------------------------------------------------------------ shared breakpoints
+    async def breakpoints(self, project_id: str) -> tuple[set[str], str]:
+        """Give the breakpoints of a project, and who set them last."""
+        async with self._storage.reading() as session:
+            row = await session.get(SharedBreakpointsRow, project_id)
+            return (set(), "") if row is None else (msgspec.json.decode(row.ids, type=set[str]), row.user)
+
+    async def put_breakpoints(self, project_id: str, ids: set[str], user: str) -> None:
+        """Keep the breakpoints of a project, in place of those before."""
+        async with self._storage.writing(documents=False) as session:
+            await session.merge(
+                SharedBreakpointsRow(project_id=project_id, ids=msgspec.json.encode(sorted(ids)), user=user)
+            )
+
+    # ------------------------------------------------------------------------------------------------ runs
+    async def runs(self, limit: int) -> list[Run]:
+        """Give the newest runs, oldest first; those that cannot be read are left out."""
+        async with self._storage.reading() as session:
+            rows = await session.scalars(select(RunRow.document).order_by(RunRow.number.desc()).limit(limit))
+            found = [_run(document) for document in rows]
+        return [run for run in reversed(found) if run is not None]
+
+    async def put_run(self, run: Run, oldest: int) -> None:
+        """Keep a run, and forget those with a number below `oldest`."""
+        async with self._storage.writing(documents=False) as session:
+            await session.merge(RunRow(number=run.number, document=msgspec.json.encode(run)))
+            await session.execute(delete(RunRow).where(RunRow.number < oldest))
+
+
+def _run(document: Any) -> Run | None:
+    try:
+        return msgspec.json.decode(document, type=Run)
+    except msgspec.MsgspecError:
+        return None
