@@ -10,13 +10,14 @@ FAMILIES := --extra ur --extra modbus --extra serial --extra can --extra dynamix
 # Drivers beyond the demo are tested too.
 TESTED := $(FAMILIES) --extra opcua
 
-run: .make/run
+run: .make/run .make/editor
 	$(BIN)/arcor2-hw demo $(ARGS)
 
 # Tests wait for devices most of the time, so three at once suit two cores. A module, or one driver's conformance,
 # stays in one process and shares its fake. What fails beside others, where times of a tenth of a second are hard to keep,
 # is tried once more with the machine to itself, as the whole cell is, a dozen processes; both outcomes are shown.
-test: .make/dev
+test: .make/dev .make/editor .make/browser
+	$(BIN)/python editor/build.py test
 	$(BIN)/python -m pytest --numprocesses 3 --dist loadgroup -m "not alone" $(ARGS) || test $$? = 5 || \
 	$(BIN)/python -m pytest --last-failed --last-failed-no-failures none -m "not alone" $(ARGS)
 	$(BIN)/python -m pytest -m alone $(ARGS) || test $$? = 5
@@ -68,6 +69,22 @@ LIBRARIES := libEGL.so.1:libegl1 libGL.so.1:libgl1 libusb-1.0.so.0:libusb-1.0-0 
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@touch $@
 
+# The editor, with the machine's Node.js or, where there is none, the one from PyPI. Built again when its sources changed.
+EDITOR := $(shell find editor -name node_modules -prune -o -name __pycache__ -prune -o -type f -print)
+.make/editor: $(EDITOR) | .make/venv
+	@$(BIN)/python editor/build.py --find-node 2>/dev/null || $(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r editor/node.txt
+	$(BIN)/python editor/build.py
+	@touch $@
+
+# The browser in which the editor is tested.
+.make/browser:
+	@mkdir -p .make
+	@command -v chromium >/dev/null || { \
+	  if test "$$(id -u)" = 0; then apt-get update -qq && apt-get install -y -qq --no-install-recommends chromium >/dev/null; \
+	  else echo "please install: chromium" >&2; exit 1; fi; \
+	}
+	@touch $@
+
 # ---------------------------------------------------------------------------------------------------- maintenance
 # Run by a maintainer with pip-tools at hand. No index address gets into the locks.
 COMPILE := pip-compile --quiet --upgrade --generate-hashes --allow-unsafe --strip-extras \
@@ -77,4 +94,4 @@ lock:
 	$(COMPILE) $(FAMILIES) --extra build --constraint requirements/dev.txt --output-file requirements/run.txt pyproject.toml
 
 clean:
-	rm -rf $(VENV) .make .mypy_cache .ruff_cache .pytest_cache
+	rm -rf $(VENV) .make editor/node_modules server/arcor2_server/editor_files .mypy_cache .ruff_cache .pytest_cache

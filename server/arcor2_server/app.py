@@ -1,4 +1,4 @@
-"""The ASGI application: the websocket, the REST routes, and the parts behind them, brought up and ended in order."""
+"""The ASGI application: websocket, REST routes, editor, and the parts behind them, brought up and ended in order."""
 
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
@@ -13,6 +13,7 @@ from arcor2_server.build.service import BuildService
 from arcor2_server.cell.online import OnlineCell
 from arcor2_server.classic import SOCKET
 from arcor2_server.collisions import CollisionWorld
+from arcor2_server.editor import editor_routes
 from arcor2_server.endpoint import Endpoint
 from arcor2_server.execution import Execution
 from arcor2_server.execution_socket import execution_endpoint
@@ -132,7 +133,7 @@ def create_app(services: Services) -> Litestar:
     """Make the application around parts that are up."""
     endpoint, of_execution = Endpoint(services), execution_endpoint(services)
     app = Litestar(
-        route_handlers=[sockets, *routes()],
+        route_handlers=[sockets, *routes(), *editor_routes()],
         guards=[own_pages_only, role_needed],
         openapi_config=None,
         exception_handlers={MethodNotAllowedException: no_such_route, HTTPException: http_refusal},

@@ -1,0 +1,127 @@
+"""Serves the web editor: one page at `/`, its hashed files below `/editor`, as built from the folder `editor`."""
+
+import hashlib
+import secrets
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from litestar import HttpMethod, Request, Response, route
+from litestar.exceptions import NotFoundException
+from litestar.handlers import HTTPRouteHandler
+
+from arcor2_hw.data.base import Data
+from arcor2_hw.data.role import Role
+from arcor2_server.rest.answers import OPEN, ROLE
+
+FILES: Final = Path(__file__).with_name("editor_files")
+"""Where the build puts the editor; absent in a checkout where it was not built."""
+NONCE: Final = b"__NONCE__"
+"""What stands in the page where each answer puts a nonce of its own, for the styles that components insert."""
+NOT_BUILT: Final = (
+    b"<!doctype html><html lang=en><meta charset=utf-8><title>ARCOR2-HW</title>"
+    b"<h1>The editor is not built</h1><p>The server runs. In a checkout, <code>make run</code> builds the editor."
+)
+IMMUTABLE: Final = "public, max-age=31536000, immutable"
+_MEDIA_TYPES: Final = {
+    ".css": "text/css",
+    ".js": "text/javascript",
+    ".svg": "image/svg+xml",
+    ".json": "application/json",
+    ".png": "image/png",
+    ".woff2": "font/woff2",
+    ".wasm": "application/wasm",
+}
+_ENCODINGS: Final = (("br", ".br"), ("gzip", ".gz"))
+"""Encodings, the densest first, and what the name of a file that is compressed so ends with."""
+_COMMON: Final = {
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+_PAGE: Final = _COMMON | {
+    "Cache-Control": "no-cache",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "X-Frame-Options": "DENY",
+    "Permissions-Policy": "camera=(self), xr-spatial-tracking=(self), fullscreen=(self), microphone=(), geolocation=()",
+}
+
+
+class EditorFile(Data, frozen=True):
+    """A file with its content as it is and compressed, by encoding."""
+
+    media_type: str
+    etag: str
+    content: Mapping[str, bytes]
+
+
+def read_files(directory: Path) -> dict[str, EditorFile]:
+    """Read the built editor, some megabytes, by path; empty when it was not built."""
+    found: dict[str, EditorFile] = {}
+    endings = tuple(ending for _, ending in _ENCODINGS)
+    for file in sorted(directory.rglob("*")) if directory.is_dir() else ():
+        if not file.is_file() or file.name.endswith(endings):
+            continue
+        content = {"": file.read_bytes()}
+        for encoding, ending in _ENCODINGS:
+            if (compressed := file.with_name(file.name + ending)).is_file():
+                content[encoding] = compressed.read_bytes()
+        found[file.relative_to(directory).as_posix()] = EditorFile(
+            _MEDIA_TYPES.get(file.suffix, "application/octet-stream"),
+            f'"{hashlib.sha256(content[""]).hexdigest()[:32]}"',
+            content,
+        )
+    return found
+
+
+def page_policy(nonce: str) -> str:
+    """Give the content security policy of the page: nothing from elsewhere, no script that is not a file of ours."""
+    return (
+        "default-src 'none'; script-src 'self'; connect-src 'self'; img-src 'self' data: blob:; "
+        f"style-src 'self' 'nonce-{nonce}'; font-src 'self'; worker-src 'self' blob:; media-src 'self' blob:; "
+        "manifest-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    )
+
+
+def _accepted(request: Request[Any, Any, Any]) -> set[str]:
+    """Give the encodings that the browser takes."""
+    taken = set()
+    for part in request.headers.get("accept-encoding", "").lower().split(","):
+        name, _, quality = part.strip().partition(";")
+        if quality.replace(" ", "") not in ("q=0", "q=0.0", "q=0.00", "q=0.000"):
+            taken.add(name.strip())
+    return taken
+
+
+def editor_routes(directory: Path = FILES) -> list[HTTPRouteHandler]:
+    """Make the routes of the page and of its files, which are read once. They ask for no token, and tell nothing."""
+    files = read_files(directory)
+    page = files.pop("index.html", None)
+    open_to_all = {ROLE: Role.OPERATOR, OPEN: True}
+
+    @route("/", http_method=[HttpMethod.GET, HttpMethod.HEAD], opt=open_to_all, name="editor page")
+    async def editor_page() -> Response[bytes]:
+        """Answer with the page; a nonce of its own makes each answer another one, so it is never kept."""
+        nonce = secrets.token_urlsafe(16)
+        content = NOT_BUILT if page is None else page.content[""].replace(NONCE, nonce.encode())
+        headers = _PAGE | {"Content-Security-Policy": page_policy(nonce)}
+        return Response(content, media_type="text/html", headers=headers)
+
+    @route("/editor/{path:path}", http_method=[HttpMethod.GET, HttpMethod.HEAD], opt=open_to_all, name="editor file")
+    async def editor_file(request: Request[Any, Any, Any]) -> Response[bytes]:
+        """Answer with a file, compressed as the browser takes it; 304 when it has it, 404 when there is none."""
+        name = str(request.path_params["path"]).lstrip("/")
+        if (file := files.get(name)) is None:
+            raise NotFoundException("The editor has no such file.")
+        # What the build names after its content never changes.
+        caching = IMMUTABLE if name.startswith("assets/") else "no-cache"
+        headers = _COMMON | {"Cache-Control": caching, "ETag": file.etag, "Vary": "Accept-Encoding"}
+        if request.headers.get("if-none-match") == file.etag:
+            return Response(b"", status_code=304, media_type=file.media_type, headers=headers)
+        accepted = _accepted(request)
+        encoding = next((each for each, _ in _ENCODINGS if each in accepted and each in file.content), "")
+        if encoding:
+            headers["Content-Encoding"] = encoding
+        return Response(file.content[encoding], media_type=file.media_type, headers=headers)
+
+    return [editor_page, editor_file]
