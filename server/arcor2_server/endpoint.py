@@ -214,10 +214,10 @@ class Endpoint:
                 continue
             route = self._routes.get(request.request)
             if route is None:
-                self._refuse(client, request, f"There is no request {request.request!r}.")
+                self._refuse(client, request, f"There is no request {request.request!r}.", "unknown_request")
                 continue
             if not client.admitted and request.request != AUTHENTICATE:
-                self._refuse(client, request, f"A token is needed: send {AUTHENTICATE} first.")
+                self._refuse(client, request, f"A token is needed: send {AUTHENTICATE} first.", "token_needed")
                 continue
             if route.at_once is not None and self._answer_at_once(client, request, route):
                 continue
@@ -250,12 +250,14 @@ class Endpoint:
         except Exception:
             reference = secrets.token_hex(4)
             log.exception("request failed", request=request.request, reference=reference, user=client.user)
-            self._refuse(client, request, f"An error inside the server: see its log, reference {reference}.")
+            trouble = f"An error inside the server: see its log, reference {reference}."
+            self._refuse(client, request, trouble, "internal")
 
     async def _run(self, client: Client, request: Request, route: Route) -> None:
         rpc = route.rpc
         if client.role < rpc.role:
-            self._refuse(client, request, f"{rpc.name} needs the role {Role(rpc.role).name.lower()} or a higher one.")
+            needed = f"{rpc.name} needs the role {Role(rpc.role).name.lower()} or a higher one."
+            self._refuse(client, request, needed, "forbidden")
             return
         args = route.default
         if route.decode is not None:
@@ -263,13 +265,14 @@ class Endpoint:
                 try:
                     args = route.decode(request.args)
                 except (msgspec.DecodeError, RecursionError) as error:
-                    self._refuse(client, request, f"The arguments of {rpc.name} are wrong: {error}.")
+                    wrong = f"The arguments of {rpc.name} are wrong: {error}."
+                    self._refuse(client, request, wrong, "invalid_arguments")
                     return
             elif args is UNSET:
-                self._refuse(client, request, f"The arguments of {rpc.name} are missing.")
+                self._refuse(client, request, f"The arguments of {rpc.name} are missing.", "invalid_arguments")
                 return
         if route.handler is None:
-            self._refuse(client, request, f"{rpc.name} is not available in this version.")
+            self._refuse(client, request, f"{rpc.name} is not available in this version.", "not_available")
             return
         context = Context(self._services, client, request.dry_run and rpc.dry_run, rpc.name)
         try:
@@ -277,21 +280,28 @@ class Endpoint:
         except RequestRefused as error:
             # Data in a refusal means that a part was done, and its events are true.
             partly = error.data is not UNSET
-            self._answer(client, request, context if partly else None, False, error.data, _shortened(str(error)))
+            text = _shortened(str(error))
+            self._answer(client, request, context if partly else None, False, error.data, text, error.code)
             return
         except Arcor2Error as error:
             if error.detail:
                 log.info("request refused", request=rpc.name, reason=_shortened(str(error)), detail=error.detail)
-            self._refuse(client, request, str(error))
+            self._refuse(client, request, str(error), error.code)
             return
         self._answer(client, request, context, True, UNSET if data is None else data)
 
     def _answer(
-        self, client: Client, request: Request, context: Context | None, result: bool, data: Any, message: str = ""
+        self,
+        client: Client,
+        request: Request,
+        context: Context | None,
+        result: bool,
+        data: Any,
+        message: str = "",
+        code: str = "",
     ) -> None:
-        response = encode(
-            Response(request.id, request.request, result, [message] if message else UNSET, data),
-        )
+        told = code if code and request.codes else UNSET
+        response = encode(Response(request.id, request.request, result, [message] if message else UNSET, data, told))
         if context is None:
             client.put(response)
             return
@@ -304,13 +314,14 @@ class Endpoint:
         for event in context.events_after:
             broadcast(event)
 
-    def _refuse(self, client: Client, request: "Request | _Head", message: str) -> None:
+    def _refuse(self, client: Client, request: "Request | _Head", message: str, code: str = "") -> None:
         name = request.request if len(request.request) <= LONGEST_NAME else UNREADABLE
         message = _shortened(message)
         if log.is_enabled_for(logging.DEBUG):
             log.debug("refused", client=client.number, request=name, message=message)
         try:
-            answer = encode(Response(request.id, name, False, [message]))
+            told = code if code and isinstance(request, Request) and request.codes else UNSET
+            answer = encode(Response(request.id, name, False, [message], UNSET, told))
         except UnicodeEncodeError:
             # A name with half a surrogate pair can be read but not sent back.
             answer = encode(Response(request.id, UNREADABLE, False, [ascii(message)]))

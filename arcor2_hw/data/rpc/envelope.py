@@ -25,19 +25,24 @@ class Rpc(Struct, frozen=True):
 
 
 class Request(Data, frozen=True):
-    """The envelope of a request; `args` is decoded when the request is known."""
+    """The envelope of a request; `args` is decoded when the request is known.
+
+    `codes`: a refusal is to name its reason (docs/protocol.md).
+    """
 
     id: int
     request: str
     args: Raw | Unset = UNSET
     dry_run: bool = False
+    codes: bool = False
 
 
 class Response(Data, frozen=True):
-    """The envelope of an answer."""
+    """The envelope of an answer. `code`: the reason of a refusal, for those who ask for it."""
 
     id: int
     response: str
     result: bool
     messages: list[str] | Unset = UNSET
     data: Any = UNSET
+    code: str | Unset = UNSET

@@ -28,6 +28,12 @@ class RequestRefused(Arcor2Error):
         self.data = data
 
 
+class NotRegistered(RequestRefused):
+    """The request needs a registered user."""
+
+    code = "not_registered"
+
+
 def make_event(name: str, data: Any = UNSET, change: ChangeType | None = None, parent: str | None = None) -> Event:
     """Make an event of the protocol; KeyError for a name that is none."""
     declared = EVENTS[name]
@@ -62,7 +68,7 @@ class Context:
     def user(self) -> str:
         """Give the registered name of the caller; RequestRefused when there is none."""
         if self.client.user is None:
-            raise RequestRefused("You are not logged in: send RegisterUser first.")
+            raise NotRegistered("You are not logged in: send RegisterUser first.")
         return self.client.user
 
     def emit(self, name: str, data: Any = UNSET, change: ChangeType | None = None, parent: str | None = None) -> None:
