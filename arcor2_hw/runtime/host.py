@@ -15,7 +15,6 @@ import socket
 import sys
 import threading
 import types
-from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 from queue import SimpleQueue
@@ -23,14 +22,13 @@ from typing import Final
 
 import msgspec
 
-from arcor2_hw.actions.json_values import encode as encode_json
-from arcor2_hw.exceptions import Arcor2Error, Cancelled, ProgramFinished, ProgramStopped
+from arcor2_hw.exceptions import Arcor2Error, ProgramFinished, ProgramStopped
 from arcor2_hw.runtime import messages as m
+from arcor2_hw.runtime.calls import Calls, error_data
 from arcor2_hw.runtime.cell import Cell, SceneFault, recipes
 from arcor2_hw.runtime.clock import Clock
 from arcor2_hw.runtime.creation import load_type, write_sources
-from arcor2_hw.runtime.device import STOP_DEADLINE, STOP_GRACE, Device, describe
-from arcor2_hw.runtime.lane import Job
+from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.link import Link
 from arcor2_hw.runtime.package import put_on_path
 from arcor2_hw.runtime.program import Program, set_current, traceback_text
@@ -44,13 +42,6 @@ LOST_WITHIN: Final = 5.0
 """Seconds that a script gets to end when it is stopped because a device is lost, as when somebody stops it."""
 FLUSH: Final = 0.3
 """Seconds for the last messages."""
-
-
-def error_data(error: BaseException, object_id: str = "") -> m.ErrorData:
-    """Give an error in the form in which it leaves the process."""
-    code = error.code if isinstance(error, Arcor2Error) else "error"
-    detail = error.detail if isinstance(error, Arcor2Error) else ""
-    return m.ErrorData(code, type(error).__name__, str(error) or type(error).__name__, detail, object_id)
 
 
 class _LogHandler(logging.Handler):
@@ -74,6 +65,7 @@ class Host:
         self._cell = Cell()
         self._work: SimpleQueue[m.HostBound] = SimpleQueue()
         self._subscribed: dict[str, m.Subscribe] = {}
+        self._calls = Calls(lambda: self._cell, self.link.post, self.clock)
         self._streams = Streams(self._cell, self._send_stream)
         self._watch = Watch(self._cell, self.link.post, self._lost)
         self._leaving = threading.Event()
@@ -150,6 +142,7 @@ class Host:
             message.package_id,
             start_paused=message.start_paused,
             breakpoints=frozenset(message.breakpoints),
+            shared_breakpoints=frozenset(message.shared_breakpoints),
             here=message.cell,
         )
         self._cell = program.cell
@@ -194,6 +187,10 @@ class Host:
         """Tell that the program is running or paused now."""
         self.link.post(m.ProgramChanged(state))
 
+    def action(self, told: m.ActionBegan | m.ActionEnded) -> None:
+        """Tell that an action was let begin, or has ended."""
+        self.link.post(told)
+
     # -------------------------------------------------------------------------------- reader thread
     def _read(self) -> None:
         try:
@@ -211,9 +208,9 @@ class Host:
                 self._cell.abandon()
                 self._work.put(message)
             case m.Call():
-                self._call(message)
+                self._calls.call(message)
             case m.StopMotion():
-                self._stop_motion(message)
+                self._calls.stop_motion(message)
             case m.Subscribe():
                 self._subscribed[message.object_id] = message
             case m.StopProgram():
@@ -221,6 +218,8 @@ class Host:
             case m.Pause() | m.Resume() | m.Step() if self.program is not None:
                 gate = self.program.gate
                 {m.Pause: gate.pause, m.Resume: gate.resume, m.Step: gate.step}[type(message)]()
+            case m.SetBreakpoints() if self.program is not None:
+                self.program.set_shared_breakpoints(frozenset(message.shared_breakpoints))
 
     def _leave(self) -> None:
         """The server is gone, or wants us gone: stop motion, disconnect, exit, in bounded time."""
@@ -245,87 +244,6 @@ class Host:
             return
         self._nudge()
         self.clock.after(LOST_WITHIN, lambda: program.ended or os._exit(4))
-
-    def _call(self, message: m.Call) -> None:
-        device: Device | None = None
-        try:
-            device = self._cell[message.object_id]
-            answer = self._answer(message.id, device)
-            method = device.cancelled_by(message.method) if message.cancel else message.method
-            if method == "stop":
-                self._stop_motion(m.StopMotion(message.id, message.object_id))
-                return
-            job, own = device.prepare(method, message.arguments, message.control, answer)
-            lane = device.stop_lane if message.cancel else device.lane_for(method)
-            lane.submit(job)
-        except Exception as error:  # noqa: BLE001 - a call that cannot be made is an answer too
-            told = error if device is None else describe(device, error)
-            self.link.post(m.CallFailed(message.id, error_data(told, message.object_id)))
-            return
-        deadline = own if message.deadline is None else message.deadline
-        if deadline is not None:
-            within = deadline
-            self.clock.after(within, lambda: lane.expire(job, within))
-
-    def _answer(self, number: int, device: Device) -> Callable[[Job], None]:
-        def answer(job: Job) -> None:
-            error = job.error
-            if error is None:
-                try:
-                    value = b"" if job.value is None else encode_json(job.value).encode()
-                except Arcor2Error as caught:
-                    error = caught
-                else:
-                    self.link.post(m.CallDone(number, value))
-                    return
-            self.link.post(m.CallFailed(number, error_data(describe(device, error), device.id)))
-
-        return answer
-
-    def _stop_motion(self, message: m.StopMotion) -> None:
-        try:
-            devices = [self._cell[message.object_id]] if message.object_id else list(self._cell)
-        except Arcor2Error as error:
-            self.link.post(m.CallFailed(message.id, error_data(error, message.object_id)))
-            return
-        stops = [device for device in devices if device.stop_method is not None]
-        if message.object_id and not stops:
-            refusal = Arcor2Error(f"{devices[0].name} cannot be stopped: it has no stop")
-            self.link.post(m.CallFailed(message.id, error_data(refusal, message.object_id)))
-            return
-        left = len(stops)
-        failed: list[m.ErrorData] = []
-        lock = threading.Lock()
-
-        def answer(device: Device, error: BaseException | None) -> None:
-            nonlocal left
-            with lock:
-                left -= 1
-                if error is not None:
-                    failed.append(error_data(describe(device, error), device.id))
-                if left:
-                    return
-            self.link.post(m.CallFailed(message.id, failed[0]) if failed else m.CallDone(message.id))
-
-        if not stops:
-            self.link.post(m.CallDone(message.id))
-        for device in stops:
-            self._stop_one(device, answer)
-
-    def _stop_one(self, device: Device, answer: Callable[[Device, BaseException | None], None]) -> None:
-        try:
-            begun = device.begin_stop(lambda job: answer(device, job.error))
-        except Arcor2Error as error:  # an earlier stop hangs
-            answer(device, error)
-            return
-        if begun is None:
-            answer(device, None)
-            return
-        stop, interrupted = begun
-        self.clock.after(STOP_DEADLINE, lambda: device.stop_lane.expire(stop, STOP_DEADLINE))
-        if interrupted is not None:
-            cancelled = Cancelled(f"{device.name}: {interrupted.method} was stopped")
-            self.clock.after(STOP_GRACE, lambda: interrupted.give_up(cancelled))
 
     # -------------------------------------------------------------------------------- clock thread
     def _nudge(self) -> None:
