@@ -1,0 +1,78 @@
+"""What server and compute worker say to each other: a tagged union per direction, framed, msgpack.
+
+The server asks one thing at a time. What the worker knows of the world it was told by messages before; a worker that
+was started anew knows nothing, and is told again.
+"""
+
+from typing import Any, Final
+
+import msgspec
+from msgspec import Struct
+
+from arcor2_hw import framing
+from arcor2_hw.compute.tasks import AnyTask
+from arcor2_hw.compute.world import Body
+
+MAX_MESSAGE: Final = 512 * 1024 * 1024
+"""Bytes; the pictures of an intrinsic calibration, or of a hand-eye one, come together."""
+
+
+class Work(Struct, frozen=True, tag=True):
+    """Compute something. within: seconds, after which the worker ends itself. Answer: Done or Failed."""
+
+    task: AnyTask
+    within: float
+
+
+class ChangeWorld(Struct, frozen=True, tag=True):
+    """Take bodies out, and put others in, in place of those of the same ids. Bodies that are refused fail the next
+    Work that needs the world.
+    """
+
+    put: list[Body]
+    remove: list[str]
+
+
+ToWorker = Work | ChangeWorld
+
+
+class Done(Struct, frozen=True, tag=True):
+    """The answer, in msgpack."""
+
+    value: bytes
+
+
+class Failed(Struct, frozen=True, tag=True):
+    """An error. codes: of its class and those that it derives from, the nearest first; reason: where it has one."""
+
+    codes: list[str]
+    message: str
+    detail: str = ""
+    reason: str = ""
+
+
+class Progress(Struct, frozen=True, tag=True):
+    """How far the computation is: 0..1, and what it does."""
+
+    share: float
+    message: str
+
+
+FromWorker = Done | Failed | Progress
+
+decode_to_worker: Any = msgspec.msgpack.Decoder(ToWorker).decode
+decode_from_worker: Any = msgspec.msgpack.Decoder(FromWorker).decode
+encode_value = msgspec.msgpack.Encoder().encode
+
+
+def encode(message: ToWorker | FromWorker) -> bytes:
+    """Give a message with its length in front; ValueError for one that is too long."""
+    body = encode_value(message)
+    if len(body) > MAX_MESSAGE:
+        raise ValueError(f"a message of {len(body)} bytes is longer than {MAX_MESSAGE}")
+    return framing.framed(body)
+
+
+def body_length(prefix: bytes) -> int:
+    """Read the length prefix; ValueError beyond MAX_MESSAGE."""
+    return framing.body_length(prefix, MAX_MESSAGE)

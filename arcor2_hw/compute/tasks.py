@@ -1,0 +1,5 @@
+"""Everything that can be asked of the compute workers. Imports no numerics."""
+
+from arcor2_hw.compute.calibration_tasks import CalibrationTask
+
+AnyTask = CalibrationTask

@@ -1,0 +1,262 @@
+"""The workers as the server uses them: started on first use, ended when idle, killed without harm to others."""
+
+import asyncio
+import os
+import signal
+import time
+from collections.abc import AsyncIterator
+from typing import get_args
+
+import psutil
+import pytest
+import pytest_asyncio
+
+from arcor2_hw.calibration.refusals import CalibrationRefused
+from arcor2_hw.compute import calibration_tasks as t
+from arcor2_hw.compute import messages as m
+from arcor2_hw.compute import task as task_module
+from arcor2_hw.compute.task import ComputeBusy, ComputeStopped, ComputeTimeout, Room
+from arcor2_hw.compute.tasks import AnyTask
+from arcor2_hw.compute.worker import function_of
+from arcor2_hw.data.camera import CameraParameters
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound
+from arcor2_server import compute as compute_module
+from arcor2_server import compute_process
+from arcor2_server.compute import Compute
+from arcor2_server.compute_process import error_of
+
+KNOWN = [Position(0, 0, 0), Position(1, 0, 0), Position(0, 1, 0), Position(1, 1, 0)]
+
+
+def question(offset: float = 0.25) -> t.FrameByPoints:
+    """Ask for a frame whose origin is at (offset, 0, 0)."""
+    return t.FrameByPoints(KNOWN, [point + Position(offset, 0, 0) for point in KNOWN])
+
+
+@pytest_asyncio.fixture
+async def compute() -> AsyncIterator[Compute]:
+    made = Compute(idle=60.0)
+    yield made
+    await made.close()
+
+
+async def until(condition: object, patience: float = 20.0) -> None:
+    assert callable(condition)
+    async with asyncio.timeout(patience):
+        while not condition():
+            await asyncio.sleep(0.01)
+
+
+async def test_started_on_first_use_and_asked_again(compute: Compute) -> None:
+    assert compute.pid(Room.CALIBRATION) is None
+    assert (await compute.run(question())).pose.position.x == pytest.approx(0.25)
+    pid = compute.pid(Room.CALIBRATION)
+    assert (await compute.run(question(0.5))).pose.position.x == pytest.approx(0.5)
+    assert compute.pid(Room.CALIBRATION) == pid
+    assert compute.pid(Room.KINEMATICS) is None
+
+
+async def test_ends_when_idle_and_comes_back() -> None:
+    compute = Compute(idle=0.2)
+    try:
+        await compute.run(question())
+        pid = compute.pid(Room.CALIBRATION)
+        assert pid is not None
+        await until(lambda: compute.pid(Room.CALIBRATION) is None)
+        await until(lambda: not psutil.pid_exists(pid))
+        assert (await compute.run(question(0.5))).pose.position.x == pytest.approx(0.5)
+    finally:
+        await compute.close()
+
+
+async def test_killed_in_the_middle_costs_one_computation(compute: Compute) -> None:
+    await compute.run(question())
+    pid = compute.pid(Room.CALIBRATION)
+    assert pid is not None
+    os.kill(pid, signal.SIGSTOP)  # it will be in the middle of whatever comes
+    hit = asyncio.create_task(compute.run(question(1.0)))
+    waiting = [asyncio.create_task(compute.run(question(float(each)))) for each in (2, 3)]
+    await asyncio.sleep(0.1)
+    os.kill(pid, signal.SIGKILL)
+    with pytest.raises(ComputeStopped, match=r"ended by SIGKILL while it worked on a frame by touch") as raised:
+        await hit
+    assert str(pid) in raised.value.detail
+    assert [(await each).pose.position.x for each in waiting] == pytest.approx([2.0, 3.0])
+    assert compute.pid(Room.CALIBRATION) not in (None, pid)
+
+
+async def test_killed_while_it_has_nothing_to_do_is_nobodys_trouble(compute: Compute) -> None:
+    await compute.run(question())
+    pid = compute.pid(Room.CALIBRATION)
+    assert pid is not None
+    os.kill(pid, signal.SIGKILL)
+    await until(lambda: compute.pid(Room.CALIBRATION) is None)
+    assert (await compute.run(question(0.5))).pose.position.x == pytest.approx(0.5)
+
+
+async def test_a_stopped_process_is_given_up(compute: Compute, monkeypatch: pytest.MonkeyPatch) -> None:
+    await compute.run(question())
+    pid = compute.pid(Room.CALIBRATION)
+    assert pid is not None
+    monkeypatch.setattr(compute_process, "START_WITHIN", 0.3)
+    os.kill(pid, signal.SIGSTOP)
+    with pytest.raises(ComputeTimeout, match=r"A frame by touch took longer than 0\.1 s"):
+        await compute.run(question(), within=0.1)
+    monkeypatch.undo()
+    assert (await compute.run(question(0.5))).pose.position.x == pytest.approx(0.5)
+    assert compute.pid(Room.CALIBRATION) != pid
+
+
+ENDLESS = """
+import sys
+from arcor2_hw.compute import worker
+worker.LATE = 0.1
+worker.function_of = lambda task: lambda *_: 7 ** 10**9  # in C, with the interpreter lock held
+worker.main(sys.argv[1:])
+"""
+
+
+async def test_one_that_computes_for_ever_ends_itself(compute: Compute, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The deadline is kept by the kernel: a library that never returns is ended all the same."""
+    monkeypatch.setattr(compute_process, "COMMAND", ("-P", "-c", ENDLESS))
+    begun = time.monotonic()
+    with pytest.raises(ComputeTimeout, match=r"longer than 0\.2 s"):
+        await compute.run(question(), within=0.2)
+    assert time.monotonic() - begun < compute_process.START_WITHIN
+    monkeypatch.undo()
+    assert (await compute.run(question(0.5))).pose.position.x == pytest.approx(0.5)
+
+
+NONSENSE = """
+import socket, sys
+socket.socket(fileno=int(sys.argv[2])).sendall(b"\\xff" * 64)
+print("a library says why")
+"""
+
+
+async def test_one_that_talks_nonsense_is_ended(compute: Compute, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compute_process, "COMMAND", ("-P", "-c", NONSENSE))
+    with pytest.raises(ComputeStopped) as raised:
+        await compute.run(question())
+    assert "a library says why" in raised.value.detail
+    monkeypatch.undo()
+    assert (await compute.run(question(0.5))).pose.position.x == pytest.approx(0.5)
+
+
+async def test_who_goes_away_leaves_the_others_their_turn(compute: Compute) -> None:
+    await compute.run(question())
+    pid = compute.pid(Room.CALIBRATION)
+    assert pid is not None
+    os.kill(pid, signal.SIGSTOP)
+    asked = [asyncio.create_task(compute.run(question(float(each)))) for each in range(3)]
+    await asyncio.sleep(0.05)
+    for each in asked[:2]:  # one that is being worked on, and one that waits
+        each.cancel()
+    await asyncio.gather(*asked[:2], return_exceptions=True)
+    os.kill(pid, signal.SIGCONT)
+    assert (await asked[2]).pose.position.x == pytest.approx(2.0)
+    assert compute.pid(Room.CALIBRATION) == pid
+
+
+async def test_what_is_in_the_background_waits_for_all_others(compute: Compute) -> None:
+    await compute.run(question())
+    pid = compute.pid(Room.CALIBRATION)
+    assert pid is not None
+    os.kill(pid, signal.SIGSTOP)
+    order: list[str] = []
+
+    async def ask(name: str, background: bool) -> None:
+        await compute.run(question(), background=background)
+        order.append(name)
+
+    tasks = [asyncio.create_task(ask("first", False))]
+    await asyncio.sleep(0.05)
+    for name, background in (("back 1", True), ("back 2", True), ("front", False)):
+        tasks.append(asyncio.create_task(ask(name, background)))
+    await asyncio.sleep(0.05)
+    os.kill(pid, signal.SIGCONT)
+    await asyncio.gather(*tasks)
+    assert order == ["first", "front", "back 1", "back 2"]
+
+
+async def test_too_many_are_refused(compute: Compute, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compute_module, "MOST_WAITING", 2)
+    tasks = [asyncio.create_task(compute.run(question())) for _ in range(3)]
+    await asyncio.sleep(0)
+    # the first has not been taken yet
+    with pytest.raises(ComputeBusy, match="2 computations wait already"):
+        await asyncio.gather(*tasks)
+    await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def test_errors_come_back_as_what_they_are(compute: Compute) -> None:
+    with pytest.raises(InvalidData, match="3 to 1000 known points"):
+        await compute.run(t.FrameByPoints([], []))
+    line = [Position(float(each), 0, 0) for each in range(4)]
+    with pytest.raises(CalibrationRefused) as raised:
+        await compute.run(t.FrameByPoints(line, line))
+    assert raised.value.reason == "degenerate"
+    assert raised.value.code == "calibration_refused"
+    with pytest.raises(InvalidData):
+        await compute.run(t.TipByTouches([Pose()] * 2))
+
+
+def test_an_error_that_is_not_known_here_is_the_nearest_that_is() -> None:
+    error = error_of(m.Failed(["marker_twice", "not_found", "error"], "There are two.", "detail"))
+    assert isinstance(error, NotFound)
+    assert (error.code, str(error), error.detail) == ("marker_twice", "There are two.", "detail")
+    assert type(error_of(m.Failed(["alien"], "What?"))) is Arcor2Error
+
+
+async def test_large_pictures_do_not_stop_the_server(compute: Compute) -> None:
+    """Sixty megabytes cross in pieces; what else happens in the server goes on meanwhile."""
+    await compute.run(question())
+    late: list[float] = []
+
+    async def tick() -> None:
+        before = time.perf_counter()
+        while True:
+            await asyncio.sleep(0.001)
+            now = time.perf_counter()
+            late.append(now - before)
+            before = now
+
+    ticking = asyncio.create_task(tick())
+    parameters = CameraParameters(1, 1, 1, 1, [0, 0, 0, 0])
+    with pytest.raises(Arcor2Error):
+        await compute.run(t.FindMarkers(bytes(60 * 1024 * 1024), parameters))
+    ticking.cancel()
+    await asyncio.gather(ticking, return_exceptions=True)
+    assert len(late) > 10
+    assert max(late) < 0.5
+
+
+async def test_closing_ends_it_whatever_it_does() -> None:
+    compute = Compute(idle=60.0)
+    await compute.run(question())
+    pid = compute.pid(Room.CALIBRATION)
+    assert pid is not None
+    os.kill(pid, signal.SIGSTOP)
+    asked = [asyncio.create_task(compute.run(question())) for _ in range(2)]
+    await asyncio.sleep(0.05)
+    begun = time.monotonic()
+    await compute.close()
+    assert time.monotonic() - begun < 10
+    assert not psutil.pid_exists(pid)
+    for each in asked:
+        with pytest.raises(ComputeStopped, match="server is ending"):
+            await each
+    with pytest.raises(ComputeStopped):
+        await compute.run(question())
+
+
+def test_tasks_name_what_they_are_and_who_runs_them() -> None:
+    """Every task of the union can be found by the worker, and is told of in words."""
+    kinds = get_args(AnyTask)
+    assert len({kind.__name__ for kind in kinds}) == len(kinds) > 5
+    for kind in kinds:
+        assert issubclass(kind, task_module.Task)
+        assert callable(function_of(kind)), kind
+        assert isinstance(kind.what, str)
+        assert kind.within > 0
