@@ -1,0 +1,15 @@
+"""The client's types are those that the server decodes with."""
+
+import asyncio
+import sys
+from pathlib import Path
+
+EDITOR = Path(__file__).resolve().parents[2] / "editor"
+
+
+async def test_the_types_of_the_editor_are_those_of_the_structs() -> None:
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, str(EDITOR / "protocol_types.py"), "--check"), stderr=asyncio.subprocess.PIPE
+    )
+    _, said = await asyncio.wait_for(process.communicate(), 30)
+    assert process.returncode == 0, said.decode()
