@@ -1,71 +1,93 @@
-"""One websocket connection to a server: requests matched to answers by id, events in the order they come."""
+"""The client: one server, joined again after a loss, with a method for every request and streams of its events."""
 
 import asyncio
 import contextlib
-import itertools
-from collections.abc import AsyncIterator
+import os
+import random
+import ssl
+import time
 from types import TracebackType
 from typing import Any, Final, Self
 
 import msgspec
-from msgspec import UNSET, Raw, Struct
-from websockets.asyncio.client import ClientConnection, connect
-from websockets.exceptions import ConnectionClosed
 
+from arcor2_hw.client.errors import AnswerLate, AnswerUnknown, EventsMissed, NotAdmitted, RequestFailed, refusal
+from arcor2_hw.client.requests import Requests
+from arcor2_hw.client.rest import Rest
+from arcor2_hw.client.stream import EventStream
+from arcor2_hw.client.wire import Message, Unanswered, Unsent, Wire
 from arcor2_hw.data.base import Unset
-from arcor2_hw.data.events import EVENTS, ChangeType, Event
-from arcor2_hw.data.rpc import RPCS, RegisterUserArgs
-from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, DeviceTimeout, InvalidData
+from arcor2_hw.data.events import Event
+from arcor2_hw.data.rpc import (
+    RPCS,
+    AuthenticateArgs,
+    RegisterForRobotEventArgs,
+    RegisterUserArgs,
+    SubscribeEventsArgs,
+)
+from arcor2_hw.exceptions import ConnectionLost, DeviceTimeout, InvalidData, NotConnected
+
+__all__ = ["Client", "RequestFailed"]
 
 ANSWER_TIMEOUT: Final = 30.0
 """Seconds to wait for an answer: what existing clients wait."""
-OPEN_TIMEOUT: Final = 10.0
+TOKEN_VARIABLE: Final = "ARCOR2_HW_TOKEN"  # noqa: S105 - the name of a variable, not a token
+FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
+"""Seconds between attempts to connect again: doubled each time, and spread so that many clients don't come at once."""
+READING: Final = frozenset(
+    {
+        *("GetActions", "GetObjectTypes", "GetProject", "GetRobotMeta", "GetScene", "History", "ListPackages"),
+        *("ListProjects", "ListScenes", "ObjectTypeUsage", "ProjectsWithScene", "SceneObjectUsage", "SystemInfo"),
+    }
+)
+"""Requests that change nothing and touch no device: asked again when the connection breaks before the answer. So is
+every dry run. No other request is ever sent twice."""
 
 
-class RequestFailed(Arcor2Error):
-    """The server answered that it would not, or could not; the text is the server's."""
+class Client(Requests):
+    """A connection to a server. Use it as `async with Client(url, user_name) as client`.
 
-    code = "request_failed"
+    Every request is a method (`await client.open_scene(id)`); `events()` and `follow(...)` give what the server tells.
+    When the connection is lost the client joins again: it connects, registers its user, subscribes to what it had
+    subscribed to, and every stream raises EventsMissed. Requests wait for that within their deadline. One that had been
+    sent and not answered raises AnswerUnknown; only those of READING and dry runs are asked again.
 
-    def __init__(self, request: str, messages: list[str], data: Any = None) -> None:
-        super().__init__(" ".join(messages) or f"{request} failed")
-        self.request = request
-        self.data = data
-
-
-class _Message(Struct):
-    """An answer or an event, before its data is decoded."""
-
-    id: int = 0
-    response: str = ""
-    result: bool = False
-    messages: list[str] = msgspec.field(default_factory=list)
-    event: str = ""
-    change_type: ChangeType | Unset = UNSET
-    parent_id: str | Unset = UNSET
-    data: Raw | Unset = UNSET
-
-
-_decode = msgspec.json.Decoder(_Message).decode
-_END: Final = object()
-
-
-class Client:
-    """A connection. Use it as `async with Client(url, user_name) as client`.
-
-    `events()` gives what the server tells, in order; an event that nobody takes waits in the queue.
+    url: ws, wss, http or https. token: by default what the variable ARCOR2_HW_TOKEN says. tls: for a certificate that
+    this machine does not trust by itself (ssl.create_default_context(cafile=...)). timeout: seconds that a request may
+    take when it does not say itself. reconnect: whether to join again; without, the first loss is the end.
+    connect_within: seconds for which a server that does not answer at first is tried again.
     """
 
-    def __init__(self, url: str, user_name: str | None = None, *, timeout: float = ANSWER_TIMEOUT) -> None:
+    def __init__(
+        self,
+        url: str,
+        user_name: str | None = None,
+        *,
+        token: str | None = None,
+        tls: ssl.SSLContext | None = None,
+        timeout: float = ANSWER_TIMEOUT,
+        reconnect: bool = True,
+        connect_within: float = 0.0,
+    ) -> None:
         self._url = url.replace("http://", "ws://", 1).replace("https://", "wss://", 1)
         self._user_name = user_name
+        self._token = token or os.environ.get(TOKEN_VARIABLE) or None
+        self._tls = tls
         self._timeout = timeout
-        self._ids = itertools.count(1)
-        self._waiting: dict[int, asyncio.Future[_Message]] = {}
-        self._events: asyncio.Queue[Any] = asyncio.Queue()
-        self._socket: ClientConnection | None = None
-        self._reader: asyncio.Task[None] | None = None
+        self._reconnect = reconnect
+        self._connect_within = connect_within
+        self._subscribed: set[str] = set()
+        self._robots: dict[tuple[str, str], RegisterForRobotEventArgs] = {}
+        self._wire: Wire | None = None
+        self._joined = asyncio.Event()
+        self._end: Exception | None = NotConnected(f"There is no connection to {self._url}.")
+        self._lost_at = 0.0
+        self._keeper: asyncio.Task[None] | None = None
+        self._own: EventStream[Event] = EventStream()
+        self._streams: list[EventStream[Any]] = [self._own]
+        self._rest: Rest | None = None
 
+    # ------------------------------------------------------------------------------------------------ life
     async def __aenter__(self) -> Self:
         await self.open()
         return self
@@ -75,102 +97,241 @@ class Client:
     ) -> None:
         await self.close()
 
+    @property
+    def url(self) -> str:
+        """Where the server is (ws or wss)."""
+        return self._url
+
+    @property
+    def connected(self) -> bool:
+        """Tell whether requests would be sent at once."""
+        return self._joined.is_set()
+
+    @property
+    def rest(self) -> Rest:
+        """What the server offers over HTTP: documents, assets, packages; with the same token."""
+        if self._rest is None:
+            self._rest = Rest(self._url, token=self._token, tls=self._tls, timeout=self._timeout)
+        return self._rest
+
     async def open(self) -> None:
-        """Connect and, when there is a user name, register it. Raises ConnectionLost naming the address."""
-        try:
-            self._socket = await connect(
-                self._url, max_size=None, compression=None, open_timeout=OPEN_TIMEOUT, close_timeout=1.0
-            )
-        except (OSError, TimeoutError) as e:
-            raise ConnectionLost(f"No server answers at {self._url}.", str(e)) from e
-        self._reader = asyncio.create_task(self._read(self._socket), name="client reader")
-        if self._user_name is not None:
-            await self.call("RegisterUser", RegisterUserArgs(self._user_name))
+        """Connect and, when there is a user name, register it.
+
+        Raises ConnectionLost naming the address, NotAdmitted, RequestFailed when the user name is taken.
+        """
+        deadline = time.monotonic() + self._connect_within
+        self._end = None
+        pause = FIRST_PAUSE
+        while True:
+            try:
+                await self._join()
+                break
+            except ConnectionLost as error:
+                if time.monotonic() + pause > deadline:
+                    self._end = error
+                    raise
+            except BaseException as error:
+                self._end = error if isinstance(error, Exception) else NotConnected("The client was not opened.")
+                raise
+            await asyncio.sleep(pause)
+            pause = min(2 * pause, LONGEST_PAUSE)
+        self._joined.set()
+        self._keeper = asyncio.create_task(self._keep(), name="client keeper")
 
     async def close(self) -> None:
-        """Close the connection; harmless when it is closed."""
-        if self._socket is not None:
-            await self._socket.close()
-        if self._reader is not None:
-            self._reader.cancel()
+        """Close the connection and end all streams; harmless when it is closed."""
+        self._finish(None, ConnectionLost(f"The connection to {self._url} is closed."))
+        if self._keeper is not None:
+            self._keeper.cancel()
             with contextlib.suppress(asyncio.CancelledError):
-                await self._reader
-            self._reader = None
+                await self._keeper
+            self._keeper = None
+        if self._wire is not None:
+            await self._wire.close()
+            self._wire = None
+        if self._rest is not None:
+            await self._rest.close()
+            self._rest = None
 
-    async def _read(self, socket: ClientConnection) -> None:
+    def _finish(self, told: Exception | None, end: Exception) -> None:
+        """Let no more happen: streams end with `told`, requests are refused with `end`."""
+        self._end = end
+        self._joined.set()  # whoever waits for the connection sees the end
+        for stream in self._streams:
+            stream.end(told)
+
+    def _deliver(self, item: Event | EventsMissed) -> None:
+        for stream in self._streams:
+            stream.put(item)
+
+    # ------------------------------------------------------------------------------------------------ joining
+    async def _join(self, gap: bool = False) -> None:
+        """Connect, and be again who we were. Raises ConnectionLost, NotAdmitted, RequestFailed, DeviceTimeout."""
+        seconds = time.monotonic() - self._lost_at
+        held: list[Event | EventsMissed] | None = [] if gap else None
+
+        def deliver(item: Event | EventsMissed) -> None:
+            if held is None:
+                self._deliver(item)
+            else:
+                held.append(item)  # until it is known that we are back, and what is missing
+
+        wire = await Wire.open(self._url, self._token, self._tls, deliver)
+        not_resumed: list[str] = []
         try:
-            async for text in socket:
-                message = _decode(text)
-                if not message.event:
-                    future = self._waiting.pop(message.id, None)
-                    if future is not None and not future.done():
-                        future.set_result(message)
-                    continue
-                declared = EVENTS.get(message.event)
-                data: Any = UNSET
-                if not isinstance(message.data, Unset):
-                    kind = Any if declared is None or declared.data is None else declared.data
-                    data = msgspec.json.decode(message.data, type=kind)
-                self._events.put_nowait(Event(message.event, message.change_type, message.parent_id, data))
-        except ConnectionClosed:
-            pass
-        finally:
-            lost = ConnectionLost(f"The connection to {self._url} is closed.")
-            for future in self._waiting.values():
-                if not future.done():
-                    future.set_exception(lost)
-            self._waiting.clear()
-            self._events.put_nowait(_END)
+            if self._user_name is not None:
+                await self._tell(wire, "RegisterUser", RegisterUserArgs(self._user_name))
+            elif self._token is not None:
+                await self._tell(wire, "SystemInfo", None)  # a wrong token is told by the answer that does not come
+            if self._subscribed:
+                await self._tell(wire, "SubscribeEvents", SubscribeEventsArgs(set(self._subscribed)))
+            for key, args in list(self._robots.items()):
+                try:
+                    await self._tell(wire, "RegisterForRobotEvent", args)
+                except RequestFailed:
+                    del self._robots[key]  # the scene is offline now, or the robot gone
+                    not_resumed.append(f"{args.what} of {args.robot_id}")
+        except BaseException:
+            await wire.close()
+            raise
+        if held is not None:
+            self._deliver(EventsMissed(rejoined=True, seconds=seconds, not_resumed=tuple(not_resumed)))
+            for item in held:
+                self._deliver(item)
+            held = None
+        self._wire = wire
 
-    async def call(self, name: str, args: Any = None, *, dry_run: bool = False, timeout: float | None = None) -> Any:
-        """Send a request and give its data, decoded as the protocol declares it.
-
-        Raises RequestFailed with the server's text, ConnectionLost, DeviceTimeout when no answer comes in time.
-        """
-        if self._socket is None:
-            raise ConnectionLost(f"There is no connection to {self._url}.")
-        number = next(self._ids)
-        request: dict[str, Any] = {"id": number, "request": name}
-        if args is not None:
-            request["args"] = args
-        if dry_run:
-            request["dry_run"] = True
-        future: asyncio.Future[_Message] = asyncio.get_running_loop().create_future()
-        self._waiting[number] = future
-        limit = self._timeout if timeout is None else timeout
+    async def _tell(self, wire: Wire, name: str, args: Any) -> None:
         try:
-            await self._socket.send(msgspec.json.encode(request).decode())
-            async with asyncio.timeout(limit):
-                message = await future
-        except TimeoutError:
-            raise DeviceTimeout(f"The server did not answer {name} within {limit:g} s.") from None
-        except ConnectionClosed:
-            raise ConnectionLost(f"The connection to {self._url} is closed.") from None
-        finally:
-            self._waiting.pop(number, None)
-        declared = RPCS.get(name)
-        data = None
-        if not isinstance(message.data, Unset):
-            kind = Any if declared is None or declared.data is None else declared.data
-            try:
-                data = msgspec.json.decode(message.data, type=kind)
-            except msgspec.ValidationError as e:
-                raise InvalidData(f"The server's answer to {name} has a wrong form.", str(e)) from e
+            message = await wire.ask(name, args, False, self._timeout)
+        except (Unsent, Unanswered):
+            await wire.closed.wait()
+            raise wire.refused or ConnectionLost(f"The connection to {self._url} is closed.") from None
         if not message.result:
-            raise RequestFailed(name, message.messages, data)
+            raise refusal(name, message.messages, reason=message.code)
+
+    async def _keep(self) -> None:
+        """Join again whenever the connection is lost, until the client is closed or not let in any more."""
+        while self._wire is not None:
+            wire = self._wire
+            await wire.closed.wait()
+            self._joined.clear()
+            self._lost_at = time.monotonic()
+            await wire.close()
+            refused = wire.refused
+            if refused is not None or not self._reconnect:
+                self._finish(refused, refused or ConnectionLost(f"The connection to {self._url} is closed."))
+                return
+            pause = FIRST_PAUSE
+            while True:
+                await asyncio.sleep(pause * random.uniform(0.5, 1.0))
+                try:
+                    await self._join(gap=True)
+                except NotAdmitted as error:
+                    self._finish(error, error)
+                    return
+                except (ConnectionLost, DeviceTimeout, RequestFailed):
+                    # Refused: the server may hold our old connection for alive, and the name for taken, for a while.
+                    pause = min(2 * pause, LONGEST_PAUSE)
+                else:
+                    break
+            self._joined.set()
+
+    # ------------------------------------------------------------------------------------------------ requests
+    async def call(self, name: str, args: Any = None, *, dry_run: bool = False, timeout: float | None = None) -> Any:
+        """Send a request and give its data, decoded as the protocol declares it. Better use its method.
+
+        Raises RequestFailed (a class of its own for each kind of reason), AnswerUnknown when the connection broke
+        after it was sent, AnswerLate when no answer came in time; NotConnected when there was no connection in time,
+        and ConnectionLost or NotAdmitted when there will be none: then nothing was sent.
+        """
+        limit = self._timeout if timeout is None else timeout
+        deadline = time.monotonic() + limit
+        while True:
+            wire = await self._connection(name, deadline, limit)
+            try:
+                message = await wire.ask(name, args, dry_run, max(deadline - time.monotonic(), 0.0))
+                break
+            except Unsent:
+                await wire.closed.wait()
+            except Unanswered:
+                await wire.closed.wait()
+                if not self._reconnect or not (name in READING or (dry_run and RPCS[name].dry_run)):
+                    raise AnswerUnknown(name, self._url) from None
+            except AnswerLate:
+                raise AnswerLate(name, limit) from None
+            await asyncio.sleep(0)  # the keeper notices, too
+        data = self._data(name, message)
+        if not message.result:
+            raise refusal(name, message.messages, data, message.code)
+        self._remember(args, dry_run)
         return data
 
-    async def events(self) -> AsyncIterator[Event]:
-        """Give the events as they come; ends when the connection does."""
-        while (event := await self._events.get()) is not _END:
-            yield event
-        self._events.put_nowait(_END)
+    async def _connection(self, name: str, deadline: float, limit: float) -> Wire:
+        while True:
+            try:
+                async with asyncio.timeout(max(deadline - time.monotonic(), 0.0)):
+                    if self._end is None:
+                        await self._joined.wait()
+            except TimeoutError:
+                raise NotConnected(
+                    f"There was no connection to {self._url} within {limit:g} s: {name} was not sent."
+                ) from None
+            if self._end is not None:
+                raise self._end.with_traceback(None)
+            wire = self._wire
+            if wire is not None and not wire.closed.is_set():
+                return wire
+            await asyncio.sleep(0.001)  # lost this moment: the keeper is about to notice
+
+    def _data(self, name: str, message: Message) -> Any:
+        if isinstance(message.data, Unset):
+            return None
+        declared = RPCS.get(name)
+        kind = Any if declared is None or declared.data is None else declared.data
+        try:
+            return msgspec.json.decode(message.data, type=kind)
+        except msgspec.ValidationError as e:
+            raise InvalidData(f"The server's answer to {name} has a wrong form.", str(e)) from e
+
+    def _remember(self, args: Any, dry_run: bool) -> None:
+        """Keep what has to be said again after a loss."""
+        if dry_run:
+            return
+        match args:
+            case RegisterUserArgs(user_name=name):
+                self._user_name = name
+            case AuthenticateArgs(token=token):
+                self._token = token
+            case SubscribeEventsArgs(events=names, send=True):
+                self._subscribed |= names
+            case SubscribeEventsArgs(events=names):
+                self._subscribed -= names
+            case RegisterForRobotEventArgs(send=True):
+                self._robots[args.robot_id, args.what] = args
+            case RegisterForRobotEventArgs():
+                self._robots.pop((args.robot_id, args.what), None)
+
+    # ------------------------------------------------------------------------------------------------ events
+    def events(self) -> EventStream[Event]:
+        """Give the client's own stream: all events since it was opened (the newest 10,000 of those not taken)."""
+        return self._own
+
+    def _follow(self, names: frozenset[str], limit: int) -> EventStream[Any]:
+        stream: EventStream[Any] = EventStream(names, limit, self._streams.remove)
+        self._streams.append(stream)
+        if self._end is not None:
+            stream.end(self._end if isinstance(self._end, NotAdmitted) else None)
+        return stream
 
     async def next_event(self, *names: str, timeout: float = ANSWER_TIMEOUT) -> Event:
-        """Give the next event with one of the names, dropping others; any event when no name is given."""
+        """Give the next event of the own stream with one of the names, dropping others; any when no name is given.
+
+        Raises DeviceTimeout, EventsMissed, ConnectionLost when the stream ended.
+        """
         try:
             async with asyncio.timeout(timeout):
-                async for event in self.events():
+                async for event in self._own:
                     if not names or event.event in names:
                         return event
         except TimeoutError:

@@ -114,7 +114,7 @@ class Cell:
     # ------------------------------------------------------------------------------------------------ hands
     async def client(self, name: str) -> Client:
         """A connected, registered client that is closed with the cell."""
-        return await self._exit.enter_async_context(Client(self.url, name))
+        return await self._exit.enter_async_context(Client(self.url, name, reconnect=False))
 
     async def tell(self, name: str, do: str, **arguments: Any) -> Any:
         """Tell a fake over its control channel."""

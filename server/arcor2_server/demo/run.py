@@ -127,7 +127,7 @@ class Demo:
             settings |= fake.settings(ready)
         problem: Arcor2Error | None = None
         outcome = Outcome()
-        async with Client(server_at, "demo") as client:
+        async with Client(server_at, "demo", reconnect=False) as client:
             poll = asyncio.create_task(self._display.follow_devices(server_at, DEVICE_POLL))
             try:
                 await self._cycle(client, settings, outcome)

@@ -80,7 +80,7 @@ async def _scene(owner: Client):  # type: ignore[no-untyped-def]
 async def _edit(url: str, number: int, point: str, scene, acknowledged: list[str]) -> None:  # type: ignore[no-untyped-def]
     seconds = [ActionParameter("seconds", "double", "0.5")]
     try:
-        async with Client(url, f"editor{number}") as client:
+        async with Client(url, f"editor{number}", reconnect=False) as client:
             for count in range(1_000_000):
                 name = f"e{number}_{count}"
                 action = AddActionArgs(point, name, f"{scene.objects[0].id}/sleep", seconds, [Flow()])

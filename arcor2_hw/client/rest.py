@@ -1,0 +1,308 @@
+"""What a server offers over HTTP: saved documents, assets and packages, typed."""
+
+import re
+import ssl
+from functools import lru_cache
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Self, TypeVar
+
+import httpx
+import msgspec
+from msgspec import UNSET
+
+from arcor2_hw.client.errors import STATUSES, RequestFailed
+from arcor2_hw.data.base import Data, Timestamp, Unset
+from arcor2_hw.data.object_type import Model3dType, Models, ObjectTypeSource
+from arcor2_hw.data.project import Project, ProjectParameter
+from arcor2_hw.data.scene import Scene, SceneObjectOverride
+from arcor2_hw.exceptions import ConnectionLost, DeviceTimeout, InvalidData
+
+T = TypeVar("T")
+_HUMP: Final = re.compile(r"(?<=[a-z0-9])([A-Z])")
+_MODELS: Final = {kind.__name__.lower(): kind for kind in Models.__args__}
+
+
+class Listed(Data, frozen=True):
+    """One entry of a list of documents."""
+
+    id: str
+    name: str
+    created: Timestamp
+    modified: Timestamp
+    description: str | Unset = UNSET
+
+
+class Asset(Data, frozen=True):
+    """What is known of an asset: a mesh, or a robot's description."""
+
+    id: str
+    created: Timestamp
+    modified: Timestamp
+    file_name: str | Unset = UNSET
+    description: str | Unset = UNSET
+
+
+class ModelName(Data, frozen=True):
+    """Names a collision model and its kind."""
+
+    id: str
+    type: Model3dType
+
+
+class ImportedIds(Data, frozen=True):
+    """Where the content of an imported package is now."""
+
+    scene_id: str
+    project_id: str
+
+
+class _Type(Data, frozen=True):
+    id: str
+    name: str
+    source: str
+    description: str | Unset = UNSET
+    model: ModelName | Unset = UNSET
+    created: Timestamp | Unset = UNSET
+    modified: Timestamp | Unset = UNSET
+
+
+class _Sources(Data, frozen=True):
+    id: str
+    script: str
+
+
+@lru_cache(maxsize=4096)
+def _snake(name: str) -> str:
+    return _HUMP.sub(r"_\1", name).lower()
+
+
+def _snaked(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {_snake(key): _snaked(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_snaked(item) for item in value]
+    return value
+
+
+def _part(key: str) -> str:
+    """Write an id as a part of a path."""
+    return httpx.URL("").copy_with(path=f"/{key}").raw_path.decode()[1:].replace("/", "%2F").replace("?", "%3F")
+
+
+class Rest:
+    """Requests over HTTP. Use it as `async with Rest(url) as rest`, or take `client.rest`.
+
+    Each raises RequestFailed (a class of its own for each kind of reason), ConnectionLost, DeviceTimeout, InvalidData
+    for an answer of a wrong form. Nothing is repeated by itself.
+    """
+
+    def __init__(
+        self, url: str, *, token: str | None = None, tls: ssl.SSLContext | None = None, timeout: float = 30.0
+    ) -> None:
+        self._url = url.replace("ws://", "http://", 1).replace("wss://", "https://", 1).rstrip("/")
+        self._http = httpx.AsyncClient(
+            base_url=self._url,
+            headers={} if token is None else {"Authorization": f"Bearer {token}"},
+            verify=True if tls is None else tls,
+            timeout=timeout,
+        )
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self.close()
+
+    async def close(self) -> None:
+        """Close the connections."""
+        await self._http.aclose()
+
+    # ------------------------------------------------------------------------------------------------ requests
+    async def request(self, method: str, path: str, kind: type[T] | Any = Any, *, body: Any = UNSET, **more: Any) -> T:
+        """Ask for a path and give the JSON answer as `kind`; `body` is sent as JSON, `more` goes to httpx."""
+        if body is not UNSET:
+            more["content"] = msgspec.json.encode(body)
+            more["headers"] = {"Content-Type": "application/json"}
+        answer = await self._send(method, path, **more)
+        try:
+            return msgspec.convert(_snaked(msgspec.json.decode(answer.content)), kind)
+        except msgspec.MsgspecError as error:
+            raise InvalidData(f"The answer of {self._url}{path} has a wrong form.", str(error)) from error
+
+    async def _send(self, method: str, path: str, **more: Any) -> httpx.Response:
+        try:
+            answer = await self._http.request(method, path, **more)
+        except httpx.TimeoutException as error:
+            raise DeviceTimeout(f"{self._url} did not answer {method} {path} in time.", str(error)) from error
+        except (httpx.HTTPError, httpx.InvalidURL) as error:
+            raise ConnectionLost(f"No server answers at {self._url}: {error}", str(error)) from error
+        if not answer.is_success:
+            raise _refusal(f"{method} {path}", answer.status_code, answer.content)
+        return answer
+
+    async def _file(self, path: str, target: Path, **more: Any) -> None:
+        """Stream an answer into a file, which appears whole or not at all."""
+        partial = target.with_name(f".{target.name}.part")
+        try:
+            async with self._http.stream("GET", path, **more) as answer:
+                if not answer.is_success:
+                    raise _refusal(f"GET {path}", answer.status_code, await answer.aread())
+                with partial.open("wb") as file:
+                    async for chunk in answer.aiter_bytes():
+                        file.write(chunk)
+            partial.replace(target)
+        except httpx.TimeoutException as error:
+            raise DeviceTimeout(f"{self._url} did not send {path} in time.", str(error)) from error
+        except httpx.HTTPError as error:
+            raise ConnectionLost(f"{self._url} did not send all of {path}: {error}", str(error)) from error
+        finally:
+            partial.unlink(missing_ok=True)
+
+    # ------------------------------------------------------------------------------------------------ scenes
+    async def scenes(self) -> list[Listed]:
+        """List the saved scenes."""
+        return await self.request("GET", "/scenes", list[Listed])
+
+    async def scene(self, key: str) -> Scene:
+        """Give a saved scene."""
+        return await self.request("GET", f"/scenes/{_part(key)}", Scene)
+
+    async def put_scene(self, scene: Scene) -> None:
+        """Save a scene, new or changed."""
+        await self.request("PUT", "/scenes", body=scene)
+
+    # ------------------------------------------------------------------------------------------------ projects
+    async def projects(self) -> list[Listed]:
+        """List the saved projects."""
+        return await self.request("GET", "/projects", list[Listed])
+
+    async def project(self, key: str) -> Project:
+        """Give a saved project."""
+        return await self.request("GET", f"/projects/{_part(key)}", Project)
+
+    async def put_project(self, project: Project) -> None:
+        """Save a project, new or changed; its scene has to be saved."""
+        await self.request("PUT", "/projects", body=project)
+
+    async def project_script(self, key: str) -> str:
+        """Give the script of a project that was written by hand. NothingThere when it has none."""
+        return (await self.request("GET", f"/projects/{_part(key)}/sources", _Sources)).script
+
+    async def put_project_script(self, key: str, script: str) -> None:
+        """Save the script of a project."""
+        await self.request("PUT", "/projects/sources", body=_Sources(key, script))
+
+    async def kept_parameters(self, key: str) -> list[ProjectParameter]:
+        """Give the parameters that are kept beside a project; those inside of it are in the project."""
+        return await self.request("GET", f"/projects/{_part(key)}/parameters", list[ProjectParameter])
+
+    async def put_kept_parameters(self, key: str, parameters: list[ProjectParameter]) -> None:
+        """Keep parameters beside a project."""
+        await self.request("PUT", f"/projects/{_part(key)}/parameters", body=parameters)
+
+    async def kept_overrides(self, key: str) -> list[SceneObjectOverride]:
+        """Give the overrides of objects' settings that are kept beside a project."""
+        return await self.request("GET", f"/projects/{_part(key)}/object-parameters", list[SceneObjectOverride])
+
+    async def put_kept_overrides(self, key: str, overrides: list[SceneObjectOverride]) -> None:
+        """Keep overrides beside a project."""
+        await self.request("PUT", f"/projects/{_part(key)}/object-parameters", body=overrides)
+
+    # ------------------------------------------------------------------------------------------------ object types
+    async def object_types(self) -> list[Listed]:
+        """List the object types that were brought in; installed ones are not among them."""
+        return await self.request("GET", "/object-types", list[Listed])
+
+    async def object_type(self, name: str) -> ObjectTypeSource:
+        """Give an object type that was brought in, without its model."""
+        one: _Type = await self.request("GET", f"/object-types/{_part(name)}", _Type)
+        return ObjectTypeSource(one.id, one.source, one.description, created=one.created, modified=one.modified)
+
+    async def put_object_type(self, name: str, source: str, model: Models | None = None) -> None:
+        """Bring in an object type, new or changed; its model has to be saved before."""
+        named = UNSET if model is None else ModelName(name, model.type())
+        await self.request("PUT", "/object-types", body=_Type(name, name, source, model=named))
+
+    async def delete_object_type(self, name: str) -> None:
+        """Take an object type out."""
+        await self.request("DELETE", f"/object-types/{_part(name)}")
+
+    async def models(self) -> list[ModelName]:
+        """List the collision models; each is named after its object type."""
+        return await self.request("GET", "/models", list[ModelName])
+
+    async def model(self, name: ModelName) -> Models:
+        """Give a collision model."""
+        kind = name.type.value.lower()
+        given: Models = await self.request("GET", f"/models/{_part(name.id)}/{kind}", _MODELS[kind])
+        return given
+
+    async def put_model(self, model: Models) -> None:
+        """Save a collision model, in place of whatever has its id."""
+        await self.request("PUT", f"/models/{model.type().value.lower()}", body=model)
+
+    # ------------------------------------------------------------------------------------------------ assets
+    async def assets(self) -> list[Asset]:
+        """List the assets."""
+        return await self.request("GET", "/assets/info", list[Asset])
+
+    async def download_asset(self, key: str, target: Path) -> None:
+        """Write the content of an asset into a file."""
+        await self._file(f"/assets/{_part(key)}/data", target)
+
+    async def upload_asset(
+        self, key: str, content: Path | bytes, *, file_name: str = "", replace: bool = False
+    ) -> Asset:
+        """Save an asset, streamed when it is a file; one of that id is replaced only with `replace`."""
+        name = file_name or (content.name if isinstance(content, Path) else key)
+        query = {"id": key, "upsert": str(replace).lower()}
+        asset: Asset = await self._upload("POST", "/assets", "assetData", name, content, query, Asset)
+        return asset
+
+    # ------------------------------------------------------------------------------------------------ packages
+    async def publish(self, project_id: str, target: Path, package_name: str = "") -> None:
+        """Build a saved project and write its package into a file."""
+        named = {"packageName": package_name} if package_name else {}
+        await self._file("/project/publish", target, params={"projectId": project_id} | named)
+
+    async def import_package(self, content: Path | bytes, **overwrite: bool) -> ImportedIds:
+        """Save the scene, project and object types of a package.
+
+        `overwrite`: overwrite_scene, overwrite_project, overwrite_object_types, overwrite_project_sources,
+        overwrite_collision_models, update_project_from_script. Raises InTheWay naming all that differs from what is
+        saved.
+        """
+        query = {name: str(value).lower() for name, value in overwrite.items()}
+        ids: ImportedIds = await self._upload(
+            "PUT", "/project/import", "executionPackage", "package.zip", content, query, ImportedIds
+        )
+        return ids
+
+    async def download_package(self, package_id: str, target: Path) -> None:
+        """Write a package into a file."""
+        await self._file(f"/packages/{_part(package_id)}", target)
+
+    async def upload_package(self, package_id: str, content: Path | bytes) -> None:
+        """Take in a package, in place of one of that id."""
+        await self._upload(
+            "POST", f"/packages/{_part(package_id)}", "executionPackage", "package.zip", content, {}, Any
+        )
+
+    async def _upload(
+        self, method: str, path: str, part: str, name: str, content: Path | bytes, query: dict[str, str], kind: Any
+    ) -> Any:
+        if isinstance(content, bytes):
+            return await self.request(method, path, kind, params=query, files={part: (name, content)})
+        with content.open("rb") as file:
+            return await self.request(method, path, kind, params=query, files={part: (name, file)})
+
+
+def _refusal(request: str, status: int, content: bytes) -> RequestFailed:
+    try:
+        text = str(msgspec.json.decode(content, type=dict[str, Any])["message"])
+    except (msgspec.MsgspecError, KeyError):
+        text = f"{request} is answered {status}."
+    return STATUSES.get(status, RequestFailed)(request, [text], reason=str(status))

@@ -1,0 +1,106 @@
+"""The generated methods: current, one for each request, and with the defaults of the Structs."""
+
+import inspect
+from typing import Any
+
+import msgspec
+import pytest
+from msgspec import UNSET
+
+from arcor2_hw.client import generating
+from arcor2_hw.client.connection import READING
+from arcor2_hw.client.requests import Requests
+from arcor2_hw.data.events import EVENTS
+from arcor2_hw.data.geometry import Position
+from arcor2_hw.data.project import Action, Project
+from arcor2_hw.data.rpc import RPCS
+
+
+class Recorder(Requests):
+    """Keeps what would be sent."""
+
+    def __init__(self) -> None:
+        self.sent: list[tuple[str, Any, bool]] = []
+
+    async def call(self, name: str, args: Any = None, *, dry_run: bool = False, timeout: float | None = None) -> Any:
+        self.sent.append((name, args, dry_run))
+        return None
+
+    def _follow(self, names: frozenset[str], limit: int) -> Any:
+        return names, limit
+
+
+def test_the_file_is_what_the_structs_say() -> None:
+    assert generating.FILE.read_text() == generating.source(), "run python -m arcor2_hw.client.generating"
+
+
+def test_there_is_a_method_for_every_request_and_no_other() -> None:
+    methods = {name for name, _ in inspect.getmembers(Requests, inspect.iscoroutinefunction)} - {"call"}
+    assert methods == {generating.snake(name) for name in RPCS}
+    assert generating.snake("AddApUsingRobot") == "add_ap_using_robot"
+
+
+@pytest.mark.parametrize("rpc", RPCS.values(), ids=lambda rpc: rpc.name)
+async def test_arguments_arrive_and_what_is_left_out_is_as_the_struct_has_it(rpc: Any) -> None:
+    client = Recorder()
+    method = getattr(client, generating.snake(rpc.name))
+    given: dict[str, Any] = {}
+    is_struct = isinstance(rpc.args, type) and issubclass(rpc.args, msgspec.Struct)
+    if is_struct:
+        required = [f.name for f in msgspec.structs.fields(rpc.args) if f.required]
+        given = {name: object() for name in required}
+        expected: Any = rpc.args(**given)
+    elif rpc.args is not None:
+        given, expected = {"items": {"a"}}, {"a"}
+    else:
+        expected = None
+    await method(**given)
+    assert client.sent == [(rpc.name, expected, False)]
+    assert ("dry_run" in inspect.signature(method).parameters) == rpc.dry_run
+
+
+async def test_every_argument_reaches_the_field_of_its_name() -> None:
+    client = Recorder()
+    for rpc in RPCS.values():
+        if not (isinstance(rpc.args, type) and issubclass(rpc.args, msgspec.Struct)):
+            continue
+        fields = msgspec.structs.fields(rpc.args)
+        given: dict[str, Any] = {
+            f.name: [object()] if f.default_factory is list else {object()} if f.default_factory is set else object()
+            for f in fields
+        }
+        await getattr(client, generating.snake(rpc.name))(**given)
+        assert client.sent[-1][1] == rpc.args(**given), rpc.name
+
+
+def test_streams_know_their_names() -> None:
+    client: Any = Recorder()
+    assert client.follow("SceneState", limit=5) == ({"SceneState"}, 5)
+    with pytest.raises(ValueError, match="SceneStat$"):
+        client.follow("SceneState", "SceneStat")
+    text = generating.FILE.read_text()
+    assert all(f'Literal["{name}"]' in text for name in EVENTS)
+
+
+def test_what_is_asked_again_reads_and_touches_no_device() -> None:
+    assert RPCS.keys() >= READING
+    assert not any(RPCS[name].dry_run for name in READING)
+    assert all(
+        name.startswith(("Get", "List", "History", "SystemInfo")) or name.endswith(("Usage", "Scene"))
+        for name in READING
+    )
+
+
+def test_a_struct_that_cannot_be_written_is_refused() -> None:
+    names = generating._Names()
+
+    class Odd(msgspec.Struct):
+        field: dict[str, str] = msgspec.field(default_factory=dict)
+
+    with pytest.raises(TypeError, match=r"Odd\.field"):
+        generating._fields(names, Odd)
+    assert names.of(list[Action] | None) == "list[Action] | None"
+    assert names.of(dict[str, Project | Any]) == "dict[str, Project | Any]"
+    assert generating._default(names, UNSET) == "UNSET"
+    with pytest.raises(TypeError):
+        generating._default(names, Position(0.0, 0.0, 0.0))

@@ -1,0 +1,95 @@
+"""The stream of events by itself: order, filter, room, and what is missing is told where it is missing."""
+
+import asyncio
+
+import pytest
+
+from arcor2_hw.client import EventsMissed, EventStream, NotAdmitted
+from arcor2_hw.data.events import Event
+
+
+def stream(*names: str, limit: int = 3) -> EventStream[Event]:
+    return EventStream(frozenset(names), limit)
+
+
+async def taken(from_stream: EventStream[Event]) -> list[str]:
+    return [event.event async for event in from_stream]
+
+
+async def test_events_come_in_order_and_the_end_after_them() -> None:
+    told = stream()
+    for name in "abc":
+        told.put(Event(name))
+    told.end()
+    told.put(Event("late"))
+    assert await taken(told) == ["a", "b", "c"]
+    assert await taken(told) == []
+
+
+async def test_only_the_names_that_are_followed_take_room() -> None:
+    told = stream("a", limit=2)
+    for name in "bababb":
+        told.put(Event(name))
+    told.end()
+    assert await taken(told) == ["a", "a"]
+
+
+async def test_what_found_no_room_is_counted_before_what_is_left() -> None:
+    told = stream(limit=3)
+    for number in range(8):
+        told.put(Event(str(number)))
+    told.end()
+    with pytest.raises(EventsMissed) as missed:
+        await anext(told)
+    assert (missed.value.dropped, missed.value.rejoined) == (5, False)
+    assert await taken(told) == ["5", "6", "7"]
+
+
+async def test_a_gap_stands_where_it_was_and_two_become_one() -> None:
+    told = stream(limit=5)
+    told.put(Event("before"))
+    told.put(EventsMissed(rejoined=True, seconds=1.0, not_resumed=("joints of r",)))
+    told.put(EventsMissed(rejoined=True, seconds=2.0))
+    told.put(Event("after"))
+    assert (await anext(told)).event == "before"
+    with pytest.raises(EventsMissed, match=r"lost for 3\.0 s") as missed:
+        await anext(told)
+    assert missed.value.not_resumed == ()
+    assert (await anext(told)).event == "after"
+
+
+async def test_a_gap_that_found_no_room_is_not_forgotten() -> None:
+    told = stream(limit=2)
+    told.put(Event("1"))
+    told.put(EventsMissed(rejoined=True, seconds=1.5))
+    for name in "23":
+        told.put(Event(name))
+    with pytest.raises(EventsMissed) as missed:
+        await anext(told)
+    assert (missed.value.dropped, missed.value.rejoined, missed.value.seconds) == (1, True, 1.5)
+    assert (await anext(told)).event == "2"
+
+
+async def test_a_reader_who_gives_up_waiting_loses_nothing() -> None:
+    told = stream()
+    for _ in range(3):
+        with pytest.raises(TimeoutError):
+            async with asyncio.timeout(0.01):
+                await anext(told)
+    told.put(Event("a"))
+    assert (await anext(told)).event == "a"
+
+
+async def test_why_it_ended_is_raised_after_what_still_waits() -> None:
+    told = stream()
+    told.put(Event("a"))
+    told.end(NotAdmitted("no"))
+    assert (await anext(told)).event == "a"
+    for _ in range(2):
+        with pytest.raises(NotAdmitted):
+            await anext(told)
+
+
+def test_a_stream_without_room_makes_no_sense() -> None:
+    with pytest.raises(ValueError, match="room"):
+        stream(limit=0)
