@@ -126,3 +126,15 @@ class RunRow(Base):
 
     number: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=False)
     document: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class CalibrationRow(Base):
+    """The record of one calibration, as JSON."""
+
+    __tablename__ = "calibration"
+
+    id: Mapped[str] = mapped_column(String(255), primary_key=True)
+    date: Mapped[str] = mapped_column(String(40), index=True)
+    kind: Mapped[str] = mapped_column(String(40))
+    object_id: Mapped[str] = mapped_column(String(255), index=True)
+    document: Mapped[bytes] = mapped_column(LargeBinary)
