@@ -269,11 +269,12 @@ class PackageStateData(Data, frozen=True):
 
 
 class ProjectExceptionData(Data, frozen=True):
-    """What the event ProjectException carries."""
+    """What the event ProjectException carries; action_id: in which action it was, beside the protocol."""
 
     message: str
     type: str
     handled: bool = False
+    action_id: str | Unset = UNSET
 
 
 class ObjectStateData(Data, frozen=True):

@@ -61,7 +61,8 @@ class OpenScene(ToHost, frozen=True):
 class RunPackage(ToHost, frozen=True):
     """Run script.py of a package directory. The script's life is told by ProgramChanged and ProgramEvent.
 
-    cell: the settings of devices at this place, which win over those of the package.
+    cell: the settings of devices at this place, which win over those of the package. breakpoints: ids of action points
+    and actions, which must be there. shared_breakpoints: more of them, left out where the project lacks them.
     """
 
     package_id: str
@@ -70,6 +71,7 @@ class RunPackage(ToHost, frozen=True):
     breakpoints: list[str] = field(default_factory=list)
     streaming_period: float = 0.1
     cell: Cell | None = None
+    shared_breakpoints: list[str] = field(default_factory=list)
 
 
 class Call(ToHost, frozen=True):
@@ -113,6 +115,12 @@ class Resume(ToHost, frozen=True):
 
 class Step(ToHost, frozen=True):
     """Go on for one action."""
+
+
+class SetBreakpoints(ToHost, frozen=True):
+    """Pause from now on where RunPackage said, and at these shared breakpoints."""
+
+    shared_breakpoints: list[str]
 
 
 class StopProgram(ToHost, frozen=True):
@@ -183,6 +191,29 @@ class ProgramEvent(ToServer, frozen=True):
     encoded: bytes
 
 
+class ActionBegan(ToServer, frozen=True):
+    """An action of the program was let begin. `number` counts them from 1; `started`: seconds since the epoch.
+
+    action_id is empty in a program whose project knows no actions; `name` is the action's, else what is called.
+    """
+
+    number: int
+    action_id: str
+    name: str
+    started: float
+    parameters: list[str] = field(default_factory=list)
+    thread_id: int | None = None
+
+
+class ActionEnded(ToServer, frozen=True):
+    """An action has ended after `duration` s, with its results or an error."""
+
+    number: int
+    duration: float
+    results: list[str] = field(default_factory=list)
+    error: str = ""
+
+
 class ProgramChanged(ToServer, frozen=True):
     """The program is now running, pausing, paused, or has ended (`stopped`).
 
@@ -213,7 +244,19 @@ class LogLine(ToServer, frozen=True):
     object_id: str = ""
 
 
-HostBound = OpenScene | RunPackage | Call | StopMotion | Subscribe | Pause | Resume | Step | StopProgram | CloseScene
+HostBound = (
+    OpenScene
+    | RunPackage
+    | Call
+    | StopMotion
+    | Subscribe
+    | Pause
+    | Resume
+    | Step
+    | SetBreakpoints
+    | StopProgram
+    | CloseScene
+)
 ServerBound = (
     Ready
     | Heartbeat
@@ -224,6 +267,8 @@ ServerBound = (
     | CallFailed
     | StreamEvent
     | ProgramEvent
+    | ActionBegan
+    | ActionEnded
     | ProgramChanged
     | DeviceChanged
     | LogLine

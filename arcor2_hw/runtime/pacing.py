@@ -70,10 +70,15 @@ class Gate:
             self._changed.notify_all()
 
     # -------------------------------------------------------------------------------- actions
-    def before(self, action_points: Set[str] = frozenset()) -> None:
-        """Wait for leave to begin an action that uses these action points. Raises ProgramStopped."""
+    def set_breakpoints(self, breakpoints: Set[str]) -> None:
+        """Pause at other ids from the next action on."""
         with self._changed:
-            if (self._mode is _Mode.STEP and not self._steps) or not self._breakpoints.isdisjoint(action_points):
+            self._breakpoints = breakpoints
+
+    def before(self, ids: Set[str] = frozenset()) -> None:
+        """Wait for leave to begin an action; `ids`: its own, and of its action points. Raises ProgramStopped."""
+        with self._changed:
+            if (self._mode is _Mode.STEP and not self._steps) or not self._breakpoints.isdisjoint(ids):
                 self._mode = _Mode.PAUSE
             self._wait()
             if self._mode is _Mode.STEP:

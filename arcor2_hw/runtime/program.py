@@ -1,6 +1,8 @@
 """A program while it runs: what is told of its actions, how it is paced, how it is stopped."""
 
+import itertools
 import threading
+import time
 import traceback
 from collections.abc import Sequence, Set
 from typing import Any, Final, Protocol
@@ -21,6 +23,7 @@ from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, InvalidData, NotFo
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.device import STOP_DEADLINE, Device, describe
 from arcor2_hw.runtime.lane import Job
+from arcor2_hw.runtime.messages import ActionBegan, ActionEnded
 from arcor2_hw.runtime.pacing import Gate
 from arcor2_hw.runtime.values import encode_shown, results
 
@@ -41,6 +44,20 @@ class Channel(Protocol):
     def changed(self, state: str) -> None:
         """Tell that the program is running or paused now."""
 
+    def action(self, told: ActionBegan | ActionEnded) -> None:
+        """Tell that an action was let begin, or has ended."""
+
+
+class Action:
+    """One call of an action. `id` is None in a project that knows no actions."""
+
+    __slots__ = ("began", "id", "number")
+
+    def __init__(self, number: int, action_id: str | None) -> None:
+        self.number = number
+        self.id = action_id
+        self.began = 0.0
+
 
 class Program:
     """One run. `stop` comes from another thread, all else from the script's threads."""
@@ -52,6 +69,7 @@ class Program:
         *,
         start_paused: bool = False,
         breakpoints: Set[str] = frozenset(),
+        shared_breakpoints: Set[str] = frozenset(),
         here: CellFile | None = None,
     ) -> None:
         self.channel = channel
@@ -64,7 +82,7 @@ class Program:
             channel.changed,
             lambda: self.cell.wait_still(STILL_WITHIN),
             start_paused=start_paused,
-            breakpoints=self.breakpoints,
+            breakpoints=self.breakpoints | shared_breakpoints,
         )
         self.stop_requested = False
         self.ended = False
@@ -73,6 +91,7 @@ class Program:
         """The script's main thread is in our code, where an exception out of nowhere would do harm."""
         self.error: BaseException | None = None
         self._blamed: tuple[BaseException, Device] | None = None
+        self._failed: tuple[BaseException, Action] | None = None
         self._main = threading.main_thread()
         self._telling = threading.Lock()
         self._device_lost = False
@@ -80,14 +99,15 @@ class Program:
         self._stop_sent = threading.Event()
         self._action_ids: dict[str, str] = {}
         self._joints_points: dict[str, str] = {}
+        self._numbers = itertools.count(1)
 
     # -------------------------------------------------------------------------------- the project
     def load(self, project: Project) -> None:
-        """Take the names of actions and points from the project; NotFound for a breakpoint that is no action point."""
+        """Take the names of actions and points from the project; NotFound for a breakpoint that it does not have."""
         self._action_ids = {a.name: a.id for point in project.action_points for a in point.actions}
         self._joints_points = {j.id: point.id for point in project.action_points for j in point.robot_joints}
-        if unknown := self.breakpoints - {point.id for point in project.action_points}:
-            raise NotFound(f"a breakpoint is set on {', '.join(sorted(unknown))}, which is no action point")
+        if unknown := self.breakpoints.difference((p.id for p in project.action_points), self._action_ids.values()):
+            raise NotFound(f"a breakpoint is set on {', '.join(sorted(unknown))}, which is no action point or action")
 
     def started(self, info: PackageInfoData) -> None:
         """Tell that everything is up and the first action follows."""
@@ -116,8 +136,12 @@ class Program:
                 points.add(known)
         return points
 
-    def action_begins(self, what: str, name: str | None, arguments: Sequence[Any]) -> str | None:
-        """Tell that action `name` begins, and wait for leave; gives its id, None in a project without actions.
+    def set_shared_breakpoints(self, ids: Set[str]) -> None:
+        """Pause from now on at these, beside those that were asked for at the start."""
+        self.gate.set_breakpoints(self.breakpoints | ids)
+
+    def action_begins(self, what: str, name: str | None, arguments: Sequence[Any]) -> Action:
+        """Tell that action `name` begins, and wait for leave.
 
         Raises InvalidData when the project knows no such action, ProgramStopped.
         """
@@ -130,25 +154,36 @@ class Program:
             if action_id is None:
                 raise InvalidData(f"{what}: the project has no action named {name!r}")
         points = self.points_of(arguments)
+        thread = None if self.in_main_thread else threading.get_ident()
+        parameters = [encode_shown(argument) for argument in arguments]
         data = ActionStateBeforeData(
             msgspec.UNSET if action_id is None else action_id,
-            [encode_shown(argument) for argument in arguments] if arguments else msgspec.UNSET,
+            parameters or msgspec.UNSET,
             points or msgspec.UNSET,
-            msgspec.UNSET if self.in_main_thread else threading.get_ident(),
+            msgspec.UNSET if thread is None else thread,
         )
         self.channel.event("ActionStateBefore", _encode(Event("ActionStateBefore", data=data)))
-        self.gate.before(points)
-        return action_id
+        self.gate.before(points if action_id is None else points | {action_id})
+        action = Action(next(self._numbers), action_id)
+        self.channel.action(ActionBegan(action.number, action_id or "", name or what, time.time(), parameters, thread))
+        action.began = time.monotonic()
+        return action
 
-    def action_ended(self, action_id: str | None, value: Any) -> None:
+    def action_ended(self, action: Action, value: Any) -> None:
         """Tell that an action has ended with a result, and wait for leave to go on. Raises ProgramStopped."""
-        if action_id is not None:
-            data = ActionStateAfterData(action_id, results(value) or msgspec.UNSET)
+        duration = time.monotonic() - action.began
+        given = results(value)
+        self.channel.action(ActionEnded(action.number, duration, given))
+        if action.id is not None:
+            data = ActionStateAfterData(action.id, given or msgspec.UNSET)
             self.channel.event("ActionStateAfter", _encode(Event("ActionStateAfter", data=data)))
         self.gate.after()
 
-    def action_failed(self) -> None:
+    def action_failed(self, action: Action, error: BaseException) -> None:
         """Say that an action is over without a result. Raises ProgramStopped."""
+        duration = time.monotonic() - action.began
+        self._failed = error, action
+        self.channel.action(ActionEnded(action.number, duration, error=str(error) or type(error).__name__))
         self.gate.after()
 
     def blame(self, device: Device, error: BaseException) -> None:
@@ -197,7 +232,10 @@ class Program:
         text = str(error) or type(error).__name__
         if self._blamed is not None and self._blamed[0] is error:
             text = str(describe(self._blamed[1], error))
-        data = ProjectExceptionData(text, type(error).__name__, isinstance(error, Arcor2Error))
+        action_id: str | msgspec.UnsetType = msgspec.UNSET
+        if self._failed is not None and self._failed[0] is error and self._failed[1].id is not None:
+            action_id = self._failed[1].id
+        data = ProjectExceptionData(text, type(error).__name__, isinstance(error, Arcor2Error), action_id)
         self.channel.event("ProjectException", _encode(Event("ProjectException", data=data)))
 
 

@@ -57,21 +57,21 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
 
     def run(an: str | None, arguments: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
         shown = _bind(bound, arguments, keywords) if keywords else arguments
-        action_id = program.action_begins(what, an, shown)
+        action = program.action_begins(what, an, shown)
         if an is not None:
             keywords["an"] = an
         try:
             value = lane.call(name, bound, arguments, keywords, deadline)
         except ProgramFinished:
-            program.action_ended(action_id, None)
+            program.action_ended(action, None)
             raise
         except BaseException as error:
-            program.action_failed()
+            program.action_failed(action, error)
             if program.stop_requested and isinstance(error, Exception):
                 raise ProgramStopped from error
             program.blame(device, error)
             raise
-        program.action_ended(action_id, value)
+        program.action_ended(action, value)
         return value
 
     def call(*arguments: Any, an: str | None = None, **keywords: Any) -> Any:

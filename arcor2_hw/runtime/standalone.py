@@ -14,6 +14,7 @@ import msgspec
 from arcor2_hw.data.events import Event, PackageStateData
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.exceptions import ProgramStopped
+from arcor2_hw.runtime.messages import ActionBegan, ActionEnded
 from arcor2_hw.runtime.program import Program
 from arcor2_hw.runtime.watch import Streams
 
@@ -31,6 +32,9 @@ class _Lines:
             sys.stdout.write(encoded.decode() + "\n")
             sys.stdout.flush()
 
+    def action(self, told: ActionBegan | ActionEnded) -> None:
+        pass  # the protocol's lines do not tell it
+
     def changed(self, state: str) -> None:
         self.event("PackageState", _encode(Event("PackageState", data=PackageStateData(PackageStateEnum(state)))))
 
@@ -38,7 +42,9 @@ class _Lines:
 def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description="Run the program of this package.")
     parser.add_argument("-p", "--pause", action="store_true", help="start paused, before the first action")
-    parser.add_argument("-b", "--breakpoints", default="", help="ids of action points to pause at, separated by commas")
+    parser.add_argument(
+        "-b", "--breakpoints", default="", help="ids of action points and actions to pause at, separated by commas"
+    )
     return parser.parse_known_args(arguments)[0]
 
 

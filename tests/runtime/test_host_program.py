@@ -271,6 +271,56 @@ def test_a_breakpoint_pauses_at_its_action_point(run: Run) -> None:
     assert run.host.expect_state("stopped").finished
 
 
+def test_a_breakpoint_pauses_before_its_action_and_shared_ones_may_be_unknown_and_change(run: Run) -> None:
+    run.directory = run.write(
+        'for _ in range(2):\n    arm.slow(0.0, an="a1")\n    arm.slow(0.0, an="a2")\n    arm.slow(0.0, an="a3")',
+        PROJECT,
+    )
+    run.host.send(
+        m.RunPackage("pkg_1", str(run.directory), False, ["act_a2"], 0.05, shared_breakpoints=["act_a3", "act_gone"])
+    )
+    for expected in ("act_a2", "act_a3"):
+        run.host.expect_state("paused")
+        assert run.told("ActionStateBefore")[-1]["action_id"] == expected
+        if expected == "act_a3":
+            run.host.send(m.SetBreakpoints(["act_a1"]))
+        run.host.send(m.Resume())
+    for expected in ("act_a1", "act_a2"):  # the second round: what was asked for at the start stays
+        run.host.expect_state("paused")
+        assert run.told("ActionStateBefore")[-1]["action_id"] == expected
+        run.host.send(m.Resume())
+    assert run.host.expect_state("stopped").finished
+
+
+def test_each_action_is_told_with_its_time_and_how_it_ended(run: Run) -> None:
+    run.start(
+        """
+        arm.slow(0.2, an="a1")
+        try:
+            arm.fail("odd", an="a2")
+        except ValueError:
+            pass
+        arm.fail("lost", an="a3")
+        """
+    )
+    before = time.time()
+    assert run.host.expect_state("stopped").error is not None
+    began = [e for e in run.host.seen if isinstance(e, m.ActionBegan)]
+    ended = [e for e in run.host.seen if isinstance(e, m.ActionEnded)]
+    assert [(e.number, e.action_id, e.name) for e in began] == [
+        (1, "act_a1", "a1"),
+        (2, "act_a2", "a2"),
+        (3, "act_a3", "a3"),
+    ]
+    assert (began[0].parameters, began[0].thread_id) == (["0.2"], None)
+    assert abs(began[0].started - before) < 10
+    assert [e.number for e in ended] == [1, 2, 3]
+    assert 0.2 <= ended[0].duration < 2
+    assert [e.error.rpartition(" ")[2] for e in ended] == ["", "odd", "cut"]
+    [told] = run.told("ProjectException")
+    assert told["action_id"] == "act_a3"
+
+
 def test_an_unknown_breakpoint_fails_the_start(run: Run) -> None:
     run.start('arm.slow(0.0, an="a1")', breakpoints=("acp_none",))
     ended = run.host.expect_state("stopped")

@@ -24,6 +24,7 @@ ADDED = {
     "RobotEef.Data": {"time_ms"},
     "RobotFeatures": {"jog", "acknowledge_stop"},
     "RobotJoints.Data": {"time_ms"},
+    "ProjectException.Data": {"action_id"},
     "RunPackage.Request.Args": {"shared_breakpoints"},
     "TemporaryPackage.Request.Args": {"shared_breakpoints"},
 }
