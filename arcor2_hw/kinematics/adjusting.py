@@ -1,0 +1,92 @@
+"""A description that follows the settings of an object, or the calibration of one arm."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from arcor2_hw.data.geometry import Orientation
+from arcor2_hw.kinematics.description import ORIGIN, Description, Geometry, Joint, Primitive, Setting
+from arcor2_hw.kinematics.errors import ModelError, ZeroLength
+from arcor2_hw.kinematics.shapes import Array
+
+_TINY: Final = 1e-6
+
+
+def with_settings(description: Description, values: Mapping[str, object]) -> Description:
+    """Let joints and links follow the settings that the description names; others are passed over.
+
+    Raises ModelError for a setting that is no finite number where one is needed, or limits that cross.
+    """
+    joints = {joint.name: joint for joint in description.joints}
+    links = dict(description.links)
+    for setting in description.settings:
+        if setting.name not in values:
+            continue
+        value = _number(description, setting, values[setting.name])
+        if setting.target == "joint":
+            joints[setting.of] = _adjusted(description, joints[setting.of], setting.component, value)
+        else:
+            ratio = value / _nominal(description, setting)
+            link = links[setting.of]
+            visual, collision = (
+                tuple(_stretched(each, ORIGIN.index(setting.component), ratio) for each in every)
+                for every in (link.visual, link.collision)
+            )
+            links[setting.of] = replace(link, visual=visual, collision=collision)
+    return replace(description, links=links, joints=tuple(joints.values()))
+
+
+def with_origins(description: Description, origins: Mapping[str, Array]) -> Description:
+    """Put joints elsewhere in their parent links, (4, 4) each, as a calibration says. Raises ModelError."""
+    if unknown := origins.keys() - {joint.name for joint in description.joints}:
+        raise ModelError(f"{description.name} has no joint {', '.join(sorted(unknown))}.")
+    moved = (replace(joint, origin=origins.get(joint.name, joint.origin)) for joint in description.joints)
+    return replace(description, joints=tuple(moved))
+
+
+def _number(description: Description, setting: Setting, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+        raise ModelError(f"{description.name}: {setting.name} must be a finite number, not {value!r}.")
+    return float(value)
+
+
+def _adjusted(description: Description, joint: Joint, component: str, value: float) -> Joint:
+    if component == "velocity":
+        return replace(joint, velocity=value)
+    if component in ("lower", "upper"):
+        lower, upper = (value, joint.upper) if component == "lower" else (joint.lower, value)
+        if lower > upper and component == "upper":  # the lower one has been set before, if it is
+            raise ModelError(f"{description.name}: the limits of {joint.name} cross: {lower:g} to {upper:g}.")
+        return replace(joint, lower=lower, upper=upper)
+    at = ORIGIN.index(component)
+    origin = joint.origin.copy()
+    if at < 3:
+        origin[at, 3] = value
+    else:
+        vector = [*Orientation.from_matrix(origin[:3, :3]).rotation_vector()]
+        vector[at - 3] = value
+        origin[:3, :3] = Orientation.from_rotation_vector(*vector).matrix()
+    return replace(joint, origin=origin)
+
+
+def _nominal(description: Description, setting: Setting) -> float:
+    """Give what a stretched link's setting is in the description itself: the joint's component that follows it too."""
+    for other in description.settings:
+        if other.target == "joint" and other.name == setting.name and other.component in ORIGIN[:3]:
+            joint = next(joint for joint in description.joints if joint.name == other.of)
+            value = float(joint.origin[ORIGIN.index(other.component), 3])
+            if abs(value) < _TINY:
+                raise ZeroLength(f"{description.name}: {setting.name} is zero, so that {setting.of} has no length.")
+            return value
+    raise ModelError(f"{description.name}: no joint follows {setting.name}, so that {setting.of} cannot either.")
+
+
+def _stretched(geometry: Geometry, axis: int, ratio: float) -> Geometry:
+    if not isinstance(geometry.what, Primitive) or geometry.what.kind != "box":
+        return geometry
+    origin = geometry.origin.copy()
+    origin[axis, 3] *= ratio
+    sizes = tuple(size * (ratio if at == axis else 1.0) for at, size in enumerate(geometry.what.sizes))
+    return replace(geometry, what=Primitive("box", sizes), origin=origin)

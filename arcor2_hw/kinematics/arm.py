@@ -1,0 +1,222 @@
+"""The chain from a robot's root to one end effector: where it is for joint values, how it moves, how well.
+
+Joint values are arrays in the order of `joint_names`, rad, m where prismatic; matrices are (4, 4) homogeneous, in the
+frame of the model's root link. Nothing here is safe for two threads at once.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from arcor2_hw.data import robot
+from arcor2_hw.data.base import Data
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.kinematics.description import EndEffector
+from arcor2_hw.kinematics.errors import ModelError
+from arcor2_hw.kinematics.shapes import Array
+
+if TYPE_CHECKING:
+    from arcor2_hw.kinematics.model import RobotModel
+
+NEAR_SINGULAR: Final = 0.02
+"""Smallest singular value, see `Dexterity`, below which a configuration counts as near a singularity: a wrist bent by
+1.6° less than it needs, where 10 mm/s at the tool ask for some 35°/s of a joint."""
+NEAR_LIMIT: Final = 0.05
+"""rad, or a twentieth of the range where that is shorter, from a limit within which a joint counts as near it."""
+
+
+class Step(NamedTuple):
+    """One joint of a chain: origin in the one before, axis (None: fixed), and which column of the model's joint values
+    moves it: value = factor * q[column] + offset."""
+
+    name: str
+    origin: Array
+    axis: Array | None
+    prismatic: bool
+    column: int
+    factor: float
+    offset: float
+
+
+def joint_model(axis: Array, prismatic: bool) -> Any:
+    """Give Pinocchio's joint about, or along, an axis."""
+    for number, letter in enumerate("XYZ"):
+        if axis[number] == 1.0:
+            return getattr(pin, f"JointModel{'P' if prismatic else 'R'}{letter}")()
+    return pin.JointModelPrismaticUnaligned(axis) if prismatic else pin.JointModelRevoluteUnaligned(axis)
+
+
+class Dexterity(Data, frozen=True):
+    """How well an arm moves in a configuration.
+
+    manipulability: Yoshikawa's measure, the root of det(J Jᵀ), of the directions that the arm commands. smallest: the
+    smallest singular value of the Jacobian with lengths divided by the arm's own, so that it has no unit.
+    near_singularity: that value is below NEAR_SINGULAR.
+    """
+
+    manipulability: float
+    smallest: float
+    near_singularity: bool
+
+
+class Arm:
+    """The chain to one end effector. Made by `RobotModel.arm`.
+
+    end_effector: which link, which of its directions are free, how exactly it has to be met. joint_names, lower, upper,
+    velocity: of the joints of this chain. indices: where these are among the model's joints.
+    length: of the chain from its first joint to the tip, m.
+    """
+
+    def __init__(self, model: "RobotModel", end_effector: EndEffector, steps: Sequence[Step], tool: Array) -> None:
+        self.model = model
+        self.end_effector = end_effector
+        self.steps = tuple(steps)
+        columns = sorted({step.column for step in steps if step.axis is not None})
+        if not columns:
+            raise ModelError(f"{model.name}: no joint moves {end_effector.link}.")
+        self.indices = np.array(columns)
+        self.joint_names = tuple(model.joint_names[column] for column in columns)
+        self.lower, self.upper = model.lower[self.indices], model.upper[self.indices]
+        self.velocity = model.velocity[self.indices]
+        self.dof = len(columns)
+        self._build(columns)
+        self.set_tool(tool)
+
+    def set_tool(self, tool: Array) -> None:
+        """Fix a tool to the end effector: its tip in the end effector's frame, (4, 4)."""
+        self.tool = np.array(tool, dtype=np.float64)
+        self._pin: Any = pin.Model()
+        body = 0
+        for origin, axis, prismatic in self._moving:
+            body = self._pin.addJoint(body, joint_model(axis, prismatic), pin.SE3(origin), f"{body}")
+        tip = pin.SE3(self._behind @ self.tool)
+        self._tip = self._pin.addFrame(pin.Frame("tip", body, 0, tip, pin.FrameType.OP_FRAME))
+        self._data: Any = self._pin.createData()
+        self.tip_in_last = self._behind @ self.tool
+        self.length = sum(float(np.linalg.norm(origin[:3, 3])) for origin, _, _ in self._moving[1:])
+        self.length = max(self.length + float(np.linalg.norm(self.tip_in_last[:3, 3])), 1e-3)
+
+    # -------------------------------------------------------------------------------- where
+    def forward(self, q: Array) -> Array:
+        """Give the tip, (4, 4)."""
+        if self._factors is not None:
+            q = self._factors @ q + self._offsets
+        pin.forwardKinematics(self._pin, self._data, q)
+        out: Array = pin.updateFramePlacement(self._pin, self._data, self._tip).homogeneous
+        return out
+
+    def pose(self, q: Array) -> Pose:
+        """Give the tip as a pose."""
+        return Pose.from_matrix(self.forward(q))
+
+    def placement(self, q: Array) -> Any:
+        """Give the tip as Pinocchio's SE3: a view that the next call overwrites."""
+        if self._factors is not None:
+            q = self._factors @ q + self._offsets
+        pin.forwardKinematics(self._pin, self._data, q)
+        return pin.updateFramePlacement(self._pin, self._data, self._tip)
+
+    # -------------------------------------------------------------------------------- how
+    def jacobian(self, q: Array) -> Array:
+        """Give velocity (m/s) and angular velocity (rad/s) of the tip per joint velocity, (6, n), in the root's axes.
+
+        Angular below linear.
+        """
+        return self._jacobian(q, pin.LOCAL_WORLD_ALIGNED)
+
+    def jacobian_in_tip(self, q: Array) -> Array:
+        """Give the same in the axes of the tip."""
+        return self._jacobian(q, pin.LOCAL)
+
+    def _jacobian(self, q: Array, axes: Any) -> Array:
+        if self._factors is None:
+            out: Array = pin.computeFrameJacobian(self._pin, self._data, q, self._tip, axes)
+            return out
+        whole = self._factors @ q + self._offsets
+        return np.asarray(pin.computeFrameJacobian(self._pin, self._data, whole, self._tip, axes) @ self._factors)
+
+    def dexterity(self, q: Array) -> Dexterity:
+        """Tell how well the arm moves in a configuration."""
+        jacobian = self.jacobian_in_tip(q)[self.rows]
+        values = np.linalg.svd(jacobian, compute_uv=False)
+        scaled = jacobian.copy()
+        scaled[: np.count_nonzero(self.rows < 3)] /= self.length
+        smallest = float(np.linalg.svd(scaled, compute_uv=False)[-1])
+        return Dexterity(float(np.prod(values)), smallest, smallest < NEAR_SINGULAR)
+
+    @property
+    def rows(self) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":
+        """Give which of x, y, z, rx, ry, rz of the tip's frame are commanded."""
+        return self._rows
+
+    # -------------------------------------------------------------------------------- joint values
+    def of(self, q: Array) -> Array:
+        """Give the values of this chain's joints out of those of the whole model."""
+        return np.asarray(q[self.indices])
+
+    def whole(self, q: Array, others: Array | None = None) -> Array:
+        """Give values of all joints of the model: this chain's, and `others` (neutral if None) where it has none."""
+        out = self.model.neutral() if others is None else np.array(others, dtype=np.float64)
+        out[self.indices] = q
+        return out
+
+    def values(self, joints: Iterable[robot.Joint]) -> Array:
+        """Give this chain's values out of named joints. Raises ModelError naming what is missing."""
+        given = {joint.name: joint.value for joint in joints}
+        if missing := [name for name in self.joint_names if name not in given]:
+            raise ModelError(f"Of {self.model.name} the joints {', '.join(missing)} are missing.")
+        values = np.array([given[name] for name in self.joint_names], dtype=np.float64)
+        if not np.isfinite(values).all():
+            raise ModelError(f"The joints of {self.model.name} must be finite numbers.")
+        return values
+
+    def named(self, q: Array) -> list[robot.Joint]:
+        """Give joint values with their names."""
+        return [robot.Joint(name, float(value)) for name, value in zip(self.joint_names, q, strict=True)]
+
+    def within(self, q: Array, slack: float = 1e-9) -> bool:
+        """Tell whether joint values keep the limits."""
+        return bool(((q >= self.lower - slack) & (q <= self.upper + slack)).all())
+
+    def near_limits(self, q: Array) -> list[str]:
+        """Give the names of joints that are near a limit, or beyond."""
+        margin = np.minimum(NEAR_LIMIT, (self.upper - self.lower) / 20.0)
+        near = (q < self.lower + margin) | (q > self.upper - margin)
+        return [name for name, is_near in zip(self.joint_names, near, strict=True) if is_near]
+
+    # -------------------------------------------------------------------------------- inside
+    def _build(self, columns: list[int]) -> None:
+        """Draw the fixed joints into the moving ones; note how the chain's joints move these."""
+        at = np.eye(4)
+        self._moving: list[tuple[Array, Array, bool]] = []
+        rows: list[tuple[int, float, float]] = []
+        for step in self.steps:
+            at = at @ step.origin
+            if step.axis is not None:
+                self._moving.append((at, step.axis, step.prismatic))
+                rows.append((columns.index(step.column), step.factor, step.offset))
+                at = np.eye(4)
+        self._behind = at
+        plain = [(number, 1.0, 0.0) for number in range(len(columns))]
+        self._factors: Array | None = None
+        self._offsets = np.array([offset for _, _, offset in rows])
+        if rows != plain:
+            self._factors = np.zeros((len(rows), len(columns)))
+            for row, (column, factor, _) in enumerate(rows):
+                self._factors[row, column] = factor
+        free = self.end_effector.free
+        self._rows = np.array([row for row, name in enumerate(("x", "y", "z", "rx", "ry", "rz")) if name not in free])
+
+    @property
+    def moving(self) -> list[tuple[Array, Array, bool]]:
+        """Give origin in the one before, axis and whether it slides, of each moving joint of the chain."""
+        return self._moving
+
+    @property
+    def coupling(self) -> tuple[Array, Array]:
+        """Give factors (m, n) and offsets (m) by which the n joints of the chain move its m moving ones."""
+        if self._factors is None:
+            return np.eye(self.dof), self._offsets
+        return self._factors, self._offsets

@@ -1,0 +1,407 @@
+"""URDF text -> what it says, checked: links, joints, shapes, and what settings and end effectors we add to it.
+
+Of the format (wiki.ros.org/urdf/XML) everything that places and limits is read; inertia, colours, transmissions and
+simulators' elements are passed over. Ours is one element `arcor2_hw`, which other readers pass over:
+
+    <arcor2_hw>
+      <end_effector link="tcp" free="rz" position_tolerance="1e-3" orientation_tolerance="0.02"/>
+      <setting name="link_1" joint="joint_2" component="x"/>          the joint's origin: x, y, z (m), rx, ry, rz (rad)
+      <setting name="lower_1" joint="joint_1" component="lower"/>     its limit: lower, upper, velocity
+      <setting name="link_1" link="link_1" component="x"/>            stretches the boxes of a link from its origin
+      <disable_collisions link1="base" link2="forearm"/>
+    </arcor2_hw>
+"""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Final, Literal, TypeVar
+from xml.etree.ElementTree import Element, TreeBuilder
+from xml.parsers import expat
+
+import numpy as np
+
+from arcor2_hw.kinematics.errors import JointLoop, ModelError, UnsafeDescription
+from arcor2_hw.kinematics.shapes import Array
+
+JointKind = Literal["revolute", "continuous", "prismatic", "fixed"]
+KINDS: Final[tuple[JointKind, ...]] = ("revolute", "continuous", "prismatic", "fixed")
+ORIGIN: Final = ("x", "y", "z", "rx", "ry", "rz")
+MAX_DEPTH: Final = 64
+MAX_PARTS: Final = 2000
+"""Links of one description."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeshFile:
+    """A mesh that a shape refers to, with its scale."""
+
+    reference: str
+    scale: tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Primitive:
+    """A box, cylinder, sphere or capsule: its kind and sizes, m."""
+
+    kind: Literal["box", "cylinder", "sphere", "capsule"]
+    sizes: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Geometry:
+    """A shape of a link, where it stands in the link's frame, (4, 4)."""
+
+    what: MeshFile | Primitive
+    origin: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A link with the shapes to be shown and those to collide."""
+
+    name: str
+    visual: tuple[Geometry, ...]
+    collision: tuple[Geometry, ...]
+
+
+@dataclass(frozen=True)
+class Mimic:
+    """A joint's value is `multiplier` times that of another plus `offset`."""
+
+    joint: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """A joint: origin (4, 4) in the parent link, axis in its own frame, limits in rad or m, velocity per s."""
+
+    name: str
+    kind: JointKind
+    parent: str
+    child: str
+    origin: Array
+    axis: tuple[float, float, float]
+    lower: float
+    upper: float
+    velocity: float
+    mimic: Mimic | None = None
+
+
+@dataclass(frozen=True)
+class EndEffector:
+    """A link that poses are meant for. free: directions of its frame that do not matter (rx, ry, rz)."""
+
+    link: str
+    free: frozenset[str] = frozenset()
+    position_tolerance: float = 1e-5
+    orientation_tolerance: float = 1e-4
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A setting of the object type that a component of a joint or link follows."""
+
+    name: str
+    target: Literal["joint", "link"]
+    of: str
+    component: str
+
+
+@dataclass(frozen=True, eq=False)
+class Description:
+    """All that a URDF says, joints ordered from the root outwards."""
+
+    name: str
+    root: str
+    links: dict[str, Link]
+    joints: tuple[Joint, ...]
+    end_effectors: tuple[EndEffector, ...]
+    settings: tuple[Setting, ...] = ()
+    touching: frozenset[frozenset[str]] = field(default_factory=frozenset)
+
+
+_Part = TypeVar("_Part", Link, Joint)
+
+
+# ------------------------------------------------------------------------------------------------ XML
+def parse_xml(content: bytes, name: str) -> Element:
+    """Give the root of a document. Raises ModelError when it is none, UnsafeDescription for a document type.
+
+    Without document types there are no entities, so that nothing is fetched and nothing grows.
+    """
+    parser = expat.ParserCreate()
+    builder = TreeBuilder()
+    depth = 0
+
+    def refuse(*_: object) -> None:
+        raise UnsafeDescription(f"{name} has a document type or an entity, which is refused.")
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal depth
+        depth += 1
+        if depth > MAX_DEPTH:
+            raise UnsafeDescription(f"{name} is nested deeper than {MAX_DEPTH} elements.")
+        if tag.startswith("xacro:"):
+            raise ModelError(f"{name} is a xacro: expand it into a URDF first.")
+        builder.start(tag, attributes)
+
+    def end(tag: str) -> None:
+        nonlocal depth
+        depth -= 1
+        builder.end(tag)
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = end
+    parser.StartDoctypeDeclHandler = refuse
+    parser.EntityDeclHandler = refuse
+    try:
+        parser.Parse(content, True)
+        return builder.close()
+    except (expat.ExpatError, ValueError, AssertionError, LookupError) as error:
+        raise ModelError(f"{name} is no XML: {error}.") from error
+
+
+def describe(content: bytes, name: str) -> Description:
+    """Read a URDF. Raises ModelError naming the link or joint and what is wrong, JointLoop, UnsafeDescription."""
+    root = parse_xml(content, name)
+    if root.tag != "robot":
+        raise ModelError(f"{name} describes no robot but a {root.tag}.")
+    robot = root.get("name") or name
+    links = _unique([_link(each, robot) for each in root.findall("link")], f"{robot}: link")
+    if not links:
+        raise ModelError(f"{robot} has no links.")
+    if len(links) > MAX_PARTS:
+        raise UnsafeDescription(f"{robot} has {len(links)} links; at most {MAX_PARTS} are taken.")
+    joints = _unique([_joint(each, robot) for each in root.findall("joint")], f"{robot}: joint")
+    base, ordered = _tree(robot, links, joints.values())
+    _check_mimics(robot, joints)
+    ours = root.find("arcor2_hw")
+    found = Description(robot, base, links, ordered, ())
+    if ours is None:
+        return replace(found, end_effectors=_leaves(found))
+    effectors = tuple(_end_effector(each, found) for each in ours.findall("end_effector"))
+    settings = tuple(_setting(each, found) for each in ours.findall("setting"))
+    pairs = (
+        frozenset({_text(e, "link1", robot), _text(e, "link2", robot)}) for e in ours.findall("disable_collisions")
+    )
+    return replace(found, end_effectors=effectors or _leaves(found), settings=settings, touching=frozenset(pairs))
+
+
+def _unique(parts: Iterable[_Part], what: str) -> dict[str, _Part]:
+    found: dict[str, _Part] = {}
+    for part in parts:
+        if part.name in found:
+            raise ModelError(f"{what} {part.name} is there twice.")
+        found[part.name] = part
+    return found
+
+
+# ------------------------------------------------------------------------------------------------ parts
+def _text(element: Element, attribute: str, where: str) -> str:
+    value = element.get(attribute)
+    if not value:
+        raise ModelError(f"{where}: {element.tag} has no {attribute}.")
+    return value
+
+
+def _numbers(element: Element, attribute: str, default: tuple[float, ...], where: str) -> tuple[float, ...]:
+    value = element.get(attribute)
+    if value is None:
+        return default
+    try:
+        found = tuple(map(float, value.split()))
+    except ValueError:
+        found = ()
+    if len(found) != len(default) or not all(map(math.isfinite, found)):
+        raise ModelError(f"{where}: {attribute} of {element.tag} must be {len(default)} numbers, not {value!r}.")
+    return found
+
+
+def _number(element: Element, attribute: str, default: float, where: str) -> float:
+    return _numbers(element, attribute, (default,), where)[0]
+
+
+def transform(xyz: tuple[float, ...], rpy: tuple[float, ...]) -> Array:
+    """Give the (4, 4) matrix of a position and of turns about the fixed axes x, then y, then z."""
+    (cr, cp, cy), (sr, sp, sy) = map(math.cos, rpy), map(math.sin, rpy)
+    out = np.eye(4)
+    out[0, :3] = cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr
+    out[1, :3] = sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr
+    out[2, :3] = -sp, cp * sr, cp * cr
+    out[:3, 3] = xyz
+    return out
+
+
+def _origin(element: Element, where: str) -> Array:
+    found = element.find("origin")
+    if found is None:
+        return np.eye(4)
+    return transform(_numbers(found, "xyz", (0.0,) * 3, where), _numbers(found, "rpy", (0.0,) * 3, where))
+
+
+def _link(element: Element, robot: str) -> Link:
+    name = _text(element, "name", robot)
+    where = f"{robot}: link {name}"
+    visual, collision = (
+        tuple(_geometry(each, f"{where}, {kind}") for each in element.findall(kind)) for kind in ("visual", "collision")
+    )
+    return Link(name, visual, collision)
+
+
+def _geometry(element: Element, where: str) -> Geometry:
+    found = element.find("geometry")
+    what = found[0] if found is not None and len(found) else None
+    if what is None:
+        raise ModelError(f"{where}: there is no geometry.")
+    origin = _origin(element, where)
+    match what.tag:
+        case "mesh":
+            sx, sy, sz = _numbers(what, "scale", (1.0, 1.0, 1.0), where)
+            return Geometry(MeshFile(_text(what, "filename", where), (sx, sy, sz)), origin)
+        case "box":
+            return Geometry(Primitive("box", _numbers(what, "size", (0.0, 0.0, 0.0), where)), origin)
+        case "cylinder" | "capsule" as kind:
+            sizes = _number(what, "radius", 0.0, where), _number(what, "length", 0.0, where)
+            return Geometry(Primitive(kind, sizes), origin)
+        case "sphere":
+            return Geometry(Primitive("sphere", (_number(what, "radius", 0.0, where),)), origin)
+    raise ModelError(f"{where}: a geometry of kind {what.tag} is not known.")
+
+
+def _joint(element: Element, robot: str) -> Joint:
+    name = _text(element, "name", robot)
+    where = f"{robot}: joint {name}"
+    kind = _text(element, "type", where)
+    if kind not in KINDS:
+        raise ModelError(f"{where} is of type {kind}; {', '.join(KINDS)} can be used.")
+    parent, child = (element.find(each) for each in ("parent", "child"))
+    if parent is None or child is None:
+        raise ModelError(f"{where} needs a parent and a child.")
+    x, y, z = (1.0, 0.0, 0.0)
+    if (axis := element.find("axis")) is not None:
+        x, y, z = _numbers(axis, "xyz", (1.0, 0.0, 0.0), where)
+    length = math.hypot(x, y, z)
+    if kind != "fixed" and length < 1e-6:
+        raise ModelError(f"{where} has an axis without direction.")
+    lower, upper, velocity = _limits(element, kind, where)
+    return Joint(
+        name,
+        kind,
+        _text(parent, "link", where),
+        _text(child, "link", where),
+        _origin(element, where),
+        (x / length, y / length, z / length) if length else (1.0, 0.0, 0.0),
+        lower,
+        upper,
+        velocity,
+        _mimic(element, where),
+    )
+
+
+def _limits(element: Element, kind: str, where: str) -> tuple[float, float, float]:
+    if kind == "fixed":
+        return 0.0, 0.0, math.inf
+    found = element.find("limit")
+    velocity = math.inf if found is None else _number(found, "velocity", 0.0, where) or math.inf
+    if kind == "continuous":
+        return -math.inf, math.inf, velocity
+    if found is None:
+        if element.find("mimic") is not None:
+            return -math.inf, math.inf, velocity
+        raise ModelError(f"{where} has no limit.")
+    lower, upper = _number(found, "lower", 0.0, where), _number(found, "upper", 0.0, where)
+    if lower > upper:
+        raise ModelError(f"{where}: its lower limit {lower:g} is above the upper, {upper:g}.")
+    return lower, upper, velocity
+
+
+def _mimic(element: Element, where: str) -> Mimic | None:
+    found = element.find("mimic")
+    if found is None:
+        return None
+    return Mimic(
+        _text(found, "joint", where), _number(found, "multiplier", 1.0, where), _number(found, "offset", 0.0, where)
+    )
+
+
+# ------------------------------------------------------------------------------------------------ the whole
+def _tree(robot: str, links: Mapping[str, Link], joints: Iterable[Joint]) -> tuple[str, tuple[Joint, ...]]:
+    """Give the root and the joints from there outwards. Raises ModelError, JointLoop."""
+    to: dict[str, Joint] = {}
+    behind: dict[str, list[Joint]] = {}
+    for joint in joints:
+        for link in (joint.parent, joint.child):
+            if link not in links:
+                raise ModelError(f"{robot}: joint {joint.name} names the link {link}, which is not there.")
+        if joint.child in to:
+            raise JointLoop(
+                f"{robot}: the joints {to[joint.child].name} and {joint.name} both carry the link {joint.child}."
+            )
+        to[joint.child] = joint
+        behind.setdefault(joint.parent, []).append(joint)
+    roots = [name for name in links if name not in to]
+    ordered: list[Joint] = []
+    waiting = list(reversed(behind.get(roots[0], []))) if roots else []
+    while waiting:
+        ordered.append(joint := waiting.pop())
+        waiting += reversed(behind.get(joint.child, []))
+    if not roots or (len(roots) == 1 and len(ordered) < len(to)):
+        reached = {joint.name for joint in ordered}
+        around = [joint.name for joint in to.values() if joint.name not in reached]
+        raise JointLoop(f"{robot}: the joints {', '.join(around)} close a loop.")
+    if len(roots) > 1:
+        raise ModelError(f"{robot}: the links {', '.join(roots)} hang on nothing; one of them alone may be the base.")
+    return roots[0], tuple(ordered)
+
+
+def _check_mimics(robot: str, joints: Mapping[str, Joint]) -> None:
+    for joint in joints.values():
+        mimic = joint.mimic
+        if mimic is None:
+            continue
+        if (other := joints.get(mimic.joint)) is None or other.kind == "fixed":
+            raise ModelError(f"{robot}: joint {joint.name} mimics {mimic.joint}, which is no joint that moves.")
+        if other.mimic is not None:
+            raise ModelError(f"{robot}: joint {joint.name} mimics {mimic.joint}, which mimics another.")
+
+
+def _leaves(found: Description) -> tuple[EndEffector, ...]:
+    """Give the links at the ends of chains that move."""
+    inner = {joint.parent for joint in found.joints}
+    moved = {found.root: False}
+    for joint in found.joints:
+        moved[joint.child] = moved[joint.parent] or joint.kind != "fixed"
+    return tuple(EndEffector(link) for link, moves in moved.items() if moves and link not in inner)
+
+
+def _end_effector(element: Element, found: Description) -> EndEffector:
+    link = _text(element, "link", found.name)
+    if link not in found.links:
+        raise ModelError(f"{found.name}: the end effector {link} is no link of it.")
+    where = f"{found.name}: end effector {link}"
+    free = frozenset((element.get("free") or "").split())
+    if free not in (frozenset(), frozenset({"rz"}), frozenset(ORIGIN[3:])):
+        raise ModelError(f"{where}: free may be empty, rz, or rx ry rz, not {element.get('free')!r}.")
+    position = _number(element, "position_tolerance", EndEffector.position_tolerance, where)
+    orientation = _number(element, "orientation_tolerance", EndEffector.orientation_tolerance, where)
+    if not (0.0 < position < 0.1 and 0.0 < orientation < 0.5):
+        raise ModelError(f"{where}: its tolerances must be above 0, and below 0.1 m and 0.5 rad.")
+    return EndEffector(link, free, position, orientation)
+
+
+def _setting(element: Element, found: Description) -> Setting:
+    name, component = _text(element, "name", found.name), _text(element, "component", found.name)
+    where = f"{found.name}: setting {name}"
+    if (joint := element.get("joint")) is not None:
+        if joint not in {each.name for each in found.joints}:
+            raise ModelError(f"{where}: there is no joint {joint}.")
+        if component not in (*ORIGIN, "lower", "upper", "velocity"):
+            raise ModelError(f"{where}: a joint has no component {component}.")
+        return Setting(name, "joint", joint, component)
+    link = _text(element, "link", where)
+    if link not in found.links or component not in ORIGIN[:3]:
+        raise ModelError(f"{where}: {component} of the link {link} cannot follow it.")
+    return Setting(name, "link", link, component)

@@ -1,0 +1,262 @@
+"""A robot's model: its joints, links, shapes and end effectors, and where they are for joint values.
+
+Nothing here is safe for two threads at once: a model computes in place. Joint values are arrays in the order of
+`joints`, rad, m where prismatic; matrices are (4, 4) homogeneous, in the root link's frame unless said otherwise.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Self
+
+import numpy as np
+import pinocchio as pin
+
+from arcor2_hw.data import robot
+from arcor2_hw.exceptions import NotFound
+from arcor2_hw.kinematics import adjusting, shapes
+from arcor2_hw.kinematics.arm import Arm, Step, joint_model
+from arcor2_hw.kinematics.description import Description, EndEffector, Geometry, Joint, MeshFile, describe
+from arcor2_hw.kinematics.errors import ModelError, ZeroLength
+from arcor2_hw.kinematics.meshes import read_mesh
+from arcor2_hw.kinematics.shapes import Array, MeshUse, Shape
+from arcor2_hw.kinematics.source import MAX_MESH, Package
+
+_PARALLEL: Final = 1e-6
+_TOUCHING: Final = 1e-5
+
+
+@dataclass(frozen=True, eq=False)
+class LinkShape:
+    """A shape of a link, and where it stands in the link's frame, (4, 4)."""
+
+    link: str
+    name: str
+    shape: Shape
+    origin: Array
+
+
+class RobotModel:
+    """A robot as its description says. Make it by `load`.
+
+    name: of the robot. joints: those that take values, without fixed and mimicking ones, from the root outwards.
+    lower, upper: their limits (infinite for continuous joints); velocity: their maxima per s. links: from the root
+    outwards. end_effectors: names of links that poses are meant for. visual, collision: shapes by link.
+    """
+
+    def __init__(self, description: Description, package: Package, beside: str, mesh_use: MeshUse = "hull") -> None:
+        self.description = description
+        self.name = description.name
+        self.root = description.root
+        self._package, self._beside, self._mesh_use = package, beside, mesh_use
+        moving = [joint for joint in description.joints if joint.kind != "fixed"]
+        self.joints: tuple[Joint, ...] = tuple(joint for joint in moving if joint.mimic is None)
+        if not self.joints:
+            raise ModelError(f"{self.name} has no joint that moves.")
+        self.joint_names = tuple(joint.name for joint in self.joints)
+        self.lower = np.array([joint.lower for joint in self.joints])
+        self.upper = np.array([joint.upper for joint in self.joints])
+        self.velocity = np.array([joint.velocity for joint in self.joints])
+        self.end_effectors: dict[str, EndEffector] = {each.link: each for each in description.end_effectors}
+        self._column = {name: number for number, name in enumerate(self.joint_names)}
+        self._build(moving)
+        self._refuse_zero_lengths()
+        self.visual, self.collision = self._shapes()
+
+    # -------------------------------------------------------------------------------- making
+    @classmethod
+    def load(
+        cls,
+        source: Path | bytes,
+        settings: Mapping[str, object] | None = None,
+        *,
+        name: str = "",
+        mesh_use: MeshUse = "hull",
+    ) -> Self:
+        """Read a package (folder, zip archive, lone URDF file, or the bytes of one of the latter two).
+
+        `settings` are those of the object, which the description may follow; `mesh_use` says whether collision meshes
+        are taken for their convex hull, which is fast, or exactly. Raises ModelError and its kinds, see `errors`.
+        """
+        package = Package.open(source, name)
+        beside, content = package.urdf()
+        description = describe(content, package.name)
+        return cls(adjusting.with_settings(description, settings or {}), package, beside, mesh_use)
+
+    def with_origins(self, origins: Mapping[str, Array]) -> Self:
+        """Give a model whose joints stand elsewhere in their parent links, (4, 4) each. Raises ModelError."""
+        moved = adjusting.with_origins(self.description, origins)
+        return type(self)(moved, self._package, self._beside, self._mesh_use)
+
+    # -------------------------------------------------------------------------------- joint values
+    def values(self, joints: Iterable[robot.Joint], others: Array | None = None) -> Array:
+        """Give joint values of named joints in the model's order.
+
+        Joints that the model lacks (a gripper's) are passed over; for one that is not given `others` stands in.
+        Raises ModelError naming a joint that is missing or given twice, or whose value is not finite.
+        """
+        found: dict[str, float] = {}
+        for joint in joints:
+            if joint.name in found:
+                raise ModelError(f"The joint {joint.name} of {self.name} is given twice.")
+            if joint.name in self._column and not np.isfinite(joint.value):
+                raise ModelError(f"The joint {joint.name} of {self.name} must be a finite number, not {joint.value!r}.")
+            found[joint.name] = joint.value
+        missing = [name for name in self.joint_names if name not in found]
+        if missing and others is None:
+            raise ModelError(f"Of {self.name} the joints {', '.join(missing)} are missing.")
+        out = np.zeros(len(self.joints)) if others is None else np.array(others, dtype=np.float64)
+        for name, number in self._column.items():
+            out[number] = found.get(name, out[number])
+        return out
+
+    def named(self, q: Array) -> list[robot.Joint]:
+        """Give joint values with their names."""
+        return [robot.Joint(name, float(value)) for name, value in zip(self.joint_names, q, strict=True)]
+
+    def neutral(self) -> Array:
+        """Give zero for each joint, or the limit nearest to it."""
+        return np.clip(np.zeros(len(self.joints)), self.lower, self.upper)
+
+    # -------------------------------------------------------------------------------- where things are
+    def link_poses(self, q: Array) -> dict[str, Array]:
+        """Give the frame of each link, (4, 4)."""
+        pin.forwardKinematics(self.pin_model, self.pin_data, self.expand(q))
+        bodies = [np.array(placement.homogeneous) for placement in self.pin_data.oMi]
+        return {link: bodies[body] @ placement for link, (body, placement) in self.bodies.items()}
+
+    def arm(self, end_effector: str, tool: Array | None = None) -> Arm:
+        """Give the chain from the root to an end effector, or to any link; `tool` (4, 4) is fixed to it.
+
+        Raises NotFound when there is no such link, ModelError when no joint moves it.
+        """
+        if end_effector not in self.description.links:
+            known = ", ".join(self.end_effectors)
+            raise NotFound(f"{self.name} has no end effector {end_effector!r}; there are {known}.")
+        steps: list[Step] = []
+        link = end_effector
+        to = {joint.child: joint for joint in self.description.joints}
+        while link != self.root:
+            joint = to[link]
+            steps.append(self._step(joint))
+            link = joint.parent
+        kind = self.end_effectors.get(end_effector, EndEffector(end_effector))
+        return Arm(self, kind, steps[::-1], np.eye(4) if tool is None else tool)
+
+    def _step(self, joint: Joint) -> Step:
+        if joint.kind == "fixed":
+            return Step(joint.name, joint.origin, None, False, -1, 0.0, 0.0)
+        leader, factor, offset = joint.name, 1.0, 0.0
+        if joint.mimic is not None:
+            leader, factor, offset = joint.mimic.joint, joint.mimic.multiplier, joint.mimic.offset
+        prismatic = joint.kind == "prismatic"
+        return Step(joint.name, joint.origin, np.array(joint.axis), prismatic, self._column[leader], factor, offset)
+
+    def expand(self, q: Array) -> Array:
+        """Give the values of all moving joints of Pinocchio's model, mimicking ones too."""
+        if not self.has_mimics:
+            return q
+        return np.asarray(self._factors @ q + self._offsets)
+
+    # -------------------------------------------------------------------------------- inside
+    def _build(self, moving: list[Joint]) -> None:
+        """Make Pinocchio's model, and note on which of its bodies each link sits, and where."""
+        self.pin_model: Any = pin.Model()
+        self.bodies: dict[str, tuple[int, Array]] = {self.root: (0, np.eye(4))}
+        rows: list[tuple[int, float, float]] = []
+        for joint in self.description.joints:
+            body, placement = self.bodies[joint.parent]
+            at = placement @ joint.origin
+            if joint.kind == "fixed":
+                self.bodies[joint.child] = body, at
+                continue
+            kind = joint_model(np.array(joint.axis), joint.kind == "prismatic")
+            added = self.pin_model.addJoint(body, kind, pin.SE3(at), joint.name)
+            self.bodies[joint.child] = added, np.eye(4)
+            step = self._step(joint)
+            rows.append((step.column, step.factor, step.offset))
+        self._factors = np.zeros((len(moving), len(self.joints)))
+        for row, (column, factor, _) in enumerate(rows):
+            self._factors[row, column] = factor
+        self._offsets = np.array([offset for _, _, offset in rows])
+        self.has_mimics = len(moving) != len(self.joints)
+        # Pinocchio numbers joints depth first, as they are added here; limits are kept by us.
+        self.pin_data: Any = self.pin_model.createData()
+        self.links: tuple[str, ...] = tuple(self.bodies)
+
+    def _refuse_zero_lengths(self) -> None:
+        """Refuse a link between two joints about one and the same axis: neither can be told from the other."""
+        frames = self.link_poses(self.neutral())
+        to = {joint.child: joint for joint in self.description.joints}
+        for joint in self.joints:
+            before = joint.parent
+            while before in to and to[before].kind == "fixed":
+                before = to[before].parent
+            other = to.get(before)
+            if other is None or other.mimic is not None or "prismatic" in (joint.kind, other.kind):
+                continue
+            one, two = frames[joint.child], frames[other.child]
+            axis, axis_before = one[:3, :3] @ joint.axis, two[:3, :3] @ other.axis
+            apart = one[:3, 3] - two[:3, 3]
+            if (
+                np.linalg.norm(np.cross(axis, axis_before)) < _PARALLEL
+                and np.linalg.norm(np.cross(apart, axis)) < _TOUCHING
+            ):
+                raise ZeroLength(
+                    f"{self.name}: the link {other.child} has no length between the joints {other.name} and"
+                    f" {joint.name}, which turn about the same axis."
+                )
+
+    def _shapes(self) -> tuple[tuple[LinkShape, ...], tuple[LinkShape, ...]]:
+        visual: list[LinkShape] = []
+        collision: list[LinkShape] = []
+        for link in self.description.links.values():
+            visual += self._made(link.name, "visual", link.visual, "exact")
+            collision += self._made(link.name, "collision", link.collision, self._mesh_use)
+        return tuple(visual), tuple(collision)
+
+    def _made(self, link: str, kind: str, every: tuple[Geometry, ...], use: MeshUse) -> list[LinkShape]:
+        made = []
+        for number, geometry in enumerate(every):
+            where = f"{self.name}: link {link}, {kind}"
+            made.append(LinkShape(link, f"{link} {number}", self._shape(geometry, where, use), geometry.origin))
+        return _capsules(made) if kind == "collision" else made
+
+    def _shape(self, geometry: Geometry, where: str, use: MeshUse) -> Shape:
+        what = geometry.what
+        if isinstance(what, MeshFile):
+            if 0.0 in what.scale:
+                raise ZeroLength(f"{where}: the mesh {what.reference} is scaled to nothing.")
+            path = self._package.locate(what.reference, self._beside)
+            mesh = read_mesh(self._package.read(path, MAX_MESH), path, what.scale)
+            return mesh if use == "exact" else shapes.hull_of(mesh.vertices, f"{where}: the mesh {path}")
+        made = {"box": shapes.Box, "cylinder": shapes.Cylinder, "sphere": shapes.Sphere, "capsule": shapes.Capsule}
+        shape: Shape = made[what.kind](*what.sizes)
+        shapes.check(shape, where)
+        return shape
+
+
+def _capsules(made: list[LinkShape]) -> list[LinkShape]:
+    """Take a cylinder with a ball of its radius at both ends for what it is, a capsule, which collides faster."""
+    left = list(made)
+    for each in made:
+        cylinder = each.shape
+        if not isinstance(cylinder, shapes.Cylinder):
+            continue
+        ends = [each.origin[:3, 3] + sign * cylinder.length / 2.0 * each.origin[:3, 2] for sign in (-1.0, 1.0)]
+        balls = [_ball(left, end, cylinder.radius) for end in ends]
+        if balls[0] is not None and balls[1] is not None:
+            capsule = shapes.Capsule(cylinder.radius, cylinder.length)
+            left = [one for one in left if one not in (*balls, each)]
+            left.append(LinkShape(each.link, each.name, capsule, each.origin))
+    return left
+
+
+def _ball(among: list[LinkShape], at: Array, radius: float) -> LinkShape | None:
+    for each in among:
+        ball = each.shape
+        if not isinstance(ball, shapes.Sphere) or abs(ball.radius - radius) > _TOUCHING:
+            continue
+        if np.linalg.norm(each.origin[:3, 3] - at) < _TOUCHING:
+            return each
+    return None

@@ -1,0 +1,176 @@
+"""Shapes of bodies, around their own origin, m: for collision (coal), for rays, and as triangles for pictures."""
+
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from arcor2_hw.data import object_type
+from arcor2_hw.kinematics.errors import BadMesh, ZeroLength
+
+Array = npt.NDArray[np.float64]
+Triangles = npt.NDArray[np.int64]
+MeshUse = Literal["hull", "exact"]
+
+_SIDES: Final = 24
+_TINY: Final = 1e-9
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box; edges in m."""
+
+    x: float
+    y: float
+    z: float
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """A cylinder along z, m."""
+
+    radius: float
+    length: float
+
+
+@dataclass(frozen=True)
+class Capsule:
+    """A cylinder along z with half balls beyond both ends; `length` is that of the cylinder, m."""
+
+    radius: float
+    length: float
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """A ball, m."""
+
+    radius: float
+
+
+@dataclass(frozen=True, eq=False)
+class Hull:
+    """A convex body: vertices (n, 3) in m and triangles (m, 3) that wind counter-clockwise seen from outside."""
+
+    vertices: Array
+    triangles: Triangles
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleMesh:
+    """A surface of triangles, (n, 3) in m and (m, 3). It has no inside: what is enclosed by it touches nothing."""
+
+    vertices: Array
+    triangles: Triangles
+
+
+Shape = Box | Cylinder | Capsule | Sphere | Hull | TriangleMesh
+
+
+def check(shape: Shape, what: str) -> None:
+    """Raise ZeroLength, naming `what`, for a size that is not a finite number above zero."""
+    if isinstance(shape, Hull | TriangleMesh):
+        return
+    for name, value in vars(shape).items():
+        if not (np.isfinite(value) and value > _TINY) and not (isinstance(shape, Capsule) and name == "length"):
+            raise ZeroLength(f"{what}: {name} of a {type(shape).__name__.lower()} must be above zero, not {value!r}.")
+
+
+def hull_of(vertices: Array, what: str) -> Hull:
+    """Give the convex hull of points (n, 3). Raises BadMesh, naming `what`, when they lie in one plane."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        found = ConvexHull(vertices)
+    except (QhullError, ValueError) as error:
+        raise BadMesh(f"{what} is flat: it has no inside.", str(error).splitlines()[0]) from error
+    number = np.full(len(vertices), -1)
+    number[found.vertices] = np.arange(len(found.vertices))
+    triangles = number[found.simplices]
+    points = vertices[found.vertices]
+    first, second, third = (points[triangles[:, corner]] for corner in range(3))
+    inward = (np.cross(second - first, third - first) * found.equations[:, :3]).sum(axis=1) < 0.0
+    triangles[inward] = triangles[inward][:, ::-1]
+    return Hull(points, triangles)
+
+
+def of_model(model: object_type.Models, mesh: TriangleMesh | None = None, use: MeshUse = "hull") -> Shape:
+    """Give the shape of a collision model of the protocol; a Mesh needs the `mesh` that was read of its asset.
+
+    Raises BadMesh when that is missing, or flat while its hull is asked for.
+    """
+    match model:
+        case object_type.Box():
+            return Box(model.size_x, model.size_y, model.size_z)
+        case object_type.Cylinder():
+            return Cylinder(model.radius, model.height)
+        case object_type.Sphere():
+            return Sphere(model.radius)
+        case object_type.Mesh():
+            if mesh is None:
+                raise BadMesh(f"The mesh {model.asset_id} of {model.id} was not read.")
+            return mesh if use == "exact" else hull_of(mesh.vertices, f"The mesh {model.asset_id}")
+
+
+def triangles_of(shape: Shape) -> TriangleMesh:
+    """Give a shape as triangles that wind counter-clockwise seen from outside; round ones have 24 sides."""
+    import trimesh
+
+    made: Any
+    match shape:
+        case TriangleMesh():
+            return shape
+        case Hull():
+            return TriangleMesh(shape.vertices, shape.triangles)
+        case Box():
+            made = trimesh.creation.box((shape.x, shape.y, shape.z))
+        case Cylinder():
+            made = trimesh.creation.cylinder(shape.radius, shape.length, sections=_SIDES)
+        case Capsule():
+            made = trimesh.creation.capsule(shape.length, shape.radius, count=(_SIDES, _SIDES))
+            made.apply_translation(-np.mean(made.bounds, axis=0))
+        case Sphere():
+            made = trimesh.creation.icosphere(3, shape.radius)
+    return TriangleMesh(np.asarray(made.vertices, dtype=np.float64), np.asarray(made.faces, dtype=np.int64))
+
+
+def extent(shape: Shape) -> Array:
+    """Give lower and upper corner of the box around a shape, shape (2, 3), m."""
+    match shape:
+        case Box():
+            half = np.array((shape.x, shape.y, shape.z)) / 2.0
+        case Cylinder():
+            half = np.array((shape.radius, shape.radius, shape.length / 2.0))
+        case Capsule():
+            half = np.array((shape.radius, shape.radius, shape.length / 2.0 + shape.radius))
+        case Sphere():
+            half = np.full(3, shape.radius)
+        case _:
+            return np.array((shape.vertices.min(axis=0), shape.vertices.max(axis=0)))
+    return np.array((-half, half))
+
+
+def coal_geometry(shape: Shape) -> Any:
+    """Give coal's geometry of a shape; primitives stay primitives, hulls are convex, meshes trees of triangles."""
+    import coal
+
+    match shape:
+        case Box():
+            return coal.Box(shape.x, shape.y, shape.z)
+        case Cylinder():
+            return coal.Cylinder(shape.radius, shape.length)
+        case Capsule():
+            return coal.Capsule(shape.radius, shape.length)
+        case Sphere():
+            return coal.Sphere(shape.radius)
+        case Hull() | TriangleMesh():
+            tree = coal.BVHModelOBBRSS()
+            tree.beginModel(len(shape.triangles), len(shape.vertices))
+            tree.addVertices(np.ascontiguousarray(shape.vertices))
+            tree.addTriangles(np.ascontiguousarray(shape.triangles, dtype=np.int32))
+            tree.endModel()
+            if isinstance(shape, TriangleMesh):
+                return tree
+            tree.buildConvexRepresentation(False)
+            return tree.convex

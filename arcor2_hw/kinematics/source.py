@@ -1,0 +1,164 @@
+"""A robot's description as it comes: a folder, a zip archive or a lone URDF; every file is bounded and stays inside."""
+
+import io
+import posixpath
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final, Self
+from urllib.parse import unquote
+
+from arcor2_hw.kinematics.errors import MissingMesh, ModelError, UnsafeDescription
+
+MAX_FILES: Final = 10_000
+MAX_URDF: Final = 16 * 1024 * 1024
+MAX_MESH: Final = 64 * 1024 * 1024
+"""Bytes of one mesh; the largest of a vendor's packages have some 20 MB."""
+MAX_PACKAGE: Final = 512 * 1024 * 1024
+"""Bytes of all files of an archive, unpacked."""
+_CHUNK: Final = 1024 * 1024
+
+
+class Package:
+    """The files of one robot's description, read when they are asked for. Make it by `open`.
+
+    name: of the folder or archive, for messages. names: relative paths with forward slashes.
+    """
+
+    def __init__(self, name: str, sizes: dict[str, int], read: Callable[[str, int], bytes]) -> None:
+        self.name = name
+        self.names = tuple(sorted(sizes))
+        self._sizes = sizes
+        self._read = read
+
+    @classmethod
+    def open(cls, source: Path | bytes, name: str = "") -> Self:
+        """Open a folder, a zip archive or a URDF file, or the bytes of one of the latter two.
+
+        Raises ModelError when it is none of them or cannot be read, UnsafeDescription when it is too large, has
+        encrypted files, or files that lie outside of it.
+        """
+        if isinstance(source, bytes):
+            return cls._of_bytes(source, name or "upload")
+        name = name or source.name
+        try:
+            if source.is_dir():
+                return cls._of_folder(source, name)
+            if not source.is_file():
+                raise ModelError(f"There is no robot description {name}.")
+            if source.stat().st_size > MAX_PACKAGE:
+                raise UnsafeDescription(f"{name} is larger than {MAX_PACKAGE} bytes.")
+            return cls._of_bytes(source.read_bytes(), name)
+        except OSError as error:
+            raise ModelError(f"{name} cannot be read: {error.strerror}", str(error)) from error
+
+    @classmethod
+    def _of_folder(cls, folder: Path, name: str) -> Self:
+        root = folder.resolve()
+        sizes: dict[str, int] = {}
+        for path in folder.rglob("*"):
+            if not path.is_file():
+                continue
+            inner = path.relative_to(folder).as_posix()
+            if not path.resolve().is_relative_to(root):
+                raise UnsafeDescription(f"{name}: {inner} is a link that leads out of the folder.")
+            sizes[inner] = path.stat().st_size
+            if len(sizes) > MAX_FILES:
+                raise UnsafeDescription(f"{name} has more than {MAX_FILES} files.")
+
+        def read(inner: str, limit: int) -> bytes:
+            with (folder / inner).open("rb") as file:
+                return file.read(limit + 1)
+
+        return cls(name, sizes, read)
+
+    @classmethod
+    def _of_bytes(cls, content: bytes, name: str) -> Self:
+        if not content.startswith(b"PK"):
+            lone = name if name.endswith(".urdf") else "robot.urdf"
+            return cls(name, {lone: len(content)}, lambda _, limit: content[: limit + 1])
+        try:
+            archive = zipfile.ZipFile(io.BytesIO(content))
+        except (zipfile.BadZipFile, ValueError, NotImplementedError) as error:
+            raise ModelError(f"{name} is no zip archive.", str(error)) from error
+        sizes: dict[str, int] = {}
+        for each in archive.infolist():
+            if each.is_dir():
+                continue
+            if _outside(each.filename):
+                raise UnsafeDescription(f"{name}: the file {each.filename!r} lies outside of the archive.")
+            if each.flag_bits & 1:
+                raise UnsafeDescription(f"{name}: the file {each.filename!r} is encrypted.")
+            sizes[posixpath.normpath(each.filename)] = each.file_size
+        if len(sizes) > MAX_FILES:
+            raise UnsafeDescription(f"{name} has more than {MAX_FILES} files.")
+        if sum(sizes.values()) > MAX_PACKAGE:
+            raise UnsafeDescription(f"{name} has more than {MAX_PACKAGE} bytes when it is unpacked.")
+        entries = {posixpath.normpath(each.filename): each for each in archive.infolist()}
+
+        def read(inner: str, limit: int) -> bytes:
+            try:  # what an archive says of its sizes need not be true
+                with archive.open(entries[inner]) as file:
+                    return file.read(limit + 1)
+            except (zipfile.BadZipFile, NotImplementedError, EOFError, RuntimeError, ValueError, OSError) as error:
+                raise ModelError(f"{name}: the file {inner} is damaged.", str(error)) from error
+            except Exception as error:
+                if type(error).__name__ != "error":  # zlib's, which has no name of its own to catch
+                    raise
+                raise ModelError(f"{name}: the file {inner} is damaged.", str(error)) from error
+
+        return cls(name, sizes, read)
+
+    def read(self, inner: str, limit: int) -> bytes:
+        """Give a file. Raises UnsafeDescription when it has more than `limit` bytes, ModelError when it is damaged."""
+        if self._sizes[inner] <= limit:
+            content = self._read(inner, limit)
+            if len(content) <= limit:
+                return content
+        raise UnsafeDescription(f"{self.name}: {inner} has more than {limit} bytes.")
+
+    def urdf(self) -> tuple[str, bytes]:
+        """Give path and content of the description. Raises ModelError unless there is one, UnsafeDescription."""
+        found = [name for name in self.names if name.lower().endswith(".urdf") and not name.startswith("__MACOSX/")]
+        if len(found) > 1:  # the one that lies nearest to the top, if it does so alone
+            depth = min(name.count("/") for name in found)
+            found = [name for name in found if name.count("/") == depth]
+        if not found:
+            raise ModelError(f"{self.name} has no file .urdf.")
+        if len(found) > 1:
+            raise ModelError(f"{self.name} has {len(found)} descriptions: {', '.join(found)}.")
+        return found[0], self.read(found[0], MAX_URDF)
+
+    def locate(self, reference: str, beside: str) -> str:
+        """Give the path of the file that a description at the path `beside` refers to.
+
+        `package://name/path`, `model://name/path`, `file:path` and relative paths are known; folders that are missing
+        at the front are forgiven. Raises UnsafeDescription for a path that leaves the package or another scheme,
+        MissingMesh when there is no such file.
+        """
+        scheme, _, rest = reference.partition("://")
+        if not rest:
+            scheme, rest = "", reference.removeprefix("file:")
+        if scheme not in ("", "package", "model"):
+            raise UnsafeDescription(f"{self.name}: {reference!r} is no file of the package.")
+        wanted = unquote(rest).replace("\\", "/")
+        if _outside(wanted) and scheme:
+            raise UnsafeDescription(f"{self.name}: {reference!r} leads out of the package.")
+        at = posixpath.normpath(wanted if scheme else posixpath.join(posixpath.dirname(beside), wanted))
+        if _outside(at):
+            raise UnsafeDescription(f"{self.name}: {reference!r} leads out of the package.")
+        parts = at.split("/")
+        for first in range(len(parts)):
+            tail = "/".join(parts[first:])
+            if tail in self._sizes:
+                return tail
+            behind = [name for name in self.names if name.endswith(f"/{tail}")]
+            if len(behind) == 1:
+                return behind[0]
+        raise MissingMesh(f"{self.name}: the mesh {reference} is missing.")
+
+
+def _outside(path: str) -> bool:
+    """Tell whether a relative path leads out of where it starts, or is none."""
+    normal = posixpath.normpath(path.replace("\\", "/"))
+    return normal.startswith(("/", "../")) or normal == ".." or ":" in normal.split("/")[0] or "\0" in normal
