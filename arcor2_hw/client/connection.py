@@ -105,7 +105,7 @@ class Client(Requests):
     @property
     def connected(self) -> bool:
         """Tell whether requests would be sent at once."""
-        return self._joined.is_set()
+        return self._end is None and self._joined.is_set()
 
     @property
     def rest(self) -> Rest:

@@ -1871,8 +1871,8 @@ class Requests(ABC):
     def follow(self, *names: str, limit: int = LIMIT) -> EventStream[Any]:
         """Give a stream of the events of these names, all when none is given, from now on.
 
-        Additional events come only after `subscribe_events`. `limit`: events that may wait to be taken. Close it, or use
-        it in `with`, when it is not read any more.
+        Additional events come only after `subscribe_events`. `limit`: events that may wait to be taken. Close it, or
+        use it in `with`, when it is not read any more.
         """
         if unknown := set(names) - EVENTS.keys():
             raise ValueError(f"there is no event {', '.join(sorted(unknown))}")

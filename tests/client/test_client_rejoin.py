@@ -1,0 +1,252 @@
+"""What the client does when the connection is lost, against a server that does what the test says."""
+
+import asyncio
+from typing import Any
+
+import pytest
+from websockets.asyncio.server import ServerConnection
+
+from arcor2_hw.client import (
+    AnswerLate,
+    AnswerUnknown,
+    Client,
+    DeviceFailed,
+    EventsMissed,
+    LockedByOther,
+    NotAdmitted,
+    RequestFailed,
+)
+from arcor2_hw.data.geometry import Position
+from arcor2_hw.data.rpc import RobotEventKind
+from arcor2_hw.exceptions import ConnectionLost, DeviceTimeout, InvalidData, NotConnected
+from tests.client.scripted import ScriptedServer, cut, scripted
+
+
+async def lose(server: ScriptedServer, client: Client) -> None:
+    """Break the connection; the client has noticed."""
+    server.sockets[-1].transport.abort()
+    async with asyncio.timeout(5.0):
+        while client.connected:
+            await asyncio.sleep(0.001)
+
+
+INFO = {"version": "1", "api_version": "1"}
+
+
+async def test_an_edit_whose_answer_is_lost_is_not_sent_again() -> None:
+    async with scripted() as server, Client(server.url, "ann") as client:
+        server.script["AddActionPoint"] = [cut]
+        with pytest.raises(AnswerUnknown, match="may or may not be done") as unknown:
+            await client.add_action_point(name="a", position=Position(0.0, 0.0, 0.0))
+        assert unknown.value.request == "AddActionPoint"
+        await client.save_project()  # waits until it is back
+        assert server.asked == [["RegisterUser", "AddActionPoint"], ["RegisterUser", "SaveProject"]]
+
+
+async def test_a_question_and_a_dry_run_are_asked_again() -> None:
+    async with scripted() as server, Client(server.url, "ann") as client:
+        server.data["SystemInfo"] = INFO
+        server.script = {"SystemInfo": [cut, cut], "SaveProject": [cut]}
+        assert (await client.system_info()).version == "1"
+        await client.save_project(dry_run=True)
+        flat = [name for asked in server.asked for name in asked]
+        assert (flat.count("SystemInfo"), flat.count("SaveProject"), flat.count("RegisterUser")) == (3, 2, 4)
+
+
+async def test_it_is_again_who_it_was_before_anything_else_is_sent() -> None:
+    async with scripted() as server, Client(server.url, "ann", token="secret") as client:
+        for name in ("RegisterForRobotEvent",):
+            server.data[name] = []
+        await client.subscribe_events({"ObjectState", "TaskState"})
+        await client.subscribe_events({"TaskState"}, send=False)
+        await client.register_for_robot_event(robot_id="r1", what=RobotEventKind.JOINTS, send=True)
+        await client.register_for_robot_event(robot_id="r2", what=RobotEventKind.JOINTS, send=True)
+        await client.register_for_robot_event(robot_id="r2", what=RobotEventKind.JOINTS, send=False)
+        before = len(server.args)
+        await lose(server, client)
+        await client.save_project()
+        assert server.asked[-1] == ["RegisterUser", "SubscribeEvents", "RegisterForRobotEvent", "SaveProject"]
+        assert server.args[before:-1] == [
+            {"user_name": "ann"},
+            {"events": ["ObjectState"], "send": True},
+            {"robot_id": "r1", "what": "joints", "send": True},
+        ]
+        assert server.tokens == ["Bearer secret"] * 2
+
+
+async def test_streams_tell_the_gap_before_the_greeting_and_what_is_not_resumed() -> None:
+    async def refuse(server: ScriptedServer, socket: ServerConnection, request: dict[str, Any]) -> None:
+        await server.answer(socket, request, False, "The scene is offline.", "request_refused")
+
+    async with scripted() as server, Client(server.url) as client:
+        server.data["RegisterForRobotEvent"] = []
+        await client.register_for_robot_event(robot_id="r1", what=RobotEventKind.EEF_POSE, send=True)
+        followed = client.follow("ShowMainScreen")
+        assert (await client.next_event()).event == "ShowMainScreen"
+        server.script["RegisterForRobotEvent"] = [refuse]
+        server.sockets[-1].transport.abort()
+        for stream in (client.events(), followed):
+            with pytest.raises(EventsMissed) as missed:
+                await anext(stream)
+            assert missed.value.rejoined
+            assert 0.0 < missed.value.seconds < 10.0
+            assert missed.value.not_resumed == ("eef_pose of r1",)
+            assert (await anext(stream)).event == "ShowMainScreen"
+        server.sockets[-1].transport.abort()
+        with pytest.raises(EventsMissed):
+            await anext(followed)
+        assert server.asked[-1] == []  # what was refused is not asked for again
+
+
+async def test_a_name_that_is_held_for_taken_is_tried_until_it_is_free() -> None:
+    async def taken(server: ScriptedServer, socket: ServerConnection, request: dict[str, Any]) -> None:
+        await server.answer(socket, request, False, "The name is taken.", "request_refused")
+
+    async with scripted() as server, Client(server.url, "ann") as client:
+        server.script["RegisterUser"] = [taken, taken]
+        await lose(server, client)
+        await client.save_scene()
+        assert [asked[-1] for asked in server.asked] == ["RegisterUser"] * 3 + ["SaveScene"]
+        assert (await client.next_event()).event == "ShowMainScreen"
+        with pytest.raises(EventsMissed):
+            await client.next_event()
+        # One gap and one greeting, not three.
+        assert (await client.next_event()).event == "ShowMainScreen"
+        with pytest.raises(DeviceTimeout):
+            await client.next_event(timeout=0.05)
+        server.script["RegisterUser"] = [taken]
+        with pytest.raises(RequestFailed, match="taken"):
+            await Client(server.url, "ann").open()
+
+
+async def test_a_token_that_is_revoked_ends_it_for_good() -> None:
+    async with scripted() as server, Client(server.url, token="old") as client:
+        server.admits = False
+        await server.sockets[-1].close(4401, "the token is not valid any more")
+        await client.next_event("ShowMainScreen")
+        for _ in range(2):
+            with pytest.raises(NotAdmitted, match="not valid any more"):
+                await client.next_event()
+            with pytest.raises(NotAdmitted):
+                await client.save_scene()
+        with pytest.raises(NotAdmitted):
+            await anext(client.follow("SceneState", "SceneSaved"))
+        assert len(server.asked) == 1
+        with pytest.raises(NotAdmitted, match="not valid"):
+            await Client(server.url, token="old").open()
+
+
+async def test_without_reconnecting_the_first_loss_is_the_end() -> None:
+    async with scripted() as server, Client(server.url, reconnect=False) as client:
+        server.script["SystemInfo"] = [cut]
+        with pytest.raises(AnswerUnknown):
+            await client.system_info()
+        with pytest.raises(ConnectionLost, match="closed"):
+            await client.system_info()
+        assert [event.event async for event in client.events()] == ["ShowMainScreen"]
+        assert not client.connected
+        assert len(server.asked) == 1
+
+
+async def test_a_deadline_holds_whether_the_answer_is_late_or_nobody_is_there() -> None:
+    async def silent(server: ScriptedServer, socket: ServerConnection, request: dict[str, Any]) -> None:
+        kept.append(request)
+
+    kept: list[dict[str, Any]] = []
+    server = ScriptedServer()
+    async with server.running():
+        client = Client(server.url, timeout=5.0)
+        await client.open()
+        server.data = {"SystemInfo": INFO, "GetEndEffectors": ["a"]}
+        server.script["GetEndEffectors"] = [silent]
+        with pytest.raises(AnswerLate, match=r"GetEndEffectors within 0\.1 s"):
+            await client.get_end_effectors("r", timeout=0.1)
+        # The late answer answers nothing, and nobody else's question.
+        await server.answer(server.sockets[-1], kept[0])
+        assert (await client.system_info()).version == "1"
+    try:
+        with pytest.raises(NotConnected, match=r"within 0\.2 s: SaveScene was not sent"):
+            await client.save_scene(timeout=0.2)
+        async with server.running(int(server.url.rpartition(":")[2])):
+            await client.save_scene()
+    finally:
+        await client.close()
+    with pytest.raises(ConnectionLost):
+        await client.save_scene()
+
+
+async def test_a_server_that_starts_late_is_waited_for() -> None:
+    server = ScriptedServer()
+    async with server.running():
+        pass
+    with pytest.raises(ConnectionLost, match="No server answers at"):
+        await Client(server.url).open()
+    client = Client(server.url, connect_within=20.0)
+    opening = asyncio.create_task(client.open())
+    await asyncio.sleep(0.15)
+    async with server.running(int(server.url.rpartition(":")[2])):
+        await opening
+        await client.close()
+
+
+async def test_what_cannot_be_read_is_told_and_does_not_end_the_connection() -> None:
+    async with scripted() as server, Client(server.url) as client:
+        await client.next_event()
+        await server.tell(event="SceneState", data={"state": "upside down"})
+        await server.sockets[-1].send("no JSON")
+        await server.tell(event="SomethingNew", data={"any": 1})
+        with pytest.raises(EventsMissed):
+            await client.next_event()
+        event = await client.next_event()
+        assert (event.event, event.data) == ("SomethingNew", {"any": 1})
+        server.data["SystemInfo"] = {"version": 1}
+        with pytest.raises(InvalidData, match="SystemInfo"):
+            await client.system_info()
+
+
+@pytest.mark.parametrize(
+    ("code", "kind"),
+    [("locked", LockedByOther), ("safety_stop", DeviceFailed), ("of_the_future", RequestFailed), ("", RequestFailed)],
+)
+async def test_a_refusal_is_typed_by_its_code(code: str, kind: type[RequestFailed]) -> None:
+    async def refuse(server: ScriptedServer, socket: ServerConnection, request: dict[str, Any]) -> None:
+        await server.answer(socket, request, False, "No.", code)
+
+    async with scripted() as server, Client(server.url) as client:
+        server.script["SaveScene"] = [refuse]
+        with pytest.raises(RequestFailed, match=r"^No\.$") as failed:
+            await client.save_scene()
+        assert (type(failed.value), failed.value.reason, failed.value.request) == (kind, code, "SaveScene")
+
+
+async def test_closing_lets_those_who_wait_go() -> None:
+    async def silent(server: ScriptedServer, socket: ServerConnection, request: dict[str, Any]) -> None:
+        pass
+
+    async with scripted() as server:
+        client = Client(server.url)
+        await client.open()
+        server.script["SaveScene"] = [silent]
+        waiting = asyncio.create_task(client.save_scene())
+        following = asyncio.create_task(anext(client.follow("SceneSaved")))
+        await asyncio.sleep(0.05)
+        await client.close()
+        with pytest.raises(ConnectionLost):
+            await waiting
+        with pytest.raises(StopAsyncIteration):
+            await following
+        await client.close()
+
+
+async def test_followers_come_and_go() -> None:
+    async with scripted() as server, Client(server.url) as client:
+        with client.follow("SceneSaved") as saved, client.follow("SceneSaved", limit=1) as narrow:
+            for _ in range(2):
+                await server.tell(event="SceneSaved")
+            await server.tell(event="SceneClosed")
+            await client.save_scene()
+            assert [(await anext(saved)).event for _ in range(2)] == ["SceneSaved"] * 2
+            with pytest.raises(EventsMissed) as missed:
+                await anext(narrow)
+            assert missed.value.dropped == 1
+        assert len(client._streams) == 1
