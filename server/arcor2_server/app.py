@@ -33,6 +33,7 @@ from arcor2_server.rpc import (  # noqa: F401
     calibration,
     cameras,
     copying,
+    editor,
     execution,
     general,
     history,
@@ -46,6 +47,7 @@ from arcor2_server.rpc import (  # noqa: F401
     perpendicular,
     project,
     robot,
+    runs,
     scene,
     scene_objects,
     temporary,
@@ -94,6 +96,8 @@ async def running_services(settings: ServerSettings) -> AsyncIterator[Services]:
         stack.push_async_callback(services.type_news.close)
         locks.tree = services.session
         locks.stored = _is_known(services)
+        await services.share()
+        stack.push_async_callback(services.close_shared)
         stack.push_async_callback(services.cell.close)
         stack.push_async_callback(services.execution.close)
         yield services

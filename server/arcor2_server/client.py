@@ -69,6 +69,8 @@ class Client:
         """Gives what it is sent when it is let in."""
         self.events: frozenset[str] | None = None
         """The events that it gets, None for all."""
+        self.follows: frozenset[str] = frozenset()
+        """Users whose view state it is sent beside that of its own."""
         self.admitted = False
         """Until then it is sent no event, and only Authenticate is served."""
         self._wire = wire
@@ -88,6 +90,11 @@ class Client:
         self.role, self.token, self.admitted = role, token, True
         if token is not None:
             log.info("client admitted", client=self.number, token=token.id, name=token.name, role=role.name.lower())
+
+    @property
+    def name(self) -> str:
+        """Give who it is: the user, else whose token it showed; empty where neither is known."""
+        return self.user or ("" if self.token is None else self.token.name)
 
     @property
     def closed(self) -> bool:

@@ -1,13 +1,14 @@
 """The Execution service: packages, and the one program that runs (protocol, section 12)."""
 
 import asyncio
-from collections.abc import Coroutine, Iterable
+from collections.abc import Collection, Coroutine
 from typing import IO, TYPE_CHECKING, Any, Final, TypeVar
 
 import msgspec
 import structlog
 
-from arcor2_hw.data.base import UNSET
+from arcor2_hw.data.base import UNSET, Unset
+from arcor2_hw.data.editor import RunEnd
 from arcor2_hw.data.events import (
     ChangeType,
     Event,
@@ -42,6 +43,18 @@ RUN_STATES: Final = frozenset({S.RUNNING, S.PAUSING, S.PAUSED, S.RESUMING})
 _IDLE: Final = frozenset({S.UNDEFINED, S.STOPPED})
 
 
+class How(msgspec.Struct, frozen=True):
+    """How a package is run. by: a user's name. breakpoints: ids of its action points and actions.
+
+    shared_breakpoints: pause at those that users share on its project, too.
+    """
+
+    start_paused: bool = False
+    breakpoints: Collection[str] = ()
+    shared_breakpoints: bool = False
+    by: str = ""
+
+
 class Execution:
     """Runs one package at a time, in a cell host of its own. Requests that a state forbids raise RequestRefused."""
 
@@ -59,9 +72,14 @@ class Execution:
         self._info: bytes | None = None
         self._before: bytes | None = None
         self._board = DeviceBoard(lambda data: services.hub.broadcast(make_event("ObjectState", data)))
+        self._run_number = 0
+        self._stopped_by: str | None = None
+        self._shared_of = ""
+        """The project whose shared breakpoints the program pauses at."""
         self._over: asyncio.Future[None] | None = None
         self._killing: asyncio.TimerHandle | None = None
         self._tasks: set[asyncio.Task[None]] = set()
+        services.breakpoints.on_change.append(self._breakpoints_changed)
 
     # -------------------------------------------------------------------------------- state
     @property
@@ -141,25 +159,29 @@ class Execution:
             raise RequestRefused("This package is running: stop it first.")
 
     # -------------------------------------------------------------------------------- commands
-    async def run(self, package_id: str, start_paused: bool = False, breakpoints: Iterable[str] = ()) -> None:
+    async def run(self, package_id: str, how: How | None = None) -> None:
         """Begin to run a package: `started` is told at once, the rest as it happens."""
         self._require_not_reserved()
-        await self._run(package_id, start_paused, breakpoints)
+        await self._run(package_id, how or How())
 
-    async def run_through(self, package_id: str, start_paused: bool, breakpoints: Iterable[str]) -> None:
+    async def run_through(self, package_id: str, how: How) -> None:
         """Run a package and wait for its end, after which clients are not sent to the list of packages."""
         over = self._over = asyncio.get_running_loop().create_future()
         try:
-            await self._run(package_id, start_paused, breakpoints)
+            await self._run(package_id, how)
             await over
         finally:
             self._over = None
 
-    async def _run(self, package_id: str, start_paused: bool, breakpoints: Iterable[str]) -> None:
+    async def _run(self, package_id: str, how: How) -> None:
         self._require_idle()
         directory = await asyncio.to_thread(self.packages.directory, package_id)
+        project_id = await asyncio.to_thread(self.packages.project_id, package_id) if how.shared_breakpoints else ""
+        shared = await self._services.breakpoints.ids(project_id) if project_id else set()
         self._require_idle()
         self.package_id = package_id
+        self._shared_of = project_id
+        self._stopped_by = None
         self.last_error = None
         self._info = self._before = None
         self._board.clear()
@@ -168,13 +190,17 @@ class Execution:
         message = m.RunPackage(
             package_id,
             str(directory.resolve()),
-            start_paused,
-            sorted(breakpoints),
+            how.start_paused,
+            sorted(how.breakpoints),
             period,
             self._services.settings.cell,
+            sorted(shared),
+        )
+        self._run_number = self._services.runs.begin(
+            package_id, by=how.by, temporary=self._over is not None, start_paused=how.start_paused
         )
         self._spawn(self._begin(message), "program start")
-        self._spawn(self._note_run(package_id), "note of the run")
+        self._spawn(self._note_run(package_id, self._run_number), "note of the run")
 
     def _require_not_reserved(self) -> None:
         if self.reserved:
@@ -196,21 +222,27 @@ class Execution:
         self._host = host
         host.send(message)
 
-    async def _note_run(self, package_id: str) -> None:
+    async def _note_run(self, package_id: str, number: int) -> None:
         try:
-            await asyncio.to_thread(self.packages.mark_executed, package_id)
+            summary = await asyncio.to_thread(self.packages.mark_executed, package_id)
+            project = summary.project_meta
+            of: dict[str, Any] = {}
+            if not isinstance(project, Unset):
+                of = {"project_id": project.id, "project_name": project.name, "project_modified": project.modified}
+            self._services.runs.describe(number, package_name=summary.package_meta.name, **of)
             directory = self.packages.checked(package_id)
             for difference in await asyncio.to_thread(check_versions, directory):
                 log.warning("package was built with another version", package=package_id, difference=difference)
         except Arcor2Error as error:
             log.warning("run not noted", package=package_id, reason=str(error))
 
-    def stop(self) -> None:
+    def stop(self, by: str = "") -> None:
         """Stop the program: devices first, then the script; its host is killed when it does not end in time.
 
         One that has just been started is refused, as the protocol says, unless its host has fallen silent.
         """
         host = self._require(RUN_STATES if self._board.answering else RUN_STATES | {S.STARTED}, "stopped")
+        self._stopped_by = by
         self._enter(S.STOPPING)
         host.send(m.StopProgram())
         self._killing = asyncio.get_running_loop().call_later(self.stop_within, self._kill, host)
@@ -233,6 +265,10 @@ class Execution:
         self._enter(S.RESUMING)
         host.send(m.Step())
 
+    def _breakpoints_changed(self, project_id: str, ids: set[str]) -> None:
+        if self._host is not None and self._shared_of == project_id and self.state not in _IDLE:
+            self._host.send(m.SetBreakpoints(sorted(ids)))
+
     def _require(self, states: "set[PackageStateEnum] | frozenset[PackageStateEnum]", what: str) -> CellHost:
         if self.state not in states or self._host is None:
             raise RequestRefused(f"The package is {self.state.value} and cannot be {what}.")
@@ -245,6 +281,10 @@ class Execution:
     async def close(self) -> None:
         """End with the server; the hosts, which the cell ends, stop motion and disconnect by themselves."""
         self._host = None  # its end is meant now
+        if self.state not in _IDLE:
+            error = "The server ended in mid-run."
+            self._services.runs.end(self._run_number, RunEnd.LOST, error=error, error_type="ConnectionLost")
+            self.state = S.STOPPED
         if self._killing is not None:
             self._killing.cancel()
         for task in self._tasks:
@@ -261,6 +301,10 @@ class Execution:
             case m.ProgramEvent():
                 self._remember(message)
                 hub.broadcast_encoded(message.event, message.encoded)
+            case m.ActionBegan():
+                self._services.runs.began(message)
+            case m.ActionEnded():
+                self._services.runs.ended(message)
             case m.ProgramChanged():
                 self._program_changed(host, message)
             case m.DeviceChanged():
@@ -303,14 +347,15 @@ class Execution:
             return
         if self.state is not S.STOPPING:
             self._fail(f"The program was lost: {reason}.", "ConnectionLost")
-        self._ended()
+        self._ended(lost=True)
 
     def _fail(self, message: str, kind: str) -> None:
         self.last_error = m.ErrorData("error", kind, message)
         self._services.hub.broadcast(make_event("ProjectException", ProjectExceptionData(message, kind)))
 
-    def _ended(self) -> None:
+    def _ended(self, *, lost: bool = False) -> None:
         self._host = None
+        self._note_end(lost)
         self._board.clear("" if self.last_error is None else self.last_error.message)
         self._info = self._before = None
         if self._killing is not None:
@@ -323,6 +368,19 @@ class Execution:
         elif not self._over.done():
             self._over.set_result(None)
         self._services.cell.hosts.prepare()
+
+    def _note_end(self, lost: bool) -> None:
+        error = self.last_error
+        end = RunEnd.FINISHED if error is None else RunEnd.LOST if lost else RunEnd.FAILED
+        if self._stopped_by is not None:
+            end = RunEnd.STOPPED
+        self._services.runs.end(
+            self._run_number,
+            end,
+            error="" if error is None else error.message,
+            error_type="" if error is None else error.type,
+            stopped_by=self._stopped_by or "",
+        )
 
     def _spawn(self, work: Coroutine[Any, Any, None], name: str) -> None:
         task = asyncio.create_task(work, name=name)

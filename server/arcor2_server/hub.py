@@ -67,6 +67,12 @@ class Hub:
             return tuple(clients)
         return tuple(client for client in clients if name in self._only.get(client, (name,)))
 
+    def subscribers(self, name: str) -> tuple[Client, ...]:
+        """Give the clients that are sent an additional event."""
+        least = EVENTS[name].role
+        hearing = self._hearing(name, self._subscribers.get(name, set()) & self.clients)
+        return tuple(client for client in hearing if client.role >= least)
+
     def send(self, client: Client, event: Event) -> None:
         """Send an event to one client."""
         if client.role >= EVENTS[event.event].role:
@@ -81,4 +87,11 @@ class Hub:
         stream = f"{name}/{key}"
         for client in self._hearing(name, self.clients if clients is None else clients & self.clients):
             if client.role >= least:
+                client.put_newest(stream, message)
+
+    def stream_to_subscribers(self, name: str, key: str, message: bytes, *, besides: Client | None = None) -> None:
+        """Send the newest message of an additional event about `key` to who subscribed, as `stream` does."""
+        stream = f"{name}/{key}"
+        for client in self.subscribers(name):
+            if client is not besides:
                 client.put_newest(stream, message)

@@ -79,9 +79,15 @@ class Packages:
         self._set(package_id, name=name)
         return self.summary(package_id)
 
-    def mark_executed(self, package_id: str) -> None:
-        """Note that a package was run now; NotFound, StorageError."""
+    def mark_executed(self, package_id: str) -> PackageSummary:
+        """Note that a package was run now; gives it. NotFound, StorageError."""
         self._set(package_id, executed=now())
+        return self.summary(package_id)
+
+    def project_id(self, package_id: str) -> str:
+        """Give the id of the project that a package was built from, empty where it does not say; NotFound."""
+        project = _project_meta(self.directory(package_id) / "data" / "project.json")
+        return "" if isinstance(project, Unset) else project.id
 
     def _set(self, package_id: str, **values: str) -> None:
         path = self.directory(package_id) / "package.json"

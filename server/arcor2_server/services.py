@@ -4,10 +4,18 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from arcor2_server.aiming import Aiming
+from arcor2_server.breakpoints import SharedBreakpoints
 from arcor2_server.calibration import Calibration, NoCalibration, RunningCalibrations
 from arcor2_server.collisions import CollisionWorld
+from arcor2_server.edit_news import EditNews
 from arcor2_server.kept import KeptAnswers
+from arcor2_server.presence import PresenceBoard
+from arcor2_server.previews import Previews
+from arcor2_server.runs import Runs
+from arcor2_server.storage.shared import SharedData
+from arcor2_server.tasks import Tasks
 from arcor2_server.type_news import TypeNews
+from arcor2_server.views import ViewStates
 
 if TYPE_CHECKING:
     from arcor2_hw.data.events import Event
@@ -34,6 +42,8 @@ class Services:
     cell: the scene when online. execution: packages and the running program. build: project to package.
     calibration: poses from pictures. calibrations: what is being calibrated. aiming: who points a robot at an object.
     collisions: what is in the way. type_news: object types that clients have to be told of. kept: encoded answers.
+    runs: their history. tasks: work under way. previews: what is dragged. views: what clients show, by user and shared.
+    breakpoints: the shared ones. presence: who looks at what. edit_news: what follows from edits.
     """
 
     settings: "ServerSettings"
@@ -54,6 +64,37 @@ class Services:
     collisions: CollisionWorld = field(default_factory=CollisionWorld)
     type_news: TypeNews = field(default_factory=TypeNews)
     kept: KeptAnswers = field(default_factory=KeptAnswers)
+    runs: Runs = field(init=False)
+    tasks: Tasks = field(init=False)
+    previews: Previews = field(init=False)
+    views: ViewStates = field(init=False)
+    breakpoints: SharedBreakpoints = field(init=False)
+    presence: PresenceBoard = field(init=False)
+    edit_news: EditNews = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Make what needs no more than these."""
+        data = SharedData(self.storage)
+        self.runs = Runs(self.hub)
+        self.tasks = Tasks(self.hub)
+        self.previews = Previews(self.hub, self.locks)
+        self.views = ViewStates(self.hub, data)
+        self.breakpoints = SharedBreakpoints(self, data)
+
+    async def share(self) -> None:
+        """Bring up what clients share, once the session is there. StorageError."""
+        await self.runs.open(SharedData(self.storage))
+        self.presence = PresenceBoard(self.hub, self.users)
+        self.edit_news = EditNews(self)
+        self.storage.on_deleted += [self.views.forget, self.breakpoints.forget]
+
+    async def close_shared(self) -> None:
+        """End what `share` brought up."""
+        self.edit_news.close()
+        self.presence.close()
+        self.previews.close()
+        self.tasks.close()
+        await self.runs.close()
 
     def greeting(self) -> list["Event"]:
         """Give what a client is sent when it is let in: what is open, what runs, or the main screen."""

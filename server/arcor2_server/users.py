@@ -1,6 +1,7 @@
 """Who is logged in at which connection, and what happens to the locks of one who left."""
 
 import asyncio
+from collections.abc import Callable
 from typing import Final
 
 import structlog
@@ -27,6 +28,9 @@ class Users:
         self._timeout = settings.lock_timeout
         self._clients: dict[str, Client] = {}
         self._releases: dict[str, asyncio.TimerHandle] = {}
+        self.on_enter: list[Callable[[str], None]] = []
+        self.on_leave: list[Callable[[str], None]] = []
+        """Called with the name of who logged in, or is logged out."""
 
     def client_of(self, user: str) -> Client | None:
         """Give the connection of a user."""
@@ -54,6 +58,9 @@ class Users:
             self._leave(client.user)
         self._clients[name] = client
         client.user = name
+        if holder is not client:
+            for tell in self.on_enter:
+                tell(name)
         if (handle := self._releases.pop(name, None)) is not None:
             handle.cancel()
         log.info("user registered", user=name, client=client.number)
@@ -73,6 +80,8 @@ class Users:
 
     def _leave(self, name: str) -> None:
         del self._clients[name]
+        for tell in self.on_leave:
+            tell(name)
         if (handle := self._releases.pop(name, None)) is not None:
             handle.cancel()
         self._releases[name] = asyncio.get_running_loop().call_later(self._timeout, self._release, name)

@@ -1,6 +1,8 @@
 """Arguments and answers that belong to no one subject, or to the server itself."""
 
-from msgspec import field
+from typing import Annotated
+
+from msgspec import Meta, field
 
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.camera import CameraParameters
@@ -67,7 +69,7 @@ class SubscribeEventsArgs(Data, frozen=True):
 
     events: set[str]
     send: bool = True
-    users: set[str] | Unset = UNSET
+    users: Annotated[set[str], Meta(max_length=100)] | Unset = UNSET
 
 
 class SystemInfoData(Data, frozen=True):

@@ -15,6 +15,7 @@ from arcor2_server.rest import (  # noqa: F401
     models,
     object_types,
     projects,
+    runs,
     scene,
     scenes,
 )

@@ -14,6 +14,7 @@ from arcor2_hw.data.events import ChangeType
 from arcor2_hw.data.package import PackageStateEnum, PackageSummary
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
+from arcor2_server.execution import How
 from arcor2_server.packages import MAX_UPLOAD
 from arcor2_server.rest.build import ZIP
 from arcor2_server.rest.operations import MIB, Binary, Upload, operation
@@ -158,7 +159,7 @@ async def get_breakpoints(services: Services, id: str) -> list[str]:  # noqa: A0
 async def debug_package(services: Services, id: str, query: DebugQuery) -> None:  # noqa: A002
     """Run a package with its breakpoints."""
     breakpoints = await Beside(services.storage).breakpoints(id)
-    await services.execution.run(id, query.break_on_first_action, breakpoints)
+    await services.execution.run(id, How(query.break_on_first_action, breakpoints))
 
 
 @operation("PUT", "/packages/stop", EXECUTION, Role.OPERATOR)

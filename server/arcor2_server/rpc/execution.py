@@ -3,8 +3,16 @@
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.events import ActionExecutionData, ChangeType
 from arcor2_hw.data.package import PackageSummary
-from arcor2_hw.data.rpc import ExecuteActionArgs, IdArgs, RenamePackageArgs, RunPackageArgs, UploadPackageArgs
+from arcor2_hw.data.rpc import (
+    ExecuteActionArgs,
+    IdArgs,
+    RenamePackageArgs,
+    RunPackageArgs,
+    TemporaryPackageArgs,
+    UploadPackageArgs,
+)
 from arcor2_server.cell.actions import RunningAction, execute, prepare
+from arcor2_server.execution import How
 from arcor2_server.locks import ACTION
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
 
@@ -98,14 +106,19 @@ async def rename_package(context: Context, args: RenamePackageArgs) -> None:
 @rpc("RunPackage")
 async def run_package(context: Context, args: RunPackageArgs) -> None:
     """Run a package."""
-    breakpoints = () if isinstance(args.breakpoints, Unset) else args.breakpoints
-    await context.services.execution.run(args.id, args.start_paused, breakpoints)
+    await context.services.execution.run(args.id, how(context, args))
+
+
+def how(context: Context, args: RunPackageArgs | TemporaryPackageArgs) -> How:
+    """Give how a package is to be run."""
+    breakpoints = frozenset[str]() if isinstance(args.breakpoints, Unset) else args.breakpoints
+    return How(args.start_paused, breakpoints, args.shared_breakpoints is True, context.client.name)
 
 
 @rpc("StopPackage")
 async def stop_package(context: Context, args: None) -> None:  # noqa: ARG001
     """Stop the program."""
-    context.services.execution.stop()
+    context.services.execution.stop(context.client.name)
 
 
 @rpc("PausePackage")

@@ -5,6 +5,7 @@ from typing import Any, Final
 
 from msgspec import Raw
 
+from arcor2_hw.data.base import Unset
 from arcor2_hw.data.events import EVENTS
 from arcor2_hw.data.rpc import (
     AuthenticateArgs,
@@ -78,6 +79,8 @@ async def register_user(context: Context, args: RegisterUserArgs) -> None:
     """Log in at this connection."""
     services, name = context.services, args.user_name
     context.events_to_caller += await services.users.register(context.client, name)
+    if context.client in services.hub.subscribers("HistoryChanged"):
+        context.events_to_caller.append(services.edit_news.history_of(context.client))
     aim = services.aiming.of(name, services.session.document)
     if aim is not None and not services.locks.holds(name, aim.object_id):
         services.aiming.end(name)
@@ -85,14 +88,25 @@ async def register_user(context: Context, args: RegisterUserArgs) -> None:
 
 @rpc("SubscribeEvents")
 async def subscribe_events(context: Context, args: SubscribeEventsArgs) -> None:
-    """Send additional events to this connection, or no longer; ObjectState first tells how everything is now."""
+    """Send additional events to this connection, or no longer; first it is told how everything is now."""
     offered = {event.name for event in EVENTS.values() if event.additional}
     if unknown := args.events - offered:
         raise RequestRefused(
             f"No additional event is called {', '.join(sorted(unknown))}; there is {', '.join(sorted(offered))}."
         )
-    services = context.services
-    services.hub.subscribe(context.client, args.events, args.send)
-    if args.send and "ObjectState" in args.events:
+    services, client = context.services, context.client
+    services.hub.subscribe(client, args.events, args.send)
+    if not isinstance(args.users, Unset):
+        client.follows = client.follows | args.users if args.send else client.follows - args.users
+    if not args.send:
+        return
+    tell = context.events_to_caller
+    if "ObjectState" in args.events:
         states = services.execution.object_states() or services.cell.object_states()
-        context.events_to_caller += [make_event("ObjectState", state) for state in states]
+        tell += [make_event("ObjectState", state) for state in states]
+    if "UserPresence" in args.events:
+        tell += services.presence.everybody()
+    if "TaskState" in args.events:
+        tell += services.tasks.under_way()
+    if "HistoryChanged" in args.events:
+        tell.append(services.edit_news.history_of(client))

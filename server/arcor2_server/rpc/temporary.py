@@ -2,15 +2,15 @@
 
 import asyncio
 import contextlib
-from collections.abc import Collection
 
 import structlog
 
-from arcor2_hw.data.base import Unset
 from arcor2_hw.data.events import ChangeType, Event, MainScreen, OpenProjectData, SceneStateEnum, ShowMainScreenData
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.rpc import TemporaryPackageArgs
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.execution import How
+from arcor2_server.rpc.execution import how
 from arcor2_server.rpc.registry import Context, RequestRefused, make_event, rpc
 from arcor2_server.services import Services
 from arcor2_server.session.checks import project_problems
@@ -22,9 +22,8 @@ log = structlog.get_logger(__name__)
 async def temporary_package(context: Context, args: TemporaryPackageArgs) -> None:
     """Run the open project, which is closed meanwhile; answered once the package is built."""
     built: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-    breakpoints = () if isinstance(args.breakpoints, Unset) else args.breakpoints
     services = context.services
-    services.cell.spawn(_Run(services, args.start_paused, breakpoints).whole(built), "temporary package")
+    services.cell.spawn(_Run(services, how(context, args)).whole(built), "temporary package")
     await built
 
 
@@ -41,10 +40,9 @@ def _settle(built: "asyncio.Future[None]", error: Exception | None = None) -> No
 class _Run:
     """One run, from the check whether it is allowed to the project being open again."""
 
-    def __init__(self, services: Services, start_paused: bool, breakpoints: Collection[str]) -> None:
+    def __init__(self, services: Services, asked: How) -> None:
         self._services = services
-        self._start_paused = start_paused
-        self._breakpoints = breakpoints
+        self._how = asked
         self._package = ""
         self._online = False
 
@@ -127,7 +125,7 @@ class _Run:
 
     async def _run(self) -> None:
         try:
-            await self._services.execution.run_through(self._package, self._start_paused, self._breakpoints)
+            await self._services.execution.run_through(self._package, self._how)
         except Arcor2Error as error:
             log.warning("temporary package not run", package=self._package, reason=str(error))
 

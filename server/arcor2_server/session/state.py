@@ -2,7 +2,7 @@
 
 import asyncio
 from collections import deque
-from collections.abc import Awaitable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from typing import TYPE_CHECKING
 
 import structlog
@@ -66,6 +66,8 @@ class Session:
         self.removed_types: set[str] = set()
         """Object types of objects that were removed: those made for one object are deleted when the scene is saved."""
         self.history = History(settings.history_limit)
+        self.on_change: list[Callable[[Sequence[Change]], None]] = []
+        """Called with the changes of each edit that is on the disk, and with none when another document is open."""
         self._services = services
         self._limit = settings.history_limit
         self._journal = Journal(settings.journal_database, self._take_back)
@@ -267,7 +269,9 @@ class Session:
 
     def _kept(self, future: "asyncio.Future[None]") -> None:
         if future.exception() is None:
-            self._pending.popleft()
+            changes = self._pending.popleft().edit.changes
+            for tell in self.on_change:
+                tell(changes)
 
     def _take_back(self) -> None:
         """Undo all that is not on the disk: the journal cannot be written."""
@@ -321,6 +325,8 @@ class Session:
         self._number = self._based_on = 0
         self._unsaved = Unsaved()
         self._forget_snapshots()
+        for tell in self.on_change:
+            tell(())
 
     async def save(self) -> None:
         """Save what has changes: the scene, the project, or both. Raises StorageError."""

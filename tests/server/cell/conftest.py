@@ -37,6 +37,7 @@ class Recorder:
 
     def __init__(self, user: str | None) -> None:
         self.user = user
+        self.name = user or ""
         self.role = Role.PROGRAMMER
         self.got: list[dict[str, Any]] = []
         self._news = asyncio.Event()

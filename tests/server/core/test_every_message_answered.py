@@ -131,15 +131,13 @@ async def test_every_request_is_answered(server: ServerProcess, user: str | None
 
 
 STATED = {
-    "GetBreakpoints",
-    "GetExecutionTrace",
-    "GetViewState",
-    "ListRuns",
-    "PreviewMove",
+    "AcknowledgeStop",
+    "HoldHandTeaching",
+    "JogRobot",
     "Reachability",
-    "SetBreakpoints",
-    "SetViewState",
-    "UpdatePresence",
+    "RetryObject",
+    "StartSceneKeepGoing",
+    "StreamRobot",
 }
 """Requests of ours that docs/protocol.md states and that are being built."""
 

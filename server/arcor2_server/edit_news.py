@@ -1,0 +1,110 @@
+"""What follows from edits of the open document, told a moment later: what one could undo, previews, breakpoints."""
+
+import asyncio
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+from arcor2_hw.data.base import UNSET
+from arcor2_hw.data.editor import HistoryChangedData, HistoryStep
+from arcor2_hw.data.events import Event
+from arcor2_server.client import Client
+from arcor2_server.hub import encode
+from arcor2_server.rpc.registry import make_event
+from arcor2_server.session.changes import Change, Edit, How, Kind
+
+if TYPE_CHECKING:
+    from arcor2_server.services import Services
+
+DELAY: Final = 0.005
+"""Seconds after an edit: its answer and its own events go out first, and edits in a row are told once."""
+NAME: Final = "HistoryChanged"
+
+
+class EditNews:
+    """Collects changes; tells each subscriber of HistoryChanged what he, as his user, could undo and redo."""
+
+    def __init__(self, services: "Services") -> None:
+        self._services = services
+        self._changes: list[Change] = []
+        self._timer: asyncio.TimerHandle | None = None
+        services.session.on_change.append(self._changed)
+
+    def history_of(self, client: Client) -> Event:
+        """Give the event that tells a client what he could undo and redo now."""
+        return self._history(client.user)
+
+    def close(self) -> None:
+        """End with the server."""
+        if self._timer is not None:
+            self._timer.cancel()
+
+    def _changed(self, changes: Sequence[Change]) -> None:
+        self._changes += changes
+        if self._timer is None:
+            self._timer = asyncio.get_running_loop().call_later(DELAY, self._tell)
+
+    def _tell(self) -> None:
+        self._timer = None
+        changes, self._changes = self._changes, []
+        self._services.previews.changed(changes)
+        self._services.breakpoints.changed(changes)
+        events: dict[str | None, bytes] = {}
+        for client in self._services.hub.subscribers(NAME):
+            if client.user not in events:
+                events[client.user] = encode(self._history(client.user))
+            client.put_newest(NAME, events[client.user])
+
+    def _history(self, user: str | None) -> Event:
+        session = self._services.session
+        undo: Any = UNSET
+        redo: Any = UNSET
+        if user is not None:
+            if (edit := session.history.undoable(user)) is not None:
+                undo = _step(edit)
+            if (edit := session.history.redoable(user)) is not None:
+                redo = _step(edit)
+        return make_event(NAME, HistoryChangedData(session.revision, undo, redo))
+
+
+# ---------------------------------------------------------------------------------------------- sentences
+_MOVES: Final = ("UpdateObjectPose", "UpdateActionPointPosition", "UpdateActionPointUsingRobot")
+_WORDS: Final = {
+    Kind.SCENE: "the scene",
+    Kind.OBJECT: "the object",
+    Kind.PROJECT: "the project",
+    Kind.POINT: "the action point",
+    Kind.ORIENTATION: "the orientation",
+    Kind.JOINTS: "the joints",
+    Kind.ACTION: "the action",
+    Kind.PARAMETER: "the parameter",
+    Kind.LOGIC: "a connection",
+    Kind.OVERRIDE: "an override",
+}
+
+
+def _step(edit: Edit) -> HistoryStep:
+    return HistoryStep(edit.number, edit.request, sentence(edit))
+
+
+def sentence(edit: Edit) -> str:
+    """Give what an edit did, as it follows `Undo` on a button: `moving the object gripper`.
+
+    Of an undo, what was taken back: that is what Redo would do again.
+    """
+    changes = [change.inverse() for change in edit.changes] if edit.how is How.UNDO else edit.changes
+    if edit.how is How.RESTORE:
+        return f"going back to revision {edit.of}"
+    if not changes:
+        return edit.request
+    first = changes[-1] if edit.how is How.UNDO else changes[0]
+    value = first.before if first.after is None else first.after
+    before, after = getattr(first.before, "name", ""), getattr(first.after, "name", "")
+    what = _WORDS[first.kind]
+    if first.before is not None and first.after is not None and before != after:
+        return f"renaming {what} {before} to {after}"
+    verb = "adding" if first.before is None else "removing" if first.after is None else "changing"
+    if verb == "changing" and edit.request.startswith(_MOVES):
+        verb = "moving"
+    name = getattr(value, "name", "")
+    others = len({change.id for change in changes}) - 1
+    return f"{verb} {what}{' ' if name else ''}{name}" + (f" and {others} more" if others else "")

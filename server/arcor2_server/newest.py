@@ -1,0 +1,45 @@
+"""Events that come faster than anybody needs them: the first at once, then the newest at a bounded rate."""
+
+import asyncio
+from collections.abc import Callable
+
+
+class Newest:
+    """Passes messages on by `send(key, message)`, of each key at most one in `period` seconds: the newest one."""
+
+    def __init__(self, period: float, send: Callable[[str, bytes], None]) -> None:
+        self._period = period
+        self._send = send
+        self._waiting: dict[str, bytes] = {}
+        self._timers: dict[str, asyncio.TimerHandle] = {}
+
+    def put(self, key: str, message: bytes) -> None:
+        """Pass on at once, or in place of what still waits."""
+        if key in self._timers:
+            self._waiting[key] = message
+            return
+        self._send(key, message)
+        self._start(key)
+
+    def end(self, key: str, message: bytes) -> None:
+        """Pass on at once whatever waits: it is the last of its key, which waits no more."""
+        self._waiting.pop(key, None)
+        if (timer := self._timers.pop(key, None)) is not None:
+            timer.cancel()
+        self._send(key, message)
+
+    def _start(self, key: str) -> None:
+        self._timers[key] = asyncio.get_running_loop().call_later(self._period, self._over, key)
+
+    def _over(self, key: str) -> None:
+        del self._timers[key]
+        if (message := self._waiting.pop(key, None)) is not None:
+            self._send(key, message)
+            self._start(key)
+
+    def close(self) -> None:
+        """Drop what waits."""
+        for timer in self._timers.values():
+            timer.cancel()
+        self._timers.clear()
+        self._waiting.clear()

@@ -1,0 +1,63 @@
+"""Who is there, and what each user looks at and edits."""
+
+from typing import Final
+
+from msgspec import UNSET
+
+from arcor2_hw.data.editor import Presence, UserPresenceData
+from arcor2_hw.data.events import Event
+from arcor2_server.client import Client
+from arcor2_server.hub import Hub, encode
+from arcor2_server.newest import Newest
+from arcor2_server.rpc.registry import RequestRefused, make_event
+from arcor2_server.users import Users
+
+PERIOD: Final = 1 / 15
+"""Seconds between two events of one user."""
+
+
+class PresenceBoard:
+    """What users said last; of one who leaves it is forgotten."""
+
+    def __init__(self, hub: Hub, users: Users) -> None:
+        self._hub = hub
+        self._users = users
+        self._said: dict[str, Presence] = {}
+        self._events = Newest(PERIOD, lambda user, event: hub.stream_to_subscribers("UserPresence", user, event))
+        users.on_enter.append(self._entered)
+        users.on_leave.append(self._left)
+
+    def everybody(self) -> list[Event]:
+        """Give the events that tell of all who are there."""
+        return [self._event(name) for name in self._users.names()]
+
+    def say(self, client: Client, presence: Presence) -> None:
+        """Take what a user's client says, and tell it. RequestRefused for what cannot be sent on."""
+        user = client.user
+        assert user is not None
+        before = self._said.get(user)
+        self._said[user] = presence
+        try:
+            self._events.put(user, encode(self._event(user)))
+        except UnicodeEncodeError as error:
+            del self._said[user]
+            if before is not None:
+                self._said[user] = before
+            raise RequestRefused(f"This cannot be sent to others: {error}.") from None
+
+    def close(self) -> None:
+        """End with the server."""
+        self._events.close()
+
+    def _event(self, user: str) -> Event:
+        client = self._users.client_of(user)
+        role = "" if client is None else client.role.name.lower()
+        return make_event("UserPresence", UserPresenceData(user, client is not None, role, self._said.get(user, UNSET)))
+
+    def _entered(self, user: str) -> None:
+        self._said.pop(user, None)
+        self._events.put(user, encode(self._event(user)))
+
+    def _left(self, user: str) -> None:
+        self._said.pop(user, None)
+        self._events.end(user, encode(make_event("UserPresence", UserPresenceData(user, False, ""))))

@@ -1,0 +1,90 @@
+"""Where things are while they are dragged: told to the others, never kept."""
+
+import asyncio
+from collections.abc import Sequence
+from typing import Final
+
+from msgspec import UNSET
+
+from arcor2_hw.data.editor import MovePreview, MovePreviewData
+from arcor2_server.client import Client
+from arcor2_server.hub import Hub, encode
+from arcor2_server.locks import Locks
+from arcor2_server.newest import Newest
+from arcor2_server.rpc.registry import make_event
+from arcor2_server.session.changes import Change
+
+PERIOD: Final = 1 / 30
+"""Seconds between two events of one item."""
+LOOK_PERIOD: Final = 0.1
+"""Seconds between two looks at whether those who drag something still hold it."""
+NAME: Final = "MovePreview"
+
+
+class _Dragged:
+    __slots__ = ("client", "locked", "user")
+
+    def __init__(self, client: Client, user: str, locked: str) -> None:
+        self.client = client
+        self.user = user
+        self.locked = locked
+
+
+class Previews:
+    """What is dragged just now, by item."""
+
+    def __init__(self, hub: Hub, locks: Locks) -> None:
+        self._hub = hub
+        self._locks = locks
+        self._dragged: dict[str, _Dragged] = {}
+        self._events = Newest(PERIOD, self._send)
+        self._look: asyncio.TimerHandle | None = None
+
+    def show(self, client: Client, user: str, preview: MovePreview, locked: str) -> None:
+        """Tell the others where an item is just now; or that it is over; `locked` is what its mover holds."""
+        if preview.position is UNSET and preview.orientation is UNSET and preview.joints is UNSET:
+            self._over(preview.id)
+            return
+        if (dragged := self._dragged.get(preview.id)) is None or dragged.client is not client or dragged.user != user:
+            self._dragged[preview.id] = _Dragged(client, user, locked)
+        data = MovePreviewData(
+            id=preview.id,
+            position=preview.position,
+            orientation=preview.orientation,
+            joints=preview.joints,
+            user=user,
+        )
+        self._events.put(preview.id, encode(make_event(NAME, data)))
+        if self._look is None:
+            self._look = asyncio.get_running_loop().call_later(LOOK_PERIOD, self._look_around)
+
+    def changed(self, changes: Sequence[Change]) -> None:
+        """End the previews of what was changed or removed."""
+        if self._dragged:
+            for change in changes:
+                self._over(change.id)
+
+    def close(self) -> None:
+        """End with the server."""
+        self._events.close()
+        if self._look is not None:
+            self._look.cancel()
+
+    def _look_around(self) -> None:
+        """End the previews of those who are gone, or do not hold the item any more."""
+        self._look = None
+        for item, dragged in list(self._dragged.items()):
+            if dragged.client not in self._hub.clients or not self._locks.holds(dragged.user, dragged.locked):
+                self._over(item)
+        if self._dragged:
+            self._look = asyncio.get_running_loop().call_later(LOOK_PERIOD, self._look_around)
+
+    def _over(self, item: str) -> None:
+        if (dragged := self._dragged.get(item)) is None:
+            return
+        self._events.end(item, encode(make_event(NAME, MovePreviewData(id=item, user=dragged.user))))
+        del self._dragged[item]
+
+    def _send(self, item: str, event: bytes) -> None:
+        if (dragged := self._dragged.get(item)) is not None:
+            self._hub.stream_to_subscribers(NAME, item, event, besides=dragged.client)

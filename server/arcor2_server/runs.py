@@ -1,0 +1,169 @@
+"""The history of runs: who ran what and how it ended; and the actions of the present or last run, one by one."""
+
+import asyncio
+from collections import OrderedDict
+from datetime import UTC, datetime
+from itertools import islice
+from typing import Any, Final
+
+import structlog
+from msgspec import UNSET
+from msgspec.structs import replace
+
+from arcor2_hw.data.base import now
+from arcor2_hw.data.editor import ActionOfRun, Run, RunEnd, TraceEntry
+from arcor2_hw.exceptions import StorageError
+from arcor2_hw.runtime import messages as m
+from arcor2_server.hub import Hub
+from arcor2_server.rpc.registry import make_event
+from arcor2_server.storage.shared import SharedData
+
+log = structlog.get_logger(__name__)
+
+KEPT: Final = 1000
+"""Runs that are kept."""
+KEPT_ACTIONS: Final = 1000
+"""Actions of the last run that are kept."""
+
+
+class Runs:
+    """All runs by number, which grows; on disk too once `open` has read them."""
+
+    def __init__(self, hub: Hub) -> None:
+        self._hub = hub
+        self._runs: OrderedDict[int, Run] = OrderedDict()
+        self._data: SharedData | None = None
+        self._writing: asyncio.Task[None] | None = None
+        self._unwritten: dict[int, Run] = {}
+        self._trace: OrderedDict[int, TraceEntry] = OrderedDict()
+        self._trace_of = 0
+
+    async def open(self, data: SharedData) -> None:
+        """Read what was kept; runs that had not ended were lost with the server. StorageError."""
+        self._data = data
+        for run in await data.runs(KEPT):
+            self._runs[run.number] = run
+            if run.end is RunEnd.RUNNING:
+                lost = replace(run, end=RunEnd.LOST, error="The server ended in mid-run.", error_type="ConnectionLost")
+                self._put(lost)
+
+    async def close(self) -> None:
+        """Write what is not written yet."""
+        if self._writing is not None:
+            await asyncio.gather(self._writing, return_exceptions=True)
+
+    # -------------------------------------------------------------------------------- a run
+    def begin(self, package_id: str, *, by: str, temporary: bool, start_paused: bool) -> int:
+        """Note that a run begins; gives its number."""
+        number = next(reversed(self._runs), 0) + 1
+        run = Run(
+            number,
+            package_id,
+            package_id,
+            now(),
+            RunEnd.RUNNING,
+            temporary=temporary,
+            start_paused=start_paused,
+            started_by=by or UNSET,
+        )
+        self._trace.clear()
+        self._trace_of = number
+        self._put(run)
+        return number
+
+    def describe(self, number: int, **values: Any) -> None:
+        """Add to a run what is known a moment after its start: names, the project."""
+        if (run := self._runs.get(number)) is not None:
+            self._put(replace(run, **values))
+
+    def end(self, number: int, end: RunEnd, *, error: str = "", error_type: str = "", stopped_by: str = "") -> None:
+        """Note how a run ended."""
+        if (run := self._runs.get(number)) is None:
+            return
+        last: ActionOfRun | Any = UNSET
+        if self._trace_of == number and self._trace:
+            entry = next(reversed(self._trace.values()))
+            last = ActionOfRun(entry.action_id, entry.name)
+            run = replace(run, actions=entry.number)
+        self._put(
+            replace(
+                run,
+                end=end,
+                ended=now(),
+                last_action=last,
+                error=error or UNSET,
+                error_type=error_type or UNSET,
+                stopped_by=stopped_by or UNSET,
+            )
+        )
+
+    def began(self, action: m.ActionBegan) -> None:
+        """Note that an action of the present run was let begin."""
+        entry = TraceEntry(
+            self._trace_of,
+            action.number,
+            action.action_id,
+            datetime.fromtimestamp(action.started, UTC).isoformat(timespec="microseconds"),
+            action.name,
+            parameters=action.parameters or UNSET,
+            thread_id=UNSET if action.thread_id is None else action.thread_id,
+        )
+        self._trace[action.number] = entry
+        if len(self._trace) > KEPT_ACTIONS:
+            self._trace.popitem(last=False)
+        self._hub.broadcast(make_event("ExecutionTrace", entry))
+
+    def ended(self, action: m.ActionEnded) -> None:
+        """Note that an action of the present run has ended."""
+        if (entry := self._trace.get(action.number)) is None:
+            return
+        entry = self._trace[action.number] = replace(
+            entry, duration=action.duration, results=action.results or UNSET, error=action.error or UNSET
+        )
+        self._hub.broadcast(make_event("ExecutionTrace", entry))
+
+    # -------------------------------------------------------------------------------- what is asked
+    def newest(
+        self, limit: int, before: int | None = None, package_id: str | None = None, project_id: str | None = None
+    ) -> list[Run]:
+        """Give runs, newest first."""
+        found = (
+            self._counted(run)
+            for run in reversed(self._runs.values())
+            if (before is None or run.number < before)
+            and (package_id is None or run.package_id == package_id)
+            and (project_id is None or run.project_id == project_id)
+        )
+        return [*islice(found, limit)]
+
+    def trace(self, limit: int, before: int | None = None) -> tuple[int, list[TraceEntry]]:
+        """Give the run whose actions are kept (0: there was none), and actions of it, newest first."""
+        entries = (e for e in reversed(self._trace.values()) if before is None or e.number < before)
+        return self._trace_of, [*islice(entries, limit)]
+
+    # -------------------------------------------------------------------------------- inside
+    def _counted(self, run: Run) -> Run:
+        if run.end is RunEnd.RUNNING and run.number == self._trace_of and self._trace:
+            return replace(run, actions=next(reversed(self._trace)))
+        return run
+
+    def _put(self, run: Run) -> None:
+        self._runs[run.number] = run
+        if len(self._runs) > KEPT:
+            self._runs.popitem(last=False)
+        self._hub.broadcast(make_event("RunChanged", run))
+        if self._data is not None:
+            self._unwritten[run.number] = run
+            if self._writing is None:
+                self._writing = asyncio.create_task(self._write(self._data), name="runs")
+
+    async def _write(self, data: SharedData) -> None:
+        """Write what is new until nothing is: the newest state of a run is enough."""
+        try:
+            while self._unwritten:
+                run = self._unwritten.pop(next(iter(self._unwritten)))
+                await data.put_run(run, next(iter(self._runs)))
+        except StorageError as error:
+            log.warning("run not noted on disk", reason=str(error))
+        finally:
+            self._writing = None

@@ -1,0 +1,99 @@
+"""Work that takes its time: what is under way, how far it is, and how it ended."""
+
+import asyncio
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, Final
+
+from msgspec import UNSET
+from msgspec.structs import replace
+
+from arcor2_hw.data.base import new_id, now
+from arcor2_hw.data.editor import TaskKind, TaskProgress, TaskStateData
+from arcor2_hw.data.events import Event
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.hub import Hub, encode
+from arcor2_server.newest import Newest
+from arcor2_server.rpc.registry import make_event
+
+PERIOD: Final = 0.1
+"""Seconds between two events of one task."""
+NAME: Final = "TaskState"
+
+
+class Task:
+    """One piece of work. What is said after its end is dropped."""
+
+    def __init__(self, tasks: "Tasks", state: TaskStateData) -> None:
+        self._tasks = tasks
+        self.state = state
+
+    def at(self, progress: float | None, message: str = "") -> None:
+        """Say how far it is, 0..1 (None: nobody knows), and what is being done."""
+        share = UNSET if progress is None else min(max(progress, 0.0), 1.0)
+        self._tasks._say(self, replace(self.state, progress=share, message=message or self.state.message))
+
+    def finish(self, message: str = "") -> None:
+        """It is done."""
+        self._end(TaskProgress.FINISHED, message)
+
+    def fail(self, message: str) -> None:
+        """It failed; `message` is why."""
+        self._end(TaskProgress.FAILED, message)
+
+    def cancel(self, message: str = "") -> None:
+        """It was given up."""
+        self._end(TaskProgress.CANCELLED, message)
+
+    def _end(self, how: TaskProgress, message: str) -> None:
+        progress: Any = 1.0 if how is TaskProgress.FINISHED else self.state.progress
+        self._tasks._say(self, replace(self.state, state=how, progress=progress, message=message or UNSET))
+
+
+class Tasks:
+    """What is under way. Clients that subscribed to TaskState are told."""
+
+    def __init__(self, hub: Hub) -> None:
+        self._hub = hub
+        self._running: dict[str, Task] = {}
+        self._events = Newest(PERIOD, lambda key, event: hub.stream_to_subscribers(NAME, key, event))
+
+    def begin(self, kind: TaskKind, title: str, started_by: str | None = None) -> Task:
+        """Tell that something began; `title` is a sentence for people, without a full stop."""
+        state = TaskStateData(new_id("task"), kind, title, TaskProgress.RUNNING, now(), started_by or UNSET)
+        task = self._running[state.id] = Task(self, state)
+        self._events.put(state.id, encode(make_event(NAME, state)))
+        return task
+
+    @contextmanager
+    def running(self, kind: TaskKind, title: str, started_by: str | None = None) -> Iterator[Task]:
+        """Tell of what is done inside: it fails with the error that leaves it."""
+        task = self.begin(kind, title, started_by)
+        try:
+            yield task
+        except asyncio.CancelledError:
+            task.cancel()
+            raise
+        except BaseException as error:
+            task.fail(str(error) if isinstance(error, Arcor2Error) else "An error inside the server.")
+            raise
+        task.finish()
+
+    def under_way(self) -> list[Event]:
+        """Give the events that tell of all that is under way."""
+        return [make_event(NAME, task.state) for task in self._running.values()]
+
+    def close(self) -> None:
+        """End with the server."""
+        self._events.close()
+
+    def _say(self, task: Task, state: TaskStateData) -> None:
+        if state.id not in self._running:
+            return
+        task.state = state
+        event = encode(make_event(NAME, state))
+        if state.state is TaskProgress.RUNNING:
+            self._events.put(state.id, event)
+        else:
+            del self._running[state.id]
+            self._events.end(state.id, event)

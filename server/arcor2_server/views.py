@@ -1,0 +1,121 @@
+"""The view state: what a user finds again on another tablet, and what all see alike; nobody here looks into it."""
+
+import asyncio
+import time
+from collections import OrderedDict
+from collections.abc import Mapping
+from typing import Any, Final
+
+import msgspec
+
+from arcor2_hw.data.base import UNSET
+from arcor2_hw.data.editor import ViewScope, ViewState
+from arcor2_server.client import Client
+from arcor2_server.hub import Hub, encode
+from arcor2_server.rpc.registry import RequestRefused, make_event
+from arcor2_server.storage.shared import SharedData
+
+LARGEST_VALUE: Final = 64 * 1024
+LARGEST_VIEW: Final = 1024 * 1024
+"""Bytes of all values of one document and scope."""
+MOST_KEYS: Final = 1000
+MOST_DOCUMENTS: Final = 200
+"""Documents of one user whose views are kept."""
+MOST_SHARED: Final = 10_000
+"""Documents whose shared views are kept."""
+IN_MEMORY: Final = 64
+LONGEST_USER: Final = 200
+
+
+class ViewStates:
+    """The values by whose they are (nobody: shared) and document; on disk, the ones in use in memory too."""
+
+    def __init__(self, hub: Hub, data: SharedData) -> None:
+        self._hub = hub
+        self._data = data
+        self._views: OrderedDict[tuple[str, str], dict[str, bytes]] = OrderedDict()
+        self._revision = 0
+        self._turn = asyncio.Lock()
+
+    async def get(self, scope: ViewScope, user: str, document: str) -> ViewState:
+        """Give a view; StorageError."""
+        async with self._turn:
+            values = await self._view(_owner(scope, user), document)
+            decoded = {key: msgspec.json.decode(value) for key, value in values.items()}
+            return ViewState(scope, decoded, await self._now(), document, user or UNSET)
+
+    async def change(self, scope: ViewScope, user: str, document: str, values: Mapping[str, Any], by: Client) -> int:
+        """Write values, None: take them away, and tell the others; gives the revision. RequestRefused, StorageError."""
+        if len(user) > LONGEST_USER:
+            raise RequestRefused(f"View states are kept for users with names up to {LONGEST_USER} characters.")
+        encoded = {key: _encoded(key, value) for key, value in values.items()}
+        owner = _owner(scope, user)
+        async with self._turn:
+            before = await self._view(owner, document)
+            after = {key: value for key, value in (before | encoded).items() if value is not None}
+            if len(after) > max(MOST_KEYS, len(before)):
+                raise RequestRefused(f"More than {MOST_KEYS} keys are not kept for one document.")
+            if sum(map(len, after.values())) > max(LARGEST_VIEW, sum(map(len, before.values()))):
+                raise RequestRefused(f"More than {LARGEST_VIEW} bytes are not kept for one document.")
+            revision = max(await self._now() + 1, time.time_ns() // 1_000_000)
+            await self._data.put_view(owner, document, encoded, revision)
+            self._revision = revision
+            if not before:
+                await self._make_room(owner)
+            if (owner, document) in self._views or not before:
+                self._views[owner, document] = after
+        state = ViewState(scope, dict(values), revision, document, user or UNSET)
+        self._tell(scope, user, state, by)
+        return revision
+
+    async def forget(self, document: str) -> None:
+        """Drop all views of a document that is gone; StorageError."""
+        async with self._turn:
+            await self._data.forget_document(document)
+            for key in [key for key in self._views if key[1] == document]:
+                del self._views[key]
+
+    # -------------------------------------------------------------------------------- inside
+    async def _view(self, owner: str, document: str) -> dict[str, bytes]:
+        key = owner, document
+        if (view := self._views.get(key)) is None:
+            view = self._views[key] = await self._data.view(owner, document)
+            if len(self._views) > IN_MEMORY:
+                self._views.popitem(last=False)
+        self._views.move_to_end(key)
+        return view
+
+    async def _now(self) -> int:
+        if not self._revision:
+            self._revision = await self._data.newest_revision()
+        return self._revision
+
+    async def _make_room(self, owner: str) -> None:
+        gone = await self._data.oldest_views(owner, MOST_DOCUMENTS if owner else MOST_SHARED)
+        if gone:
+            await self._data.forget_views(owner, gone)
+            for document in gone:
+                self._views.pop((owner, document), None)
+
+    def _tell(self, scope: ViewScope, user: str, state: ViewState, by: Client) -> None:
+        event = encode(make_event("ViewStateChanged", state))
+        for client in self._hub.subscribers("ViewStateChanged"):
+            concerned = scope is ViewScope.SHARED or user == client.user or user in client.follows
+            if concerned and client is not by:
+                client.put(event)
+
+
+def _owner(scope: ViewScope, user: str) -> str:
+    return "" if scope is ViewScope.SHARED else user
+
+
+def _encoded(key: str, value: Any) -> bytes | None:
+    if value is None:
+        return None
+    try:
+        encoded = msgspec.json.encode(value)
+    except (RecursionError, UnicodeEncodeError, OverflowError) as error:
+        raise RequestRefused(f"The value of {key!r} cannot be kept: {error}.") from None
+    if len(encoded) > LARGEST_VALUE:
+        raise RequestRefused(f"The value of {key!r} has more than {LARGEST_VALUE} bytes.")
+    return encoded
