@@ -45,13 +45,13 @@ def to_zip(files: Files) -> bytes:
         return buffer.getvalue()
 
 
-def from_zip(data: Path | bytes, wanted: Callable[[PurePosixPath], bool]) -> dict[str, bytes]:
-    """Give the wanted files of a zip; nothing else of it is unpacked, but every path is checked.
+def from_zip(data: Path | bytes, wanted: Callable[[PurePosixPath], bool], largest: int = MAX_READ) -> dict[str, bytes]:
+    """Give the wanted files of a zip, together at most `largest` bytes; every path is checked, wanted or not.
 
     InvalidPackage when it is damaged, leads outside, holds a link or one file twice, or is too large; StorageError.
     """
     found: dict[str, bytes] = {}
-    left = MAX_READ
+    left = largest
     try:
         with zipfile.ZipFile(io.BytesIO(data) if isinstance(data, bytes) else data) as archive:
             entries = archive.infolist()
@@ -70,7 +70,7 @@ def from_zip(data: Path | bytes, wanted: Callable[[PurePosixPath], bool]) -> dic
                     while chunk := source.read(min(_CHUNK, left + 1)):
                         left -= len(chunk)
                         if left < 0:
-                            raise InvalidPackage(f"What the package tells is larger than {MAX_READ} bytes.")
+                            raise InvalidPackage(f"What the package tells is larger than {largest} bytes.")
                         content += chunk
                 found[path.as_posix()] = bytes(content)
     except OSError as error:

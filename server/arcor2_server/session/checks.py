@@ -1,6 +1,6 @@
 """What is wrong with an object, an action, a scene or a project: pure functions over data and object types."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Protocol
 
 import msgspec
@@ -107,8 +107,16 @@ def check_setting(parameter: Parameter, meta: ParameterMeta) -> None:
 
 def scene_problems(scene: Scene, types: Types) -> list[str]:
     """Give what is wrong with a scene."""
-    problems = [problem for obj in scene.objects for problem in object_problems(obj, types)]
-    return problems + _twice((obj.name for obj in scene.objects), "object")
+    return [problem for _, problem in scene_findings(scene, types)]
+
+
+def scene_findings(scene: Scene, types: Types) -> Iterator[tuple[str, str]]:
+    """Give what is wrong with a scene, each with the entry of the document that is at fault: `objects[2]`."""
+    for index, obj in enumerate(scene.objects):
+        for problem in object_problems(obj, types):
+            yield f"objects[{index}]", problem
+    for problem in _twice((obj.name for obj in scene.objects), "object"):
+        yield "objects", problem
 
 
 def _twice(names: Iterable[str], what: str) -> list[str]:
@@ -266,22 +274,38 @@ def check_project_parameter(parameter: ProjectParameter) -> None:
 
 def project_problems(scene: Scene, project: Project, types: Types) -> list[str]:
     """Give what is wrong with a project on its scene. The cost grows with their size, not with its square."""
+    return [problem for _, problem in project_findings(scene, project, types)]
+
+
+def project_findings(scene: Scene, project: Project, types: Types) -> Iterator[tuple[str, str]]:
+    """Give what is wrong with a project on its scene, each with the entry at fault.
+
+    `scene.objects[2]` or `project.action_points[0].actions[1]`.
+    """
     if project.scene_id != scene.id:
-        return [f"The project {project.name} belongs to another scene than {scene.name}."]
-    problems = scene_problems(scene, types)
+        yield "project.scene_id", f"The project {project.name} belongs to another scene than {scene.name}."
+        return
+    for entry, problem in scene_findings(scene, types):
+        yield f"scene.{entry}", problem
     document = Document.of(scene, project)
-    for parameter in project.parameters:
-        problems += _problem(check_project_parameter, parameter)
-    problems += _parent_problems(document, project)
-    for point in project.action_points:
+    for index, parameter in enumerate(project.parameters):
+        for problem in _problem(check_project_parameter, parameter):
+            yield f"project.parameters[{index}]", problem
+    yield from _parent_problems(document, project)
+    for index, point in enumerate(project.action_points):
+        at = f"project.action_points[{index}]"
         if not is_valid_name(point.name):
-            problems.append(f"{point.name!r} is no valid name for an action point.")
-        for joints in point.robot_joints:
-            problems += _problem(_check_joints, point.name, joints, document, types)
-        for action in point.actions:
-            problems += _problem(check_action, action, document, types)
-    problems += _twice((point.name for point in project.action_points), "action point")
-    return problems + _twice((a.name for point in project.action_points for a in point.actions), "action")
+            yield at, f"{point.name!r} is no valid name for an action point."
+        for number, joints in enumerate(point.robot_joints):
+            for problem in _problem(_check_joints, point.name, joints, document, types):
+                yield f"{at}.robot_joints[{number}]", problem
+        for number, action in enumerate(point.actions):
+            for problem in _problem(check_action, action, document, types):
+                yield f"{at}.actions[{number}]", problem
+    for problem in _twice((point.name for point in project.action_points), "action point"):
+        yield "project.action_points", problem
+    for problem in _twice((a.name for point in project.action_points for a in point.actions), "action"):
+        yield "project.action_points", problem
 
 
 def check_action(action: Action, lookup: ProjectLookup, types: Types) -> None:
@@ -310,23 +334,23 @@ def _check_joints(point: str, joints: ProjectRobotJoints, lookup: ProjectLookup,
         raise InvalidData(f"{point}: the joints {joints.name} belong to no robot of the scene.") from None
 
 
-def _parent_problems(document: Document, project: Project) -> list[str]:
-    problems = []
+def _parent_problems(document: Document, project: Project) -> Iterator[tuple[str, str]]:
     parents = {point.id: point for point in project.action_points}
+    places = {point.id: f"project.action_points[{index}]" for index, point in enumerate(project.action_points)}
     sound: set[str] = set()
     for point in project.action_points:
         path: dict[str, None] = {}
         at = point
         while at.id not in sound:
             if at.id in path:
-                problems.append(f"The action point {at.name} hangs on itself.")
+                yield places[at.id], f"The action point {at.name} hangs on itself."
                 break
             path[at.id] = None
             if isinstance(at.parent, Unset):
                 break
             if (above := parents.get(at.parent)) is None:
-                problems += _problem(check_parent, document, at.parent, at.name)
+                for problem in _problem(check_parent, document, at.parent, at.name):
+                    yield places[at.id], problem
                 break
             at = above
         sound.update(path)
-    return problems
