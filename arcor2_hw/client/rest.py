@@ -6,6 +6,7 @@ from functools import lru_cache
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self, TypeVar
+from urllib.parse import quote
 
 import httpx
 import msgspec
@@ -87,7 +88,7 @@ def _snaked(value: Any) -> Any:
 
 def _part(key: str) -> str:
     """Write an id as a part of a path."""
-    return httpx.URL("").copy_with(path=f"/{key}").raw_path.decode()[1:].replace("/", "%2F").replace("?", "%3F")
+    return quote(key, safe="")
 
 
 class Rest:
