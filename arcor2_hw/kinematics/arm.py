@@ -16,6 +16,7 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.kinematics.description import EndEffector
 from arcor2_hw.kinematics.errors import ModelError
 from arcor2_hw.kinematics.shapes import Array
+from arcor2_hw.kinematics.tree import joint_model
 
 if TYPE_CHECKING:
     from arcor2_hw.kinematics.model import RobotModel
@@ -38,14 +39,6 @@ class Step(NamedTuple):
     column: int
     factor: float
     offset: float
-
-
-def joint_model(axis: Array, prismatic: bool) -> Any:
-    """Give Pinocchio's joint about, or along, an axis."""
-    for number, letter in enumerate("XYZ"):
-        if axis[number] == 1.0:
-            return getattr(pin, f"JointModel{'P' if prismatic else 'R'}{letter}")()
-    return pin.JointModelPrismaticUnaligned(axis) if prismatic else pin.JointModelRevoluteUnaligned(axis)
 
 
 class Dexterity(Data, frozen=True):

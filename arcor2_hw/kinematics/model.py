@@ -7,20 +7,20 @@ Nothing here is safe for two threads at once: a model computes in place. Joint v
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Self
+from typing import Final, Self
 
 import numpy as np
-import pinocchio as pin
 
 from arcor2_hw.data import robot
 from arcor2_hw.exceptions import NotFound
 from arcor2_hw.kinematics import adjusting, shapes
-from arcor2_hw.kinematics.arm import Arm, Step, joint_model
+from arcor2_hw.kinematics.arm import Arm, Step
 from arcor2_hw.kinematics.description import Description, EndEffector, Geometry, Joint, MeshFile, describe
 from arcor2_hw.kinematics.errors import ModelError, ZeroLength
 from arcor2_hw.kinematics.meshes import read_mesh
 from arcor2_hw.kinematics.shapes import Array, MeshUse, Shape
 from arcor2_hw.kinematics.source import MAX_MESH, Package
+from arcor2_hw.kinematics.tree import Tree
 
 _PARALLEL: Final = 1e-6
 _TOUCHING: Final = 1e-5
@@ -59,7 +59,10 @@ class RobotModel:
         self.velocity = np.array([joint.velocity for joint in self.joints])
         self.end_effectors: dict[str, EndEffector] = {each.link: each for each in description.end_effectors}
         self._column = {name: number for number, name in enumerate(self.joint_names)}
-        self._build(moving)
+        self.tree = Tree(description, np.eye(4))
+        self.links: tuple[str, ...] = tuple(self.tree.bodies)
+        self.touching: frozenset[frozenset[str]] | None = None
+        """Links that overlap by design, once somebody has looked."""
         self._refuse_zero_lengths()
         self.visual, self.collision = self._shapes()
 
@@ -121,9 +124,7 @@ class RobotModel:
     # -------------------------------------------------------------------------------- where things are
     def link_poses(self, q: Array) -> dict[str, Array]:
         """Give the frame of each link, (4, 4)."""
-        pin.forwardKinematics(self.pin_model, self.pin_data, self.expand(q))
-        bodies = [np.array(placement.homogeneous) for placement in self.pin_data.oMi]
-        return {link: bodies[body] @ placement for link, (body, placement) in self.bodies.items()}
+        return self.tree.frames(q)
 
     def arm(self, end_effector: str, tool: Array | None = None) -> Arm:
         """Give the chain from the root to an end effector, or to any link; `tool` (4, 4) is fixed to it.
@@ -152,38 +153,7 @@ class RobotModel:
         prismatic = joint.kind == "prismatic"
         return Step(joint.name, joint.origin, np.array(joint.axis), prismatic, self._column[leader], factor, offset)
 
-    def expand(self, q: Array) -> Array:
-        """Give the values of all moving joints of Pinocchio's model, mimicking ones too."""
-        if not self.has_mimics:
-            return q
-        return np.asarray(self._factors @ q + self._offsets)
-
     # -------------------------------------------------------------------------------- inside
-    def _build(self, moving: list[Joint]) -> None:
-        """Make Pinocchio's model, and note on which of its bodies each link sits, and where."""
-        self.pin_model: Any = pin.Model()
-        self.bodies: dict[str, tuple[int, Array]] = {self.root: (0, np.eye(4))}
-        rows: list[tuple[int, float, float]] = []
-        for joint in self.description.joints:
-            body, placement = self.bodies[joint.parent]
-            at = placement @ joint.origin
-            if joint.kind == "fixed":
-                self.bodies[joint.child] = body, at
-                continue
-            kind = joint_model(np.array(joint.axis), joint.kind == "prismatic")
-            added = self.pin_model.addJoint(body, kind, pin.SE3(at), joint.name)
-            self.bodies[joint.child] = added, np.eye(4)
-            step = self._step(joint)
-            rows.append((step.column, step.factor, step.offset))
-        self._factors = np.zeros((len(moving), len(self.joints)))
-        for row, (column, factor, _) in enumerate(rows):
-            self._factors[row, column] = factor
-        self._offsets = np.array([offset for _, _, offset in rows])
-        self.has_mimics = len(moving) != len(self.joints)
-        # Pinocchio numbers joints depth first, as they are added here; limits are kept by us.
-        self.pin_data: Any = self.pin_model.createData()
-        self.links: tuple[str, ...] = tuple(self.bodies)
-
     def _refuse_zero_lengths(self) -> None:
         """Refuse a link between two joints about one and the same axis: neither can be told from the other."""
         frames = self.link_poses(self.neutral())

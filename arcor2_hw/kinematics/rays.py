@@ -1,0 +1,139 @@
+"""Where a straight line enters a shape, computed exactly; all in the frame of the shape."""
+
+import math
+from typing import Final
+
+import numpy as np
+
+from arcor2_hw.kinematics.shapes import (
+    Array,
+    Box,
+    Capsule,
+    Cylinder,
+    Hull,
+    Shape,
+    Sphere,
+    TriangleMesh,
+    coal_geometry,
+)
+
+_TINY: Final = 1e-12
+_CONTACTS: Final = 1000
+_Span = tuple[float, float]
+
+
+def entry(shape: Shape, start: Array, way: Array, inflation: float = 0.0) -> float | None:
+    """Give at which share of `way` (3) a line from `start` (3) enters a shape; 0 when it starts inside, None: never.
+
+    Edges, heights and radii are larger by `inflation`, m, as the protocol's are; the planes of a hull stand out by half
+    of it. A mesh is met where
+    a triangle comes within half of `inflation`.
+    """
+    a, d = start.tolist(), way.tolist()
+    half = inflation / 2.0
+    match shape:
+        case Box():
+            sizes = (shape.x, shape.y, shape.z)
+            return _common([_slab(a[i], d[i], size / 2.0 + half) for i, size in enumerate(sizes)])
+        case Sphere():
+            return _common([_round(a, d, shape.radius + inflation)])
+        case Cylinder():
+            around = _round(a[:2], d[:2], shape.radius + inflation)
+            return _common([around, _slab(a[2], d[2], shape.length / 2.0 + half)])
+        case Capsule():
+            return _capsule(a, d, shape.radius + inflation, shape.length / 2.0)
+        case Hull():
+            return _hull(shape, start, way, half)
+        case TriangleMesh():
+            return _mesh(shape, start, way, half)
+
+
+def _common(spans: list[_Span | None]) -> float | None:
+    """Give where all spans, and the line itself, have begun, if they have not ended there."""
+    low, high = 0.0, 1.0
+    for span in spans:
+        if span is None:
+            return None
+        low, high = max(low, span[0]), min(high, span[1])
+    return low if low <= high else None
+
+
+def _slab(a: float, d: float, half: float) -> _Span | None:
+    if abs(d) < _TINY:
+        return (-math.inf, math.inf) if abs(a) <= half else None
+    one, other = (-half - a) / d, (half - a) / d
+    return min(one, other), max(one, other)
+
+
+def _round(a: list[float], d: list[float], radius: float) -> _Span | None:
+    square = math.fsum(x * x for x in d)
+    beyond = math.fsum(x * x for x in a) - radius * radius
+    if square < _TINY * _TINY:
+        return (-math.inf, math.inf) if beyond <= 0.0 else None
+    middle = math.fsum(x * y for x, y in zip(a, d, strict=True))
+    discriminant = middle * middle - square * beyond
+    if discriminant < 0.0:
+        return None
+    root = math.sqrt(discriminant)
+    return (-middle - root) / square, (-middle + root) / square
+
+
+def _capsule(a: list[float], d: list[float], radius: float, half: float) -> float | None:
+    found = [_common([_round(a[:2], d[:2], radius), _slab(a[2], d[2], half)])]
+    found += [_common([_round([a[0], a[1], a[2] - end], d, radius)]) for end in (-half, half)]
+    return min((each for each in found if each is not None), default=None)
+
+
+def _hull(shape: Hull, start: Array, way: Array, half: float) -> float | None:
+    first, second, third = (shape.vertices[shape.triangles[:, corner]] for corner in range(3))
+    normals = np.cross(second - first, third - first)
+    lengths = np.linalg.norm(normals, axis=1)
+    real = lengths > _TINY
+    normals = normals[real] / lengths[real, None]
+    room = ((first[real] - start) * normals).sum(axis=1) + half  # to each plane, positive inside
+    closing = normals @ way
+    parallel = np.abs(closing) < _TINY
+    if (room[parallel] < 0.0).any():
+        return None
+    at = room[~parallel] / closing[~parallel]
+    entering = closing[~parallel] < 0.0
+    low, high = max(0.0, at[entering].max(initial=0.0)), min(1.0, at[~entering].min(initial=1.0))
+    return float(low) if low <= high else None
+
+
+def _mesh(shape: TriangleMesh, start: Array, way: Array, half: float) -> float | None:
+    """Give the nearest triangle met (T. Möller, B. Trumbore, Journal of Graphics Tools 2 (1997) 21)."""
+    first, second, third = (shape.vertices[shape.triangles[:, corner]] for corner in range(3))
+    u, v = second - first, third - first
+    p = np.cross(way, v)
+    determinant = (u * p).sum(axis=1)
+    crossing = np.abs(determinant) > _TINY * _TINY
+    scale = np.where(crossing, determinant, 1.0)
+    s = start - first
+    alpha = (s * p).sum(axis=1) / scale
+    q = np.cross(s, u)
+    beta = (q @ way) / scale
+    at = (v * q).sum(axis=1) / scale
+    met = crossing & (alpha >= 0.0) & (beta >= 0.0) & (alpha + beta <= 1.0) & (at >= 0.0) & (at <= 1.0)
+    found = float(at[met].min()) if met.any() else None
+    return found if not half else _touched(shape, start, way, half, found)
+
+
+def _touched(shape: TriangleMesh, start: Array, way: Array, half: float, found: float | None) -> float | None:
+    """Give where a line as thick as twice `half` first touches a mesh, at most `found`."""
+    import coal
+
+    length = float(np.linalg.norm(way))
+    if length < _TINY:
+        return found
+    along = way / length
+    aside = np.cross(along, (0.0, 0.0, 1.0) if abs(along[2]) < 0.9 else (1.0, 0.0, 0.0))
+    aside /= np.linalg.norm(aside)
+    placed = coal.Transform3s(np.column_stack((aside, np.cross(along, aside), along)), start + way / 2.0)
+    request, result = coal.CollisionRequest(), coal.CollisionResult()
+    request.num_max_contacts = _CONTACTS
+    mesh, still = coal_geometry(shape), coal.Transform3s.Identity()
+    if not coal.collide(coal.Capsule(half, length), placed, mesh, still, request, result):
+        return found
+    shares = [float((np.asarray(each.pos) - start) @ along) / length for each in result.getContacts()]
+    return min([min(max(share, 0.0), 1.0) for share in shares] + ([] if found is None else [found]))

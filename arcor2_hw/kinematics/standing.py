@@ -1,0 +1,186 @@
+"""A robot that stands in a collision world: its shapes and what it holds, moved and checked as one."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from arcor2_hw.kinematics.model import RobotModel
+from arcor2_hw.kinematics.shapes import Array, Shape, coal_geometry
+from arcor2_hw.kinematics.tree import Tree
+
+_SAMPLES: Final = 100
+_ALWAYS: Final = 0.95
+"""Share of random configurations in which two links touch that then count as built into each other."""
+
+
+@dataclass(eq=False)
+class Held:
+    """A body that a link carries: its shape, where it is in the link, and the links it may touch."""
+
+    name: str
+    shape: Shape
+    link: str
+    in_link: Array
+    touching: frozenset[str]
+
+
+@dataclass(eq=False)
+class Part:
+    """A shape of a link, or a held body: its name, the body of Pinocchio's model it sits on, its frame there."""
+
+    name: str
+    link: str
+    held: Held | None
+    body: int
+    origin: Array
+    geometry: Any
+    object: Any
+
+
+class StandingRobot:
+    """One robot of a world. q: its present joint values, in the model's order. parts: shapes and what is held.
+
+    margin: m by which the world's bodies have to be away to count as free.
+
+    Not safe for two threads at once.
+    """
+
+    def __init__(self, name: str, model: RobotModel, base: Array, q: Array, margin: float = 0.0) -> None:
+        self.name = name
+        self.margin = margin
+        self.model = model
+        self.q = np.array(q, dtype=np.float64)
+        self.held: dict[str, Held] = {}
+        self._touching: frozenset[frozenset[str]] | None = None
+        self.place(base)
+
+    def place(self, base: Array) -> None:
+        """Let the root stand elsewhere, (4, 4) in the world."""
+        self.base = np.array(base, dtype=np.float64)
+        self.tree = Tree(self.model.description, self.base)
+        self.rebuild()
+
+    def rebuild(self) -> None:
+        """Make the shapes anew, after something was taken or put down."""
+        self.parts: list[Part] = []
+        for each in self.model.collision:
+            body, frame = self.tree.bodies[each.link]
+            self._add(each.name, each.link, None, body, frame @ each.origin, each.shape)
+        for held in self.held.values():
+            body, frame = self.tree.bodies[held.link]
+            self._add(held.name, held.link, held, body, frame @ held.in_link, held.shape)
+        self._geometry = pin.GeometryModel()
+        for part in self.parts:
+            self._geometry.addGeometryObject(
+                pin.GeometryObject(part.name, part.body, pin.SE3(part.origin), part.geometry)
+            )
+        self.pairs = [(one, two) for one, two in self._candidates() if not self._may_touch(one, two)]
+        for one, two in self.pairs:
+            self._geometry.addCollisionPair(pin.CollisionPair(one, two))
+        self._data = pin.GeometryData(self._geometry)
+        # What does not move with the joints is no question of a configuration.
+        self.moving = [number for number, part in enumerate(self.parts) if part.body]
+        self.manager: Any = coal.DynamicAABBTreeCollisionManager()
+        for number in self.moving:
+            self.manager.registerObject(self.parts[number].object)
+        self.manager.setup()
+
+    def _add(self, name: str, link: str, held: Held | None, body: int, origin: Array, shape: Shape) -> None:
+        geometry = coal_geometry(shape)
+        self.parts.append(Part(name, link, held, body, origin, geometry, coal.CollisionObject(geometry)))
+
+    # -------------------------------------------------------------------------------- moving
+    def pose(self, q: Array, everything: bool = False) -> None:
+        """Put the parts where joint values lead, their boxes wider by the margin; `everything`: those at rest too."""
+        pin.updateGeometryPlacements(self.tree.model, self.tree.data, self._geometry, self._data, self.tree.expand(q))
+        placements = self._data.oMg
+        for number in range(len(self.parts)) if everything else self.moving:
+            placed, body = self.parts[number].object, placements[number]
+            placed.setTranslation(body.translation)
+            placed.setRotation(body.rotation)
+            placed.computeAABB()
+            if self.margin:
+                placed.getAABB().expand(self.margin)
+        self.manager.update()
+
+    def link_frames(self, q: Array) -> dict[str, Array]:
+        """Give the links' frames in the world, (4, 4)."""
+        return self.tree.frames(q)
+
+    # -------------------------------------------------------------------------------- itself
+    def hits_itself(self, q: Array) -> bool:
+        """Tell whether the robot, or what it holds, is in collision with itself."""
+        return bool(
+            pin.computeCollisions(
+                self.tree.model, self.tree.data, self._geometry, self._data, self.tree.expand(q), True
+            )
+        )
+
+    def _candidates(self) -> Iterable[tuple[int, int]]:
+        parts = self.parts
+        return ((one, two) for one in range(len(parts)) for two in range(one + 1, len(parts)))
+
+    def _may_touch(self, one: int, two: int) -> bool:
+        first, second = self.parts[one], self.parts[two]
+        if first.body == second.body:
+            return True
+        for held, other in ((first.held, second), (second.held, first)):
+            if held is not None and (other.link in held.touching or self._follows(other.body, held.link)):
+                return True
+        if first.held is not None or second.held is not None:
+            return False
+        parents = self.tree.model.parents
+        if first.body in (parents[second.body],) or second.body in (parents[first.body],):
+            return True
+        pair = frozenset({first.link, second.link})
+        return pair in self.model.description.touching or pair in self._built_into_each_other()
+
+    def _follows(self, body: int, link: str) -> bool:
+        """Tell whether a body is moved by the joints behind a link: fingers hold what the hand carries."""
+        at, _ = self.tree.bodies[link]
+        while body > at:
+            body = self.tree.model.parents[body]
+        return body == at != 0
+
+    def _built_into_each_other(self) -> frozenset[frozenset[str]]:
+        """Give the links whose shapes touch in nearly all configurations, so that they overlap by design."""
+        if self._touching is None:
+            known = self.model.touching
+            if known is None:
+                known = self.model.touching = _sampled(self.model)
+            self._touching = known
+        return self._touching
+
+
+def _sampled(model: RobotModel) -> frozenset[frozenset[str]]:
+    tree = Tree(model.description, np.eye(4))
+    geometry = pin.GeometryModel()
+    links: list[tuple[str, int]] = []
+    for each in model.collision:
+        body, frame = tree.bodies[each.link]
+        links.append((each.link, body))
+        placed = pin.SE3(frame @ each.origin)
+        geometry.addGeometryObject(pin.GeometryObject(each.name, body, placed, coal_geometry(each.shape)))
+    pairs = [(one, two) for one in range(len(links)) for two in range(one + 1, len(links))]
+    pairs = [(one, two) for one, two in pairs if links[one][1] != links[two][1]]
+    for one, two in pairs:
+        geometry.addCollisionPair(pin.CollisionPair(one, two))
+    data = pin.GeometryData(geometry)
+    chance = np.random.default_rng(0)
+    lower, upper = np.maximum(model.lower, -np.pi), np.minimum(model.upper, np.pi)
+    counts: dict[frozenset[str], int] = {}
+    for _ in range(_SAMPLES):
+        q = tree.expand(chance.uniform(lower, upper))
+        pin.computeCollisions(tree.model, tree.data, geometry, data, q, False)
+        touched = {
+            frozenset({links[one][0], links[two][0]})
+            for (one, two), result in zip(pairs, data.collisionResults, strict=True)
+            if result.isCollision()
+        }
+        for pair in touched:
+            counts[pair] = counts.get(pair, 0) + 1
+    return frozenset(pair for pair, count in counts.items() if count >= _ALWAYS * _SAMPLES)
