@@ -5,13 +5,17 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from queue import Empty, SimpleQueue
 from typing import Final
 
+from msgspec.structs import replace
+
+from arcor2_hw.data.device import Connection
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.scene import Scene, SceneObjectOverride
-from arcor2_hw.exceptions import Arcor2Error, Cancelled, NotFound, ProgramStopped
+from arcor2_hw.exceptions import Arcor2Error, Cancelled, NotConnected, NotFound, ProgramStopped, Refused
 from arcor2_hw.objects import Generic
-from arcor2_hw.runtime.creation import Recipe, recipe
+from arcor2_hw.runtime.creation import Recipe, load_type, recipe
 from arcor2_hw.runtime.device import CLOSE_DEADLINE, STOP_DEADLINE, Device, describe, overrides, until
 from arcor2_hw.runtime.lane import Job
+from arcor2_hw.runtime.messages import OpenScene
 
 CONTROL_DEADLINE: Final = 10.0
 """Seconds for taking control: a controller may have to load and start its control program."""
@@ -33,8 +37,12 @@ def recipes(
     classes: Mapping[str, type[Generic]],
     models: Mapping[str, ObjectModel],
     overridden: Iterable[SceneObjectOverride] = (),
+    failed: Callable[[SceneFault], None] | None = None,
 ) -> list[Recipe]:
-    """Work out how every object is made; SceneFault names the first that cannot be."""
+    """Work out how every object is made.
+
+    SceneFault names the first that cannot be; with `failed`, that is told of each instead.
+    """
     overridden = list(overridden)
     found = []
     for scene_object in scene.objects:
@@ -44,8 +52,40 @@ def recipes(
                 raise NotFound(f"{scene_object.name}: object type {scene_object.type} is not there")
             found.append(recipe(scene_object, cls, models.get(scene_object.type), overridden))
         except Arcor2Error as error:
-            raise SceneFault(scene_object.id, error) from error
+            fault = SceneFault(scene_object.id, error)
+            if failed is None:
+                raise fault from error
+            failed(fault)
     return found
+
+
+def scene_recipes(
+    message: OpenScene, failed: Callable[[SceneFault], None] | None = None, only: str = ""
+) -> list[Recipe]:
+    """Load the types of a scene's objects, or of `only` that one, and work out how each is made.
+
+    SceneFault for the first object that cannot be; with `failed`, that is told of each, else NotFound or
+    InvalidData for a type.
+    """
+    objects = [one for one in message.scene.objects if only in ("", one.id)]
+    codes = {code.name: code for code in message.types}
+    classes: dict[str, type[Generic]] = {}
+    broken: dict[str, Arcor2Error] = {}
+    for name in dict.fromkeys(one.type for one in objects if one.type in codes):
+        try:
+            classes[name] = load_type(codes[name])
+        except Arcor2Error as error:
+            if failed is None and not only:
+                raise
+            broken[name] = error
+    for one in objects:
+        if (problem := broken.get(one.type)) is not None:
+            fault = SceneFault(one.id, NotConnected(f"{one.name}: {problem}", problem.detail))
+            if failed is None:
+                raise fault
+            failed(fault)
+    rest = replace(message.scene, objects=[one for one in objects if one.type not in broken])
+    return recipes(rest, classes, message.models, message.overrides, failed)
 
 
 class Cell:
@@ -53,6 +93,7 @@ class Cell:
 
     def __init__(self) -> None:
         self._devices: dict[str, Device] = {}
+        self._absent: dict[str, Arcor2Error] = {}
         self._ended: SimpleQueue[Job | None] = SimpleQueue()
         self._abandoned = False
         self.changed: Callable[[Device], None] = lambda _: None
@@ -65,6 +106,8 @@ class Cell:
         try:
             return self._devices[object_id]
         except KeyError:
+            if (error := self._absent.get(object_id)) is not None:
+                raise NotConnected(str(error), error.detail) from None
             raise NotFound(f"the scene has no object {object_id}") from None
 
     def find(self, name: str) -> Generic:
@@ -75,15 +118,16 @@ class Cell:
         raise NotFound(f"the scene has no object {name}")
 
     # -------------------------------------------------------------------------------- up and down
-    def open(self, how: Iterable[Recipe]) -> None:
+    def open(self, how: Iterable[Recipe], failed: Callable[[SceneFault], None] | None = None) -> None:
         """Create and connect all objects at once; SceneFault with the first that fails, as soon as it fails.
 
+        With `failed`, that is called with each that fails, and the others go on.
         What came up stays up: `close` follows in any case. ProgramStopped when `abandon` is called meanwhile.
         """
         began = time.monotonic()
         pending: dict[Job, tuple[Device, float]] = {}
         for each in how:
-            self._devices[each.scene_object.id] = Device(each, lambda device: self.changed(device), self.find)
+            self._make(each)
         for device in self:
             opening, deadline = device.open(self._ended.put)
             pending[opening] = (device, began + deadline)
@@ -100,8 +144,47 @@ class Cell:
             if ended is None:
                 continue
             device, _ = pending.pop(ended)
-            if ended.error is not None:
-                raise SceneFault(device.id, describe(device, ended.error)) from ended.error
+            if ended.error is None:
+                continue
+            fault = SceneFault(device.id, describe(device, ended.error))
+            if failed is None:
+                raise fault from ended.error
+            device.fail(fault.error)
+            failed(fault)
+
+    def _make(self, how: Recipe) -> Device:
+        device = Device(how, lambda device: self.changed(device), self.find)
+        self._devices[device.id] = device
+        return device
+
+    def lack(self, fault: SceneFault) -> None:
+        """Note an object that could not even be prepared; whoever asks for it is told why."""
+        self._absent[fault.object_id] = fault.error
+
+    def require_failed(self, object_id: str) -> None:
+        """Raise Refused unless an object has failed; NotFound."""
+        if object_id in self._absent:
+            return
+        device = self[object_id]
+        connection = None if device.instance is None else device.instance.connection
+        if device.failure is None and connection is not Connection.FAILED:
+            raise Refused(f"{device.name} has not failed")
+
+    def retry(self, how: Recipe) -> None:
+        """Create and connect one object in place of the one that failed; SceneFault when it fails again."""
+        object_id = how.scene_object.id
+        former = self._devices.get(object_id)
+        if former is not None and former.failure is None:
+            former.fail(NotConnected(f"{former.name} is being connected anew"))
+        device = self._make(how)
+        self._absent.pop(object_id, None)
+        job, deadline = device.open(lambda _: None)
+        if not job.wait(deadline):
+            device.lane.expire(job, deadline)
+        if job.error is not None:
+            error = describe(device, job.error)
+            device.fail(error)
+            raise SceneFault(object_id, error) from job.error
 
     def abandon(self) -> None:
         """Make an `open` that is under way end at once."""
@@ -117,6 +200,8 @@ class Cell:
         jobs: list[tuple[Device, Job]] = []
         problem: Arcor2Error | None = None
         for device in self:
+            if device.failure is not None:
+                continue
             try:
                 job = device.begin_close()
             except Arcor2Error as error:  # both lanes hang

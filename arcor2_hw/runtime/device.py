@@ -97,6 +97,8 @@ class Device:
         self.stop_lane = Lane(self.name, "stop")
         self._watch_lane: Lane | None = None
         self.closing = False
+        self.failure: Arcor2Error | None = None
+        """Why it did not come up, in a scene that goes on without it."""
 
     # -------------------------------------------------------------------------------- life
     def open(self, notify: Callable[[Job], None]) -> tuple[Job, float]:
@@ -115,6 +117,7 @@ class Device:
                 instance.attach(self._find)
             instance.connect()
         if self.closing:  # came up too late: nobody waits any more
+            self.instance = None
             instance.cleanup()
 
     def _life_changed(self, life: Observing) -> None:
@@ -134,7 +137,17 @@ class Device:
                 f"{self.name}: {method} was not done: the connection is lost", self.connection_reason()
             )
 
-    def begin_close(self) -> Job | None:
+    def fail(self, error: Arcor2Error) -> None:
+        """Count as failed from now on; what is there of it is closed beside everything else."""
+        self.failure = error
+        try:
+            if self.begin_close(lambda _: self.release_lanes()) is None:
+                self.release_lanes()
+        except Arcor2Error:  # both lanes hang
+            self.release_lanes()
+        self.instance = None
+
+    def begin_close(self, notify: Callable[[Job], None] | None = None) -> Job | None:
         """Begin to disconnect; gives the call, None when there is nothing to close.
 
         A device whose lane hangs is closed from the stop lane: its socket is still ours to shut.
@@ -143,7 +156,7 @@ class Device:
         instance = self.instance
         if instance is None:
             return None
-        job = Job("disconnect", instance.cleanup)  # calls disconnect unless an older type has its own
+        job = Job("disconnect", instance.cleanup, notify=notify)  # calls disconnect unless an older type has its own
         (self.stop_lane if self.lane.busy_with else self.lane).submit(job)
         return job
 
@@ -168,7 +181,9 @@ class Device:
         return self.lane
 
     def require(self) -> Generic:
-        """Give the instance; NotConnected when there is none."""
+        """Give the instance; NotConnected when there is none, or it has failed."""
+        if self.failure is not None:
+            raise NotConnected(f"{self.name} is not there: {self.failure}", self.failure.detail)
         if self.instance is None:
             raise NotConnected(f"{self.name} is not up")
         return self.instance

@@ -22,17 +22,20 @@ from typing import Final
 
 import msgspec
 
-from arcor2_hw.exceptions import Arcor2Error, ProgramFinished, ProgramStopped
+from arcor2_hw.data.device import Connection
+from arcor2_hw.exceptions import Arcor2Error, ProgramFinished, ProgramStopped, Refused
 from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.calls import Calls, error_data
-from arcor2_hw.runtime.cell import Cell, SceneFault, recipes
+from arcor2_hw.runtime.cell import Cell, SceneFault, scene_recipes
 from arcor2_hw.runtime.clock import Clock
-from arcor2_hw.runtime.creation import load_type, write_sources
+from arcor2_hw.runtime.creation import write_sources
 from arcor2_hw.runtime.device import Device
+from arcor2_hw.runtime.holding import Holds
 from arcor2_hw.runtime.link import Link
 from arcor2_hw.runtime.package import put_on_path
 from arcor2_hw.runtime.program import Program, set_current, traceback_text
-from arcor2_hw.runtime.watch import OBSERVE_PERIOD, Streams, Watch
+from arcor2_hw.runtime.streaming import RatedStreams, Streams
+from arcor2_hw.runtime.watch import OBSERVE_PERIOD, Watch
 
 GONE_WITHIN: Final = 1.8
 """Seconds from the loss of the server to the end of this process, whatever hangs."""
@@ -65,10 +68,14 @@ class Host:
         self._cell = Cell()
         self._work: SimpleQueue[m.HostBound] = SimpleQueue()
         self._subscribed: dict[str, m.Subscribe] = {}
-        self._calls = Calls(lambda: self._cell, self.link.post, self.clock)
-        self._streams = Streams(self._cell, self._send_stream)
+        self._calls = Calls(lambda: self._cell, self.link.post, self.clock, self._stopping)
+        self._holds = Holds(lambda: self._cell, self.link.post, self.clock, self._calls)
+        self._streams = Streams(self.link.post_stream)
+        self._rated = RatedStreams(lambda: self._cell, self.clock, self._streams)
         self._watch = Watch(self._cell, self.link.post, self._lost)
         self._leaving = threading.Event()
+        self._scene: m.OpenScene | None = None
+        self._retrying = threading.Lock()
         self._types: str | None = None
         self._wake, wake_up = socket.socketpair()
         wake_up.setblocking(False)
@@ -109,11 +116,11 @@ class Host:
     def _open_scene(self, message: m.OpenScene) -> bool:
         """Bring the scene up; False when the host has to go."""
         fault: SceneFault | None = None
+        self._scene = message
+        failed = self._missing if message.keep_going else None
         try:
             self._types = write_sources(message.types)
-            used = {scene_object.type for scene_object in message.scene.objects}
-            classes = {code.name: load_type(code) for code in message.types if code.name in used}
-            self._cell.open(recipes(message.scene, classes, message.models, message.overrides))
+            self._cell.open(scene_recipes(message, failed), failed)
         except SceneFault as caught:
             fault = caught
         except Arcor2Error as error:
@@ -130,8 +137,40 @@ class Host:
         self.clock.every(message.streaming_period if message.streaming_period > 0 else 0.1, self._stream_subscribed)
         return True
 
+    def _missing(self, fault: SceneFault) -> None:
+        """Go on without an object."""
+        self._cell.lack(fault)
+        self._watch.tell(fault.object_id, Connection.FAILED, str(fault.error))
+
+    def _retry(self, message: m.RetryObject) -> None:
+        """Make and connect an object anew. On a thread of its own: loading its type may last."""
+        object_id = message.object_id
+        try:
+            assert self._scene is not None
+            self._cell.require_failed(object_id)
+            if not self._retrying.acquire(blocking=False):
+                raise Refused("another object is being retried: wait for that")
+            try:
+                self._watch.tell(object_id, Connection.CONNECTING)
+                (recipe,) = scene_recipes(self._scene, only=object_id)
+                self._cell.retry(recipe)
+            except SceneFault as fault:
+                self._missing(fault)
+                raise fault.error from fault
+            finally:
+                self._retrying.release()
+        except Exception as error:  # noqa: BLE001 - whatever a type does when it is loaded
+            self.link.post(m.CallFailed(message.id, error_data(error, object_id)))
+            return
+        self._watch.glance(self._cell[object_id])
+        self.link.post(m.CallDone(message.id))
+
     def _close_scene(self) -> None:
-        active = self._leaving.is_set() or any(device.lane.busy_with or device.moving for device in self._cell)
+        active = (
+            self._leaving.is_set()
+            or self._holds.any
+            or any(device.lane.busy_with or device.moving for device in self._cell)
+        )
         stopped = self._cell.wait_stopped(self._cell.stop_all(), 0.5) if active else None
         problem = self._cell.close() or stopped
         self.link.post(m.SceneClosed(None if problem is None else error_data(problem)))
@@ -146,7 +185,6 @@ class Host:
             here=message.cell,
         )
         self._cell = program.cell
-        self._streams = Streams(program.cell, self._send_stream)
         self._watch = Watch(program.cell, self.link.post, self._lost)
         program.inside = True
         self.program = program
@@ -211,6 +249,12 @@ class Host:
                 self._calls.call(message)
             case m.StopMotion():
                 self._calls.stop_motion(message)
+            case m.Lease():
+                self._holds.lease(message)
+            case m.RetryObject():
+                threading.Thread(target=self._retry, args=(message,), name="retry", daemon=True).start()
+            case m.Stream():
+                self._rated.want(message)
             case m.Subscribe():
                 self._subscribed[message.object_id] = message
             case m.StopProgram():
@@ -220,6 +264,9 @@ class Host:
                 {m.Pause: gate.pause, m.Resume: gate.resume, m.Step: gate.step}[type(message)]()
             case m.SetBreakpoints() if self.program is not None:
                 self.program.set_shared_breakpoints(frozenset(message.shared_breakpoints))
+
+    def _stopping(self, device: Device) -> None:
+        self._holds.stopping(device)
 
     def _leave(self) -> None:
         """The server is gone, or wants us gone: stop motion, disconnect, exit, in bounded time."""
@@ -261,9 +308,6 @@ class Host:
         if program is not None and not program.ended:
             for device in program.cell:
                 self._streams.send(device, joints=True, eef=True)
-
-    def _send_stream(self, name: str, object_id: str, encoded: bytes) -> None:
-        self.link.post_stream(m.StreamEvent(name, object_id, encoded))
 
     # -------------------------------------------------------------------------------- signal handler
     def _interrupted(self, number: int, frame: types.FrameType | None) -> None:  # noqa: ARG002

@@ -3,7 +3,7 @@
 Arguments and results of calls travel as JSON documents in bytes, exactly as they stand in scenes, projects and events.
 """
 
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import msgspec
 from msgspec import Struct, field
@@ -12,7 +12,9 @@ from arcor2_hw import framing
 from arcor2_hw.data.cell import Cell
 from arcor2_hw.data.device import Alarm, Connection, Health
 from arcor2_hw.data.object_type import ObjectModel
+from arcor2_hw.data.operation import HoldKind
 from arcor2_hw.data.project import Project
+from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.scene import Scene, SceneObjectOverride
 from arcor2_hw.framing import PREFIX_SIZE as PREFIX_SIZE
 
@@ -48,7 +50,10 @@ class ToHost(Struct, frozen=True, tag=True):
 
 
 class OpenScene(ToHost, frozen=True):
-    """Create and connect all objects at once. Answer: SceneOpened or SceneFailed."""
+    """Create and connect all objects at once. Answer: SceneOpened or SceneFailed.
+
+    keep_going: an object that cannot be made or connected is told as failed by DeviceChanged, and the others come up.
+    """
 
     scene: Scene
     types: list[TypeCode]
@@ -56,6 +61,14 @@ class OpenScene(ToHost, frozen=True):
     overrides: list[SceneObjectOverride] = field(default_factory=list)
     streaming_period: float = 0.1
     project: Project | None = None
+    keep_going: bool = False
+
+
+class RetryObject(ToHost, frozen=True):
+    """Make and connect an object anew that has failed. Answer: CallDone or CallFailed with this id."""
+
+    id: int
+    object_id: str
 
 
 class RunPackage(ToHost, frozen=True):
@@ -103,6 +116,33 @@ class Subscribe(ToHost, frozen=True):
     object_id: str
     joints: bool
     eef: bool
+
+
+class Stream(ToHost, frozen=True):
+    """Send joints and end effector poses of a robot at these rates (Hz) from now on, each with its time."""
+
+    object_id: str
+    joints: list[float]
+    eef: list[float]
+
+
+class Lease(ToHost, frozen=True):
+    """Let a robot be moved until a moment of the monotonic clock; 0: let go. The first of a number begins the hold.
+
+    Answer: CallDone (`{"scale": fraction of the velocity}`) or CallFailed with this id; at its end, HoldEnded.
+    A jog has either `twist` in the axes of `frame`, or `joints` with rates.
+    """
+
+    id: int
+    object_id: str
+    hold: int
+    kind: HoldKind
+    until: float
+    twist: tuple[float, float, float, float, float, float] | None = None
+    frame: Literal["world", "base", "tool"] = "world"
+    joints: list[Joint] | None = None
+    end_effector_id: str | None = None
+    arm_id: str | None = None
 
 
 class Pause(ToHost, frozen=True):
@@ -177,11 +217,23 @@ class CallFailed(ToServer, frozen=True):
 
 
 class StreamEvent(ToServer, frozen=True):
-    """RobotJoints or RobotEef of the protocol, as the whole encoded event, for subscribers (or all, from a program)."""
+    """RobotJoints or RobotEef of the protocol, as the whole encoded event, for subscribers (or all, from a program).
+
+    rate: that of the Stream it is for; 0 at the streaming period.
+    """
 
     event: str
     object_id: str
     encoded: bytes
+    rate: float = 0.0
+
+
+class HoldEnded(ToServer, frozen=True):
+    """A hold has ended and the robot is at rest, or `error` says that it did not obey; None: it was let go."""
+
+    object_id: str
+    hold: int
+    error: ErrorData | None = None
 
 
 class ProgramEvent(ToServer, frozen=True):
@@ -246,10 +298,13 @@ class LogLine(ToServer, frozen=True):
 
 HostBound = (
     OpenScene
+    | RetryObject
     | RunPackage
     | Call
     | StopMotion
     | Subscribe
+    | Stream
+    | Lease
     | Pause
     | Resume
     | Step
@@ -266,6 +321,7 @@ ServerBound = (
     | CallDone
     | CallFailed
     | StreamEvent
+    | HoldEnded
     | ProgramEvent
     | ActionBegan
     | ActionEnded

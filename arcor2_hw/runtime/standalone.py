@@ -16,7 +16,7 @@ from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.exceptions import ProgramStopped
 from arcor2_hw.runtime.messages import ActionBegan, ActionEnded
 from arcor2_hw.runtime.program import Program
-from arcor2_hw.runtime.watch import Streams
+from arcor2_hw.runtime.streaming import Streams
 
 _encode = msgspec.json.Encoder().encode
 
@@ -59,7 +59,7 @@ class Standalone:
         self.directory = Path(script).resolve().parent if script else Path.cwd()
         channel = _Lines()
         self.program = Program(channel, self.directory.name, start_paused=options.pause, breakpoints=breakpoints)
-        self._streams = Streams(self.program.cell, lambda name, _, encoded: channel.event(name, encoded))
+        self._streams = Streams(lambda told: channel.event(told.event, told.encoded))
         self._ticking = threading.Event()
 
     def start(self) -> None:

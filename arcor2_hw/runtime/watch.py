@@ -1,18 +1,13 @@
-"""What is told of devices without being asked: joints and end effectors of robots, connection, health, alarms."""
+"""What is told of devices without being asked: connection, health, alarms, control."""
 
 import threading
 import time
 from collections.abc import Callable
 from typing import Any, Final
 
-import msgspec
-
-from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.device import Alarm, Connection, Health
-from arcor2_hw.data.events import Event, RobotEefData, RobotJointsData
-from arcor2_hw.data.robot import EefPose
 from arcor2_hw.exceptions import DeviceTimeout
-from arcor2_hw.objects import Generic, MultiArmRobot, Robot
+from arcor2_hw.objects import Generic
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.device import Device, overrides
 from arcor2_hw.runtime.lane import Job
@@ -24,55 +19,6 @@ INQUIRY_PERIOD: Final = 1.0
 """Seconds between two looks at alarms and control, for which a driver may have to ask."""
 
 _WITH_REASON: Final = (Connection.LOST, Connection.FAILED)
-_encode = msgspec.json.Encoder().encode
-
-
-def _joints(robot: Robot) -> bytes:
-    return _encode(Event("RobotJoints", data=RobotJointsData(robot.id, robot.robot_joints(include_gripper=True))))
-
-
-def _eef(robot: Robot) -> bytes:
-    poses: list[EefPose] = []
-    if isinstance(robot, MultiArmRobot):
-        for arm in sorted(robot.get_arm_ids()):
-            poses += [
-                EefPose(eef, robot.get_end_effector_pose(eef, arm), arm)
-                for eef in sorted(robot.get_end_effectors_ids(arm))
-            ]
-    else:
-        poses = [EefPose(e, robot.get_end_effector_pose(e), UNSET) for e in sorted(robot.get_end_effectors_ids())]
-    return _encode(Event("RobotEef", data=RobotEefData(robot.id, poses)))
-
-
-class Streams:
-    """Sends the state of robots. A robot that has not answered the last time is not asked again: nothing piles up."""
-
-    def __init__(self, cell: Cell, send: Callable[[str, str, bytes], None]) -> None:
-        self._cell = cell
-        self._send = send
-        self._pending: dict[str, Job] = {}
-
-    def send(self, device: Device, *, joints: bool, eef: bool) -> None:
-        """Begin to send joints or end effector poses of a device that is a robot; what fails is left out."""
-        robot = device.instance
-        if not isinstance(robot, Robot) or device.closing:
-            return
-        before = self._pending.get(device.id)
-        if before is not None and not before.ended:
-            return
-        job = Job("stream", self._look, (robot, joints, eef))
-        self._pending[device.id] = job
-        try:
-            device.watch_lane.submit(job)
-        except DeviceTimeout as error:  # a question of somebody else hangs there
-            job.finish(None, error)
-
-    def _look(self, robot: Robot, joints: bool, eef: bool) -> None:
-        # A value that is stale, or a robot that is away, is no event: clients see the age of the last one.
-        if joints:
-            self._send("RobotJoints", robot.id, _joints(robot))
-        if eef:
-            self._send("RobotEef", robot.id, _eef(robot))
 
 
 class Watch:
@@ -91,7 +37,7 @@ class Watch:
         self._tell = tell
         self._lost = lost
         self._turn = threading.Lock()
-        cell.changed = self._glance
+        cell.changed = self.glance
         self._pending: dict[str, Job] = {}
         self._known: dict[str, DeviceChanged] = {}
         self._inquired: dict[str, float] = {}
@@ -115,11 +61,20 @@ class Watch:
             except DeviceTimeout as error:
                 job.finish(None, error)
 
-    def _glance(self, device: Device) -> None:
+    def glance(self, device: Device) -> None:
         """Look at the connection alone, which is memory. On the thread that keeps it."""
         instance = device.instance
         if instance is not None and not device.closing:
             self._compare(device, instance, None)
+
+    def tell(self, object_id: str, connection: Connection, reason: str = "") -> None:
+        """Tell of an object of which there is no instance that could be looked at."""
+        health = Health.FAILURE if connection is Connection.FAILED else Health.NORMAL
+        with self._turn:
+            found = DeviceChanged(object_id, connection, health, [], None, reason)
+            if found != self._known.get(object_id):
+                self._known[object_id] = found
+                self._tell(found)
 
     def _observe(self, device: Device, instance: Generic) -> None:
         before = self._known.get(device.id)

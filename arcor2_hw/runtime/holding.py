@@ -1,0 +1,229 @@
+"""Held motion in the host: a robot moves as long as leases are renewed, and is stopped here when one runs out.
+
+Whoever hangs, client, network or server: the lease ends by the clock of this process, and by the driver's own.
+"""
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any, Final
+
+from arcor2_hw.actions.json_values import encode as encode_json
+from arcor2_hw.data.operation import HoldKind
+from arcor2_hw.exceptions import Arcor2Error, Cancelled, DeviceTimeout, Refused
+from arcor2_hw.objects import Robot
+from arcor2_hw.runtime import messages as m
+from arcor2_hw.runtime.calls import Calls, Post, error_data
+from arcor2_hw.runtime.cell import CONTROL_DEADLINE, Cell
+from arcor2_hw.runtime.clock import Clock
+from arcor2_hw.runtime.device import Device, describe
+from arcor2_hw.runtime.jogging import Jog
+from arcor2_hw.runtime.lane import Job
+
+RENEWED_WITHIN: Final = 2.0
+"""Seconds that a driver has to take a renewal, or to make an arm stiff again; a good one takes milliseconds."""
+
+
+JUST_AFTER: Final = 0.001
+"""Seconds from the end of a lease to the look whether it was renewed."""
+
+
+class _Hold:
+    """One press of the button, from its first lease until the robot stands."""
+
+    def __init__(self, device: Device, lease: m.Lease) -> None:
+        self.device = device
+        self.number = lease.hold
+        self.kind = lease.kind
+        self.arm: dict[str, Any] = {} if lease.arm_id is None else {"arm_id": lease.arm_id}
+        self.newest = lease
+        self.jog: Jog | None = None
+        self.begun = False
+        self.unanswered: list[int] = []
+        """Leases that are to be answered by the next call of the driver."""
+        self.let_go: list[int] = []
+        self.job: Job | None = None
+        self.ending = False
+        self.error: Arcor2Error | None = None
+
+
+class Holds:
+    """At most one hold of each device. Leases come on the reader's thread, time passes on the clock's."""
+
+    def __init__(self, cell: Callable[[], Cell], post: Post, clock: Clock, calls: Calls) -> None:
+        self._cell = cell
+        self._post = post
+        self._clock = clock
+        self._calls = calls
+        self._lock = threading.Lock()
+        self._held: dict[str, _Hold] = {}
+        self._ended: dict[str, int] = {}
+        """By device, the number of the last hold that has ended: it and those before never begin again."""
+
+    @property
+    def any(self) -> bool:
+        """Tell whether anything is held."""
+        return bool(self._held)
+
+    # -------------------------------------------------------------------------------- leases
+    def lease(self, message: m.Lease) -> None:
+        """Begin, renew or end a hold; CallDone (with the scale of a jog) or CallFailed answers it."""
+        try:
+            hold = self._taken(message)
+        except Arcor2Error as error:
+            self._post(m.CallFailed(message.id, error_data(error, message.object_id)))
+            return
+        if hold is None:
+            self._post(m.CallDone(message.id))
+        elif message.until == 0.0:
+            self.end(hold, None)
+        else:
+            self._clock.after(message.until - time.monotonic() + JUST_AFTER, lambda: self._look(hold))
+            self._act(hold)
+
+    def _taken(self, message: m.Lease) -> _Hold | None:
+        """Note a lease; gives its hold, None when it lets go of one that has ended. Raises NotFound, Refused."""
+        device = self._cell()[message.object_id]
+        with self._lock:
+            hold = self._held.get(message.object_id)
+            if hold is not None and hold.number == message.hold:
+                if message.until == 0.0:
+                    hold.let_go.append(message.id)
+                    return hold
+                if hold.ending:
+                    raise hold.error or Refused(f"{device.name}: that hold was ended")
+            elif message.until == 0.0:
+                return None
+            elif hold is not None:
+                raise Refused(f"{device.name} is held already")
+            elif message.hold <= self._ended.get(message.object_id, 0):
+                raise Refused(f"{device.name}: that hold has ended")
+            if message.until <= time.monotonic():
+                raise Refused(f"{device.name}: the lease had run out when it came")
+            if hold is None:
+                hold = self._held[message.object_id] = _Hold(device, message)
+            hold.newest = message
+            hold.unanswered.append(message.id)
+            return hold
+
+    def _look(self, hold: _Hold) -> None:
+        """End a hold that has run out. On the clock's thread, when a lease ends."""
+        if hold.newest.until <= time.monotonic():
+            what = "jog" if hold.kind is HoldKind.JOG else "hold"
+            self.end(hold, Cancelled(f"{hold.device.name}: the {what} was not renewed in time"))
+
+    # -------------------------------------------------------------------------------- acting
+    def _act(self, hold: _Hold) -> None:
+        """Have the driver told of the newest lease, unless it is being told; then it is told again at the end."""
+        with self._lock:
+            if hold.ending or hold.job is not None or not hold.unanswered:
+                return
+            numbers, hold.unanswered = hold.unanswered, []
+            job = hold.job = Job(
+                "jog" if hold.kind is HoldKind.JOG else "set_hand_teaching_mode",
+                lambda: self._tell_driver(hold),
+                notify=lambda done: self._told(hold, done, numbers),
+            )
+            within = RENEWED_WITHIN + (0.0 if hold.begun else CONTROL_DEADLINE)
+        lane = hold.device.lane
+        try:
+            lane.submit(job)
+        except DeviceTimeout as error:
+            job.finish(None, error)
+            return
+        self._clock.after(within, lambda: lane.expire(job, within))
+
+    def _tell_driver(self, hold: _Hold) -> float:
+        """Call the driver, on the device's lane; gives the scale of the velocity."""
+        device, robot = hold.device, hold.device.require()
+        assert isinstance(robot, Robot)
+        if not hold.begun:
+            device.require_not_lost("jog" if hold.kind is HoldKind.JOG else "hand teaching")
+            device.take_control()
+            device.lane.check_wanted()
+            if hold.kind is HoldKind.JOG:
+                hold.jog = Jog(robot, hold.arm)
+        if hold.ending:  # while control was being taken
+            raise hold.error or Cancelled(f"{device.name} was let go before it moved")
+        lease = hold.newest
+        if hold.jog is not None:
+            return hold.jog.drive(lease)
+        if not hold.begun:
+            robot.set_hand_teaching_mode(True, **hold.arm)
+        return 1.0
+
+    def _told(self, hold: _Hold, job: Job, numbers: list[int]) -> None:
+        """Answer the leases that the driver was told of."""
+        device = hold.device
+        if job.error is not None:
+            error = (hold.error if hold.ending else None) or describe(device, job.error)
+            for number in numbers:
+                self._post(m.CallFailed(number, error_data(error, device.id)))
+            hold.job = None
+            self.end(hold, error)
+            return
+        hold.begun = True
+        value = encode_json({"scale": job.value}).encode()
+        for number in numbers:
+            self._post(m.CallDone(number, value))
+        hold.job = None
+        self._act(hold)
+
+    # -------------------------------------------------------------------------------- ends
+    def stopping(self, device: Device) -> None:
+        """End the hold of a device that is being stopped."""
+        hold = self._held.get(device.id)
+        if hold is not None:
+            self.end(hold, Cancelled(f"{device.name} was stopped"))
+
+    def end(self, hold: _Hold, error: Arcor2Error | None) -> None:
+        """Bring the robot to rest, then tell; `error` says why, None when it was let go."""
+        with self._lock:
+            if hold.ending:
+                return
+            hold.ending, hold.error = True, error
+            numbers, hold.unanswered = hold.unanswered, []
+        why = error or Cancelled(f"{hold.device.name} was let go")
+        for number in numbers:
+            self._post(m.CallFailed(number, error_data(why, hold.device.id)))
+        if hold.kind is HoldKind.JOG:
+            self._calls.stop(hold.device, lambda _, problem: self._at_rest(hold, problem))
+        else:
+            self._stiffen(hold)
+
+    def _stiffen(self, hold: _Hold) -> None:
+        """Make the arm stiff, behind the call that may be making it movable; by a stop where that does not do."""
+        device, lane = hold.device, hold.device.lane
+        robot = device.instance
+        assert isinstance(robot, Robot)
+
+        def done(job: Job) -> None:
+            if job.error is None:
+                self._at_rest(hold, None)
+            else:
+                problem = job.error
+                self._calls.stop(device, lambda _, other: self._at_rest(hold, problem if other else None))
+
+        job = Job("set_hand_teaching_mode", lambda: robot.set_hand_teaching_mode(False, **hold.arm), notify=done)
+        try:
+            lane.submit(job)
+        except DeviceTimeout as error:
+            job.finish(None, error)
+            return
+        self._clock.after(RENEWED_WITHIN, lambda: lane.expire(job, RENEWED_WITHIN))
+
+    def _at_rest(self, hold: _Hold, problem: BaseException | None) -> None:
+        device = hold.device
+        error = hold.error if problem is None else describe(device, problem)
+        with self._lock:
+            self._ended[device.id] = hold.number
+            if self._held.get(device.id) is hold:
+                del self._held[device.id]
+            let_go, hold.let_go = hold.let_go, []
+        told = None if error is None else error_data(error, device.id)
+        self._post(m.HoldEnded(device.id, hold.number, told))
+        for number in let_go:
+            if problem is None:
+                self._post(m.CallDone(number))
+            else:
+                self._post(m.CallFailed(number, error_data(describe(device, problem), device.id)))

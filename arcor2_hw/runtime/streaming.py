@@ -1,0 +1,110 @@
+"""Joints and end effectors of robots, sent without being asked: at the streaming period, and at rates of their own."""
+
+import contextlib
+import threading
+import time
+from collections.abc import Callable
+
+import msgspec
+
+from arcor2_hw.data.base import UNSET, Unset
+from arcor2_hw.data.events import Event, RobotEefData, RobotJointsData
+from arcor2_hw.data.robot import EefPose
+from arcor2_hw.exceptions import Arcor2Error, DeviceTimeout
+from arcor2_hw.objects import MultiArmRobot, Robot
+from arcor2_hw.runtime.cell import Cell
+from arcor2_hw.runtime.clock import Clock
+from arcor2_hw.runtime.device import Device
+from arcor2_hw.runtime.lane import Job
+from arcor2_hw.runtime.messages import Stream, StreamEvent
+
+_encode = msgspec.json.Encoder().encode
+
+
+Send = Callable[[StreamEvent], None]
+
+
+def _joints(robot: Robot, time_ms: float | Unset) -> bytes:
+    joints = robot.robot_joints(include_gripper=True)
+    return _encode(Event("RobotJoints", data=RobotJointsData(robot.id, joints, time_ms)))
+
+
+def _eef(robot: Robot, time_ms: float | Unset) -> bytes:
+    poses: list[EefPose] = []
+    if isinstance(robot, MultiArmRobot):
+        for arm in sorted(robot.get_arm_ids()):
+            poses += [
+                EefPose(eef, robot.get_end_effector_pose(eef, arm), arm)
+                for eef in sorted(robot.get_end_effectors_ids(arm))
+            ]
+    else:
+        poses = [EefPose(e, robot.get_end_effector_pose(e), UNSET) for e in sorted(robot.get_end_effectors_ids())]
+    return _encode(Event("RobotEef", data=RobotEefData(robot.id, poses, time_ms)))
+
+
+class Streams:
+    """Sends the state of robots. A robot that has not answered the last time is not asked again: nothing piles up."""
+
+    def __init__(self, send: Send) -> None:
+        self._send = send
+        self._pending: dict[tuple[str, bool, bool, float], Job] = {}
+
+    def send(self, device: Device, *, joints: bool, eef: bool, rate: float = 0.0) -> None:
+        """Begin to send joints or end effector poses of a device that is a robot; what fails is left out.
+
+        rate: that of the stream it is for, whose events carry their time; 0 for the ordinary events.
+        """
+        robot = device.instance
+        if not isinstance(robot, Robot) or device.closing:
+            return
+        key = (device.id, joints, eef, rate)
+        before = self._pending.get(key)
+        if before is not None and not before.ended:
+            return
+        job = Job("stream", self._look, (robot, joints, eef, rate))
+        self._pending[key] = job
+        try:
+            device.watch_lane.submit(job)
+        except DeviceTimeout as error:  # a question of somebody else hangs there
+            job.finish(None, error)
+
+    def _look(self, robot: Robot, joints: bool, eef: bool, rate: float) -> None:
+        # A value that is stale, or a robot that is away, is no event: clients see the age of the last one.
+        time_ms: float | Unset = round(time.monotonic() * 1e3, 3) if rate else UNSET
+        if joints:
+            self._send(StreamEvent("RobotJoints", robot.id, _joints(robot, time_ms), rate))
+        if eef:
+            self._send(StreamEvent("RobotEef", robot.id, _eef(robot, time_ms), rate))
+
+
+class RatedStreams:
+    """Keeps time for streams at rates of their own: each robot, event and rate is read and encoded once a beat."""
+
+    def __init__(self, cell: Callable[[], Cell], clock: Clock, streams: Streams) -> None:
+        self._cell = cell
+        self._clock = clock
+        self._streams = streams
+        self._lock = threading.Lock()
+        self._wanted: dict[tuple[str, bool], frozenset[float]] = {}
+        self._beating: set[tuple[str, bool, float]] = set()
+
+    def want(self, message: Stream) -> None:
+        """Take the rates of a robot, in place of those before. On the reader's thread."""
+        for joints, rates in ((True, message.joints), (False, message.eef)):
+            with self._lock:
+                self._wanted[message.object_id, joints] = frozenset(rates)
+                new = [rate for rate in rates if (message.object_id, joints, rate) not in self._beating]
+                self._beating.update((message.object_id, joints, rate) for rate in new)
+            for rate in new:
+                self._beat(message.object_id, joints, rate, time.monotonic())
+
+    def _beat(self, object_id: str, joints: bool, rate: float, due: float) -> None:
+        with self._lock:
+            if rate not in self._wanted[object_id, joints]:
+                self._beating.discard((object_id, joints, rate))
+                return
+        with contextlib.suppress(Arcor2Error):  # it has failed; it may be retried
+            self._streams.send(self._cell()[object_id], joints=joints, eef=not joints, rate=rate)
+        now = time.monotonic()
+        following = max(due + 1.0 / rate, now)  # missed beats are not made up for
+        self._clock.after(following - now, lambda: self._beat(object_id, joints, rate, following))

@@ -1,0 +1,305 @@
+"""Held motion in the cell host: leases, their end whoever hangs, speed and limits, hand teaching."""
+
+import os
+import signal
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from arcor2_hw.data.operation import HoldKind
+from arcor2_hw.data.robot import Joint
+from arcor2_hw.runtime import messages as m
+
+from .conftest import HostProcess, open_scene, scene_object, type_code
+
+ARM = """
+from arcor2_hw.exceptions import Arcor2NotImplemented
+
+class Arm(Robot):
+    _ABSTRACT = False
+
+    def __init__(self, obj_id, name, pose, settings=None):
+        super().__init__(obj_id, name, pose, settings)
+        self.told = []
+        self.owner = None
+        self.taking = 0.0
+        self.hangs = 0.0
+        self.at = 0.0
+        self.fault = ""
+        self.hand = False
+
+    def note(self, what, *more): self.told.append([what, time.monotonic(), *more])
+    def report(self): return self.told
+    def forget(self):
+        self.told, self.taking, self.hangs, self.at, self.fault = [], 0.0, 0.0, 0.0, ""
+    def set(self, key: str, value: float): setattr(self, key, value)
+    def set_fault(self, fault: str): self.fault = fault
+    def lose_control(self): self.owner = None
+    def take_control(self):
+        time.sleep(self.taking)
+        self.owner = "us"
+    def control_owner(self): return self.owner
+    def get_end_effectors_ids(self): return {"tool"}
+    def get_end_effector_pose(self, end_effector): return Pose()
+    def robot_joints(self, include_gripper=False): return [Joint("turn", self.at), Joint("free", 0.0)]
+    def joint_limits(self): return {"turn": (-1.0, 1.0)}
+    def forward_kinematics(self, end_effector_id, joints):
+        turn = joints[0].value
+        return Pose(Position(0.8 * turn, 0.0, 0.0))  # a lever of 0.8 m, all but straight
+    def grippers(self): return set()
+    def suctions(self): return set()
+    def stop(self):
+        self.note("stop")
+        if self.hand: self.set_hand_teaching_mode(False)
+    def get_hand_teaching_mode(self): return self.hand
+    def set_hand_teaching_mode(self, enabled):
+        if self.fault: raise SafetyStop(self.fault)
+        self.hand = enabled
+        self.note("hand", enabled)
+    def jog(self, twist=None, joint_velocities=None, frame="world", valid_for=0.2, end_effector_id=None):
+        if self.fault: raise SafetyStop(self.fault)
+        self.note("jog", twist, joint_velocities, frame, valid_for, end_effector_id)
+        time.sleep(self.hangs)
+"""
+OBJ = "obj_arm"
+ALONG_X = (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class Holder:
+    """Sends leases as the server does."""
+
+    def __init__(self, host: HostProcess) -> None:
+        self.host = host
+        self.hold = 0
+        self._number = 10_000
+
+    def lease(self, valid: float = 0.3, *, kind: HoldKind = HoldKind.JOG, new: bool = False, **more: Any) -> int:
+        self.hold += new
+        self._number += 1
+        if kind is HoldKind.JOG and valid and "joints" not in more:
+            more.setdefault("twist", ALONG_X)
+        until = time.monotonic() + valid if valid else 0.0
+        self.host.send(m.Lease(self._number, OBJ, self.hold, kind, until, **more))
+        return self._number
+
+    def granted(self, valid: float = 0.3, **more: Any) -> float:
+        answer = self.host.answer(self.lease(valid, **more))
+        assert isinstance(answer, dict), answer
+        return float(answer["scale"])
+
+    def refused(self, valid: float = 0.3, **more: Any) -> m.ErrorData:
+        answer = self.host.answer(self.lease(valid, **more))
+        assert isinstance(answer, m.ErrorData), answer
+        return answer
+
+    def ended(self) -> m.HoldEnded:
+        known = [e for e in self.host.seen if isinstance(e, m.HoldEnded) and e.hold == self.hold]
+        return known[0] if known else self.host.expect(m.HoldEnded, lambda e: e.hold == self.hold)
+
+    def told(self, *what: str) -> list[list[Any]]:
+        return [one for one in self.host.call(OBJ, "report") if not what or one[0] in what]
+
+
+@pytest.fixture(scope="module")
+def hosted() -> Iterator[Holder]:
+    host = HostProcess()
+    host.send(open_scene([type_code("Arm", ARM)], scene_object("arm", "Arm", pose=True)))
+    host.expect(m.SceneOpened)
+    yield Holder(host)
+    host.end()
+
+
+@pytest.fixture
+def holder(hosted: Holder) -> Holder:
+    hosted.host.call(OBJ, "forget")
+    return hosted
+
+
+def test_renewed_until_it_is_let_go(holder: Holder) -> None:
+    assert holder.granted(new=True) == 1.0
+    for _ in range(8):
+        time.sleep(0.1)
+        holder.granted()
+    assert holder.host.answer(holder.lease(0.0)) is None
+    ended = holder.ended()
+    assert ended.error is None
+    jogs, stops = holder.told("jog"), holder.told("stop")
+    assert len(jogs) == 9
+    assert all(tuple(jog[2]) == ALONG_X and jog[4] == "world" and 0.1 < jog[5] <= 0.3 for jog in jogs)
+    assert len(stops) == 1
+    assert stops[0][1] > jogs[-1][1]
+
+
+def test_what_is_not_renewed_is_stopped_and_does_not_begin_again(holder: Holder) -> None:
+    began = time.monotonic()
+    holder.granted(0.15, new=True)
+    ended = holder.ended()
+    assert ended.error is not None
+    assert "not renewed in time" in ended.error.message
+    assert "arm" in ended.error.message
+    (stop,) = holder.told("stop")
+    assert 0.15 <= stop[1] - began < 0.5  # the machine may be busy; the figure is in the benchmarks
+    assert "has ended" in holder.refused().message
+    assert len(holder.told("jog")) == 1
+    holder.granted(new=True)
+    holder.lease(0.0)
+    holder.ended()
+
+
+def test_a_lease_that_comes_late_is_thrown_away(holder: Holder) -> None:
+    """The host hangs for longer than the leases last that wait for it, and with them a new press."""
+    pid = holder.host.process.pid
+    os.kill(pid, signal.SIGSTOP)
+    late = [holder.lease(0.1, new=True)] + [holder.lease(0.1) for _ in range(4)]
+    time.sleep(0.3)
+    os.kill(pid, signal.SIGCONT)
+    for number in late:
+        error = holder.host.answer(number)
+        assert isinstance(error, m.ErrorData)
+        assert "had run out" in error.message
+    assert holder.told("jog") == []
+
+
+def test_another_hold_is_refused_while_one_lasts(holder: Holder) -> None:
+    holder.granted(new=True)
+    holder.hold += 1
+    assert "held already" in holder.refused().message
+    holder.hold -= 1
+    holder.lease(0.0)
+    holder.ended()
+
+
+def test_control_is_taken_as_long_as_it_takes_and_motion_begins_only_if_still_held(holder: Holder) -> None:
+    holder.host.call(OBJ, "set", key="taking", value=0.6)
+    holder.host.call(OBJ, "lose_control")
+    numbers = [holder.lease(new=True)]
+    for _ in range(9):
+        time.sleep(0.1)
+        numbers.append(holder.lease())
+    assert all(holder.host.answer(number) == {"scale": 1.0} for number in numbers)
+    assert len(holder.told("jog")) < len(numbers)  # the leases that came meanwhile are told as one
+    holder.lease(0.0)
+    holder.ended()
+
+    holder.host.call(OBJ, "forget")
+    holder.host.call(OBJ, "set", key="taking", value=0.6)
+    holder.host.call(OBJ, "lose_control")
+    assert "not renewed" in holder.refused(0.2, new=True).message
+    holder.ended()
+    assert holder.told("jog") == []
+
+
+def test_a_driver_that_hangs_is_stopped_past_it(holder: Holder) -> None:
+    holder.host.call(OBJ, "set", key="hangs", value=0.8)
+    began = time.monotonic()
+    holder.lease(0.2, new=True)
+    ended = holder.ended()
+    assert ended.error is not None
+    stops = holder.told("stop")
+    assert 0.2 <= stops[0][1] - began < 0.6
+
+
+def test_stop_ends_it(holder: Holder) -> None:
+    holder.granted(new=True)
+    holder.host.send(m.StopMotion(77, OBJ))
+    assert holder.host.answer(77) is None
+    ended = holder.ended()
+    assert ended.error is not None
+    assert "was stopped" in ended.error.message
+    assert holder.refused().message
+
+
+def test_what_the_driver_says_ends_it(holder: Holder) -> None:
+    holder.granted(new=True)
+    holder.host.call(OBJ, "set_fault", fault="protective stop of 192.0.2.1")
+    assert "protective stop" in holder.refused().message
+    ended = holder.ended()
+    assert ended.error is not None
+    assert (ended.error.code, ended.error.object_id) == ("safety_stop", OBJ)
+    assert holder.told("stop")
+    assert "protective stop" in holder.refused(new=True).message
+    holder.ended()
+
+
+def test_the_end_effector_is_never_faster_than_a_person_may_be_near(holder: Holder) -> None:
+    assert holder.granted(new=True, twist=(0.3, 0.0, 0.4, 0.0, 0.0, 1.0)) == pytest.approx(0.5)
+    assert holder.granted(joints=[Joint("turn", 0.1)]) == 1.0
+    scale = holder.granted(joints=[Joint("turn", 1.0)])
+    assert 0.9 * 0.25 <= scale * 1.0 * 0.8 <= 0.25
+    first, _, last = holder.told("jog")
+    assert first[2] == pytest.approx([0.15, 0.0, 0.2, 0.0, 0.0, 0.5])
+    assert last[2] is None
+    assert last[3] == pytest.approx([scale, 0.0])
+    holder.lease(0.0)
+    holder.ended()
+
+
+def test_a_joint_slows_down_before_its_limit_and_stops_there(holder: Holder) -> None:
+    holder.host.call(OBJ, "set", key="at", value=0.95)
+    scale = holder.granted(new=True, joints=[Joint("turn", 0.25)])
+    assert 0.0 < scale * 0.25 * 0.3 < 0.05
+    assert holder.granted(joints=[Joint("turn", -0.25)]) == 1.0
+    holder.host.call(OBJ, "set", key="at", value=0.995)
+    error = holder.refused(joints=[Joint("turn", 0.25)])
+    assert "the joint turn is at its upper limit" in error.message
+    holder.ended()
+    assert holder.granted(new=True, joints=[Joint("turn", -0.25)]) == 1.0
+    holder.lease(0.0)
+    holder.ended()
+
+
+def test_a_jog_in_space_that_leads_a_joint_to_its_limit(holder: Holder) -> None:
+    assert holder.granted(new=True) == 1.0
+    time.sleep(0.1)
+    holder.host.call(OBJ, "set", key="at", value=0.95)
+    assert holder.granted() < 0.9  # by the way that the joint has made since the last lease
+    time.sleep(0.1)
+    holder.host.call(OBJ, "set", key="at", value=0.999)
+    assert "turn is at its upper limit" in holder.refused().message
+    holder.ended()
+    assert holder.granted(new=True) < 0.1  # which way it leads is not known yet
+    holder.host.call(OBJ, "set", key="at", value=0.9)
+    holder.granted()
+    holder.lease(0.0)
+    holder.ended()
+
+
+@pytest.mark.parametrize(
+    ("more", "text"),
+    [
+        ({"joints": [Joint("elbow", 0.1)]}, "no joint elbow"),
+        ({"end_effector_id": "claw"}, "no end effector 'claw'"),
+    ],
+)
+def test_names_that_the_robot_does_not_have(holder: Holder, more: Any, text: str) -> None:
+    assert text in holder.refused(new=True, **more).message
+    holder.ended()
+    assert holder.told("jog") == []
+
+
+def test_hand_teaching_lasts_as_long_as_it_is_held(holder: Holder) -> None:
+    for _ in range(3):
+        holder.granted(0.3, kind=HoldKind.HAND_TEACHING, new=not holder.told())
+        time.sleep(0.1)
+    ended = holder.ended()
+    assert ended.error is not None
+    assert [one[2] for one in holder.told("hand")] == [True, False]
+    assert holder.host.call(OBJ, "get_hand_teaching_mode") is False
+    holder.granted(kind=HoldKind.HAND_TEACHING, new=True)
+    assert holder.host.answer(holder.lease(0.0, kind=HoldKind.HAND_TEACHING)) is None
+    assert holder.host.call(OBJ, "get_hand_teaching_mode") is False
+
+
+def test_a_host_without_its_server_stops_what_is_held() -> None:
+    host = HostProcess()
+    try:
+        host.send(open_scene([type_code("Arm", ARM)], scene_object("arm", "Arm", pose=True)))
+        host.expect(m.SceneOpened)
+        holder = Holder(host)
+        holder.granted(0.3, new=True)
+        host.socket.close()
+        assert host.gone(5.0) == 0
+    finally:
+        host.end()
