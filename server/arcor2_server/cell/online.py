@@ -21,6 +21,7 @@ from arcor2_server.cell.actions import RunningAction
 from arcor2_server.cell.devices import DeviceBoard, DeviceStatus, overlay_for
 from arcor2_server.cell.host import CellHost
 from arcor2_server.cell.hosts import CellHosts
+from arcor2_server.cell.scene_task import SceneTask
 from arcor2_server.client import Client
 from arcor2_server.locks import PROJECT, SCENE, SERVER
 from arcor2_server.rpc.registry import RequestRefused, make_event
@@ -58,7 +59,8 @@ class OnlineCell:
         self._task: asyncio.Task[None] | None = None
         self._answer: asyncio.Future[m.ErrorData | None] | None = None
         self._subscribers: dict[tuple[str, RobotEventKind], set[Client]] = {}
-        self._board = DeviceBoard(lambda data: services.hub.broadcast(make_event("ObjectState", data)))
+        self.task = SceneTask(services.tasks)
+        self._board = DeviceBoard(self._tell_object)
         self._background: set[asyncio.Task[None]] = set()
         self._preparing = asyncio.get_running_loop().call_later(SPARE_AFTER, self.hosts.prepare)
         services.hub.on_leave.append(self._forget_client)
@@ -93,8 +95,15 @@ class OnlineCell:
             await asyncio.wait([self._task])
         return self.state
 
+    def _tell_object(self, data: ObjectStateData) -> None:
+        self._services.hub.broadcast(make_event("ObjectState", data))
+        if self.state is SceneStateEnum.STARTING:
+            self.task.connected(self._board.states())
+
     def _tell(self, state: SceneStateEnum, message: str = "") -> None:
         self.state = state
+        scene = self._services.session.scene
+        self.task.entered(state, "" if scene is None else scene.name, message)
         log.info("scene", state=state.value, reason=message)
         self._services.hub.broadcast(make_event("SceneState", SceneStateData(state, message or UNSET)))
 

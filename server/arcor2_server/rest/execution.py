@@ -10,6 +10,7 @@ import msgspec
 from msgspec import field
 
 from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset, new_id
+from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.data.events import ChangeType
 from arcor2_hw.data.package import PackageStateEnum, PackageSummary
 from arcor2_hw.data.role import Role
@@ -109,7 +110,8 @@ async def list_packages(services: Services) -> list[SummaryPackage]:
 @operation("POST", "/packages/{id}", EXECUTION, Role.PROGRAMMER, file="executionPackage", limit=MAX_UPLOAD + MIB)
 async def upload_package(services: Services, id: str, upload: Upload) -> None:  # noqa: A002 - the protocol's name
     """Take in a package as a zip, in place of one of that id."""
-    summary = await services.execution.take(id, upload.file)
+    with services.tasks.running(TaskKind.UPLOAD, f"Taking in the package {id}"):
+        summary = await services.execution.take(id, upload.file)
     services.hub.broadcast(make_event("PackageChanged", summary, ChangeType.ADD))
 
 

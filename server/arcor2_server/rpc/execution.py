@@ -1,6 +1,7 @@
 """Requests that bring the scene online, execute single actions, and run packages (protocol, 7.2, 7.4, 7.6)."""
 
 from arcor2_hw.data.base import Unset
+from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.data.events import ActionExecutionData, ChangeType
 from arcor2_hw.data.package import PackageSummary
 from arcor2_hw.data.rpc import (
@@ -21,12 +22,14 @@ from arcor2_server.rpc.registry import Context, RequestRefused, rpc
 @rpc("StartScene")
 async def start_scene(context: Context, args: None) -> None:  # noqa: ARG001
     """Bring the scene online; SceneState tells how it goes."""
+    context.services.cell.task.asked_by = context.client.name
     await context.services.cell.begin_start(dry_run=context.dry_run)
 
 
 @rpc("StopScene")
 async def stop_scene(context: Context, args: None) -> None:  # noqa: ARG001
     """Take the scene offline; SceneState tells how it goes."""
+    context.services.cell.task.asked_by = context.client.name
     await context.services.cell.begin_stop(dry_run=context.dry_run)
 
 
@@ -85,7 +88,9 @@ async def list_packages(context: Context, args: None) -> list[PackageSummary]:  
 @rpc("UploadPackage")
 async def upload_package(context: Context, args: UploadPackageArgs) -> None:
     """Take a package as a zip."""
-    summary = await context.services.execution.upload(args.id, args.data)
+    services = context.services
+    with services.tasks.running(TaskKind.UPLOAD, f"Taking in the package {args.id}", context.client.name):
+        summary = await services.execution.upload(args.id, args.data)
     context.emit("PackageChanged", summary, ChangeType.ADD)
 
 

@@ -5,6 +5,7 @@ import contextlib
 
 import structlog
 
+from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.data.events import ChangeType, Event, MainScreen, OpenProjectData, SceneStateEnum, ShowMainScreenData
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.rpc import TemporaryPackageArgs
@@ -107,7 +108,8 @@ class _Run:
         if services.cell.state not in (SceneStateEnum.STOPPED, SceneStateEnum.STARTED):
             raise RequestRefused(f"The scene is {services.cell.state.value}: wait until that is over.")
         name = f"Temporary package for project '{project.name}'."
-        self._package = await services.build.build(project.id, name)
+        with services.tasks.running(TaskKind.BUILD, f"Building {project.name} to run it", self._how.by):
+            self._package = await services.build.build(project.id, name)
         return project
 
     async def _close(self) -> None:
