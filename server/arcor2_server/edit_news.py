@@ -11,6 +11,7 @@ from arcor2_server.client import Client
 from arcor2_server.hub import encode
 from arcor2_server.rpc.registry import make_event
 from arcor2_server.session.changes import Change, Edit, How, Kind
+from arcor2_server.session.history import History
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services
@@ -60,9 +61,9 @@ class EditNews:
         redo: Any = UNSET
         if user is not None:
             if (edit := session.history.undoable(user)) is not None:
-                undo = _step(edit)
+                undo = HistoryStep(edit.number, edit.request, sentence(_original(edit, session.history)))
             if (edit := session.history.redoable(user)) is not None:
-                redo = _step(edit)
+                redo = HistoryStep(edit.number, edit.request, sentence(_original(edit, session.history)))
         return make_event(NAME, HistoryChangedData(session.revision, undo, redo))
 
 
@@ -82,8 +83,11 @@ _WORDS: Final = {
 }
 
 
-def _step(edit: Edit) -> HistoryStep:
-    return HistoryStep(edit.number, edit.request, sentence(edit))
+def _original(edit: Edit, history: History) -> Edit:
+    """Give the edit that an undo or redo is of, as far as it is kept."""
+    while edit.how in (How.UNDO, How.REDO) and (found := history.find(edit.of)) is not None:
+        edit = found
+    return edit
 
 
 def sentence(edit: Edit) -> str:
@@ -91,12 +95,12 @@ def sentence(edit: Edit) -> str:
 
     Of an undo, what was taken back: that is what Redo would do again.
     """
-    changes = [change.inverse() for change in edit.changes] if edit.how is How.UNDO else edit.changes
     if edit.how is How.RESTORE:
         return f"going back to revision {edit.of}"
+    changes = [change.inverse() for change in reversed(edit.changes)] if edit.how is How.UNDO else edit.changes
     if not changes:
         return edit.request
-    first = changes[-1] if edit.how is How.UNDO else changes[0]
+    first = changes[0]
     value = first.before if first.after is None else first.after
     before, after = getattr(first.before, "name", ""), getattr(first.after, "name", "")
     what = _WORDS[first.kind]

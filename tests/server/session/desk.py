@@ -28,6 +28,7 @@ from arcor2_server.rpc import (  # noqa: F401
     action_points,
     actions,
     copying,
+    editor,
     general,
     history,
     joints,
@@ -238,6 +239,10 @@ class Person:
         taken, self._messages = self._messages, []
         return taken
 
+    def put_back(self, messages: list[dict[str, Any]]) -> None:
+        """Leave what was taken too early for the next time."""
+        self._messages[:0] = messages
+
     def events(self) -> list[dict[str, Any]]:
         """Give the events since the last time, without the answers."""
         return [message for message in self.take() if "event" in message]
@@ -311,9 +316,13 @@ async def open_desk(directory: Path, **settings: Any) -> AsyncIterator[Desk]:
     try:
         await services.session.open()
         try:
-            desk = Desk(services, types, cell)
-            yield desk
-            await desk.close()
+            await services.share()
+            try:
+                desk = Desk(services, types, cell)
+                yield desk
+                await desk.close()
+            finally:
+                await services.close_shared()
         finally:
             await services.session.close()
     finally:

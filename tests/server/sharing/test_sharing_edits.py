@@ -1,0 +1,158 @@
+"""What follows from edits: shared breakpoints that come and go, and the sentences for undo and redo."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+from arcor2_server import breakpoints
+from tests.server.session.desk import Desk, Person, Refused, open_desk
+from tests.server.session.work import Work
+from tests.server.sharing.conftest import came, subscribed
+
+
+@pytest.fixture
+def work(alice: Person) -> Work:
+    return Work(alice)
+
+
+# ---------------------------------------------------------------------------------------------- shared breakpoints
+async def test_breakpoints_are_shared_and_told(alice: Person, bob: Person, stranger: Person, work: Work) -> None:
+    project = await work.project("p")
+    action = await work.add_action(work.point("p"), "wait")
+    await subscribed(bob, "BreakpointsChanged")
+    revision = work.session.revision
+    both = {action, work.point("p")}
+    answer = await alice.ask("SetBreakpoints", add=sorted(both))
+    assert (set(answer["ids"]), answer["user"], answer["project_id"]) == (both, "alice", project)
+    told = await came(bob, "BreakpointsChanged")
+    assert (set(told["ids"]), told["user"]) == (both, "alice")
+    assert set((await stranger.ask("GetBreakpoints"))["ids"]) == both
+    await alice.ask("SetBreakpoints", add=[action])  # is set already
+    await bob.ask("SetBreakpoints", remove=[action, "act_none"])
+    told = await came(bob, "BreakpointsChanged")
+    assert (told["ids"], told["user"]) == ([work.point("p")], "bob")
+    assert work.session.revision == revision
+    with pytest.raises(Refused, match="act_none"):
+        await alice.ask("SetBreakpoints", add=["act_none"])
+    with pytest.raises(Refused, match="at once"):
+        await alice.ask("SetBreakpoints", add=[action], remove=[action])
+    with pytest.raises(Refused, match="RegisterUser"):
+        await stranger.ask("SetBreakpoints", remove=[action])
+    with pytest.raises(Refused, match="pro_none"):
+        await alice.ask("GetBreakpoints", project_id="pro_none")
+
+
+async def test_there_are_not_too_many(monkeypatch: pytest.MonkeyPatch, alice: Person, work: Work) -> None:
+    monkeypatch.setattr(breakpoints, "MOST", 2)
+    await work.project("p", "q", "r")
+    points = [work.point(name) for name in "pqr"]
+    await alice.ask("SetBreakpoints", add=points[:2])
+    with pytest.raises(Refused, match="at most 2"):
+        await alice.ask("SetBreakpoints", add=points[2:])
+    await alice.ask("SetBreakpoints", add=points[2:], remove=points[:1])
+
+
+async def test_a_breakpoint_goes_with_what_it_is_on_and_undo_brings_it_back(
+    alice: Person, bob: Person, work: Work
+) -> None:
+    await work.project("p")
+    action = await work.add_action(work.point("p"), "wait")
+    await alice.ask("SetBreakpoints", add=[action])
+    await subscribed(bob, "BreakpointsChanged")
+    await alice.ask("RemoveAction", id=action)
+    assert (await came(bob, "BreakpointsChanged"))["ids"] == []
+    assert (await bob.ask("GetBreakpoints"))["ids"] == []
+    await alice.ask("Undo")
+    assert (await came(bob, "BreakpointsChanged"))["ids"] == [action]
+    await work.add_action(work.point("p"), "other")
+    await asyncio.sleep(0.02)
+    assert "BreakpointsChanged" not in bob.names()
+
+
+async def test_they_are_the_projects_whether_it_is_open_or_not(tmp_path: Path) -> None:
+    async with open_desk(tmp_path) as desk:
+        alice = await desk.person("alice")
+        work = Work(alice)
+        project = await work.project("p")
+        point = work.point("p")
+        await alice.ask("SaveProject")
+        await alice.ask("SetBreakpoints", add=[point])
+        await alice.ask("CloseProject")
+        with pytest.raises(Refused, match="No scene is open"):
+            await alice.ask("GetBreakpoints")
+        assert (await alice.ask("GetBreakpoints", project_id=project))["ids"] == [point]
+    async with open_desk(tmp_path) as desk:
+        alice = await desk.person("alice")
+        assert await alice.ask("GetBreakpoints", project_id=project) == {
+            "project_id": project,
+            "ids": [point],
+            "user": "alice",
+        }
+        await alice.ask("DeleteProject", id=project)
+        assert await desk.services.breakpoints.ids(project) == set()
+    async with open_desk(tmp_path) as desk:
+        assert await desk.services.breakpoints.ids(project) == set()
+
+
+# ---------------------------------------------------------------------------------------------- undo and redo
+async def test_each_is_told_what_he_could_undo(alice: Person, bob: Person, stranger: Person, work: Work) -> None:
+    await stranger.ask("SubscribeEvents", events=["HistoryChanged"])
+    assert await came(stranger, "HistoryChanged") == {"revision": 0}
+    await work.project()
+    await subscribed(bob, "HistoryChanged")
+    await alice.ask("SubscribeEvents", events=["HistoryChanged"])
+    assert (await came(alice, "HistoryChanged")) == {"revision": 0}
+    await work.add_point("p")
+    point = work.point("p")
+    told = await came(alice, "HistoryChanged", lambda data: data["revision"] == 1)
+    assert told == {
+        "revision": 1,
+        "undo": {"number": 1, "request": "AddActionPoint", "text": "adding the action point p"},
+    }
+    assert await came(bob, "HistoryChanged", lambda data: data["revision"] == 1) == {"revision": 1}
+    await alice.lock(point, tree=True)
+    await alice.ask("RenameActionPoint", action_point_id=point, new_name="q")
+    told = await came(alice, "HistoryChanged", lambda data: data["revision"] == 2)
+    assert told["undo"]["text"] == "renaming the action point p to q"
+    await alice.ask("Undo")
+    told = await came(alice, "HistoryChanged", lambda data: data["revision"] == 3)
+    assert told["undo"]["text"] == "adding the action point p"
+    assert told["redo"]["text"] == "renaming the action point p to q"
+    await alice.ask("Redo")
+    told = await came(alice, "HistoryChanged", lambda data: data["revision"] == 4)
+    assert told["undo"]["text"] == "renaming the action point p to q"
+    assert "redo" not in told
+    await alice.lock(point, tree=True)
+    await alice.ask("UpdateActionPointPosition", action_point_id=point, new_position={"x": 1.0, "y": 0.0, "z": 0.0})
+    told = await came(alice, "HistoryChanged", lambda data: data["revision"] == 5)
+    assert told["undo"]["text"] == "moving the action point q"
+    await work.add_action(point, "wait")
+    told = await came(alice, "HistoryChanged", lambda data: data["revision"] == 6)
+    assert told["undo"]["text"] == "adding the action wait"
+    await alice.ask("RestoreRevision", revision=1)
+    told = await came(alice, "HistoryChanged", lambda data: data["revision"] == 7)
+    assert told["undo"]["text"] == "going back to revision 1"
+    await alice.ask("Undo")
+    told = await came(alice, "HistoryChanged", lambda data: data["revision"] == 8)
+    assert told["redo"]["text"] == "going back to revision 1"
+    bob.take()
+    await bob.ask("RegisterUser", user_name="bobby")
+    assert (await came(bob, "HistoryChanged"))["revision"] == 8
+    await alice.ask("CloseProject", force=True)
+    assert await came(alice, "HistoryChanged") == {"revision": 0}
+
+
+async def test_edits_in_a_row_are_told_after_their_answers_and_not_each(desk: Desk, alice: Person, work: Work) -> None:
+    await work.project()
+    await subscribed(alice, "HistoryChanged")
+    for number in range(50):
+        await alice.ask("AddActionPoint", name=f"p{number}", position={"x": 0.0, "y": 0.0, "z": 0.0})
+    taken = alice.take()
+    while not any(m.get("event") == "HistoryChanged" and m["data"]["revision"] == 50 for m in taken):
+        await asyncio.sleep(0.005)
+        taken += alice.take()
+    order = [m.get("event") or m["response"] for m in taken]
+    assert order.index("HistoryChanged") > order.index("AddActionPoint")
+    assert order[-1] == "HistoryChanged"
+    assert order.count("HistoryChanged") <= 50

@@ -1,0 +1,169 @@
+"""Presence and previews: who is told what of whom, how often, and until when."""
+
+import asyncio
+import time
+from typing import Any
+
+import pytest
+
+from arcor2_hw.data.role import Role
+from arcor2_server import presence, previews
+from tests.server.session.desk import Desk, Person, Refused
+from tests.server.session.work import ORIGIN, UPRIGHT, Work
+from tests.server.sharing.conftest import came, subscribed
+
+POSE = {"position": {"x": 1.0, "y": 2.0, "z": 3.0}, "orientation": UPRIGHT}
+
+
+# ---------------------------------------------------------------------------------------------- presence
+async def test_people_come_look_and_leave(desk: Desk, alice: Person, stranger: Person) -> None:
+    await stranger.ask("SubscribeEvents", events=["UserPresence"])
+    assert (await came(stranger, "UserPresence")) == {"user": "alice", "online": True, "role": "programmer"}
+    bob = await desk.person("bob")
+    assert (await came(stranger, "UserPresence"))["user"] == "bob"
+    said: dict[str, Any] = {"document": "pro_1", "selected": ["acp_1"], "editing": "act_1", "view": "Flow", "camera": POSE}
+    await bob.ask("UpdatePresence", **said)
+    told = await came(stranger, "UserPresence", lambda data: "presence" in data)
+    assert (told["user"], told["presence"]) == ("bob", said)
+    late = await desk.person("carol")
+    await late.ask("SubscribeEvents", events=["UserPresence"])
+    everybody = {e["data"]["user"]: e["data"].get("presence") for e in late.events()}
+    assert everybody == {"alice": None, "bob": said, "carol": None}
+    await bob.ask("RegisterUser", user_name="rob")
+    assert (await came(stranger, "UserPresence", lambda data: data["user"] == "bob"))["online"] is False
+    assert "presence" not in await came(stranger, "UserPresence", lambda data: data["user"] == "rob")
+    await late.leave()
+    desk._people.remove(late)
+    assert (await came(stranger, "UserPresence", lambda data: not data["online"]))["user"] == "carol"
+
+
+async def test_presence_needs_a_user_and_ends_somewhere(alice: Person, stranger: Person) -> None:
+    with pytest.raises(Refused, match="RegisterUser"):
+        await stranger.ask("UpdatePresence", view="3D")
+    with pytest.raises(Refused, match="selected"):
+        await alice.ask("UpdatePresence", selected=["a"] * 51)
+    with pytest.raises(Refused, match="view"):
+        await alice.ask("UpdatePresence", view="x" * 51)
+
+
+async def test_of_what_comes_fast_the_newest_is_told(
+    monkeypatch: pytest.MonkeyPatch, alice: Person, bob: Person
+) -> None:
+    await subscribed(bob, "UserPresence")
+    began = time.monotonic()
+    for number in range(300):
+        await alice.ask("UpdatePresence", view=str(number))
+    told = [await came(bob, "UserPresence", lambda data: data["user"] == "alice")]
+    while told[-1]["presence"]["view"] != "299":
+        told.append(await came(bob, "UserPresence"))
+    assert len(told) <= 2 + (time.monotonic() - began) / presence.PERIOD
+    assert len(told) < 300
+
+
+# ---------------------------------------------------------------------------------------------- previews
+@pytest.fixture
+async def work(alice: Person) -> Work:
+    work = Work(alice)
+    await work.project("p", "q")
+    await work.add_orientation(work.point("p"))
+    alice.take()
+    return work
+
+
+async def drag(person: Person, item: str, x: float) -> None:
+    await person.ask("PreviewMove", id=item, position={"x": x, "y": 0.0, "z": 0.0})
+
+
+def is_over(data: Any) -> bool:
+    return set(data) == {"id", "user"}
+
+
+async def test_a_drag_is_told_to_the_others_until_it_is_over(alice: Person, bob: Person, work: Work) -> None:
+    point = work.point("p")
+    await subscribed(bob, "MovePreview")
+    await subscribed(alice, "MovePreview")
+    await alice.lock(point, tree=True)
+    await drag(alice, point, 0.25)
+    told = await came(bob, "MovePreview")
+    assert told == {"id": point, "user": "alice", "position": {"x": 0.25, "y": 0.0, "z": 0.0}}
+    # The end comes after what it leads to, so that nothing jumps back.
+    await alice.ask("UpdateActionPointPosition", action_point_id=point, new_position={"x": 0.5, "y": 0.0, "z": 0.0})
+    await came(bob, "ActionPointChanged")
+    assert await came(bob, "MovePreview") == {"id": point, "user": "alice"}
+    await drag(alice, point, 0.75)
+    await alice.ask("PreviewMove", id=point)
+    await came(bob, "MovePreview", is_over)
+    assert "MovePreview" not in alice.names()
+    assert work.session.action_point(point).position.x == 0.5
+    assert (await alice.ask("History"))["revision"] == work.session.revision
+
+
+async def test_it_is_over_when_the_lock_is_given_back_or_its_holder_is_gone(
+    desk: Desk, alice: Person, bob: Person, work: Work
+) -> None:
+    point = work.point("p")
+    await subscribed(bob, "MovePreview")
+    await alice.lock(point, tree=True)
+    await drag(alice, point, 1.0)
+    await came(bob, "MovePreview")
+    await alice.ask("WriteUnlock", object_id=point)
+    assert is_over(await came(bob, "MovePreview"))
+    carol = await desk.person("carol")
+    await carol.lock(point, tree=True)
+    await drag(carol, point, 2.0)
+    await came(bob, "MovePreview")
+    await carol.leave()
+    desk._people.remove(carol)
+    assert await came(bob, "MovePreview") == {"id": point, "user": "carol"}
+    assert desk.services.previews._dragged == {}
+
+
+async def test_who_may_not_drag_and_what(desk: Desk, alice: Person, bob: Person, stranger: Person, work: Work) -> None:
+    point, robot = work.point("p"), work.object("robot")
+    orientation = work.session.require_project().action_points[0].orientations[0].id
+    await alice.lock(point)
+    for person, reason in ((bob, "bob does not hold"), (stranger, "RegisterUser")):
+        with pytest.raises(Refused, match=reason):
+            await drag(person, point, 1.0)
+    with pytest.raises(Refused, match="no_such"):
+        await drag(alice, "no_such", 1.0)
+    with pytest.raises(Refused, match="no joints"):
+        await alice.ask("PreviewMove", id=point, joints=[])
+    await alice.ask("PreviewMove", id=orientation, orientation=UPRIGHT)  # by the lock of its point
+    with pytest.raises(Refused, match="does not hold"):
+        await drag(alice, robot, 1.0)
+    client = desk.services.users.client_of("alice")
+    assert client is not None
+    client.role = Role.STANDARD_USER
+    with pytest.raises(Refused, match="technician"):
+        await drag(alice, robot, 1.0)
+
+
+async def test_a_fast_drag_is_told_at_most_thirty_times_a_second(alice: Person, bob: Person, work: Work) -> None:
+    point = work.point("p")
+    await subscribed(bob, "MovePreview")
+    await alice.lock(point)
+    began = time.monotonic()
+    for number in range(300):
+        await drag(alice, point, float(number))
+    told: list[float] = []
+    while not told or told[-1] < 299:
+        told.append((await came(bob, "MovePreview"))["position"]["x"])
+    assert told == sorted(told)
+    assert told[0] == 0
+    assert len(told) <= 2 + (time.monotonic() - began) / previews.PERIOD
+    assert len(told) < 300
+    await asyncio.sleep(0)
+
+
+async def test_nobody_who_did_not_subscribe_meets_any_of_it(alice: Person, bob: Person, work: Work) -> None:
+    point = work.point("p")
+    await alice.lock(point, tree=True)
+    bob.take()
+    await drag(alice, point, 1.0)
+    await alice.ask("UpdatePresence", view="3D")
+    await alice.ask("SetViewState", scope="shared", values={"a": 1})
+    await alice.ask("SetBreakpoints", add=[point])
+    await alice.ask("UpdateActionPointPosition", action_point_id=point, new_position=ORIGIN)
+    await asyncio.sleep(0.05)
+    assert bob.names() == ["ActionPointChanged/update_base"]

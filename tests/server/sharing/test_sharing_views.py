@@ -1,0 +1,123 @@
+"""The view state: whose it is, what of it is told to whom, what is refused, what outlives the server."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from arcor2_hw.data.role import Role
+from arcor2_server import views
+from tests.server.session.desk import Desk, Person, Refused, open_desk
+from tests.server.session.work import Work
+from tests.server.sharing.conftest import came, subscribed
+
+
+async def view(person: Person, scope: str = "user", **more: Any) -> Any:
+    return await person.ask("GetViewState", scope=scope, **more)
+
+
+async def test_values_are_kept_by_user_document_and_key(alice: Person, bob: Person) -> None:
+    first = await alice.ask("SetViewState", scope="user", values={"stars": ["scn_1"], "opacity": {"obj_1": 0.5}})
+    second = await alice.ask("SetViewState", scope="user", document="pro_1", values={"stars": 1})
+    assert second["revision"] > first["revision"]
+    await alice.ask("SetViewState", scope="user", values={"stars": None, "filters": 7})
+    mine = await view(alice)
+    assert mine["values"] == {"opacity": {"obj_1": 0.5}, "filters": 7}
+    assert (mine["user"], mine["document"], mine["scope"]) == ("alice", "", "user")
+    assert (await view(alice, document="pro_1"))["values"] == {"stars": 1}
+    assert (await view(bob))["values"] == {}
+    assert (await view(bob, user="alice"))["values"] == mine["values"]
+    assert (await view(bob, "shared"))["values"] == {}
+
+
+async def test_who_is_told(desk: Desk, alice: Person, bob: Person, stranger: Person) -> None:
+    screen = await subscribed(stranger, "ViewStateChanged", users=["alice"])
+    for person in (alice, bob):
+        await subscribed(person, "ViewStateChanged")
+    await alice.ask("SetViewState", scope="user", document="pro_1", values={"a": 1, "b": None})
+    told = await came(screen, "ViewStateChanged")
+    assert told["values"] == {"a": 1, "b": None}
+    assert (told["user"], told["document"], told["scope"]) == ("alice", "pro_1", "user")
+    answer = await bob.ask("SetViewState", scope="shared", document="pro_1", values={"place/START": [0, 1, 2]})
+    for person in (alice, screen):
+        told = await came(person, "ViewStateChanged")
+        assert (told["scope"], told["revision"], told["values"]) == (
+            "shared",
+            answer["revision"],
+            {"place/START": [0, 1, 2]},
+        )
+        assert "user" not in told
+    assert bob.events() == []
+    await stranger.ask("SubscribeEvents", events=[], users=["alice"], send=False)
+    await alice.ask("SetViewState", scope="user", values={"a": 2})
+    assert screen.events() == bob.events() == []
+
+
+async def test_what_is_refused(monkeypatch: pytest.MonkeyPatch, alice: Person, stranger: Person) -> None:
+    with pytest.raises(Refused, match="RegisterUser"):
+        await stranger.ask("SetViewState", scope="user", values={"a": 1})
+    with pytest.raises(Refused, match="RegisterUser"):
+        await view(stranger)
+    with pytest.raises(Refused, match="nobody's"):
+        await view(alice, "shared", user="alice")
+    with pytest.raises(Refused, match="scope"):
+        await view(alice, "everybody")
+    with pytest.raises(Refused, match="values"):
+        await alice.ask("SetViewState", scope="user", values={})
+    with pytest.raises(Refused, match="length"):
+        await alice.ask("SetViewState", scope="user", values={"k" * 201: 1})
+    with pytest.raises(Refused, match=r"'a'.*bytes"):
+        await alice.ask("SetViewState", scope="user", values={"b": 1, "a": "x" * views.LARGEST_VALUE})
+    assert (await view(alice))["values"] == {}  # nothing of a refused request is kept
+    monkeypatch.setattr(views, "MOST_KEYS", 3)
+    await alice.ask("SetViewState", scope="user", values={"a": 1, "b": 2, "c": 3})
+    with pytest.raises(Refused, match="keys"):
+        await alice.ask("SetViewState", scope="user", values={"d": 4})
+    await alice.ask("SetViewState", scope="user", values={"d": 4, "a": None})
+    monkeypatch.setattr(views, "LARGEST_VIEW", 100)
+    with pytest.raises(Refused, match="bytes"):
+        await alice.ask("SetViewState", scope="user", values={"b": "x" * 100})
+    assert (await view(alice))["values"] == {"b": 2, "c": 3, "d": 4}
+
+
+async def test_an_operator_keeps_a_view_of_his_own_but_changes_none_of_all(alice: Person, desk: Desk) -> None:
+    client = desk.services.users.client_of("alice")
+    assert client is not None
+    client.role = Role.OPERATOR
+    await alice.ask("SetViewState", scope="user", values={"stars": []})
+    with pytest.raises(Refused, match="standard_user"):
+        await alice.ask("SetViewState", scope="shared", values={"place/END": 1})
+
+
+async def test_only_the_newest_documents_are_kept(monkeypatch: pytest.MonkeyPatch, alice: Person) -> None:
+    monkeypatch.setattr(views, "MOST_DOCUMENTS", 3)
+    monkeypatch.setattr(views, "IN_MEMORY", 2)
+    for number in range(3):
+        await alice.ask("SetViewState", scope="user", document=f"pro_{number}", values={"a": number})
+    await alice.ask("SetViewState", scope="user", document="pro_0", values={"b": 1})
+    await alice.ask("SetViewState", scope="user", document="pro_3", values={"a": 3})
+    kept = [(await view(alice, document=f"pro_{number}"))["values"] for number in range(4)]
+    assert kept == [{"a": 0, "b": 1}, {}, {"a": 2}, {"a": 3}]
+
+
+async def test_it_outlives_the_server_and_goes_with_its_document(tmp_path: Path) -> None:
+    async with open_desk(tmp_path) as desk:
+        alice = await desk.person("alice")
+        project = await Work(alice).project("p")
+        await alice.ask("SaveProject")
+        await alice.ask("CloseProject")
+        for scope in ("user", "shared"):
+            await alice.ask("SetViewState", scope=scope, document=project, values={"a": [1, {"b": None}]})
+        before = await alice.ask("SetViewState", scope="user", values={"stars": [project]})
+    async with open_desk(tmp_path) as desk:
+        alice = await desk.person("alice")
+        for scope in ("user", "shared"):
+            assert (await view(alice, scope, document=project))["values"] == {"a": [1, {"b": None}]}
+        lists = desk.services.storage.revision
+        after = await alice.ask("SetViewState", scope="user", values={"x": 1})
+        assert after["revision"] > before["revision"]
+        assert desk.services.storage.revision == lists  # lists of documents need not be made anew
+        await alice.ask("DeleteProject", id=project)
+        for scope in ("user", "shared"):
+            assert (await view(alice, scope, document=project))["values"] == {}
+        assert (await view(alice))["values"] == {"stars": [project], "x": 1}
