@@ -59,7 +59,8 @@ class Arm:
 
     end_effector: which link, which of its directions are free, how exactly it has to be met. joint_names, lower, upper,
     velocity: of the joints of this chain. indices: where these are among the model's joints.
-    length: of the chain from its first joint to the tip, m.
+    length: of the chain from its first joint to the tip, m. centre: of the first joint. reach: m from there beyond
+    which nothing is.
     """
 
     def __init__(self, model: "RobotModel", end_effector: EndEffector, steps: Sequence[Step], tool: Array) -> None:
@@ -88,8 +89,10 @@ class Arm:
         self._tip = self._pin.addFrame(pin.Frame("tip", body, 0, tip, pin.FrameType.OP_FRAME))
         self._data: Any = self._pin.createData()
         self.tip_in_last = self._behind @ self.tool
-        self.length = sum(float(np.linalg.norm(origin[:3, 3])) for origin, _, _ in self._moving[1:])
-        self.length = max(self.length + float(np.linalg.norm(self.tip_in_last[:3, 3])), 1e-3)
+        lengths = [float(np.linalg.norm(origin[:3, 3])) for origin, _, _ in self._moving[1:]]
+        self.length = max(sum(lengths) + float(np.linalg.norm(self.tip_in_last[:3, 3])), 1e-3)
+        self.centre = self._moving[0][0][:3, 3]
+        self.reach = self.length + self._slides
 
     # -------------------------------------------------------------------------------- where
     def forward(self, q: Array) -> Array:
@@ -169,6 +172,11 @@ class Arm:
         """Give joint values with their names."""
         return [robot.Joint(name, float(value)) for name, value in zip(self.joint_names, q, strict=True)]
 
+    def middle(self) -> Array:
+        """Give the middle of each joint's range, zero where it has none."""
+        whole = np.isfinite(self.lower + self.upper)
+        return np.where(whole, (np.where(whole, self.lower, 0.0) + np.where(whole, self.upper, 0.0)) / 2.0, 0.0)
+
     def within(self, q: Array, slack: float = 1e-9) -> bool:
         """Tell whether joint values keep the limits."""
         return bool(((q >= self.lower - slack) & (q <= self.upper + slack)).all())
@@ -192,6 +200,11 @@ class Arm:
                 rows.append((columns.index(step.column), step.factor, step.offset))
                 at = np.eye(4)
         self._behind = at
+        self.prismatic = [self.model.joints[column].kind == "prismatic" for column in columns]
+        reaches = np.maximum(np.abs(self.lower), np.abs(self.upper))
+        self._slides = float(
+            sum(abs(f) * reaches[c] + abs(o) for (c, f, o), m in zip(rows, self._moving, strict=True) if m[2])
+        )
         plain = [(number, 1.0, 0.0) for number in range(len(columns))]
         self._factors: Array | None = None
         self._offsets = np.array([offset for _, _, offset in rows])
