@@ -139,6 +139,7 @@ async def test_each_is_told_what_he_could_undo(alice: Person, bob: Person, stran
     bob.take()
     await bob.ask("RegisterUser", user_name="bobby")
     assert (await came(bob, "HistoryChanged"))["revision"] == 8
+    await alice.ask("WriteUnlock", object_id=point)
     await alice.ask("CloseProject", force=True)
     assert await came(alice, "HistoryChanged") == {"revision": 0}
 

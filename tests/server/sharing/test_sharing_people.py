@@ -21,7 +21,13 @@ async def test_people_come_look_and_leave(desk: Desk, alice: Person, stranger: P
     assert (await came(stranger, "UserPresence")) == {"user": "alice", "online": True, "role": "programmer"}
     bob = await desk.person("bob")
     assert (await came(stranger, "UserPresence"))["user"] == "bob"
-    said: dict[str, Any] = {"document": "pro_1", "selected": ["acp_1"], "editing": "act_1", "view": "Flow", "camera": POSE}
+    said: dict[str, Any] = {
+        "document": "pro_1",
+        "selected": ["acp_1"],
+        "editing": "act_1",
+        "view": "Flow",
+        "camera": POSE,
+    }
     await bob.ask("UpdatePresence", **said)
     told = await came(stranger, "UserPresence", lambda data: "presence" in data)
     assert (told["user"], told["presence"]) == ("bob", said)
