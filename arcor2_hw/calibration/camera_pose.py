@@ -1,11 +1,32 @@
 """Where a camera stands, from what it sees of markers and boards of known size and place."""
 
+import math
 from collections.abc import Sequence
+from typing import Final
 
-from arcor2_hw.calibration.camera_results import CameraPose, PoseOptions
+import numpy as np
+
+from arcor2_hw.calibration.averaging import averaged, weight_of
+from arcor2_hw.calibration.boards import check_pose
+from arcor2_hw.calibration.camera_results import CameraPose, MarkerError, PoseOptions
 from arcor2_hw.calibration.layout import Layout
-from arcor2_hw.calibration.pictures import Picture
+from arcor2_hw.calibration.lens import Lens
+from arcor2_hw.calibration.pictures import Picture, grey_of, same_size
+from arcor2_hw.calibration.pose_problem import Hints, Seen
+from arcor2_hw.calibration.pose_search import Found, search
+from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
+from arcor2_hw.calibration.results import Grade
+from arcor2_hw.calibration.rigid import inverted
+from arcor2_hw.calibration.sight import sight_of
 from arcor2_hw.data.camera import CameraParameters
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.exceptions import InvalidData
+
+MOST_PICTURES: Final = 100
+_GOOD: Final = 0.002
+"""m, standard deviation of a position up to which it is good."""
+_STOOD_STILL: Final = 0.5
+"""px, by which a marker may move from picture to picture."""
 
 
 def find_camera_pose(
@@ -21,14 +42,156 @@ def find_camera_pose(
 
     Raises:
         InvalidPicture: a picture that is none, is damaged or too large; pictures of different sizes.
-        InvalidData: parameters that are none; a marker that is listed twice, or is not in its dictionary.
+        InvalidData: parameters that are none; a marker that is not in its dictionary; Conflict: one listed twice.
         CalibrationRefused: blurred; no marker; ambiguous (one marker seen from the front: the text says what helps);
-            implausible (a marker twice in the picture, or elsewhere than it is said to be; the camera moved between
-            the pictures); not converged.
+            unobservable (known too badly); implausible (a marker twice in the picture, or elsewhere than it is said to
+            be; the camera moved between the pictures).
     """
-    raise NotImplementedError
+    options = options or PoseOptions()
+    hints = _hints(options)
+    if not 1 <= len(pictures) <= MOST_PICTURES:
+        raise InvalidData(f"one to {MOST_PICTURES} pictures are needed, not {len(pictures)}")
+    several = len(pictures) > 1
+    greys = [grey_of(each, f"picture {i}" if several else "the picture") for i, each in enumerate(pictures)]
+    lens = Lens(parameters, *same_size(greys))
+    sighting = sight_of(greys, lens, layout, options.blur_threshold, options.largest_blur)
+    _check_still(sighting.seen)
+    if options.method == "averaged":
+        found = averaged(lens, sighting.seen, hints, options)
+    else:
+        found = search(lens, sighting.seen, hints, options)
+    return _result(found, sighting.seen, layout, options, sighting.blur, len(pictures))
 
 
-def draw_camera_pose(picture: Picture, parameters: CameraParameters, layout: Layout, result: CameraPose) -> bytes:
-    """Draw where the markers should be with that pose onto the picture: PNG."""
-    raise NotImplementedError
+def _hints(options: PoseOptions) -> Hints:
+    """Give what is known beforehand. Raises InvalidData."""
+    expected = gravity = None
+    if isinstance(options.expected, Pose):
+        check_pose(options.expected, "the expected pose of the camera")
+        expected = inverted(options.expected.matrix())
+    if isinstance(options.gravity, Position):
+        gravity = np.array(tuple(options.gravity))
+        length = float(np.linalg.norm(gravity))
+        if not (math.isfinite(length) and length > 1e-6):
+            raise InvalidData(
+                "the direction of gravity has to be a vector other than zero", str(tuple(options.gravity))
+            )
+        gravity = gravity / length
+    for name in ("expected_position", "expected_orientation", "gravity_deviation", "largest_deviation"):
+        if not (math.isfinite(getattr(options, name)) and getattr(options, name) > 0):
+            raise InvalidData(f"{name} has to be a positive number, not {getattr(options, name)}")
+    if not options.min_distance < options.max_distance:
+        raise InvalidData("min_distance has to be less than max_distance")
+    return Hints(expected, options.expected_position, options.expected_orientation, gravity, options.gravity_deviation)
+
+
+def _check_still(seen: list[Seen]) -> None:
+    """Raise CalibrationRefused when markers are at other places in later pictures."""
+    first: dict[tuple[str, int], Seen] = {}
+    for each in seen:
+        before = first.setdefault(each.key, each)
+        if each.key[0] == "marker" and before is not each:
+            moved = float(np.linalg.norm(each.pixels.mean(axis=0) - before.pixels.mean(axis=0)))
+            if moved > _STOOD_STILL:
+                raise CalibrationRefused(
+                    f"The camera, or {each.name}, moved between picture {before.picture} and picture {each.picture}.",
+                    f"by {moved:.1f} px",
+                    Reason.IMPLAUSIBLE,
+                )
+
+
+def _result(
+    found: Found, seen: list[Seen], layout: Layout, options: PoseOptions, blur: float, pictures: int
+) -> CameraPose:
+    """Give what was found with its errors in words, or refuse it."""
+    covariance = found.covariance
+    position = float(np.sqrt(np.linalg.eigvalsh(covariance[:3, :3])[-1]))
+    orientation = float(np.sqrt(np.linalg.eigvalsh(covariance[3:, 3:])[-1]))
+    _check_known(found, position, options)
+    origin_from_camera = inverted(found.pose)
+    errors = []
+    for each, left in zip(seen, found.errors, strict=True):
+        distances = np.linalg.norm(left, axis=1)
+        to_camera = origin_from_camera[:3, 3] - each.middle
+        distance = float(np.linalg.norm(to_camera))
+        errors.append(
+            MarkerError(
+                each.name,
+                each.picture,
+                len(left),
+                float(np.sqrt(np.mean(distances**2))),
+                float(distances.max()),
+                distance,
+                float(np.arccos(np.clip(to_camera @ each.normal / distance, -1, 1))),
+                each.key not in found.left_out,
+            )
+        )
+    used = [e for e in errors if e.used]
+    residual = math.sqrt(sum(e.residual**2 * e.corners for e in used) / sum(e.corners for e in used))
+    places = {each.key for each in seen} - found.left_out
+    grade, verdict = _verdict(places, position, orientation, residual, errors, found.parameters_f)
+    total = len(layout.markers) + len(layout.boards)
+    weights = {each.key: weight_of(found.pose, each, options) for each in seen}
+    return CameraPose(
+        pose=Pose.from_matrix(origin_from_camera),
+        quality=float(np.clip(sum(weights[key] for key in places) / total, 0.0, 1.0)),
+        residual=residual,
+        markers=errors,
+        covariance=[[float(value) for value in row] for row in covariance],
+        position_deviation=position,
+        orientation_deviation=orientation,
+        blur=blur,
+        method=options.method,
+        pictures=pictures,
+        grade=grade,
+        verdict=verdict,
+    )
+
+
+def _check_known(found: Found, position: float, options: PoseOptions) -> None:
+    """Raise CalibrationRefused for a pose that is known too badly, or contradicts a hint."""
+    if math.isfinite(position) and position <= options.largest_deviation:
+        return
+    only = len({each.key for each in found.seen} - found.left_out) == 1
+    first = found.seen[0]
+    what = f"Only {first.name} is seen, from nearly straight ahead or far away" if only else "The markers are far away"
+    raise CalibrationRefused(
+        f"{what}: the camera's position would be known to {position * 1000:.0f} mm only. What helps: a second marker, "
+        "a larger one, a view from the side or from nearer, the direction of gravity, or where the camera roughly is.",
+        f"standard deviation {position * 1000:.1f} mm, at most {options.largest_deviation * 1000:.1f} mm",
+        Reason.UNOBSERVABLE,
+    )
+
+
+def _verdict(
+    places: set[tuple[str, int]],
+    position: float,
+    orientation: float,
+    residual: float,
+    errors: list[MarkerError],
+    f: float,
+) -> tuple[Grade, str]:
+    """Say how good a pose is, and what a technician should look at."""
+    markers = sum(kind == "marker" for kind, _ in places)
+    boards = len(places) - markers
+    parts = [f"{n} {name}{'s' if n > 1 else ''}" for n, name in ((markers, "marker"), (boards, "board")) if n]
+    text = (
+        f"The camera's position is known to {position * 1000:.1f} mm and its direction to "
+        f"{math.degrees(orientation):.2f}° (standard deviations; {' and '.join(parts)}, residual {residual:.2f} px)."
+    )
+    grade = Grade.GOOD if position <= _GOOD else Grade.USABLE
+    for name in sorted({e.name for e in errors if not e.used}):
+        worst = max((e for e in errors if e.name == name), key=lambda e: e.residual)
+        text += (
+            f" {name.capitalize()} was left out: it stands some "
+            f"{worst.residual * worst.distance / f * 1000:.0f} mm from where it is said to."
+        )
+        grade = Grade.USABLE
+    if len(places) == 1 and markers == 1:
+        text += " One marker alone: nothing checks where it stands."
+        grade = Grade.USABLE
+    elif residual > 0.5:
+        off = max(e.residual * e.distance / f for e in errors if e.used)
+        text += f" The markers' places do not quite agree with each other, by some {off * 1000:.1f} mm."
+        grade = Grade.USABLE
+    return grade, text

@@ -25,8 +25,8 @@ class PoseOptions(Data, frozen=True):
     min_distance, max_distance: m, at which a marker's weight by distance is 1 and 0.
     largest_deviation: m, standard deviation of the position (largest axis) from which on a pose is refused.
     largest_residual: px, of a marker; what lies beyond does not stand where it is said to.
-    focal_deviation, centre_deviation: how well the intrinsics are known: fx and fy as a part of themselves, cx and cy
-    in px (standard deviations).
+    focal_deviation, centre_deviation, distortion_deviation: how well the intrinsics are known: fx and fy as a part of
+    themselves, cx and cy in px, each coefficient as a part of itself (standard deviations).
     expected: where the camera is roughly known to be, in the origin's frame, with its standard deviations
     expected_position (m) and expected_orientation (rad).
     gravity: direction of gravity in the camera's frame, of an accelerometer, of any length; the origin's z is then
@@ -43,6 +43,7 @@ class PoseOptions(Data, frozen=True):
     largest_residual: float = 3.0
     focal_deviation: float = 0.0005
     centre_deviation: float = 0.5
+    distortion_deviation: float = 0.02
     expected: Pose | Unset = UNSET
     expected_position: float = 0.05
     expected_orientation: float = 0.1

@@ -1,8 +1,102 @@
-"""Markers in a picture: found, and their corners measured to a few hundredths of a pixel."""
+"""Markers in a picture: found, and their corners measured to a hundredth of a pixel."""
 
+from collections import defaultdict
+from typing import Any, Final
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from arcor2_hw.calibration.edges import Chart, Measured, chart_of, measure
 from arcor2_hw.calibration.layout import MarkerDictionary
-from arcor2_hw.calibration.pictures import Picture
-from arcor2_hw.data.camera import CameraParameters, MarkerCorners
+from arcor2_hw.calibration.lens import Array, Lens
+from arcor2_hw.calibration.pictures import Grey, Picture, grey_of
+from arcor2_hw.data.camera import CameraParameters, Corner, MarkerCorners
+
+_COARSE: Final = 0.5
+"""px, standard deviation of a corner of the detector's, where the edges could not be measured."""
+
+
+_SEARCHES: Final = (((29,), 15.0), ((13, 33), 6.0))
+"""Windows (px) of the local threshold, and by how much a marker is darker than its surroundings (grey levels)."""
+_MARGIN: Final = 8
+"""px around a marker that are looked at."""
+_STRAIGHT: Final = 0.1
+"""px, shift of edges up to which a tone curve is the right one."""
+_LEVELS: Final = np.arange(256) / 255.0
+_SRGB: Final = np.where(_LEVELS <= 0.04045, _LEVELS / 12.92, ((_LEVELS + 0.055) / 1.055) ** 2.4)
+_TONES: Final = (_SRGB.astype(np.float32), _LEVELS.astype(np.float32))
+"""Light by grey value (IEC 61966-2-1, and a straight line)."""
+
+
+def dictionary_number(dictionary: MarkerDictionary) -> int:
+    """Give OpenCV's number of a dictionary."""
+    prefix = "DICT_" if dictionary[0].isdigit() else "DICT_ARUCO_"
+    if dictionary.startswith("apriltag"):
+        prefix = "DICT_"
+    return int(getattr(cv2.aruco, prefix + dictionary.upper()))
+
+
+def dictionary_size(dictionary: MarkerDictionary) -> int:
+    """Give how many markers a dictionary has."""
+    return len(cv2.aruco.getPredefinedDictionary(dictionary_number(dictionary)).bytesList)
+
+
+def detect(grey: Grey, dictionary: MarkerDictionary, enough: int = 1000) -> list[tuple[int, Array]]:
+    """Find markers: number and corners (4 × 2, px, to a pixel or so). One that is found twice at a place is given once.
+
+    A picture in which fewer than `enough` are found is searched once more for those of low contrast.
+    """
+    family = cv2.aruco.getPredefinedDictionary(dictionary_number(dictionary))
+    result: list[tuple[int, Array]] = []
+    for windows, offset in _SEARCHES:
+        settings = cv2.aruco.DetectorParameters()
+        settings.adaptiveThreshWinSizeMin = windows[0]
+        settings.adaptiveThreshWinSizeMax = windows[-1]
+        settings.adaptiveThreshWinSizeStep = max(windows[-1] - windows[0], 1)
+        settings.adaptiveThreshConstant = offset
+        settings.minMarkerPerimeterRate = 0.02
+        found: Any = cv2.aruco.ArucoDetector(family, settings).detectMarkers(grey)
+        corners, numbers = found[0], found[1]
+        for number, each in zip(np.ravel(numbers) if numbers is not None else (), corners, strict=True):
+            at = np.asarray(each, dtype=np.float64).reshape(4, 2)
+            near = float(np.linalg.norm(at[0] - at[2])) / 4
+            if not any(n == number and float(np.linalg.norm(c.mean(0) - at.mean(0))) < near for n, c in result):
+                result.append((int(number), at))
+        if len(result) >= enough:
+            break
+    return result
+
+
+def measured(grey: Grey, lens: Lens, dictionary: MarkerDictionary, found: list[tuple[int, Array]]) -> list[Measured]:
+    """Measure the corners of markers that were found; one whose edges cannot be measured keeps the detector's.
+
+    Grey values are light by one of two tone curves, that of sRGB or a straight line: with the right one, edges of the
+    largest marker lie where they should.
+    """
+    family = dictionary_number(dictionary)
+    result: dict[int, Measured] = {}
+    tone = _TONES[0]
+    for index in sorted(range(len(found)), key=lambda i: -float(np.linalg.norm(np.ptp(found[i][1], axis=0)))):
+        number, corners = found[index]
+        chart = chart_of(family, number)
+        fine = _measured(grey, tone, lens, chart, number, corners)
+        if not result and (fine is None or abs(fine.shift) > _STRAIGHT):
+            other = _measured(grey, _TONES[1], lens, chart, number, corners)
+            if other is not None and (fine is None or abs(other.shift) < abs(fine.shift)):
+                fine, tone = other, _TONES[1]
+        result[index] = fine or Measured(number, corners, np.eye(8) / _COARSE**2, float("nan"), 0.0, 0.0)
+    return [result[index] for index in range(len(found))]
+
+
+def _measured(
+    grey: Grey, tone: npt.NDArray[np.float32], lens: Lens, chart: Chart, number: int, corners: Array
+) -> Measured | None:
+    """Measure one marker in its part of the picture."""
+    left, top = np.maximum(np.floor(corners.min(axis=0)) - _MARGIN, 0).astype(int)
+    right, bottom = np.ceil(corners.max(axis=0)).astype(int) + _MARGIN
+    light = cv2.LUT(grey[top:bottom, left:right], tone)
+    return measure(np.asarray(light, dtype=np.float32), (float(left), float(top)), lens, chart, number, corners)
 
 
 def find_marker_corners(
@@ -15,4 +109,10 @@ def find_marker_corners(
 
     Raises InvalidPicture, InvalidData as find_camera_pose.
     """
-    raise NotImplementedError
+    grey = grey_of(picture)
+    lens = Lens(parameters, grey.shape[1], grey.shape[0])
+    by_number: defaultdict[int, list[MarkerCorners]] = defaultdict(list)
+    for each in measured(grey, lens, dictionary, detect(grey, dictionary)):
+        corners = [Corner(float(x), float(y)) for x, y in each.corners]
+        by_number[each.number].append(MarkerCorners(each.number, corners))
+    return [each for number in sorted(by_number) for each in by_number[number]]

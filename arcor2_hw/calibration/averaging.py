@@ -1,0 +1,76 @@
+"""The paper's way to a camera's pose: one per marker, averaged with distance and angle as weights."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from arcor2_hw.calibration.camera_results import PoseOptions
+from arcor2_hw.calibration.lens import Array, Lens
+from arcor2_hw.calibration.pose_problem import Hints, PoseProblem, Seen
+from arcor2_hw.calibration.pose_search import Found, covariance_of, intrinsics_deviations, solve
+from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
+from arcor2_hw.calibration.rigid import inverted, mean_rotation, motion
+from arcor2_hw.exceptions import InvalidData
+
+_FLAT: float = 2.0
+"""rad, angle between the camera's axis and a marker's z up to which the marker has no weight (protocol, section 15)."""
+
+
+def weight_of(camera_from_origin: Array, each: Seen, options: PoseOptions) -> float:
+    """Give a marker's weight, 0..1, by its distance and by how much it faces the camera (protocol, section 15)."""
+    middle = camera_from_origin[:3, :3] @ each.middle + camera_from_origin[:3, 3]
+    distance = float(np.linalg.norm(middle))
+    near = 1.0 - (distance - options.min_distance) / (options.max_distance - options.min_distance)
+    theta = math.acos(float(np.clip((camera_from_origin[:3, :3] @ each.normal)[2], -1.0, 1.0)))
+    facing = (theta - _FLAT) / (math.pi - _FLAT)
+    return (min(max(near, 0.0), 1.0) + min(max(facing, 0.0), 1.0)) / 2
+
+
+def averaged(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOptions) -> Found:
+    """Find a pose per marker and average them.
+
+    Raises CalibrationRefused: no marker's pose is certain (that of the first is told), or two contradict each other.
+    InvalidData: all weights are zero.
+    """
+    deviations = intrinsics_deviations(lens, options)
+    refusal: CalibrationRefused | None = None
+    left_out: set[tuple[str, int]] = set()
+    poses: list[Array] = []
+    weights: list[float] = []
+    covariances: list[Array] = []
+    for each in seen:
+        problem = PoseProblem(lens, [each], hints, deviations)
+        try:
+            solution = solve(problem, options)
+        except CalibrationRefused as error:
+            refusal = refusal or error
+            left_out.add(each.key)
+            continue
+        poses.append(inverted(solution.pose))
+        weights.append(weight_of(solution.pose, each, options))
+        covariances.append(covariance_of(solution))
+    if not poses:
+        assert refusal is not None
+        raise refusal
+    if sum(weights) <= 0:
+        raise InvalidData("No marker is near enough, or faces the camera enough, to count: all weights are zero.")
+    share = np.array(weights) / sum(weights)
+    stacked = np.stack(poses)
+    pose = motion(mean_rotation(stacked[:, :3, :3], share), share @ stacked[:, :3, 3])
+    spread = stacked[:, :3, 3] - pose[:3, 3]
+    covariance = np.einsum("n,nij->ij", share**2, np.stack(covariances))
+    covariance[:3, :3] += np.einsum("n,ni,nj->ij", share**2, spread, spread)
+    everything = PoseProblem(lens, seen, hints, deviations)
+    errors = everything.errors(inverted(pose), everything.unchanged)
+    if errors is None:
+        raise CalibrationRefused("The markers' poses contradict each other.", reason=Reason.IMPLAUSIBLE)
+    for each, left in zip(seen, errors, strict=True):
+        residual = float(np.sqrt(np.mean(np.sum(left**2, axis=1))))
+        if residual > 10 * options.largest_residual and each.key not in left_out:
+            raise CalibrationRefused(
+                f"{each.name.capitalize()} contradicts the others: it does not stand where it is said to.",
+                f"residual {residual:.0f} px",
+                Reason.IMPLAUSIBLE,
+            )
+    return Found(inverted(pose), covariance, list(seen), errors, lens.parameters.fx, left_out)

@@ -1,0 +1,103 @@
+"""ChArUco boards: their points, what is seen of them, and what is wrong with how one is described."""
+
+import math
+from typing import Any, Final
+
+import cv2
+import numpy as np
+
+from arcor2_hw.calibration.layout import CharucoBoard, Layout
+from arcor2_hw.calibration.lens import Array
+from arcor2_hw.calibration.markers import dictionary_number, dictionary_size
+from arcor2_hw.calibration.pictures import Grey
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.exceptions import Conflict, InvalidData
+
+CORNER_DEVIATION: Final = 0.05
+"""px, of a corner between squares as it is measured."""
+LARGEST_BOARD: Final = 64
+"""Columns and rows."""
+FEWEST_CORNERS: Final = 6
+"""Below that many a board does not count as seen."""
+
+
+def board_of(board: CharucoBoard) -> cv2.aruco.CharucoBoard:
+    """Give OpenCV's board. Raises InvalidData for one that cannot be."""
+    if not (2 <= board.columns <= LARGEST_BOARD and 2 <= board.rows <= LARGEST_BOARD):
+        raise InvalidData(f"a board of {board.columns} × {board.rows} squares: 2 to {LARGEST_BOARD} are possible")
+    if board.columns * board.rows < 6:
+        raise InvalidData(f"a board of {board.columns} × {board.rows} squares has too few corners")
+    if not (math.isfinite(board.square) and 0 < board.marker < board.square):
+        raise InvalidData(f"a board's marker ({board.marker} m) has to be smaller than its square ({board.square} m)")
+    last = board.first_id + board.columns * board.rows // 2 - 1
+    size = dictionary_size(board.dictionary)
+    if board.first_id < 0 or last >= size:
+        raise InvalidData(
+            f"the board's markers {board.first_id} to {last} are not all in {board.dictionary} (0 to {size - 1})"
+        )
+    check_pose(board.pose, "the board's pose")
+    numbers = np.arange(board.first_id, last + 1)
+    family = cv2.aruco.getPredefinedDictionary(dictionary_number(board.dictionary))
+    made = cv2.aruco.CharucoBoard((board.columns, board.rows), board.square, board.marker, family, numbers)
+    made.setLegacyPattern(board.legacy_pattern)
+    return made
+
+
+def board_points(board: CharucoBoard, made: cv2.aruco.CharucoBoard) -> Array:
+    """Give the corners between squares in the board's frame (origin in its middle, y up, z out of it), n × 3, m."""
+    points = np.asarray(made.getChessboardCorners(), dtype=np.float64)
+    middle = np.array([board.columns, board.rows]) * board.square / 2
+    return np.column_stack((points[:, 0] - middle[0], middle[1] - points[:, 1], np.zeros(len(points))))
+
+
+def seen_of_board(
+    grey: Grey, board: CharucoBoard, made: cv2.aruco.CharucoBoard, found: list[tuple[int, Array]]
+) -> tuple[Array, Array]:
+    """Give the points of a board that are seen (n × 3, in its frame) and where (n × 2, px), from markers found."""
+    last = board.first_id + board.columns * board.rows // 2 - 1
+    own = [(number, corners) for number, corners in found if board.first_id <= number <= last]
+    nothing = np.zeros((0, 3)), np.zeros((0, 2))
+    if len(own) < 2:
+        return nothing
+    numbers = np.array([[number] for number, _ in own], dtype=np.int32)
+    corners = [np.asarray(each, dtype=np.float32).reshape(1, 4, 2) for _, each in own]
+    detector = cv2.aruco.CharucoDetector(made)
+    result: Any = detector.detectBoard(grey, markerCorners=corners, markerIds=numbers)
+    pixels, ids = result[0], result[1]
+    if ids is None or len(ids) < FEWEST_CORNERS:
+        return nothing
+    points = board_points(board, made)[np.ravel(ids)]
+    # Corners on one line allow any rotation about it.
+    if np.linalg.svd(points[:, :2] - points[:, :2].mean(axis=0), compute_uv=False)[1] < 0.5 * board.square:
+        return nothing
+    return points, np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+
+
+def check_layout(layout: Layout) -> None:
+    """Raise InvalidData or Conflict for a layout that cannot be: the error names the marker."""
+    listed: set[tuple[str, int]] = set()
+    size = dictionary_size(layout.dictionary)
+    for marker in layout.markers:
+        number = marker.marker_id
+        if not 0 <= number < size:
+            raise InvalidData(f"marker {number} is not in the dictionary {layout.dictionary} (0 to {size - 1})")
+        if (layout.dictionary, number) in listed:
+            raise Conflict(f"marker {number} is listed twice")
+        listed.add((layout.dictionary, number))
+        side = layout.size if not isinstance(marker.size, float | int) else marker.size
+        if not (math.isfinite(side) and 0 < side < 10):
+            raise InvalidData(f"the size of marker {number} has to be a positive number of metres, not {side}")
+        check_pose(marker.pose, f"the pose of marker {number}")
+    for index, board in enumerate(layout.boards):
+        board_of(board)
+        for number in range(board.first_id, board.first_id + board.columns * board.rows // 2):
+            if (board.dictionary, number) in listed:
+                raise Conflict(f"marker {number} of board {index} is listed twice")
+            listed.add((board.dictionary, number))
+
+
+def check_pose(pose: Pose, name: str) -> None:
+    """Raise InvalidData for a pose with numbers that are not finite, or too large to be one."""
+    numbers = (*pose.position, *pose.orientation)
+    if not all(map(math.isfinite, numbers)) or max(map(abs, pose.position)) > 1000:
+        raise InvalidData(f"{name} has to be finite, in metres", str(numbers))

@@ -1,0 +1,263 @@
+"""A marker's corners from all its edges, also those inside, measured across them to a hundredth of a pixel.
+
+The cells of a marker are a chart of straight edges. Across each of them grey values are sampled at many places; where
+the step lies is measured by the area under it. A homography from the marker to the rays of the camera (distortion
+undone) is fitted to all of them at once, so that a corner is never looked for in the picture itself. Dark cells look
+smaller, or larger, than they are: by the camera's tone curve, by light that spreads, by ink. Since edges face both
+ways, that shift is found together with the homography.
+"""
+
+import functools
+from dataclasses import dataclass
+from typing import Final
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from arcor2_hw.calibration.lens import Array, Lens
+
+_ALONG: Final = 6
+"""Places on each edge of a cell."""
+_UNIT: Final = np.linspace(-1.0, 1.0, 17)
+"""Samples across an edge."""
+_WEIGHTS: Final = np.where(np.abs(_UNIT) == 1.0, 0.5, 1.0) * (_UNIT[1] - _UNIT[0])
+_CLEAR: Final = 1.8
+"""How many times the blur a place has to be away from where its edge turns."""
+_LEAST_CONTRAST: Final = 0.02
+"""Of the range of grey values."""
+_WIDEST: Final = 4.0
+"""px to each side of an edge, along its normal."""
+_NARROWEST: Final = 1.5
+_ROUNDS: Final = 4
+_SHIFT_DEVIATION: Final = 0.3
+"""px, what a shift of edges is known before."""
+_CORNER_FLOOR: Final = 0.01
+"""px, by which a corner may be off for reasons that are the same all along an edge: lens model, paper."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """The edges inside and around a marker, in cells from its middle (x right, y up).
+
+    points: n × 2, _ALONG on the edge of each cell. across: n, 0 where the edge is crossed along x, 1 along y.
+    towards: n, 1 or -1, where it is light. free: n, distance to where the edge ends or turns. corners: 4 × 2, upper
+    left first, clockwise.
+    """
+
+    points: Array
+    across: npt.NDArray[np.intp]
+    towards: Array
+    free: Array
+    corners: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """A measured marker.
+
+    corners: 4 × 2, px. information: 8 × 8, the inverse of their covariance, px⁻². blur: px, standard deviation of an
+    edge. shift: px, by which edges lie towards the light. contrast: of the range of light.
+    """
+
+    number: int
+    corners: Array
+    information: Array
+    blur: float
+    shift: float
+    contrast: float
+
+
+@functools.lru_cache(maxsize=1024)
+def chart_of(dictionary: int, number: int) -> Chart:
+    """Give the edges of a marker of one of OpenCV's predefined dictionaries."""
+    known = cv2.aruco.getPredefinedDictionary(dictionary)
+    side = known.markerSize + 2
+    light = np.pad(cv2.aruco.generateImageMarker(known, number, side) > 127, 1, constant_values=True)
+    half = side / 2
+    fractions = (np.arange(_ALONG) + 0.5) / _ALONG
+    points: list[tuple[float, float]] = []
+    across: list[int] = []
+    towards: list[float] = []
+    free: list[float] = []
+    for axis, cells in enumerate((light, light.T)):
+        change = cells[:, 1:].astype(np.int8) - cells[:, :-1].astype(np.int8)
+        for row, column in zip(*np.nonzero(change), strict=True):
+            line = change[:, column]
+            first = last = int(row)
+            while line[first - 1] == line[row]:
+                first -= 1
+            while line[last + 1] == line[row]:
+                last += 1
+            for along in row + fractions:
+                at = (column - half, half - (along - 1)) if axis == 0 else (along - 1 - half, half - column)
+                points.append((float(at[0]), float(at[1])))
+                free.append(float(min(along - first, last + 1 - along)))
+            across += [axis] * _ALONG
+            towards += [float(line[row]) * (1.0 if axis == 0 else -1.0)] * _ALONG
+    return Chart(
+        np.array(points),
+        np.array(across, dtype=np.intp),
+        np.array(towards),
+        np.array(free),
+        np.array([[-half, half], [half, half], [half, -half], [-half, -half]]),
+    )
+
+
+def measure(
+    picture: npt.NDArray[np.float32],
+    first: tuple[float, float],
+    lens: Lens,
+    chart: Chart,
+    number: int,
+    corners: Array,
+) -> Measured | None:
+    """Measure a marker whose corners are known to a pixel or two; None when its edges are not where they should be.
+
+    picture: light, 0..1, rows × columns, of a part of the picture; first: column and row of its first pixel. corners:
+    4 × 2, px, upper left first, clockwise.
+    """
+    model = np.ascontiguousarray(chart.corners, dtype=np.float32)
+    rays = np.ascontiguousarray(lens.rays(corners), dtype=np.float32)
+    h = np.asarray(cv2.getPerspectiveTransform(model, rays), dtype=np.float64).ravel()[:8]
+    shift, blur = 0.0, 1.0
+    for index in range(_ROUNDS):
+        at, slopes = lens.pixels_and_slopes(_mapped(h, chart.points))
+        sight = _sight(h, chart, slopes)
+        step = _crossings(picture, at - first, sight, blur)
+        if step is None:
+            return None
+        offsets, valid, blur, contrast = step
+        wanted = np.column_stack((sight.by_h, np.ones(len(offsets))))
+        residual = offsets - shift
+        weights = _tukey(residual, valid)
+        prior = np.zeros(9)
+        prior[8] = 1.0
+        spread = max(float(np.sqrt(np.sum(weights * residual**2) / max(weights.sum(), 1.0))), 0.01)
+        balance = (spread / _SHIFT_DEVIATION) ** 2
+        # Columns of very different size are brought to one, or the normal equations lose half of their digits.
+        scale = np.sqrt(np.sum(wanted**2, axis=0))
+        scaled = wanted / scale
+        normal = scaled.T @ (scaled * weights[:, None]) + np.diag(prior * balance / scale**2)
+        right = scaled.T @ (weights * residual)
+        right[8] -= balance * shift / scale[8]
+        try:
+            change = np.linalg.solve(normal, right) / scale
+        except np.linalg.LinAlgError:
+            return None
+        h = h + change[:8]
+        shift += float(change[8])
+        moved = float(np.abs(sight.by_h @ change[:8]).max())
+        if not np.isfinite(moved) or moved > 6.0:
+            return None
+        if index and moved < 0.003:
+            break
+    used = int(np.count_nonzero(weights > 0.1))
+    if used < max(24, 0.5 * np.count_nonzero(valid)) or abs(shift) > 1.5:
+        return None
+    freedom = max(used - 9, 1)
+    left = residual - wanted @ change
+    variance = float(np.sum(weights * left**2)) / freedom
+    covariance_h = variance * np.linalg.inv(normal)[:8, :8] / np.outer(scale[:8], scale[:8])
+    corner_rays = _mapped(h, chart.corners)
+    pixels, corner_slopes = lens.pixels_and_slopes(corner_rays)
+    by_corner = np.einsum("nij,njk->nik", corner_slopes, _by_h(h, chart.corners, corner_rays)).reshape(8, 8)
+    covariance = by_corner @ covariance_h @ by_corner.T + _CORNER_FLOOR**2 * np.eye(8)
+    return Measured(number, pixels, np.linalg.inv(covariance), blur, shift, contrast)
+
+
+def _mapped(h: Array, points: Array) -> Array:
+    """Give the rays of points of the marker."""
+    q = points @ h[6:8] + 1.0
+    return np.column_stack(((points @ h[0:2] + h[2]) / q, (points @ h[3:5] + h[5]) / q))
+
+
+def _by_h(h: Array, points: Array, rays: Array) -> Array:
+    """Give the derivatives of rays by the homography: n × 2 × 8."""
+    q = points @ h[6:8] + 1.0
+    one = np.column_stack((points, np.ones(len(points)))) / q[:, None]
+    result = np.zeros((len(points), 2, 8))
+    result[:, 0, 0:3] = one
+    result[:, 1, 3:6] = one
+    result[:, :, 6:8] = -rays[:, :, None] * (points / q[:, None])[:, None, :]
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class _Sight:
+    """How edges look in the picture.
+
+    normals: n × 2, unit vectors towards the light. ways: n × 2, the marker's own direction across an edge, towards the
+    light; it goes along the neighbouring edges, never over them. cell: n, px, width of a cell along it. slant: n, the
+    cosine between the two. room: n, px, to the neighbouring edge. by_h: n × 8, by how much h moves edges along normals.
+    """
+
+    normals: Array
+    ways: Array
+    cell: Array
+    slant: Array
+    room: Array
+    by_h: Array
+
+
+def _sight(h: Array, chart: Chart, slopes: Array) -> _Sight:
+    points = chart.points
+    rays = _mapped(h, points)
+    q = points @ h[6:8] + 1.0
+    by_x = np.column_stack((h[0] - rays[:, 0] * h[6], h[3] - rays[:, 1] * h[6])) / q[:, None]
+    by_y = np.column_stack((h[1] - rays[:, 0] * h[7], h[4] - rays[:, 1] * h[7])) / q[:, None]
+    x = np.einsum("nij,nj->ni", slopes, by_x)
+    y = np.einsum("nij,nj->ni", slopes, by_y)
+    over_x = chart.across[:, None] == 0
+    along = np.where(over_x, y, x)
+    ways = np.where(over_x, x, y) * chart.towards[:, None]
+    cell = np.hypot(ways[:, 0], ways[:, 1])
+    length = np.hypot(along[:, 0], along[:, 1])
+    ways = ways / cell[:, None]
+    normals = np.column_stack((-along[:, 1], along[:, 0])) / length[:, None]
+    slant = np.sum(normals * ways, axis=1)
+    normals *= np.sign(slant)[:, None]
+    slant = np.abs(slant)
+    by_pixel = np.einsum("ni,nij->nj", normals, slopes)
+    by_h = np.einsum("nj,njk->nk", by_pixel, _by_h(h, points, rays))
+    return _Sight(normals, ways, cell, slant, chart.free * length * slant, by_h)
+
+
+def _crossings(
+    picture: npt.NDArray[np.float32], at: Array, sight: _Sight, blur: float
+) -> tuple[Array, npt.NDArray[np.bool_], float, float] | None:
+    """Measure by how much edges lie off along their normals: offsets, which are valid, the blur, the contrast."""
+    reach = np.minimum(np.maximum(0.45 * sight.cell, _NARROWEST), _WIDEST / np.maximum(sight.slant, 0.3))
+    across = reach[:, None] * _UNIT
+    map_x = (at[:, 0:1] + sight.ways[:, 0:1] * across).astype(np.float32)
+    map_y = (at[:, 1:2] + sight.ways[:, 1:2] * across).astype(np.float32)
+    valid = (map_x.min(axis=1) >= 0) & (map_y.min(axis=1) >= 0) & (sight.slant > 0.3)
+    valid &= (map_x.max(axis=1) <= picture.shape[1] - 1) & (map_y.max(axis=1) <= picture.shape[0] - 1)
+    valid &= sight.room > min(_CLEAR * blur, 4.0)
+    if np.count_nonzero(valid) < 24:
+        return None
+    values = cv2.remap(picture, map_x, map_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(np.float64)
+    ends = np.where(valid[:, None], values, np.nan).reshape(-1, _ALONG, _UNIT.size)
+    count = np.repeat(np.maximum(valid.reshape(-1, _ALONG).sum(axis=1), 1), _ALONG)
+    dark = np.repeat(np.nansum(ends[:, :, :2], axis=(1, 2)) / 2, _ALONG) / count
+    light = np.repeat(np.nansum(ends[:, :, -2:], axis=(1, 2)) / 2, _ALONG) / count
+    difference = light - dark
+    contrast = float(np.median(difference[valid]))
+    if contrast <= _LEAST_CONTRAST:
+        return None
+    valid &= difference > 0.35 * contrast
+    parts = (values - dark[:, None]) / np.where(valid, difference, 1.0)[:, None]
+    offsets = reach * (1.0 - parts @ _WEIGHTS) * sight.slant
+    slopes = (parts[:, 2:] - parts[:, :-2]) / ((_UNIT[2] - _UNIT[0]) * reach * sight.slant)[:, None]
+    steepest = float(np.max(slopes[valid].mean(axis=0)))
+    return offsets, valid, 1.0 / (max(steepest, 1e-3) * np.sqrt(2 * np.pi)), contrast
+
+
+def _tukey(residual: Array, valid: npt.NDArray[np.bool_]) -> Array:
+    """Give weights that leave out what lies far off."""
+    if not valid.any():
+        return np.zeros(len(residual))
+    middle = np.median(residual[valid])
+    scale = max(1.4826 * float(np.median(np.abs(residual[valid] - middle))), 0.02)
+    part = (residual - middle) / (4.685 * scale)
+    return np.where(valid & (np.abs(part) < 1), (1 - part**2) ** 2, 0.0)

@@ -1,0 +1,96 @@
+"""A camera's lens as the solvers use it: pixels to rays and back, by OpenCV's model."""
+
+import math
+from typing import Any, Final
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from arcor2_hw.data.camera import CameraParameters
+from arcor2_hw.exceptions import InvalidData
+
+Array = npt.NDArray[np.float64]
+
+_UNDISTORTING: Final = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 60, 1e-12)
+_ROUND_TRIP: Final = 0.01
+"""px, by which a corner of the picture may differ after it was taken to a ray and back."""
+_STEP: Final = 1e-5
+_NOTHING: Final = np.zeros(3)
+
+
+class Lens:
+    """Intrinsics, checked for pictures of width × height.
+
+    Raises InvalidData: numbers that are not finite or not positive; a principal point that cannot belong to pictures of
+    that size; distortion that cannot be undone in the corners of the picture.
+    """
+
+    def __init__(self, parameters: CameraParameters, width: int, height: int) -> None:
+        p = parameters
+        for name, value in (("fx", p.fx), ("fy", p.fy)):
+            if not (math.isfinite(value) and value > 0):
+                raise InvalidData(f"{name} of the camera must be a positive number of pixels, not {value}")
+        if not all(map(math.isfinite, (p.cx, p.cy, *p.dist_coefs))):
+            raise InvalidData("the camera's parameters must be finite numbers")
+        if not (0.25 < p.cx / width < 0.75 and 0.25 < p.cy / height < 0.75):
+            raise InvalidData(
+                f"the camera's parameters are not those of pictures of {width} × {height}: "
+                f"the principal point is at {p.cx:.0f}, {p.cy:.0f}"
+            )
+        self.parameters = parameters
+        self.width, self.height = width, height
+        self.matrix: Array = np.array([[p.fx, 0.0, p.cx], [0.0, p.fy, p.cy], [0.0, 0.0, 1.0]])
+        self.coefficients: Array = np.array(p.dist_coefs, dtype=np.float64)
+        corners = np.array([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]])
+        back = self.pixels(self.rays(corners))
+        miss = float(np.abs(back - corners).max())
+        if not miss < _ROUND_TRIP:
+            raise InvalidData(
+                "the camera's distortion cannot be undone in the corners of the picture: "
+                "its coefficients are wrong, or of another lens model",
+                f"{p.dist_coefs}, off by {miss:.3g} px",
+            )
+
+    def rays(self, pixels: Array) -> Array:
+        """Give x and y at distance 1 of the rays that pixels see: n × 2."""
+        points = np.ascontiguousarray(pixels, dtype=np.float64).reshape(-1, 1, 2)
+        found: Any = cv2.undistortPoints(points, self.matrix, self.coefficients, criteria=_UNDISTORTING)
+        return np.asarray(found, dtype=np.float64).reshape(-1, 2)
+
+    def pixels(self, rays: Array) -> Array:
+        """Give the pixels to which rays (x and y at distance 1) go: n × 2."""
+        points = np.column_stack((rays, np.ones(len(rays))))
+        found: Any = cv2.projectPoints(points, _NOTHING, _NOTHING, self.matrix, self.coefficients)[0]
+        return np.asarray(found, dtype=np.float64).reshape(-1, 2)
+
+    def pixels_and_slopes(self, rays: Array) -> tuple[Array, Array]:
+        """Give the pixels of rays, n × 2, and by how much they move per x and per y of the ray: n × 2 × 2."""
+        count = len(rays)
+        moved = np.concatenate((rays, rays + np.array([_STEP, 0.0]), rays + np.array([0.0, _STEP])))
+        found = self.pixels(moved)
+        at = found[:count]
+        slopes = np.stack((found[count : 2 * count] - at, found[2 * count :] - at), axis=-1) / _STEP
+        return at, slopes
+
+    def projected(self, points: Array, change: Array) -> Array:
+        """Project points in the camera's frame with intrinsics changed by that much (as `numbers`): n × 2."""
+        pixels: Any = cv2.projectPoints(points, _NOTHING, _NOTHING, *self._changed(change))[0]
+        return np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+
+    def projected_with_slopes(self, points: Array, change: Array) -> tuple[Array, Array, Array]:
+        """Project points as `projected` does; give the derivatives by the points and by the intrinsics, too."""
+        pixels: Any
+        pixels, derivatives = cv2.projectPoints(points, _NOTHING, _NOTHING, *self._changed(change))[:2]
+        jacobian = np.asarray(derivatives, dtype=np.float64).reshape(len(points), 2, -1)
+        return np.asarray(pixels, dtype=np.float64).reshape(-1, 2), jacobian[:, :, 3:6], jacobian[:, :, 6:]
+
+    @property
+    def numbers(self) -> Array:
+        """Give fx, fy, cx, cy and the coefficients as one vector."""
+        p = self.parameters
+        return np.array([p.fx, p.fy, p.cx, p.cy, *p.dist_coefs])
+
+    def _changed(self, change: Array) -> tuple[Array, Array]:
+        fx, fy, cx, cy = self.numbers[:4] + change[:4]
+        return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]), self.coefficients + change[4:]

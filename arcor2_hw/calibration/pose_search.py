@@ -1,0 +1,159 @@
+"""The search for a camera's pose: several starts; what contradicts is left out, what is ambiguous is refused."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from arcor2_hw.calibration.camera_results import PoseOptions
+from arcor2_hw.calibration.lens import Array, Lens
+from arcor2_hw.calibration.pose_problem import Hints, PoseProblem, Seen, Solution
+from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
+from arcor2_hw.calibration.rigid import apart, inverted
+
+_TRIED: Final = 4
+"""How many of the best starts are followed."""
+_TELL_APART: Final = 16.0
+"""Difference of cost (chi square) from which on the better of two poses is the right one: four standard deviations."""
+_SCALINGS: Final = 3
+_SAME: Final = (0.002, 0.004)
+"""m, rad, up to which two poses are one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A pose (camera_from_origin), its covariance (of the camera in the origin's frame: m, rad), errors in px."""
+
+    pose: Array
+    covariance: Array
+    seen: list[Seen]
+    errors: list[Array]
+    parameters_f: float
+    left_out: set[tuple[str, int]] = field(default_factory=set)
+
+
+def search(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOptions) -> Found:
+    """Find the pose that explains all that is seen. Raises CalibrationRefused (AMBIGUOUS, IMPLAUSIBLE, …)."""
+    left_out: set[tuple[str, int]] = set()
+    deviations = intrinsics_deviations(lens, options)
+    everything = PoseProblem(lens, seen, hints, deviations)
+    while True:
+        kept = [each for each in seen if each.key not in left_out]
+        problem = PoseProblem(lens, kept, hints, deviations) if left_out else everything
+        best = solve(problem, options)
+        worst, worst_key = 0.0, kept[0].key
+        for each, errors in zip(kept, problem.errors(best.pose, best.change) or (), strict=True):
+            residual = float(np.sqrt(np.mean(np.sum(errors**2, axis=1))))
+            if residual > worst:
+                worst, worst_key = residual, each.key
+        if worst <= options.largest_residual:
+            break
+        names = {each.key: each.name for each in kept}
+        if len(names) < 3:
+            raise CalibrationRefused(
+                f"The picture contradicts what is said of {' and '.join(sorted(names.values()))} by {worst:.0f} px: "
+                "it stands elsewhere, or has another size.",
+                f"residual {worst:.1f} px, at most {options.largest_residual:.1f}",
+                Reason.IMPLAUSIBLE,
+            )
+        left_out.add(worst_key)
+        if 2 * (len(names) - 1) <= len({each.key for each in seen}):
+            raise CalibrationRefused(
+                "Most markers do not stand where they are said to: no majority of them agrees on where the camera is.",
+                f"{len(left_out)} of {len({each.key for each in seen})} contradict the others",
+                Reason.IMPLAUSIBLE,
+            )
+    left = everything.errors(best.pose, best.change)
+    if left is None:
+        raise CalibrationRefused("The markers contradict each other.", reason=Reason.IMPLAUSIBLE)
+    return Found(best.pose, covariance_of(best), list(seen), left, lens.parameters.fx, left_out)
+
+
+def solve(problem: PoseProblem, options: PoseOptions) -> Solution:
+    """Give the best pose of a problem. Raises CalibrationRefused when another one is as good, or there is none."""
+    starts = [start for start in problem.starts() if np.isfinite(problem.typical(start))]
+    if not starts:
+        raise CalibrationRefused("No pose of the camera explains the picture.", reason=Reason.NOT_CONVERGED)
+    problem.scale = max(1.0, min(problem.typical(start) for start in starts))
+    found = _minima(problem, starts)
+    for _ in range(_SCALINGS):
+        scale = max(1.0, problem.typical(found[0].pose, found[0].change)) if found else problem.scale
+        if abs(scale / problem.scale - 1) < 0.1:
+            break
+        problem.scale = scale
+        again = [problem.refined(each.pose, each.change) for each in found]
+        found = sorted((each for each in again if each), key=lambda each: each.cost)
+    allowed = [each for each in found if _allowed(each.pose, options)]
+    if not allowed:
+        what = "lies below where it can be" if found else "could not be found"
+        raise CalibrationRefused(
+            f"The camera's place, as the picture has it, {what}.",
+            "" if not found else f"z = {inverted(found[0].pose)[2, 3]:.3f} m, at least {options.lowest} m",
+            Reason.IMPLAUSIBLE if found else Reason.NOT_CONVERGED,
+        )
+    best = allowed[0]
+    for other in allowed[1:]:
+        distance, angle = apart(inverted(best.pose), inverted(other.pose))
+        if other.cost - best.cost < _TELL_APART and distance > 2 * options.largest_deviation:
+            raise CalibrationRefused(
+                f"The picture fits two places of the camera, {distance * 1000:.0f} mm and {np.degrees(angle):.0f}° "
+                f"apart: {_who(problem)} seen from nearly straight ahead. What helps: a second marker, a view from the "
+                "side or from nearer, the direction of gravity, or where the camera roughly is.",
+                f"costs {best.cost:.1f} and {other.cost:.1f}",
+                Reason.AMBIGUOUS,
+            )
+    return best
+
+
+def covariance_of(solution: Solution) -> Array:
+    """Give the covariance of the camera in the origin's frame: position (m), rotation vector (rad), 6 × 6."""
+    # From a motion of the origin before the camera (rotation, displacement) to one of the camera in the origin.
+    back = -solution.pose[:3, :3].T
+    turn = np.zeros((6, 6))
+    turn[:3, 3:] = back
+    turn[3:, :3] = back
+    return np.asarray(turn @ solution.covariance @ turn.T)
+
+
+def intrinsics_deviations(lens: Lens, options: PoseOptions) -> Array:
+    """Give how well the intrinsics are known (standard deviations, as Lens.numbers)."""
+    p = lens.parameters
+    centre = options.centre_deviation
+    coefficients = np.abs(lens.coefficients) * options.distortion_deviation
+    return np.array([options.focal_deviation * p.fx, options.focal_deviation * p.fy, centre, centre, *coefficients])
+
+
+def _minima(problem: PoseProblem, starts: list[Array]) -> list[Solution]:
+    """Give the distinct minima that the best starts lead to, the best one first."""
+    result: list[Solution] = []
+    tried: list[Array] = []
+    least = float("inf")
+    for start in sorted(starts, key=problem.cost):
+        if len(tried) >= _TRIED:
+            break
+        if any(_same(start, other) for other in tried):
+            continue
+        tried.append(start)
+        solution = problem.refined(start, enough=least)
+        if solution is not None and not any(_same(solution.pose, other.pose) for other in result):
+            result.append(solution)
+            least = min(least, solution.cost)
+    return sorted(result, key=lambda each: each.cost)
+
+
+def _same(a: Array, b: Array) -> bool:
+    """Tell whether two poses (camera_from_origin) are one."""
+    distance, angle = apart(inverted(a), inverted(b))
+    return distance < _SAME[0] and angle < _SAME[1]
+
+
+def _allowed(pose: Array, options: PoseOptions) -> bool:
+    """Tell whether the camera may be there."""
+    return not isinstance(options.lowest, float | int) or float(inverted(pose)[2, 3]) >= options.lowest
+
+
+def _who(problem: PoseProblem) -> str:
+    """Name what is seen."""
+    names = sorted({each.name for each in problem.seen})
+    return f"{names[0]} is" if len(names) == 1 else f"{', '.join(names)} are"

@@ -1,0 +1,200 @@
+"""Calibration by pictures: poses of a camera from rendered pictures whose truth is known.
+
+The solver is given intrinsics that are off: fx and fy by 0.05 %, cx and cy by 0.5 px, every distortion coefficient by
+2 % of itself (standard deviations), drawn anew for each picture.
+"""
+
+import math
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Final
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from arcor2_hw.calibration.camera_pose import find_camera_pose
+from arcor2_hw.calibration.camera_results import CameraPose, PoseOptions
+from arcor2_hw.calibration.layout import CharucoBoard, Layout, Marker
+from arcor2_hw.calibration.refusals import CalibrationRefused
+from arcor2_hw.data.camera import CameraParameters
+from arcor2_hw.data.geometry import Pose
+from benchmarks import rendering
+from benchmarks.figures import Figure, Report, median, percentile
+from benchmarks.rendering import Array, Exposure, Lens, Plate
+
+SEED: Final = 20261121
+PICTURES: Final = 200
+LONG: Final = 2000
+LENS: Final = Lens(870.0, 868.0, 645.0, 355.0, (0.08, -0.16, 0.0006, -0.0004, 0.05))
+SIZE: Final = 0.1
+FOCAL, CENTRE, DISTORTION = 0.0005, 0.5, 0.02
+TELLS: Final = 4.0
+"""A result that is off by more than that many of its own standard deviations has a wrong verdict."""
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What is looked at, from where, and how the picture comes out."""
+
+    world_from_camera: Array
+    plates: list[Plate]
+    layout: Layout
+    exposure: Exposure
+
+
+@dataclass
+class Tally:
+    """Errors in mm and degrees, times in ms, what was refused or wrong."""
+
+    position: list[float] = field(default_factory=list)
+    orientation: list[float] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+    refused: list[str] = field(default_factory=list)
+    wrong: int = 0
+
+    def note(self) -> str:
+        """Say what else was seen."""
+        reasons = ", ".join(f"{self.refused.count(each)} {each}" for each in sorted(set(self.refused)))
+        return (
+            f"seed {SEED}; refused {len(self.refused)}{f' ({reasons})' if reasons else ''}, wrong verdicts {self.wrong}"
+        )
+
+
+# ------------------------------------------------------------------------------------------------ views
+def on_table(x: float, y: float, turn: float) -> Array:
+    """Give world_from_plate of a plate that lies on the table."""
+    pose = np.eye(4)
+    pose[:2, :2] = [[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]]
+    pose[:2, 3] = x, y
+    return pose
+
+
+def camera_over(random: np.random.Generator) -> Array:
+    """Give world_from_camera of a camera 0.5 to 1.6 m away, tilted by 0 to 60°, turned at will."""
+    distance, tilt, azimuth = random.uniform(0.5, 1.6), math.radians(random.uniform(0, 60)), random.uniform(0, math.tau)
+    eye = distance * np.array([math.sin(tilt) * math.cos(azimuth), math.sin(tilt) * math.sin(azimuth), math.cos(tilt)])
+    target = np.append(random.uniform(-0.03, 0.03, 2), 0.0)
+    return rendering.looking_at(eye, target, random.uniform(0, math.tau))
+
+
+def in_sight(plate: Plate, world_from_camera: Array, lens: Lens) -> bool:
+    """Tell whether all of a plate is in the picture."""
+    width, height = plate.size
+    corners = np.array([[x * width / 2, y * height / 2, 0.0, 1.0] for x in (-1, 1) for y in (-1, 1)])
+    x, y, z, _ = np.linalg.inv(world_from_camera) @ plate.world_from_plate @ corners.T
+    u, v = rendering.bent(x / z, y / z, lens.coefficients)
+    u, v = u * lens.fx + lens.cx, v * lens.fy + lens.cy
+    return bool(z.min() > 0 and u.min() > 8 and v.min() > 8 and u.max() < lens.width - 9 and v.max() < lens.height - 9)
+
+
+def markers_view(random: np.random.Generator, count: int, background: Plate) -> View:
+    """Give a view of one marker, or of several around the middle, all of them in the picture."""
+    while True:
+        camera = camera_over(random)
+        numbers = random.choice(50, count, replace=False)
+        start = random.uniform(0, math.tau)
+        places = []
+        for index in range(count):
+            angle, radius = start + index * math.tau / count, random.uniform(0.10, 0.14) if count > 1 else 0.03
+            places.append(on_table(radius * math.cos(angle), radius * math.sin(angle), random.uniform(0, math.tau)))
+        plates = [rendering.marker(int(n), SIZE, place) for n, place in zip(numbers, places, strict=True)]
+        if all(in_sight(plate, camera, LENS) for plate in plates):
+            break
+    listed = [Marker(int(n), Pose.from_matrix(place)) for n, place in zip(numbers, places, strict=True)]
+    return View(camera, [background, *plates], Layout(listed, size=SIZE), exposure_of(random))
+
+
+def board_view(random: np.random.Generator, background: Plate) -> View:
+    """Give a view of a ChArUco board of 7 × 5 squares of 30 mm."""
+    cell = 0.03 / 8
+    while True:
+        camera, place = (
+            camera_over(random),
+            on_table(random.uniform(-0.05, 0.05), random.uniform(-0.05, 0.05), random.uniform(0, math.tau)),
+        )
+        plate = rendering.charuco(7, 5, cell, place)
+        if in_sight(plate, camera, LENS):
+            break
+    board = CharucoBoard(7, 5, cell * 8, cell * 6, pose=Pose.from_matrix(place))
+    return View(camera, [background, plate], Layout(boards=[board]), exposure_of(random))
+
+
+def exposure_of(random: np.random.Generator) -> Exposure:
+    """Give blur, noise and light as they vary in a hall."""
+    return Exposure(
+        random.uniform(0.6, 1.2), random.uniform(1.5, 3.0), random.uniform(0.7, 1.05), random.uniform(0, 0.4)
+    )
+
+
+def intrinsics_off(random: np.random.Generator, factor: float = 1.0) -> CameraParameters:
+    """Give the camera's intrinsics as somebody measured them."""
+    f = 1 + factor * FOCAL * random.normal(size=2)
+    c = factor * CENTRE * random.normal(size=2)
+    bent = [k * (1 + factor * DISTORTION * random.normal()) for k in LENS.coefficients]
+    return CameraParameters(LENS.fx * f[0], LENS.fy * f[1], LENS.cx + c[0], LENS.cy + c[1], bent)
+
+
+def picture_of(view: View, random: np.random.Generator) -> npt.NDArray[np.uint8]:
+    """Take the picture."""
+    return rendering.render(LENS, view.world_from_camera, view.plates, random, view.exposure)
+
+
+def errors_of(pose: Pose, world_from_camera: Array) -> tuple[float, float]:
+    """Give by how much a pose is off: mm, degrees."""
+    off = pose.inverted() * Pose.from_matrix(world_from_camera)
+    return math.hypot(*off.position) * 1e3, math.degrees(off.orientation.angle_to(Pose().orientation))
+
+
+# ------------------------------------------------------------------------------------------------ figures
+def measure(
+    make: Callable[[np.random.Generator, Plate], View], pictures: int, limit: float, options: PoseOptions, factor: float
+) -> Tally:
+    """Find the camera on pictures, given as JPEG files; what is off by more than `limit` mm has a wrong verdict."""
+    tally = Tally()
+    for index in range(pictures):
+        random = np.random.default_rng([SEED, index])
+        if index % 20 == 0:
+            background = rendering.table(random)
+        view = make(random, background)
+        done, data = cv2.imencode(".jpg", picture_of(view, random), [cv2.IMWRITE_JPEG_QUALITY, 95])
+        assert done
+        file, parameters = data.tobytes(), intrinsics_off(random, factor)
+        began = time.perf_counter()
+        try:
+            result: CameraPose | None = find_camera_pose([file], parameters, view.layout, options)
+        except CalibrationRefused as refused:
+            result = None
+            tally.refused.append(refused.reason.value)
+        tally.seconds.append(time.perf_counter() - began)
+        if result is not None:
+            position, orientation = errors_of(result.pose, view.world_from_camera)
+            tally.position.append(position)
+            tally.orientation.append(orientation)
+            tally.wrong += position > limit or position > TELLS * 1e3 * result.position_deviation * math.sqrt(3)
+    return tally
+
+
+def run(report: Report, *, long: bool = False) -> None:
+    """Measure the poses of a camera."""
+    pictures = LONG if long else PICTURES
+    sys.stderr.write(f"calibration: seed {SEED}, {pictures} pictures of each kind\n")
+    cv2.setNumThreads(1)
+    options = PoseOptions(focal_deviation=FOCAL, centre_deviation=CENTRE)
+    three = measure(lambda random, table: markers_view(random, 3, table), pictures, 3.0, options, 1.0)
+    one = measure(lambda random, table: markers_view(random, 1, table), pictures, 10.0, options, 1.0)
+    board = measure(board_view, pictures, 3.0, options, 1.0)
+    for name, tally in (("three", three), ("one", one), ("board", board)):
+        prefix, count = f"camera_pose_{name}", len(tally.position)
+        report.add(Figure(f"{prefix}_mm", median(tally.position), count, tally.note()))
+        report.add(
+            Figure(f"{prefix}_p99_mm", percentile(tally.position, 99), count, f"worst {max(tally.position):.2f}")
+        )
+        far = f"99th percentile {percentile(tally.orientation, 99):.3f}"
+        report.add(Figure(f"{prefix}_deg", median(tally.orientation), count, far))
+        slow = f"99th percentile {percentile(tally.seconds, 99) * 1e3:.1f}; with the decoding of a JPEG file"
+        report.add(Figure(f"{prefix}_ms", median(tally.seconds) * 1e3, len(tally.seconds), slow))
+        report.add(Figure(f"{prefix}_wrong", 100 * tally.wrong / pictures, pictures))
+        report.add(Figure(f"{prefix}_refused", 100 * len(tally.refused) / pictures, pictures))

@@ -1,0 +1,254 @@
+"""Pictures of markers and boards as a camera takes them, ray by ray: the truth for calibrations.
+
+Every pixel is 16 rays. A pixel's rays come from the lens's own formula, inverted by Newton's method; where they meet
+the printed plates is computed in the plates' frames. Nothing is projected, and nothing of the solver, or of OpenCV's
+geometry, is used: the dictionaries' bits are all that is taken from there. A picture then gets light that falls off to
+one side, blur of lens and defocus, the camera's tone curve, noise and 8 bits.
+
+Not modelled: depth (plates are painted in the order given), shadows, reflections, rolling shutter, colour filters.
+"""
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+SUBPIXELS: Final = 4
+WHITE, BLACK, TABLE = 0.85, 0.06, 0.32  # reflectance
+
+
+@dataclass(frozen=True)
+class Lens:
+    """fx, fy, cx, cy in px; coefficients k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, as many as there are."""
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    coefficients: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    width: int = 1280
+    height: int = 720
+
+
+@dataclass(frozen=True, eq=False)
+class Plate:
+    """Something flat and printed. cells: reflectance, rows from the top, columns from the left; cell: side of one, m.
+
+    world_from_plate: 4 × 4; the origin is in the plate's middle, x right, y up, z out of it.
+    """
+
+    world_from_plate: Array
+    cells: Array
+    cell: float
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height, m."""
+        return self.cells.shape[1] * self.cell, self.cells.shape[0] * self.cell
+
+
+@dataclass(frozen=True)
+class Exposure:
+    """blur: px, standard deviation. noise: grey levels, standard deviation. light: of a white sheet, 1 saturates.
+
+    falloff: by how much less light there is at one side. srgb: tone curve of pictures, not of bare sensors.
+    """
+
+    blur: float = 0.8
+    noise: float = 2.0
+    light: float = 1.0
+    falloff: float = 0.2
+    srgb: bool = True
+
+
+# ------------------------------------------------------------------------------------------------ things
+def marker(number: int, size: float, world_from_marker: Array, dictionary: int = cv2.aruco.DICT_4X4_50) -> Plate:
+    """Give one marker with a white margin as wide as a cell. size: side of its black square, m."""
+    bits = _bits(number, dictionary)
+    return Plate(world_from_marker, np.pad(bits, 1, constant_values=WHITE), size / len(bits))
+
+
+def charuco(columns: int, rows: int, cell: float, world_from_board: Array) -> Plate:
+    """Give a board of squares of 8 cells and markers of 6, of 4x4_50 from number 0, with a margin of 4 cells."""
+    board = np.full((rows * 8, columns * 8), WHITE)
+    number = 0
+    for row in range(rows):
+        for column in range(columns):
+            top, left = row * 8, column * 8
+            if (row + column) % 2 == 0:
+                board[top : top + 8, left : left + 8] = BLACK
+            else:
+                board[top + 1 : top + 7, left + 1 : left + 7] = _bits(number, cv2.aruco.DICT_4X4_50)
+                number += 1
+    return Plate(world_from_board, np.pad(board, 4, constant_values=WHITE), cell)
+
+
+def table(random: np.random.Generator, side: float = 6.0, grain: float = 0.008) -> Plate:
+    """Give a speckled table at z = 0."""
+    count = int(side / grain)
+    return Plate(np.eye(4), np.clip(random.normal(TABLE, 0.06, (count, count)), 0.02, 0.9), grain)
+
+
+@functools.cache
+def _bits(number: int, dictionary: int) -> Array:
+    """Give a marker's cells, its black border being one of them."""
+    known = cv2.aruco.getPredefinedDictionary(dictionary)
+    side = known.markerSize + 2
+    return np.where(cv2.aruco.generateImageMarker(known, number, side) > 127, WHITE, BLACK).astype(np.float64)
+
+
+# ------------------------------------------------------------------------------------------------ rays
+def bent(x: Array, y: Array, coefficients: tuple[float, ...]) -> tuple[Array, Array]:
+    """Give where the lens sends a ray through (x, y) at distance 1."""
+    k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = (*coefficients, *(0.0,) * (12 - len(coefficients)))
+    q = x * x + y * y
+    radial = (1.0 + q * (k1 + q * (k2 + q * k3))) / (1.0 + q * (k4 + q * (k5 + q * k6)))
+    return (
+        x * radial + 2.0 * p1 * x * y + p2 * (q + 2.0 * x * x) + q * (s1 + q * s2),
+        y * radial + 2.0 * p2 * x * y + p1 * (q + 2.0 * y * y) + q * (s3 + q * s4),
+    )
+
+
+@functools.lru_cache(maxsize=4)
+def rays(lens: Lens) -> Array:
+    """Give x and y at distance 1 for the middle of every pixel and of a margin of one: rows + 2, columns + 2, 2."""
+    u, v = np.meshgrid(np.arange(-1.0, lens.width + 1), np.arange(-1.0, lens.height + 1))
+    aim_x, aim_y = (u - lens.cx) / lens.fx, (v - lens.cy) / lens.fy
+    x, y = aim_x.copy(), aim_y.copy()
+    step = 1e-6
+    for _ in range(30):
+        at_x, at_y = bent(x, y, lens.coefficients)
+        right_x, right_y = bent(x + step, y, lens.coefficients)
+        up_x, up_y = bent(x, y + step, lens.coefficients)
+        a, b, c, d = (right_x - at_x) / step, (up_x - at_x) / step, (right_y - at_y) / step, (up_y - at_y) / step
+        miss_x, miss_y = aim_x - at_x, aim_y - at_y
+        determinant = a * d - b * c
+        x += (d * miss_x - b * miss_y) / determinant
+        y += (a * miss_y - c * miss_x) / determinant
+        if max(np.abs(miss_x).max(), np.abs(miss_y).max()) < 1e-11:
+            return np.stack((x, y), axis=-1)
+    raise ValueError("the lens folds its picture: no ray belongs to some of the pixels")
+
+
+def _met(plate: Plate, world_from_camera: Array, x: Array, y: Array) -> tuple[Array, Array]:
+    """Give where rays meet a plate, in its frame, m; NaN for one that looks the other way or at its back."""
+    plate_from_camera = np.linalg.inv(plate.world_from_plate) @ world_from_camera
+    r, eye = plate_from_camera[:3, :3], plate_from_camera[:3, 3]
+    if eye[2] <= 0:
+        return np.full_like(x, np.nan), np.full_like(x, np.nan)
+    along = r[2, 0] * x + r[2, 1] * y + r[2, 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = np.where(along < 0, -eye[2] / along, np.nan)
+    return (
+        eye[0] + distance * (r[0, 0] * x + r[0, 1] * y + r[0, 2]),
+        eye[1] + distance * (r[1, 0] * x + r[1, 1] * y + r[1, 2]),
+    )
+
+
+def _box(plate: Plate, world_from_camera: Array, lens: Lens) -> tuple[slice, slice] | None:
+    """Give the part of the picture (with its margin of one) that may show a plate."""
+    coarse = 8
+    grid = rays(lens)[::coarse, ::coarse]
+    x, y = _met(plate, world_from_camera, grid[..., 0], grid[..., 1])
+    width, height = plate.size
+    with np.errstate(invalid="ignore"):
+        seen = (np.abs(x) < 0.6 * width) & (np.abs(y) < 0.6 * height)
+    rows, columns = np.nonzero(seen)
+    if not len(rows):
+        return None
+    top, left = max(int(rows.min() - 3) * coarse, 1), max(int(columns.min() - 3) * coarse, 1)
+    bottom = min(int(rows.max() + 4) * coarse, lens.height + 1)
+    right = min(int(columns.max() + 4) * coarse, lens.width + 1)
+    return slice(top, bottom), slice(left, right)
+
+
+def _paint(picture: Array, plate: Plate, world_from_camera: Array, lens: Lens, subpixels: int) -> None:
+    """Paint a plate into a picture of reflectances."""
+    box = _box(plate, world_from_camera, lens)
+    if box is None:
+        return
+    rows, columns = box
+    grid = rays(lens)
+    middle = grid[rows, columns]
+    after = slice(rows.start + 1, rows.stop + 1), slice(columns.start + 1, columns.stop + 1)
+    before = slice(rows.start - 1, rows.stop - 1), slice(columns.start - 1, columns.stop - 1)
+    by_u = (grid[rows, after[1]] - grid[rows, before[1]]) / 2
+    by_v = (grid[after[0], columns] - grid[before[0], columns]) / 2
+    width, height = plate.size
+    # A cell is divided so finely that its edge, over which values go linearly, is as wide as the gap between two rays.
+    x, y = _met(plate, world_from_camera, middle[..., 0], middle[..., 1])
+    pixel = float(np.nanmedian(np.hypot(np.diff(x, axis=1)[:-1], np.diff(y, axis=1)[:-1])))
+    fine = int(np.clip(plate.cell / pixel * subpixels, 1, 256)) if subpixels > 1 else 1
+    target = picture[rows.start - 1 : rows.stop - 1, columns.start - 1 : columns.stop - 1]
+    total, weight = np.zeros(target.shape), np.zeros(target.shape)
+    for j in range(subpixels):
+        for i in range(subpixels):
+            du, dv = (i + 0.5) / subpixels - 0.5, (j + 0.5) / subpixels - 0.5
+            ray = middle + du * by_u + dv * by_v
+            x, y = _met(plate, world_from_camera, ray[..., 0], ray[..., 1])
+            with np.errstate(invalid="ignore"):
+                inside = (np.abs(x) <= width / 2) & (np.abs(y) <= height / 2)
+            total[inside] += _printed(plate, x[inside], y[inside], fine)
+            weight += inside
+    share = weight / subpixels**2
+    target[...] = target * (1 - share) + total / subpixels**2
+
+
+def _printed(plate: Plate, x: Array, y: Array, fine: int) -> Array:
+    """Give what is printed at points, with edges that are a `fine`th of a cell wide."""
+    count_y, count_x = plate.cells.shape
+
+    def index(at: Array, count: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Array]:
+        texel = np.clip(at * fine - 0.5, 0, count * fine - 1)
+        low = np.floor(texel)
+        high = np.minimum(low + 1, count * fine - 1)
+        return (low // fine).astype(np.intp), (high // fine).astype(np.intp), texel - low
+
+    left, right, part_x = index(x / plate.cell + count_x / 2, count_x)
+    top, bottom, part_y = index(count_y / 2 - y / plate.cell, count_y)
+    cells = plate.cells
+    upper = cells[top, left] * (1 - part_x) + cells[top, right] * part_x
+    lower = cells[bottom, left] * (1 - part_x) + cells[bottom, right] * part_x
+    return np.asarray(upper * (1 - part_y) + lower * part_y)
+
+
+# ------------------------------------------------------------------------------------------------ pictures
+def render(
+    lens: Lens,
+    world_from_camera: Array,
+    plates: Sequence[Plate],
+    random: np.random.Generator,
+    exposure: Exposure = Exposure(),
+) -> npt.NDArray[np.uint8]:
+    """Take a picture: grey values, rows × columns. The first plate is the background, and gets one ray per pixel."""
+    reflectance = np.full((lens.height, lens.width), TABLE)
+    for index, plate in enumerate(plates):
+        _paint(reflectance, plate, world_from_camera, lens, SUBPIXELS if index else 1)
+    side = np.linspace(1.0 - exposure.falloff, 1.0, lens.width)
+    light = reflectance * side[None, :] * exposure.light
+    if exposure.blur > 0:
+        blurred = cv2.GaussianBlur(light, (0, 0), exposure.blur, borderType=cv2.BORDER_REPLICATE)
+        light = blurred.astype(np.float64)
+    light = np.clip(light, 0.0, 1.0)
+    if exposure.srgb:
+        light = np.where(light <= 0.0031308, 12.92 * light, 1.055 * np.power(light, 1 / 2.4) - 0.055)
+    return np.clip(np.rint(light * 255.0 + random.normal(0.0, exposure.noise, light.shape)), 0, 255).astype(np.uint8)
+
+
+def looking_at(eye: Array, target: Array, roll: float) -> Array:
+    """Give world_from_camera of a camera at `eye` whose optical axis goes through `target`, turned by roll about it."""
+    z = (target - eye) / np.linalg.norm(target - eye)
+    x = np.cross(z, (0.0, 0.0, 1.0) if abs(z[2]) < 0.99 else (0.0, 1.0, 0.0))
+    x /= np.linalg.norm(x)
+    y = np.cross(z, x)
+    pose = np.eye(4)
+    c, s = np.cos(roll), np.sin(roll)
+    pose[:3, :3] = np.column_stack((c * x + s * y, c * y - s * x, z))
+    pose[:3, 3] = eye
+    return pose
