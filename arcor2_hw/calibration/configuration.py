@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import msgspec
-import yaml
 from msgspec import field
 
 from arcor2_hw.calibration.camera_results import PoseMethod, PoseOptions
@@ -118,6 +117,8 @@ def read_configuration(path: Path) -> CalibrationConfiguration:
 
 def yaml_of(text: bytes, where: str) -> Any:
     """Read YAML; InvalidData naming `where`, also for a key that is there twice, of which YAML would take the last."""
+    import yaml  # 10 ms that the server's start does without
+
     try:
         root = yaml.compose(text, yaml.SafeLoader)
         _refuse_twice(root, where)
@@ -127,6 +128,8 @@ def yaml_of(text: bytes, where: str) -> Any:
 
 
 def _refuse_twice(node: Any, where: str) -> None:
+    import yaml
+
     if isinstance(node, yaml.SequenceNode):
         for item in node.value:
             _refuse_twice(item, where)

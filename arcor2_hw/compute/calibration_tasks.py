@@ -185,6 +185,7 @@ CalibrationTask = (
     | DrawCameraPose
     | FindMarkers
     | FindHandEye
+    | FindRobotPose
     | FindIntrinsics
     | FrameByAxes
     | FrameByPoints

@@ -1,6 +1,6 @@
 """What stands in the way, as the compute worker is told of it. Imports no numerics."""
 
-from typing import Final
+from typing import Any, Final
 
 from msgspec import Struct, field
 
@@ -58,11 +58,14 @@ class Body(Struct, frozen=True):
 
 
 class RobotModel(Struct, frozen=True):
-    """A robot's model: its URDF, or package of it, and where its base stands. name: as a person knows it."""
+    """A robot's model: its URDF, or a package of it, and where its root link stands in the world.
+
+    settings: those of its object, by name, which the description may follow.
+    """
 
     urdf: KeptFile
     base: Pose = field(default_factory=Pose)
-    name: str = ""
+    settings: dict[str, Any] = field(default_factory=dict)
 
 
 class StandingRobot(Struct, frozen=True):

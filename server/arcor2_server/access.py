@@ -13,7 +13,7 @@ from litestar.handlers import BaseRouteHandler, WebsocketRouteHandler
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error
-from arcor2_server.rest.answers import OPEN, ROLE
+from arcor2_server.rest.answers import OPEN, PERSON, ROLE
 from arcor2_server.settings import ServerSettings
 from arcor2_server.tokens import Token, TokenFile
 
@@ -133,11 +133,14 @@ def role_needed(connection: ASGIConnection[Any, Any, Any, Any], handler: BaseRou
         return
     access: Access = connection.app.state.access
     try:
-        role = access.admit(connection).role
+        admission = access.admit(connection)
     except TooManyAttempts as error:
         raise TooManyRequestsException(str(error)) from None
     except AccessRefused as error:
         raise NotAuthorizedException(str(error), headers={"WWW-Authenticate": "Bearer"}) from None
+    role = admission.role
+    if admission.token is not None:
+        connection.state[PERSON] = admission.token.name
     if role is None:
         raise NotAuthorizedException(
             "A token is needed: Authorization: Bearer ...", headers={"WWW-Authenticate": "Bearer"}

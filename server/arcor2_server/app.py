@@ -87,6 +87,8 @@ async def running_services(settings: ServerSettings) -> AsyncIterator[Services]:
             execution=cast("Execution", None),
             build=cast("BuildService", None),
         )
+        services.markers.load()
+        stack.push_async_callback(services.compute.close)
         services.session = Session(services)
         await services.session.open()
         stack.push_async_callback(services.session.close)

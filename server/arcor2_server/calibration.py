@@ -1,61 +1,112 @@
-"""What computes poses from pictures: the one interface to the calibration service, and what is running of it."""
+"""What computes poses from pictures: the interface, the service over the compute worker, and what is running of it."""
 
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Protocol
 
+from msgspec.structs import replace
+
+from arcor2_hw.calibration.camera_results import CameraPose
+from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
+from arcor2_hw.calibration.results import RobotPose
+from arcor2_hw.compute.calibration_tasks import FindCameraPose, FindMarkers, FindRobotPose
+from arcor2_hw.compute.world import RobotModel
 from arcor2_hw.data.base import Data
-from arcor2_hw.data.camera import CameraParameters, EstimatedPose, MarkerCorners
+from arcor2_hw.data.camera import CameraParameters, MarkerCorners
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint
-from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.compute_process import Told
 from arcor2_server.rpc.registry import RequestRefused
 
+if TYPE_CHECKING:
+    from arcor2_server.services import Services
 
-class CalibrationUnavailable(Arcor2Error):
-    """Nothing computes calibrations at this server."""
-
-    code = "calibration_unavailable"
+EXPECTED_WITHIN = (0.3, 0.5)
+"""m and rad, standard deviations of the pose that a camera has in the scene: enough to choose between two answers."""
 
 
 class RobotView(Data, frozen=True):
-    """A robot as a camera of known pose sees it. robot_pose: where it is taken to stand. urdf: its package's file."""
+    """A robot as a camera of known pose sees it. robot_pose: where it is taken to stand."""
 
     robot_joints: list[Joint]
     robot_pose: Pose
     camera_pose: Pose
     camera_parameters: CameraParameters
-    urdf_uri: str
 
 
 class Calibration(Protocol):
-    """Computes poses from the files of pictures. Raises Arcor2Error: no marker seen, no picture, no service."""
+    """Computes poses from pictures' files.
 
-    async def camera_pose(self, parameters: CameraParameters, image: bytes, *, inverse: bool = False) -> EstimatedPose:
-        """Give the pose of the camera in the origin frame; with `inverse`, of the origin in the camera's frame."""
+    told: called with the progress. Raises InvalidData for what is no picture, CalibrationRefused for one that
+    determines nothing, NotInstalled, ComputeStopped, ComputeTimeout.
+    """
 
-    async def marker_corners(self, parameters: CameraParameters, image: bytes) -> list[MarkerCorners]:
+    async def camera(
+        self,
+        parameters: CameraParameters,
+        pictures: list[bytes],
+        *,
+        expected: Pose | None = None,
+        told: Told | None = None,
+    ) -> CameraPose:
+        """Give where a camera stands that sees the configured markers.
+
+        expected: where it is roughly known to be, which is asked only where the markers alone leave two answers.
+        """
+
+    async def markers(self, parameters: CameraParameters, picture: bytes) -> list[MarkerCorners]:
         """Give the corners of every marker in the picture."""
 
-    async def robot_pose(self, view: RobotView, depth: bytes) -> Pose:
-        """Give the pose of a robot in the world from a depth picture (16 bit, mm)."""
+    async def robot(
+        self, model: RobotModel, view: RobotView, depth: list[bytes], *, told: Told | None = None
+    ) -> RobotPose:
+        """Give where a robot stands in the world, from depth pictures (16 bit, mm)."""
 
 
-_UNAVAILABLE: Final = "No calibration service is there: poses cannot be computed from pictures."
+class CalibrationService:
+    """Asks the compute worker, with the markers that are configured."""
 
+    def __init__(self, services: "Services") -> None:
+        self._services = services
 
-class NoCalibration:
-    """Stands where no calibration service is."""
+    async def camera(
+        self,
+        parameters: CameraParameters,
+        pictures: list[bytes],
+        *,
+        expected: Pose | None = None,
+        told: Told | None = None,
+    ) -> CameraPose:
+        """Give where a camera stands."""
+        configuration = self._services.markers.configuration
+        if not configuration.markers and not configuration.boards:
+            raise CalibrationRefused(
+                "No markers are configured: say which stand where (serve --calibration, or PUT "
+                "/api/calibration/markers).",
+                reason=Reason.NO_MARKER,
+            )
+        task = FindCameraPose(pictures, parameters, configuration.layout, configuration.options)
+        run = self._services.compute.run
+        try:
+            return await run(task, told=told)
+        except CalibrationRefused as error:
+            if expected is None or error.reason != Reason.AMBIGUOUS:
+                raise
+        distance, angle = EXPECTED_WITHIN
+        hinted = replace(task.options, expected=expected, expected_position=distance, expected_orientation=angle)
+        found = await run(replace(task, options=hinted), told=told)
+        return replace(found, verdict=f"{found.verdict} Of two answers, the one near its present pose was taken.")
 
-    async def camera_pose(self, *_: object, **__: object) -> EstimatedPose:
-        """Raise CalibrationUnavailable."""
-        raise CalibrationUnavailable(_UNAVAILABLE)
+    async def markers(self, parameters: CameraParameters, picture: bytes) -> list[MarkerCorners]:
+        """Give the corners of every marker in the picture."""
+        dictionary = self._services.markers.configuration.dictionary
+        return await self._services.compute.run(FindMarkers(picture, parameters, dictionary))
 
-    async def marker_corners(self, *_: object) -> list[MarkerCorners]:
-        """Raise CalibrationUnavailable."""
-        raise CalibrationUnavailable(_UNAVAILABLE)
-
-    async def robot_pose(self, *_: object) -> Pose:
-        """Raise CalibrationUnavailable."""
-        raise CalibrationUnavailable(_UNAVAILABLE)
+    async def robot(
+        self, model: RobotModel, view: RobotView, depth: list[bytes], *, told: Told | None = None
+    ) -> RobotPose:
+        """Give where a robot stands in the world."""
+        placed = replace(model, base=view.robot_pose)
+        task = FindRobotPose(placed, view.robot_joints, depth, view.camera_parameters, view.camera_pose)
+        return await self._services.compute.run(task, told=told)
 
 
 class RunningCalibrations:

@@ -5,13 +5,16 @@ from typing import TYPE_CHECKING
 
 from arcor2_server.aiming import Aiming
 from arcor2_server.breakpoints import SharedBreakpoints
-from arcor2_server.calibration import Calibration, NoCalibration, RunningCalibrations
+from arcor2_server.calibration import Calibration, CalibrationService, RunningCalibrations
 from arcor2_server.collisions import CollisionWorld
+from arcor2_server.compute import Compute
 from arcor2_server.edit_news import EditNews
 from arcor2_server.kept import KeptAnswers
+from arcor2_server.markers import Markers
 from arcor2_server.presence import PresenceBoard
 from arcor2_server.previews import Previews
 from arcor2_server.runs import Runs
+from arcor2_server.storage.calibrations import Calibrations
 from arcor2_server.storage.shared import SharedData
 from arcor2_server.tasks import Tasks
 from arcor2_server.type_news import TypeNews
@@ -40,7 +43,8 @@ class Services:
     storage: saved documents. assets: meshes and the like. types: what is known of object types.
     session: the open scene or project.
     cell: the scene when online. execution: packages and the running program. build: project to package.
-    calibration: poses from pictures. calibrations: what is being calibrated. aiming: who points a robot at an object.
+    compute: what needs numerics. calibration: poses from pictures. calibrations: what is being calibrated.
+    calibration_records: what was. markers: which stand where. aiming: who points a robot at an object.
     collisions: what is in the way. type_news: object types that clients have to be told of. kept: encoded answers.
     runs: their history. tasks: work under way. previews: what is dragged. views: what clients show, by user and shared.
     breakpoints: the shared ones. presence: who looks at what. edit_news: what follows from edits.
@@ -58,7 +62,10 @@ class Services:
     cell: "OnlineCell"
     execution: "Execution"
     build: "BuildService"
-    calibration: Calibration = field(default_factory=NoCalibration)
+    calibration: Calibration = field(init=False)
+    calibration_records: Calibrations = field(init=False)
+    compute: Compute = field(init=False)
+    markers: Markers = field(init=False)
     calibrations: RunningCalibrations = field(default_factory=RunningCalibrations)
     aiming: Aiming = field(default_factory=Aiming)
     collisions: CollisionWorld = field(default_factory=CollisionWorld)
@@ -74,6 +81,10 @@ class Services:
 
     def __post_init__(self) -> None:
         """Make what needs no more than these."""
+        self.compute = Compute(self.settings.compute_idle)
+        self.calibration = CalibrationService(self)
+        self.calibration_records = Calibrations(self.storage)
+        self.markers = Markers(self.settings.markers_file, self.settings.markers)
         data = SharedData(self.storage)
         self.runs = Runs(self.hub)
         self.tasks = Tasks(self.hub)

@@ -7,6 +7,7 @@ from typing import Any, Final, Self
 
 import msgspec
 
+from arcor2_hw.calibration.configuration import CalibrationConfiguration
 from arcor2_hw.data.cell import Cell
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
@@ -49,6 +50,10 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     streaming_period: float = 0.1
     scene_inflation: float = 0.01
     """By how much sizes are larger than stated where the safety of a line is asked, m."""
+    compute_idle: float = 120.0
+    """Seconds after which a compute worker that is asked nothing ends, and gives its memory back."""
+    markers: CalibrationConfiguration | None = None
+    """Which markers stand where; else as it was said over REST."""
     history_limit: int = 1000
     """Steps of undo that the journal keeps."""
     allowed_hosts: frozenset[str] = frozenset()
@@ -74,6 +79,11 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     def journal_database(self) -> Path:
         """Give the file of the journal of the open document."""
         return self.data_dir / "journal.sqlite"
+
+    @property
+    def markers_file(self) -> Path:
+        """Give the file in which markers are kept that were set over REST."""
+        return self.data_dir / "markers.json"
 
     @property
     def assets_dir(self) -> Path:
@@ -116,6 +126,7 @@ _VARIABLES: Final = {
     "ARCOR2_ARSERVER_LOCK_RETRY_WAIT": "lock_retry_wait",
     "ARCOR2_STREAMING_PERIOD": "streaming_period",
     "ARCOR2_SCENE_INFLATION": "scene_inflation",
+    "ARCOR2_HW_COMPUTE_IDLE": "compute_idle",
     "ARCOR2_HW_HOST": "host",
     "ARCOR2_HW_DATABASE_URL": "database_url",
     "ARCOR2_HW_ALLOWED_HOSTS": "allowed_hosts",

@@ -9,6 +9,7 @@ from arcor2_server.rest import (  # noqa: F401
     assets,
     build,
     calibration,
+    calibrations,
     documents,
     execution,
     general,

@@ -24,6 +24,8 @@ OPEN: Final = "open"
 """The key of a route's `opt` that says that it asks nobody for a token: it tells nothing."""
 SERVICE: Final = "service"
 """The key of a route's `opt` that names the service it belongs to."""
+PERSON: Final = "person"
+"""The key of a request's state under which the name on its token is, where it has one."""
 
 _encode = msgspec.json.Encoder().encode
 
@@ -61,8 +63,11 @@ _STATUS: Final[dict[type[Arcor2Error], tuple[int, str]]] = {
     InvalidProject: (409, "InvalidProject"),
 }
 """Status and `type` of the answer by kind of error, the first that fits: existing clients tell them by the type."""
-_ABSENT: Final = frozenset({"calibration_unavailable"})
-"""Codes that say that the part of the system that would answer is not there."""
+_ABSENT: Final = frozenset({"not_installed", "compute_stopped", "compute_timeout", "compute_busy"})
+"""Codes that say that the part of the system that would answer is not there, or did not."""
+_BY_CODE: Final = {"calibration_refused": (409, "Invalid")}
+_BY_REASON: Final = {"no_marker": (404, "NotFound")}
+"""As the original's Calibration service has them (protocol, section 15)."""
 _STATES: Final = {"Execution": "PackageRunState"}
 """The type of an error of state, where a service has one of its own."""
 
@@ -75,6 +80,7 @@ def answer(content: Any, status: int = 200) -> Response[bytes]:
 def refusal(service: str, error: Arcor2Error) -> Response[bytes]:
     """Answer an error of ours: 404 for what is not there, 400 for what has a wrong form, 409 for a wrong state."""
     otherwise = (503, "General") if error.code in _ABSENT else (409, _STATES.get(service, "General"))
+    otherwise = _BY_REASON.get(getattr(error, "reason", "")) or _BY_CODE.get(error.code, otherwise)
     status, name = next((found for kind, found in _STATUS.items() if isinstance(error, kind)), otherwise)
     return answer(WebApiError(service, _printable(str(error)), name, _printable(error.detail)), status)
 

@@ -1,20 +1,23 @@
-"""The Calibration service over REST (protocol, section 15); where none is there, each answers 503."""
+"""The Calibration service over REST as the original has it (protocol, section 15)."""
 
 import asyncio
-from typing import Final
+from typing import Final, TypeVar
 
 import msgspec
 
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.camera import CameraParameters, EstimatedPose, MarkerCorners
 from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.calibration import RobotView
 from arcor2_server.rest.naming import camelized_names, snaked
 from arcor2_server.rest.operations import MIB, Upload, operation
+from arcor2_server.robot_models import model_of_uri
 from arcor2_server.services import Services
 
+T = TypeVar("T")
 CALIBRATION = "Calibration"
 MAX_IMAGE: Final = 64 * MIB
 COEFFICIENTS: Final = (4, 5, 8, 12)
@@ -43,12 +46,22 @@ class CameraPoseQuery(CameraQuery, frozen=True, rename="camel"):
     inverse: bool = False
 
 
+class CalibrateRobotArgs(Data, frozen=True):
+    """A robot as a camera of known pose sees it. robot_pose: where it is taken to stand. urdf_uri: names an asset."""
+
+    robot_joints: list[Joint]
+    robot_pose: Pose
+    camera_pose: Pose
+    camera_parameters: CameraParameters
+    urdf_uri: str
+
+
 @operation("PUT", "/calibrate/camera", CALIBRATION, Role.TECHNICIAN, file="image", limit=MAX_IMAGE)
 async def calibrate_camera(services: Services, query: CameraPoseQuery, upload: Upload) -> EstimatedPose:
     """Give the pose of the camera, which sees markers whose poses are known."""
     parameters = query.parameters()
     image = await asyncio.to_thread(upload.file.read)
-    return await services.calibration.camera_pose(parameters, image, inverse=query.inverse)
+    return (await services.calibration.camera(parameters, [image])).estimated(inverse=query.inverse)
 
 
 @operation("PUT", "/markers/corners", CALIBRATION, Role.TECHNICIAN, file="image", limit=MAX_IMAGE, plain=True)
@@ -56,14 +69,22 @@ async def marker_corners(services: Services, query: CameraQuery, upload: Upload)
     """Give the corners of the markers in a picture, pixels."""
     parameters = query.parameters()
     image = await asyncio.to_thread(upload.file.read)
-    return await services.calibration.marker_corners(parameters, image)
+    return await services.calibration.markers(parameters, image)
 
 
 @operation("PUT", "/calibrate/robot", CALIBRATION, Role.TECHNICIAN, file="image", parts=("args",), limit=MAX_IMAGE)
 async def calibrate_robot(services: Services, upload: Upload) -> Pose:
     """Give the pose of a robot that a depth camera of known pose sees (16 bit, mm)."""
+    args = read_args(upload.fields["args"], CalibrateRobotArgs)
+    view = RobotView(args.robot_joints, args.robot_pose, args.camera_pose, args.camera_parameters)
+    model = model_of_uri(services, args.urdf_uri)
+    depth = await asyncio.to_thread(upload.file.read)
+    return (await services.calibration.robot(model, view, [depth])).pose
+
+
+def read_args(text: str, kind: type[T]) -> T:
+    """Read the part `args` of a multipart body, JSON in either spelling of names. InvalidData."""
     try:
-        view = msgspec.convert(snaked(msgspec.json.decode(upload.fields["args"])), RobotView)
+        return msgspec.convert(snaked(msgspec.json.decode(text)), kind)
     except (msgspec.DecodeError, RecursionError) as error:
         raise InvalidData(f"The part args is wrong: {camelized_names(str(error))}.") from None
-    return await services.calibration.robot_pose(view, await asyncio.to_thread(upload.file.read))

@@ -92,6 +92,10 @@ def _lowered(schema: Any, plain: bool) -> Any:
             case "anyOf" if {"type": "null"} in value:
                 others = [_lowered(item, plain) for item in value if item != {"type": "null"}]
                 lowered |= {"nullable": True} | (others[0] if len(others) == 1 else {"anyOf": others})
+            case "contentEncoding":
+                lowered["format"] = {"base64": "byte"}[value]
+            case "exclusiveMinimum" | "exclusiveMaximum":
+                lowered |= {f"m{key[10:]}": value, key: True}
             case "default" | "enum":
                 lowered[key] = value
             case _:
@@ -127,7 +131,9 @@ def _operation(one: Operation, schemas: Schemas) -> dict[str, Any]:
         schema = schemas[str(one.takes["body"]), False]
         made["requestBody"] = {"required": True, "content": {"application/json": {"schema": schema}}}
     elif one.file:
-        properties: dict[str, Any] = {one.file: {"type": "string", "format": "binary"}}
+        file: dict[str, Any] = {"type": "string", "format": "binary"}
+        several = {"type": "array", "minItems": 1, "items": file}
+        properties: dict[str, Any] = {one.file: several if "uploads" in one.takes else file}
         properties |= {name: {"type": "string", "description": "JSON"} for name in one.parts}
         schema = {"type": "object", "required": [one.file, *one.parts], "properties": properties}
         made["requestBody"] = {"required": True, "content": {"multipart/form-data": {"schema": schema}}}
@@ -151,7 +157,7 @@ def _responses(one: Operation, schemas: Schemas) -> dict[str, Any]:
         good["content"] = {one.media_type: {"schema": {"type": "string", "format": "binary"}}}
     refused = {"application/json": {"schema": schemas[str(WebApiError), False]}}
     reasons = {"default": "Refused: the body says why."}
-    if one.takes.keys() & {"query", "body", "upload"}:
+    if one.takes.keys() & {"query", "body", "upload", "uploads"}:
         reasons["400"] = "What was sent has a wrong form."
     if not one.open:
         reasons |= {"401": "A token is needed.", "403": "The role is too low."}

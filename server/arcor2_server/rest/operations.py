@@ -21,7 +21,7 @@ from litestar.response import Stream
 
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
-from arcor2_server.rest.answers import OPEN, ROLE, SERVICE, InternalError, Unsupported, refusal
+from arcor2_server.rest.answers import OPEN, PERSON, ROLE, SERVICE, InternalError, Unsupported, refusal
 from arcor2_server.rest.naming import camelized, camelized_names, snake, snaked
 
 log = structlog.get_logger(__name__)
@@ -30,6 +30,8 @@ F = TypeVar("F", bound=Callable[..., Awaitable[Any]])
 MIB: Final = 1024 * 1024
 LARGEST_BODY: Final = 16 * MIB
 """Bytes of a JSON body, as of a message of the websocket."""
+MOST_FILES: Final = 200
+"""Files of one body."""
 BESIDE: Final = 256 * 1024
 """Bytes of JSON beyond which it is read, or written, beside the event loop."""
 
@@ -51,11 +53,18 @@ class Upload(msgspec.Struct):
     fields: dict[str, str]
 
 
+class Uploads(msgspec.Struct):
+    """The files of a multipart body that has several of one name, in their order; `fields` are the other parts."""
+
+    files: list[IO[bytes]]
+    fields: dict[str, str]
+
+
 @dataclass(frozen=True, slots=True)
 class Operation:
     """One operation. The handler's own parameters say what it takes: `services`, `query` (a Struct), `body` (a type
-    that msgspec reads), `upload`, `port` (on which it
-    was asked); all others are parts of the path.
+    that msgspec reads), `upload`, `uploads`, `port` (on
+    which it was asked), `person` (whose token it is, empty where none is asked for); all others are parts of the path.
     """
 
     method: Literal["GET", "PUT", "POST", "DELETE"]
@@ -78,7 +87,7 @@ class Operation:
     path_names: tuple[str, ...] = field(default=())
 
 
-SPECIAL: Final = frozenset({"services", "query", "body", "upload", "port"})
+SPECIAL: Final = frozenset({"services", "query", "body", "upload", "uploads", "port", "person"})
 """Parameters of a handler that are no parts of the path."""
 OPERATIONS: Final[list[Operation]] = []
 
@@ -151,6 +160,10 @@ async def _arguments(declared: Operation, request: Request[Any, Any, Any], uploa
             given[name] = await _body(kind, request)
         elif name == "upload":
             given[name] = await _upload(declared, request, uploads)
+        elif name == "uploads":
+            given[name] = await _uploads(declared, request, uploads)
+        elif name == "person":
+            given[name] = request.state.get(PERSON, "")
     return given
 
 
@@ -205,31 +218,55 @@ def _decoded(content: bytes, kind: Any) -> Any:
 
 
 async def _upload(declared: Operation, request: Request[Any, Any, Any], uploads: list[UploadFile]) -> Upload:
+    parts, texts = await _multipart(declared, request, uploads)
+    file = _as_file(dict(parts).get(declared.file), uploads)
+    if file is None:
+        raise InvalidData(f"The body has no file {declared.file}.")
+    return Upload(typing.cast("IO[bytes]", file.file), file.filename, texts)
+
+
+async def _uploads(declared: Operation, request: Request[Any, Any, Any], uploads: list[UploadFile]) -> Uploads:
+    parts, texts = await _multipart(declared, request, uploads)
+    named = [part for name, part in parts if name == declared.file]
+    if len(named) > MOST_FILES:
+        raise InvalidData(f"The body has {len(named)} files {declared.file}; {MOST_FILES} are the most.")
+    files = [file for part in named if (file := _as_file(part, uploads)) is not None]
+    if not files:
+        raise InvalidData(f"The body has no file {declared.file}.")
+    return Uploads([typing.cast("IO[bytes]", file.file) for file in files], texts)
+
+
+async def _multipart(
+    declared: Operation, request: Request[Any, Any, Any], uploads: list[UploadFile]
+) -> tuple[list[tuple[str, Any]], dict[str, str]]:
+    """Give all parts of a body in their order, and those that are text, or have to be."""
     if request.content_type[0] != "multipart/form-data":
         raise Unsupported(f"The body has to be multipart/form-data with the file {declared.file}.")
     try:
         form = await request.form()
     except UnicodeDecodeError:
         raise InvalidData("A part of the body is neither text nor a file with a name.") from None
-    parts = dict(form.multi_items())
-    uploads += [part for _, part in form.multi_items() if isinstance(part, UploadFile)]
+    parts = list(form.multi_items())
+    uploads += [part for _, part in parts if isinstance(part, UploadFile)]
+    last = dict(parts)
     for name in declared.parts:
-        if name not in parts:
+        if name not in last:
             raise InvalidData(f"The body has no part {name}.")
-    file = parts.get(declared.file)
-    if isinstance(file, str):
-        # A part without a file name, that could be read as text.
-        file = UploadFile("application/octet-stream", "", file.encode())
-        uploads.append(file)
-    if not isinstance(file, UploadFile):
-        raise InvalidData(f"The body has no file {declared.file}.")
     texts: dict[str, str] = {}
-    for name, part in parts.items():
+    for name, part in last.items():
         if isinstance(part, str):
             texts[name] = part
         elif name in declared.parts:
             texts[name] = (await part.read(LARGEST_BODY)).decode(errors="replace")
-    return Upload(typing.cast("IO[bytes]", file.file), file.filename, texts)
+    return parts, texts
+
+
+def _as_file(part: Any, uploads: list[UploadFile]) -> UploadFile | None:
+    if isinstance(part, str):
+        # A part without a file name, that could be read as text.
+        part = UploadFile("application/octet-stream", "", part.encode())
+        uploads.append(part)
+    return part if isinstance(part, UploadFile) else None
 
 
 async def _response(declared: Operation, given: Any) -> Response[Any]:

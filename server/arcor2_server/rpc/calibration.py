@@ -1,14 +1,17 @@
 """Requests that find out where cameras and robots stand (protocol, 7.1, 7.2, 7.5)."""
 
 from collections.abc import Awaitable, Callable
-from typing import Final
+from typing import Any, Final
 
 import msgspec
 import structlog
 from msgspec.structs import replace
 
-from arcor2_hw.data.base import UNSET, Unset
+from arcor2_hw.calibration.records import CalibrationInput, CalibrationKind, CalibrationRecord
+from arcor2_hw.compute.world import RobotModel
+from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.camera import CameraParameters, EstimatedPose, MarkerCorners
+from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.data.events import ChangeType, ProcessStateData, ProcessStateEnum
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.rpc import CalibrateCameraArgs, CalibrateRobotArgs, GetCameraPoseArgs, MarkersCornersArgs
@@ -16,6 +19,8 @@ from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
 from arcor2_server.calibration import RobotView
 from arcor2_server.cell.motion import require_not_moving
+from arcor2_server.compute_process import Told
+from arcor2_server.robot_models import model_of
 from arcor2_server.rpc.cameras import PICTURE_WITHIN, camera_parameters, require_camera
 from arcor2_server.rpc.editing import require_held
 from arcor2_server.rpc.registry import Context, RequestRefused, make_event, rpc
@@ -27,6 +32,12 @@ log = structlog.get_logger(__name__)
 CAMERA_CALIBRATION: Final = "CameraCalibration"
 ROBOT_CALIBRATION: Final = "RobotCalibration"
 TO_CALIBRATION_POSE: Final = "move_to_calibration_pose"
+PICTURES: Final = 3
+"""Pictures of a camera that is calibrated: the mean of a few halves the noise of one."""
+STILL: Final = 0.002
+"""rad or m: a joint that changed by more while the picture was taken has moved."""
+DEPTH_FRAMES: Final = 10
+"""Frames of which a camera gives the mean as one depth picture."""
 
 
 # ------------------------------------------------------------------------------------------------ given pictures
@@ -44,17 +55,33 @@ def _file(image: str) -> bytes:
 @rpc("GetCameraPose")
 async def get_camera_pose(context: Context, args: GetCameraPoseArgs) -> EstimatedPose:
     """Give where a camera stands by the markers in its picture."""
-    calibration = context.services.calibration
-    return await calibration.camera_pose(args.camera_parameters, _file(args.image), inverse=args.inverse)
+    found = await context.services.calibration.camera(args.camera_parameters, [_file(args.image)])
+    return found.estimated(inverse=args.inverse)
 
 
 @rpc("MarkersCorners")
 async def markers_corners(context: Context, args: MarkersCornersArgs) -> list[MarkerCorners]:
     """Give where markers are in a picture."""
-    return await context.services.calibration.marker_corners(args.camera_parameters, _file(args.image))
+    return await context.services.calibration.markers(args.camera_parameters, _file(args.image))
 
 
 # ------------------------------------------------------------------------------------------------ objects of the scene
+class Outcome(Data, frozen=True):
+    """What a calibration found out, and from what."""
+
+    kind: CalibrationKind
+    pose: Pose
+    verdict: str
+    residual: float
+    unit: str
+    inputs: list[CalibrationInput]
+    parameters: dict[str, Any]
+    result: dict[str, Any]
+
+
+Find = Callable[[Told], Awaitable[Outcome]]
+
+
 @rpc("CalibrateCamera")
 async def calibrate_camera(context: Context, args: CalibrateCameraArgs) -> None:
     """Put a camera where its picture says that it stands; ProcessState tells how it goes."""
@@ -66,9 +93,27 @@ async def calibrate_camera(context: Context, args: CalibrateCameraArgs) -> None:
     require_held(context, args.id)
     services.calibrations.begin(camera.id, camera.name)
 
-    async def find() -> Pose:
-        image = await _picture(services, camera, "color_image")
-        return (await services.calibration.camera_pose(parameters, image)).pose
+    async def find(told: Told) -> Outcome:
+        pictures = []
+        for number in range(PICTURES):
+            told(0.1 * number, f"taking picture {number + 1} of {PICTURES}")
+            pictures.append(await _picture(services, camera, "color_image"))
+        told(0.1 * PICTURES, "looking for the markers")
+        expected = None if isinstance(camera.pose, Unset) else camera.pose
+        found = await services.calibration.camera(parameters, pictures, expected=expected)
+        return Outcome(
+            CalibrationKind.CAMERA_POSE,
+            found.pose,
+            found.verdict,
+            found.residual,
+            "px",
+            [CalibrationInput.of(f"picture {number}", each) for number, each in enumerate(pictures, 1)],
+            {
+                "camera_parameters": msgspec.to_builtins(parameters),
+                "markers": msgspec.to_builtins(services.markers.configuration),
+            },
+            msgspec.to_builtins(found),
+        )
 
     _begin(context, camera, CAMERA_CALIBRATION, find)
 
@@ -84,10 +129,7 @@ async def calibrate_robot(context: Context, args: CalibrateRobotArgs) -> None:
     require_held(context, args.robot_id)
     require_not_moving(services, robot.id)
     services.cell.arm(robot.id, None)
-    meta = services.types.robot_meta(robot.type)
-    urdf = meta.urdf_package_filename
-    if isinstance(urdf, Unset):
-        raise RequestRefused(f"{robot.name} has no model (URDF) by which a camera could find it.")
+    model = model_of(services, robot, "by which a camera could find it")
     user = context.user
     await services.locks.acquire(user, camera.id)
     try:
@@ -101,11 +143,11 @@ async def calibrate_robot(context: Context, args: CalibrateRobotArgs) -> None:
     if moves:
         services.cell.moving.add(robot.id)
 
-    async def find() -> Pose:
+    async def find(told: Told) -> Outcome:
         if moves:
+            told(0.0, f"{robot.name} moves to where it is seen well")
             await services.cell.call(robot.id, TO_CALIBRATION_POSE, control=True)
-        view = await _view(services, robot, camera, parameters, urdf)
-        return await services.calibration.robot_pose(view, await _picture(services, camera, "depth_image"))
+        return await _seen(services, robot, camera, parameters, model, told)
 
     def end() -> None:
         if moves:
@@ -113,6 +155,36 @@ async def calibrate_robot(context: Context, args: CalibrateRobotArgs) -> None:
         services.locks.release(user, camera.id)
 
     _begin(context, robot, ROBOT_CALIBRATION, find, end)
+
+
+async def _seen(
+    services: Services,
+    robot: SceneObject,
+    camera: SceneObject,
+    parameters: CameraParameters,
+    model: RobotModel,
+    told: Told,
+) -> Outcome:
+    """Take a depth picture and find the robot in it."""
+    view = await _view(services, robot, camera, parameters)
+    told(0.2, f"{camera.name} takes a depth picture")
+    depth = await _picture(services, camera, "depth_image", averaged_frames=DEPTH_FRAMES)
+    after = await services.cell.robot_joints(robot.id)
+    if any(abs(one.value - other.value) > STILL for one, other in zip(view.robot_joints, after, strict=False)):
+        raise RequestRefused(f"{robot.name} moved while the picture was taken.")
+    found = await services.calibration.robot(
+        model, view, [depth], told=lambda share, text: told(0.3 + 0.7 * share, text)
+    )
+    return Outcome(
+        CalibrationKind.ROBOT_POSE,
+        found.pose,
+        found.verdict,
+        found.residual,
+        "m",
+        [CalibrationInput.of("depth picture", depth), CalibrationInput("model", "", 0, model.urdf.name)],
+        {"view": msgspec.to_builtins(view), "camera_id": camera.id, "camera_name": camera.name},
+        msgspec.to_builtins(found),
+    )
 
 
 def _camera(services: Services, args: CalibrateRobotArgs) -> SceneObject:
@@ -125,18 +197,16 @@ def _camera(services: Services, args: CalibrateRobotArgs) -> SceneObject:
     raise RequestRefused("The scene has no camera that could see the robot.")
 
 
-async def _view(
-    services: Services, robot: SceneObject, camera: SceneObject, parameters: CameraParameters, urdf: str
-) -> RobotView:
+async def _view(services: Services, robot: SceneObject, camera: SceneObject, parameters: CameraParameters) -> RobotView:
     if isinstance(robot.pose, Unset) or isinstance(camera.pose, Unset):
         raise RequestRefused(f"{robot.name} and {camera.name} need a pose from which to search.")
     joints = await services.cell.robot_joints(robot.id)
-    return RobotView(joints, robot.pose, camera.pose, parameters, urdf)
+    return RobotView(joints, robot.pose, camera.pose, parameters)
 
 
-async def _picture(services: Services, camera: SceneObject, method: str) -> bytes:
+async def _picture(services: Services, camera: SceneObject, method: str, **arguments: int) -> bytes:
     """Take a picture; gives its file."""
-    raw = await services.cell.call(camera.id, method, deadline=PICTURE_WITHIN)
+    raw = await services.cell.call(camera.id, method, arguments, deadline=PICTURE_WITHIN)
     try:
         return _file(msgspec.json.decode(raw, type=str))
     except msgspec.MsgspecError:
@@ -144,13 +214,9 @@ async def _picture(services: Services, camera: SceneObject, method: str) -> byte
 
 
 def _begin(
-    context: Context,
-    obj: SceneObject,
-    process: str,
-    find: Callable[[], Awaitable[Pose]],
-    end: Callable[[], None] = lambda: None,
+    context: Context, obj: SceneObject, process: str, find: Find, end: Callable[[], None] = lambda: None
 ) -> None:
-    """Answer, tell the start, find the pose, and tell how it ended."""
+    """Answer, tell the start, find the pose, keep a record, and tell how it ended."""
     services, user = context.services, context.user
 
     def tell(state: ProcessStateEnum, message: str = "") -> None:
@@ -158,8 +224,14 @@ def _begin(
         services.hub.broadcast(make_event("ProcessState", data))
 
     async def whole() -> None:
+        verdict = ""
         try:
-            await _place(services, user, obj.id, await find())
+            with services.tasks.running(TaskKind.CALIBRATION, f"Calibration of {obj.name}", user) as task:
+                outcome = await find(task.at)
+                await _place(services, user, obj.id, outcome.pose)
+                await services.calibration_records.put(_record(obj, user, outcome))
+                verdict = outcome.verdict
+                task.at(1.0, verdict)
         except Arcor2Error as error:
             log.info("calibration failed", process=process, object=obj.name, reason=str(error), detail=error.detail)
             tell(ProcessStateEnum.FAILED, str(error))
@@ -167,13 +239,31 @@ def _begin(
             log.exception("calibration failed", process=process, object=obj.name)
             tell(ProcessStateEnum.FAILED, f"An error inside the server: {error}")
         else:
-            tell(ProcessStateEnum.FINISHED)
+            tell(ProcessStateEnum.FINISHED, verdict)
         finally:
             services.calibrations.end(obj.id)
             end()
 
     context.emit("ProcessState", ProcessStateData(process, ProcessStateEnum.STARTED))
     services.cell.spawn(whole(), f"calibration of {obj.name}")
+
+
+def _record(obj: SceneObject, user: str, outcome: Outcome) -> CalibrationRecord:
+    return CalibrationRecord(
+        outcome.kind,
+        user,
+        obj.id,
+        obj.name,
+        "world",
+        outcome.verdict,
+        residual=outcome.residual,
+        residual_unit=outcome.unit,
+        inputs=outcome.inputs,
+        parameters=outcome.parameters,
+        result=outcome.result,
+        before=obj.pose,
+        after=outcome.pose,
+    )
 
 
 async def _place(services: Services, user: str, object_id: str, pose: Pose) -> None:

@@ -106,6 +106,10 @@ class AssetStore:
         except KeyError:
             raise NotFound(f"There is no asset {key!r}.") from None
 
+    def file(self, key: str) -> Path:
+        """Give the file of an asset's present content, which never changes, and goes with it; NotFound."""
+        return self._path(self.info(key).digest).absolute()
+
     async def read(self, asset: Asset) -> AsyncIterator[bytes]:
         """Give the content of an asset in pieces, of the very version that `info` told of."""
         with self._told("read"):

@@ -1,17 +1,26 @@
 """Requests to cameras, and those that find out where cameras and robots stand."""
 
 import asyncio
+import hashlib
 import io
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 from PIL import Image
 
-from arcor2_hw.data.camera import CameraParameters, Corner, EstimatedPose, MarkerCorners
+from arcor2_hw.calibration.camera_results import CameraPose
+from arcor2_hw.calibration.configuration import CalibrationConfiguration
+from arcor2_hw.calibration.layout import Marker
+from arcor2_hw.calibration.records import CalibrationKind
+from arcor2_hw.calibration.results import Grade, RobotPose
+from arcor2_hw.compute.world import RobotModel
+from arcor2_hw.data.camera import CameraParameters, Corner, MarkerCorners
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.exceptions import Arcor2Error, NotFound
 from arcor2_server.calibration import RobotView
+from arcor2_server.compute_process import Told
 from tests.server.protocol.stage import Actor, Stage, happens, open_stage, refused
 
 PARAMETERS = {"fx": 600, "fy": 610, "cx": 320, "cy": 240, "dist_coefs": [0, 0, 0, 0]}
@@ -33,17 +42,34 @@ class Service:
         if self.refusal is not None:
             raise self.refusal
 
-    async def camera_pose(self, parameters: CameraParameters, image: bytes, *, inverse: bool = False) -> EstimatedPose:
-        await self._take(parameters, image, inverse)
-        return EstimatedPose(FOUND, 0.75)
+    async def camera(
+        self,
+        parameters: CameraParameters,
+        pictures: list[bytes],
+        *,
+        expected: Pose | None = None,
+        told: Told | None = None,
+    ) -> CameraPose:
+        await self._take(parameters, pictures, expected)
+        zeros = [[0.0] * 6] * 6
+        return CameraPose(
+            FOUND, 0.75, 0.2, [], zeros, 0.001, 0.002, 0.5, "joint", len(pictures), Grade.GOOD, "It is well known."
+        )
 
-    async def marker_corners(self, parameters: CameraParameters, image: bytes) -> list[MarkerCorners]:
-        await self._take(parameters, image)
+    async def markers(self, parameters: CameraParameters, picture: bytes) -> list[MarkerCorners]:
+        await self._take(parameters, [picture])
         return [MarkerCorners(10, [Corner(1, 2), Corner(3, 2), Corner(3, 4), Corner(1, 4)])]
 
-    async def robot_pose(self, view: RobotView, depth: bytes) -> Pose:
-        await self._take(view, depth)
-        return FOUND
+    async def robot(
+        self, model: RobotModel, view: RobotView, depth: list[bytes], *, told: Told | None = None
+    ) -> RobotPose:
+        if told is not None:
+            told(0.5, "looking for the robot")
+        await self._take(view, depth, model)
+        zeros = [[0.0] * 6] * 6
+        return RobotPose(
+            FOUND, Grade.GOOD, "It is well known.", 0.9, 0.0, 0.001, 1000, zeros, 0.001, 0.01, 0.02, 0.01, 8, 8, 0.5
+        )
 
 
 async def ready(stage: Stage, **objects: str) -> tuple[Actor, Service]:
@@ -97,18 +123,24 @@ async def test_pictures_of_clients_go_to_the_calibration_service(tmp_path: Path,
     async with open_stage(tmp_path) as stage:
         stranger = await stage.person()
         args: dict[str, Any] = {"camera_parameters": PARAMETERS, "image": "\xff\xd8\x00picture"}
-        assert "No calibration service" in await refused(stranger, request_name, **args)
+        # A picture that is none; without markers that are configured it is not even looked at.
+        words = "No markers are configured" if request_name == "GetCameraPose" else "picture"
+        assert words in await refused(stranger, request_name, **args)
         service = stage.services.calibration = Service()
         if request_name == "GetCameraPose":
             answer = await stranger.ask(request_name, **args, inverse=True)
             assert answer["quality"] == 0.75
+            inverse = FOUND.inverted()
+            assert answer["pose"]["position"] == msgspec.to_builtins(inverse.position)
+            assert answer["pose"]["orientation"] == msgspec.to_builtins(inverse.orientation)
+            answer = await stranger.ask(request_name, **args)
             assert answer["pose"]["position"] == {"x": 1, "y": 2, "z": 3}
-            assert service.asked[0][2] is True
+            assert service.asked.pop()[2] is None, "nothing is known of where the camera is"
         else:
             (seen,) = await stranger.ask(request_name, **args)
             assert seen["marker_id"] == 10
             assert seen["corners"][2] == {"x": 3, "y": 4}
-        parameters, image = service.asked[0][:2]
+        parameters, (image,) = service.asked[0][:2]
         assert parameters.fy == 610
         assert image == b"\xff\xd8\x00picture"
         # What the original never answered: a picture that is none.
@@ -140,16 +172,23 @@ async def test_a_camera_is_put_where_its_picture_says(tmp_path: Path) -> None:
         assert "calibrated already" in await refused(alice, "CalibrateCamera", id=eye)
         service.go.set()
         await happens(bob, "ProcessState", state="finished")
-        assert process(bob, "CameraCalibration") == [("started", False), ("finished", False)]
+        assert process(bob, "CameraCalibration") == [("started", False), ("finished", True)]
+        assert bob.waiting[-1]["data"]["message"] == "It is well known."
         assert bob.names() == ["ProcessState", "SceneObjectChanged/update", "ProcessState"]
-        parameters, image, inverse = service.asked[0]
+        parameters, images, expected = service.asked[0]
         assert parameters.cx == 320
-        assert image.startswith(b"\xff\xd8")
-        assert not inverse
+        assert len(images) == 3
+        assert all(image.startswith(b"\xff\xd8") for image in images)
+        assert expected == Pose(), "where it was placed"
         placed = stage.services.session.scene_object(eye)
         assert placed.pose == FOUND
         raw = await stage.services.cell.ask(Pose, eye, "pose")
         assert raw == FOUND, "the live camera has moved too"
+        (record,) = await stage.services.calibration_records.find(object_id=eye)
+        assert (record.kind, record.person, record.object_name) == (CalibrationKind.CAMERA_POSE, "alice", "eye")
+        assert (record.before, record.after, record.residual, record.residual_unit) == (Pose(), FOUND, 0.2, "px")
+        assert [each.sha256 for each in record.inputs] == [hashlib.sha256(image).hexdigest() for image in images]
+        assert record.parameters["camera_parameters"] == PARAMETERS
 
         service.refusal = NotFound("No marker is seen.")
         await alice.ask("CalibrateCamera", id=eye)
@@ -163,7 +202,7 @@ async def test_a_camera_is_put_where_its_picture_says(tmp_path: Path) -> None:
         assert "No scene is open" in await refused(alice, "CalibrateCamera", id=eye)
 
 
-async def test_without_a_service_a_calibration_fails_as_when_it_is_down(tmp_path: Path) -> None:
+async def test_a_camera_that_sees_no_markers_stays_where_it_is(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "Eye") as stage:
         alice = await stage.person("alice")
         await stage.place(alice, eye="Eye")
@@ -172,7 +211,15 @@ async def test_without_a_service_a_calibration_fails_as_when_it_is_down(tmp_path
         await alice.ask("CalibrateCamera", id=stage.ids["eye"])
         failed = await happens(alice, "ProcessState", state="failed")
         assert failed["id"] == "CameraCalibration"
-        assert "No calibration service" in failed["message"]
+        assert "No markers are configured" in failed["message"]
+        marker = Marker(7, Pose(Position(0.2, 0, 0)))
+        await stage.services.markers.set(CalibrationConfiguration(markers=[marker]))
+        alice.take()
+        await alice.ask("CalibrateCamera", id=stage.ids["eye"])
+        failed = await happens(alice, "ProcessState", state="failed")
+        assert alice.names() == ["ProcessState", "ProcessState"], "nothing was moved"
+        assert stage.services.session.scene_object(stage.ids["eye"]).pose == Pose()
+        assert await stage.services.calibration_records.find() == []
 
 
 async def test_a_robot_is_put_where_a_camera_sees_it(tmp_path: Path) -> None:
@@ -210,14 +257,20 @@ async def test_a_robot_is_put_where_a_camera_sees_it(tmp_path: Path) -> None:
         )
         service.go.set()
         await happens(carol, "ProcessState", state="finished")
-        assert process(carol, "RobotCalibration") == [("started", False), ("finished", False)]
+        assert process(carol, "RobotCalibration") == [("started", False), ("finished", True)]
+        tasks = [message["data"] for message in carol.waiting if message.get("event") == "TaskState"]
+        assert tasks == [], "nobody asked for these"
         assert carol.names() == ["ProcessState", "SceneObjectChanged/update", "ProcessState"]
-        view, depth = service.asked[0]
+        view, (depth,), model = service.asked[0]
         assert [joint.value for joint in view.robot_joints[:3]] == [0, 0, 1], "it went to its calibration pose"
-        assert view.urdf_uri == "arm.zip"
+        assert (model.urdf.name, Path(model.urdf.path).read_bytes()) == ("arm.zip", b"content")
+        assert view.robot_pose == Pose()
         picture = Image.open(io.BytesIO(depth))
         assert (picture.format, picture.mode, picture.getpixel((3, 3))) == ("PNG", "I;16", 1500)
         assert stage.services.session.scene_object(arm).pose == FOUND
+        (record,) = await stage.services.calibration_records.find(object_id=arm)
+        assert (record.kind, record.person, record.after) == (CalibrationKind.ROBOT_POSE, "alice", FOUND)
+        assert record.parameters["camera_id"] == eye
         await bob.lock(eye)
         await bob.ask("WriteUnlock", object_id=eye)
 

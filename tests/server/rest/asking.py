@@ -6,6 +6,8 @@ from typing import Any
 
 import httpx
 
+from arcor2_hw.compute.calibration_tasks import FrameByPoints
+from arcor2_hw.exceptions import InvalidData
 from arcor2_server.app import create_app
 from arcor2_server.services import Services
 
@@ -16,6 +18,12 @@ async def asking(services: Services) -> AsyncIterator[httpx.AsyncClient]:
     transport = httpx.ASGITransport(create_app(services))  # type: ignore[arg-type]
     async with httpx.AsyncClient(transport=transport, base_url="http://127.0.0.1:6789") as client:
         yield client
+
+
+async def start_workers(services: Services) -> None:
+    """Let the compute workers come up before the tests, not within the one that happens to need them first."""
+    with contextlib.suppress(InvalidData):
+        await services.compute.run(FrameByPoints([], []))
 
 
 def granted(answer: httpx.Response) -> Any:

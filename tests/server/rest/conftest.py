@@ -14,7 +14,7 @@ from arcor2_server.app import running_services
 from arcor2_server.services import Services
 from arcor2_server.settings import ServerSettings
 from tests.server.core.serving import ServerProcess, until
-from tests.server.rest.asking import asking
+from tests.server.rest.asking import asking, start_workers
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
@@ -27,6 +27,7 @@ async def services(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Se
         async with running_services(ServerSettings(data_dir=directory)) as parts:
             parts.cell.hosts.prepare()
             await until(lambda: psutil.Process().children())
+            await start_workers(parts)
             yield parts
 
 

@@ -281,24 +281,31 @@ CAMERA: dict[str, Any] = {"fx": 1, "fy": 1, "cx": 1, "cy": 1, "distCoefs": [0, 0
 
 
 @pytest.mark.parametrize("path", ["/calibrate/camera", "/markers/corners"])
-async def test_calibration_says_that_it_is_not_there(server: ServerProcess, path: str) -> None:
-    async with httpx.AsyncClient(base_url=base(server)) as http:
-        answer = await http.put(path, params=CAMERA, files=PICTURE)
-        refused(answer, 503, "General", "calibration")
+async def test_calibration_refuses_what_is_no_picture(server: ServerProcess, path: str) -> None:
+    async with httpx.AsyncClient(base_url=base(server), timeout=30.0) as http:
+        if path == "/calibrate/camera":
+            refused(await http.put(path, params=CAMERA, files=PICTURE), 404, "NotFound", "No markers are configured")
+            marker = {"marker_id": 7, "pose": {}}
+            granted(await http.put("/api/calibration/markers", json={"markers": [marker]}))
+        refused(await http.put(path, params=CAMERA, files=PICTURE), 400, "Argument", "picture")
         refused(await http.put(path, params=CAMERA | {"distCoefs": [0]}, files=PICTURE), 400, "Argument", "distCoefs")
         refused(await http.put(path, params={"fx": 1}, files=PICTURE), 400, "Argument")
         refused(await http.put(path, params=CAMERA), 415, "Argument")
 
 
-async def test_calibration_of_a_robot_says_that_it_is_not_there(server: ServerProcess) -> None:
-    async with httpx.AsyncClient(base_url=base(server)) as http:
+async def test_calibration_of_a_robot_needs_its_model(server: ServerProcess) -> None:
+    async with httpx.AsyncClient(base_url=base(server), timeout=30.0) as http:
         args = (
             '{"robotJoints": [{"name": "j1", "value": 1}], "robotPose": {}, "cameraPose": {}, "urdfUri": "arm.zip",'
             ' "cameraParameters": {"fx": 1, "fy": 1, "cx": 1, "cy": 1, "distCoefs": [0, 0, 0, 0]}}'
         )
-        refused(await http.put("/calibrate/robot", files=PICTURE, data={"args": args}), 503, "General", "calibration")
+        refused(await http.put("/calibrate/robot", files=PICTURE, data={"args": args}), 404, "NotFound", "arm.zip")
+        granted(await http.post("/assets", params={"id": "arm.zip"}, files={"assetData": ("arm.zip", b"PK no zip")}))
+        refused(await http.put("/calibrate/robot", files=PICTURE, data={"args": args}), 400, "Argument", "picture")
         as_a_file = PICTURE | {"args": ("args.json", args.encode(), "application/json")}
-        refused(await http.put("/calibrate/robot", files=as_a_file), 503, "General")
+        refused(await http.put("/calibrate/robot", files=as_a_file), 400, "Argument", "picture")
+        by_address = args.replace("arm.zip", "http://127.0.0.1:10000/assets/arm.zip/data")
+        refused(await http.put("/calibrate/robot", files=PICTURE, data={"args": by_address}), 400, "Argument")
         refused(await http.put("/calibrate/robot", files=PICTURE), 400, "Argument", "args")
         refused(await http.put("/calibrate/robot", files=PICTURE, data={"args": "{}"}), 400, "Argument", "robotJoints")
 

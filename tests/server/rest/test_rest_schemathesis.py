@@ -26,6 +26,7 @@ from arcor2_server.rest import OPERATIONS
 from arcor2_server.rest.operations import Operation
 from arcor2_server.settings import ServerSettings
 from tests.server.core.serving import until
+from tests.server.rest.asking import start_workers
 
 EXAMPLES = 8
 """For each of some seventy operations."""
@@ -51,6 +52,7 @@ class Loop:
         async with running_services(ServerSettings(data_dir=self._directory)) as services:
             services.cell.hosts.prepare()
             await until(lambda: psutil.Process().children())
+            await start_workers(services)
             self.app = create_app(services)
             self._up.set()
             await self._end.wait()
@@ -89,19 +91,23 @@ def api(server: Loop) -> Any:
     return schemathesis.openapi.from_asgi("/openapi", server)
 
 
-CONFORMING = [content_type_conformance, negative_data_rejection, response_schema_conformance, status_code_conformance]
+CHECKS = [
+    content_type_conformance,
+    negative_data_rejection,
+    not_a_server_error,
+    response_schema_conformance,
+    status_code_conformance,
+]
 
 
 @pytest.mark.parametrize("declared", OPERATIONS, ids=lambda one: f"{one.method} {one.path}")
 def test_whatever_is_asked_gets_an_answer_of_the_stated_form(api: Any, declared: Operation) -> None:
     operation = api[declared.path][declared.method]
-    # The Calibration service, which is not there, is not there with 503.
-    checks = CONFORMING if declared.service == "Calibration" else [*CONFORMING, not_a_server_error]
 
     @settings(max_examples=EXAMPLES, deadline=None, database=None, derandomize=True, suppress_health_check=HealthCheck)
     @given(st.one_of([operation.as_strategy(mode) for mode in GenerationMode]))
     def ask(case: Any) -> None:
-        answer = case.call_and_validate(checks=checks)
+        answer = case.call_and_validate(checks=CHECKS)
         if answer.status_code >= 400:
             assert set(answer.json()) == {"service", "message", "type", "description"}
 

@@ -1,0 +1,400 @@
+"""Calibrations beyond the original's, over REST (docs/protocol.md): whole results, more kinds, and their records."""
+
+import asyncio
+from typing import Annotated, Any, Final
+
+import msgspec
+from msgspec import Meta, field
+from msgspec.structs import replace
+
+from arcor2_hw.calibration.camera_results import (
+    CameraPose,
+    HandEye,
+    HandEyeOptions,
+    HandEyeSample,
+    Intrinsics,
+    IntrinsicsOptions,
+    Mounting,
+    PoseOptions,
+)
+from arcor2_hw.calibration.configuration import CalibrationConfiguration
+from arcor2_hw.calibration.layout import CharucoBoard, Layout
+from arcor2_hw.calibration.records import (
+    CalibrationCheck,
+    CalibrationInput,
+    CalibrationKind,
+    CalibrationRecord,
+    check_against,
+)
+from arcor2_hw.calibration.results import RobotPose, TouchedFrame, TouchedOrientation, TouchedTip
+from arcor2_hw.compute import calibration_tasks as t
+from arcor2_hw.data.base import UNSET, Data, Unset
+from arcor2_hw.data.camera import CameraParameters
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.role import Role
+from arcor2_hw.exceptions import InvalidData
+from arcor2_server.rest.calibration import CALIBRATION, CalibrateRobotArgs, read_args
+from arcor2_server.rest.operations import MIB, Binary, Upload, Uploads, operation
+from arcor2_server.robot_models import model_of_uri
+from arcor2_server.services import Services
+
+MAX_PICTURES: Final = 256 * MIB
+"""Bytes of all pictures together."""
+MOST_POINTS: Final = 1000
+
+Points = Annotated[list[Position], Meta(max_length=MOST_POINTS)]
+
+
+class RecordAs(Data, frozen=True):
+    """What a record is kept under: of which object, and in which frame its pose is stated. before: its pose so far."""
+
+    object_id: str
+    object_name: str = ""
+    parent: str = "world"
+    before: Pose | Unset = UNSET
+    applied: bool = False
+
+
+# ------------------------------------------------------------------------------------------------ markers
+@operation("GET", "/api/calibration/markers", CALIBRATION, Role.OPERATOR, plain=True)
+async def get_markers(services: Services) -> CalibrationConfiguration:
+    """Give which markers and boards stand where in this workplace."""
+    return services.markers.configuration
+
+
+@operation("PUT", "/api/calibration/markers", CALIBRATION, Role.TECHNICIAN, plain=True)
+async def put_markers(services: Services, body: CalibrationConfiguration) -> None:
+    """Say which markers and boards stand where, in place of what was said before."""
+    await services.markers.set(body)
+
+
+# ------------------------------------------------------------------------------------------------ pictures
+class CameraArgs(Data, frozen=True):
+    """markers: where they stand, else as configured. options: else as configured. record: keep one of the result."""
+
+    camera_parameters: CameraParameters
+    markers: CalibrationConfiguration | Unset = UNSET
+    options: PoseOptions | Unset = UNSET
+    record: RecordAs | Unset = UNSET
+
+
+class CameraPictureArgs(Data, frozen=True):
+    """result: what `camera` gave for this picture."""
+
+    camera_parameters: CameraParameters
+    result: CameraPose
+    markers: CalibrationConfiguration | Unset = UNSET
+
+
+class RobotArgs(CalibrateRobotArgs, frozen=True):
+    """distance (m), angle (rad): by how much the pose may be off. record: keep one of the result."""
+
+    distance: Annotated[float, Meta(gt=0, le=1)] = 0.08
+    angle: Annotated[float, Meta(gt=0, le=1)] = 0.14
+    record: RecordAs | Unset = UNSET
+
+
+class HandEyeArgs(Data, frozen=True):
+    """flanges: of the robot, in its base frame, one for each picture, in the same order. target: what is seen."""
+
+    flanges: list[Pose]
+    camera_parameters: CameraParameters
+    target: Layout
+    mounting: Mounting
+    options: HandEyeOptions = HandEyeOptions()
+    record: RecordAs | Unset = UNSET
+
+
+class IntrinsicsArgs(Data, frozen=True):
+    """board: what is seen."""
+
+    board: CharucoBoard
+    options: IntrinsicsOptions = IntrinsicsOptions()
+    record: RecordAs | Unset = UNSET
+
+
+async def _pictures(uploads: Uploads) -> list[bytes]:
+    return [await asyncio.to_thread(file.read) for file in uploads.files]
+
+
+def _configured(services: Services, given: CalibrationConfiguration | Unset) -> CalibrationConfiguration:
+    return services.markers.configuration if isinstance(given, Unset) else given
+
+
+_MANY: Final[dict[str, Any]] = {"file": "image", "parts": ("args",), "limit": MAX_PICTURES, "plain": True}
+
+
+@operation("PUT", "/api/calibration/camera", CALIBRATION, Role.TECHNICIAN, **_MANY)
+async def find_camera_pose(services: Services, uploads: Uploads, person: str) -> CameraPose:
+    """Give where a camera stands, from one picture of markers or several of the same view, with all errors."""
+    args = read_args(uploads.fields["args"], CameraArgs)
+    configuration = _configured(services, args.markers)
+    options = configuration.options if isinstance(args.options, Unset) else args.options
+    pictures = await _pictures(uploads)
+    task = t.FindCameraPose(pictures, args.camera_parameters, configuration.layout, options)
+    found = await services.compute.run(task)
+    details = {"camera_parameters": args.camera_parameters, "markers": configuration, "options": options}
+    kind = CalibrationKind.CAMERA_POSE
+    await _keep(services, person, args.record, kind, found, found.residual, "px", pictures, details, found.pose)
+    return found
+
+
+@operation(
+    "PUT",
+    "/api/calibration/camera/picture",
+    CALIBRATION,
+    Role.TECHNICIAN,
+    file="image",
+    parts=("args",),
+    limit=64 * MIB,
+    media_type="image/png",
+)
+async def draw_camera_pose(services: Services, upload: Upload) -> Binary:
+    """Draw where the markers should be with a camera's pose onto its picture; PNG."""
+    args = read_args(upload.fields["args"], CameraPictureArgs)
+    picture = await asyncio.to_thread(upload.file.read)
+    layout = _configured(services, args.markers).layout
+    drawn = await services.compute.run(t.DrawCameraPose(picture, args.camera_parameters, layout, args.result))
+    return Binary(drawn, "image/png", "camera-pose.png")
+
+
+@operation("PUT", "/api/calibration/robot", CALIBRATION, Role.TECHNICIAN, **_MANY)
+async def find_robot_pose(services: Services, uploads: Uploads, person: str) -> RobotPose:
+    """Give where a robot stands that a depth camera of known pose sees (16 bit, mm), with all figures."""
+    args = read_args(uploads.fields["args"], RobotArgs)
+    pictures = await _pictures(uploads)
+    model = replace(model_of_uri(services, args.urdf_uri), base=args.robot_pose)
+    found = await services.compute.run(
+        t.FindRobotPose(
+            model, args.robot_joints, pictures, args.camera_parameters, args.camera_pose, args.distance, args.angle
+        )
+    )
+    details = {"view": replace(args, record=UNSET)}
+    kind = CalibrationKind.ROBOT_POSE
+    await _keep(services, person, args.record, kind, found, found.residual, "m", pictures, details, found.pose)
+    return found
+
+
+@operation("PUT", "/api/calibration/hand-eye", CALIBRATION, Role.TECHNICIAN, **_MANY)
+async def find_hand_eye(services: Services, uploads: Uploads, person: str) -> HandEye:
+    """Give where a camera sits on a robot's flange, or beside the robot."""
+    args = read_args(uploads.fields["args"], HandEyeArgs)
+    pictures = await _pictures(uploads)
+    if len(pictures) != len(args.flanges):
+        raise InvalidData(f"There are {len(pictures)} pictures, but {len(args.flanges)} poses of the flange.")
+    samples = [HandEyeSample(flange, picture) for flange, picture in zip(args.flanges, pictures, strict=True)]
+    task = t.FindHandEye(samples, args.camera_parameters, args.target, args.mounting, args.options)
+    found = await services.compute.run(task)
+    details = {"args": replace(args, record=UNSET)}
+    kind = CalibrationKind.HAND_EYE
+    await _keep(services, person, args.record, kind, found, found.residual, "px", pictures, details, found.pose)
+    return found
+
+
+@operation("PUT", "/api/calibration/intrinsics", CALIBRATION, Role.TECHNICIAN, **_MANY)
+async def find_intrinsics(services: Services, uploads: Uploads, person: str) -> Intrinsics:
+    """Give the focal lengths, the centre and the distortion of a camera, from pictures of a ChArUco board."""
+    args = read_args(uploads.fields["args"], IntrinsicsArgs)
+    pictures = await _pictures(uploads)
+    found = await services.compute.run(t.FindIntrinsics(pictures, args.board, args.options))
+    details = {"args": replace(args, record=UNSET)}
+    kind = CalibrationKind.INTRINSICS
+    await _keep(services, person, args.record, kind, found, found.residual, "px", pictures, details, UNSET)
+    return found
+
+
+# ------------------------------------------------------------------------------------------------ by touch
+class FrameByAxesArgs(Data, frozen=True):
+    """A frame's origin, a point on its +x axis, and points in its xy plane on the side of +y; m."""
+
+    origin: Position
+    on_x: Position
+    in_plane: Points
+    record: RecordAs | Unset = UNSET
+
+
+class FrameByPointsArgs(Data, frozen=True):
+    """Points in the frame that is looked for, and where they were touched, in the same order; m."""
+
+    known: Points
+    touched: Points
+    record: RecordAs | Unset = UNSET
+
+
+class TipArgs(Data, frozen=True):
+    """Poses of the flange in the robot's base frame, with the tip on one point."""
+
+    flanges: Annotated[list[Pose], Meta(max_length=MOST_POINTS)]
+    record: RecordAs | Unset = UNSET
+
+
+class AlignmentArgs(Data, frozen=True):
+    """Orientations of the flange with the tool's axes along those of a reference."""
+
+    flanges: Annotated[list[Orientation], Meta(max_length=MOST_POINTS)]
+    reference: Orientation = field(default_factory=Orientation)
+    record: RecordAs | Unset = UNSET
+
+
+class DirectionsArgs(Data, frozen=True):
+    """The tip, then moved along the tool's +z, then from the tip to its +x side; the flange does not turn meanwhile."""
+
+    flange: Orientation
+    tip: Position
+    along_z: Position
+    on_x: Position
+    record: RecordAs | Unset = UNSET
+
+
+@operation("PUT", "/api/calibration/touch/frame-by-axes", CALIBRATION, Role.TECHNICIAN, plain=True)
+async def frame_by_axes(services: Services, body: FrameByAxesArgs, person: str) -> TouchedFrame:
+    """Give a frame from three touched points or more: origin, x axis, xy plane."""
+    found = await services.compute.run(t.FrameByAxes(body.origin, body.on_x, body.in_plane))
+    await _keep_touched(services, person, body, CalibrationKind.USER_FRAME, found, found.pose)
+    return found
+
+
+@operation("PUT", "/api/calibration/touch/frame-by-points", CALIBRATION, Role.TECHNICIAN, plain=True)
+async def frame_by_points(services: Services, body: FrameByPointsArgs, person: str) -> TouchedFrame:
+    """Give a frame from three points or more that are known in it, and were touched: a robot's base, or an object."""
+    found = await services.compute.run(t.FrameByPoints(body.known, body.touched))
+    await _keep_touched(services, person, body, CalibrationKind.BASE_FRAME, found, found.pose)
+    return found
+
+
+@operation("PUT", "/api/calibration/touch/tip", CALIBRATION, Role.TECHNICIAN, plain=True)
+async def tip_by_touches(services: Services, body: TipArgs, person: str) -> TouchedTip:
+    """Give a tool's tip on the flange, from one point touched in four orientations or more."""
+    found = await services.compute.run(t.TipByTouches(body.flanges))
+    await _keep_touched(services, person, body, CalibrationKind.TOOL_TIP, found, Pose(found.position))
+    return found
+
+
+@operation("PUT", "/api/calibration/touch/orientation-by-alignment", CALIBRATION, Role.TECHNICIAN, plain=True)
+async def orientation_by_alignment(services: Services, body: AlignmentArgs, person: str) -> TouchedOrientation:
+    """Give a tool's orientation on the flange, from aligning it with a reference."""
+    found = await services.compute.run(t.OrientationByAlignment(body.flanges, body.reference))
+    turned = Pose(orientation=found.orientation)
+    await _keep_touched(services, person, body, CalibrationKind.TOOL_ORIENTATION, found, turned)
+    return found
+
+
+@operation("PUT", "/api/calibration/touch/orientation-by-points", CALIBRATION, Role.TECHNICIAN, plain=True)
+async def orientation_by_points(services: Services, body: DirectionsArgs, person: str) -> TouchedOrientation:
+    """Give a tool's orientation on the flange, from moving its tip along its +z and to its +x side."""
+    found = await services.compute.run(t.OrientationByPoints(body.flange, body.tip, body.along_z, body.on_x))
+    turned = Pose(orientation=found.orientation)
+    await _keep_touched(services, person, body, CalibrationKind.TOOL_ORIENTATION, found, turned)
+    return found
+
+
+# ------------------------------------------------------------------------------------------------ records
+class RecordsQuery(Data, frozen=True):
+    """Of an object, of a kind, older than a date; at most so many."""
+
+    object_id: str | Unset = UNSET
+    kind: CalibrationKind | Unset = UNSET
+    before: str | Unset = UNSET
+    limit: Annotated[int, Meta(ge=0, le=1000)] = 100
+
+
+class ByHandArgs(Data, frozen=True):
+    """A pose that somebody typed in. remark: why, or from where."""
+
+    object_id: str
+    object_name: str
+    pose: Pose
+    parent: str = "world"
+    before: Pose | Unset = UNSET
+    remark: str = ""
+
+
+class CheckArgs(Data, frozen=True):
+    """A pose measured later, in the same frame as the record's, and how far it may be off (m, rad)."""
+
+    pose: Pose
+    distance_limit: Annotated[float, Meta(gt=0)] = 0.002
+    angle_limit: Annotated[float, Meta(gt=0)] = 0.0035
+
+
+@operation("GET", "/api/calibrations", CALIBRATION, Role.OPERATOR, plain=True)
+async def list_calibrations(services: Services, query: RecordsQuery) -> list[CalibrationRecord]:
+    """List the records of calibrations, newest first."""
+    given = {name: value for name, value in msgspec.structs.asdict(query).items() if not isinstance(value, Unset)}
+    return await services.calibration_records.find(**given)
+
+
+@operation("POST", "/api/calibrations", CALIBRATION, Role.TECHNICIAN, plain=True)
+async def record_by_hand(services: Services, body: ByHandArgs, person: str) -> CalibrationRecord:
+    """Keep a record of a pose that somebody typed in."""
+    record = CalibrationRecord(
+        CalibrationKind.BY_HAND,
+        person,
+        body.object_id,
+        body.object_name,
+        body.parent,
+        body.remark or "Typed in by hand.",
+        before=body.before,
+        after=body.pose,
+    )
+    await services.calibration_records.put(record)
+    return record
+
+
+@operation("GET", "/api/calibrations/{calibration_id}", CALIBRATION, Role.OPERATOR, plain=True)
+async def get_calibration(services: Services, calibration_id: str) -> CalibrationRecord:
+    """Give the record of a calibration."""
+    return await services.calibration_records.get(calibration_id)
+
+
+@operation("PUT", "/api/calibrations/{calibration_id}/check", CALIBRATION, Role.OPERATOR, plain=True)
+async def check_calibration(services: Services, calibration_id: str, body: CheckArgs) -> CalibrationCheck:
+    """Compare a pose measured now with that of a record."""
+    record = await services.calibration_records.get(calibration_id)
+    return check_against(record, body.pose, distance_limit=body.distance_limit, angle_limit=body.angle_limit)
+
+
+async def _keep(
+    services: Services,
+    person: str,
+    under: RecordAs | Unset,
+    kind: CalibrationKind,
+    found: Any,
+    residual: float,
+    unit: str,
+    pictures: list[bytes],
+    details: dict[str, Any],
+    after: Pose | Unset,
+) -> None:
+    """Keep a record where one is wanted."""
+    if isinstance(under, Unset):
+        return
+    result: dict[str, Any] = msgspec.to_builtins(found)
+    result.pop("picture", None)  # what can be drawn again
+    inputs = [CalibrationInput.of(f"picture {number}", each) for number, each in enumerate(pictures, 1)]
+    await services.calibration_records.put(
+        CalibrationRecord(
+            kind,
+            person,
+            under.object_id,
+            under.object_name or under.object_id,
+            under.parent,
+            found.verdict,
+            residual=residual,
+            residual_unit=unit,
+            inputs=inputs,
+            parameters=msgspec.to_builtins(details),
+            result=result,
+            before=under.before,
+            after=after,
+            applied=under.applied,
+        )
+    )
+
+
+async def _keep_touched(
+    services: Services, person: str, body: Any, kind: CalibrationKind, found: Any, after: Pose
+) -> None:
+    unit = "rad" if kind is CalibrationKind.TOOL_ORIENTATION else "m"
+    details = {"args": replace(body, record=UNSET)}
+    await _keep(services, person, body.record, kind, found, found.residual, unit, [], details, after)
