@@ -26,6 +26,7 @@ class SharedBreakpoints:
         self._services = services
         self._data = data
         self._set: dict[str, tuple[set[str], str]] = {}
+        self._last: tuple[str, set[str]] = ("", set())
         self._turn = asyncio.Lock()
         self.on_change: list[Callable[[str, set[str]], None]] = []
         """Called with a project, and the breakpoints that it has now."""
@@ -69,7 +70,9 @@ class SharedBreakpoints:
             return
         ids = {c.id for c in changes if c.kind in _KINDS and (c.before is None or c.after is None)}
         if ids & known[0]:
-            self._tell(self._told(project[0].id, known, self._of_open()))
+            told = self._told(project[0].id, known, self._of_open())
+            if self._last != (told.project_id, told.ids):
+                self._tell(told)
 
     async def forget(self, project_id: str) -> None:
         """Drop those of a project that is gone: what is on disk goes with its views."""
@@ -100,6 +103,7 @@ class SharedBreakpoints:
         return ProjectBreakpoints(project_id, known[0] & items, known[1] or UNSET)
 
     def _tell(self, told: ProjectBreakpoints) -> None:
+        self._last = (told.project_id, told.ids)
         self._services.hub.broadcast(make_event("BreakpointsChanged", told))
         for tell in self.on_change:
             tell(told.project_id, told.ids)

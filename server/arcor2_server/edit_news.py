@@ -1,7 +1,6 @@
 """What follows from edits of the open document, told a moment later: what one could undo, previews, breakpoints."""
 
 import asyncio
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from arcor2_hw.data.base import UNSET
@@ -18,6 +17,8 @@ if TYPE_CHECKING:
 
 DELAY: Final = 0.005
 """Seconds after an edit: its answer and its own events go out first, and edits in a row are told once."""
+AT_LATEST: Final = 0.1
+"""Seconds after which it is told although edits still come."""
 NAME: Final = "HistoryChanged"
 
 
@@ -28,6 +29,9 @@ class EditNews:
         self._services = services
         self._changes: list[Change] = []
         self._timer: asyncio.TimerHandle | None = None
+        self._since = 0.0
+        self._last = 0.0
+        self._kept = services.session.revision
         services.session.on_change.append(self._changed)
 
     def history_of(self, client: Client) -> Event:
@@ -39,15 +43,26 @@ class EditNews:
         if self._timer is not None:
             self._timer.cancel()
 
-    def _changed(self, changes: Sequence[Change]) -> None:
-        self._changes += changes
+    def _changed(self, edit: Edit | None) -> None:
+        loop = asyncio.get_running_loop()
+        self._last = loop.time()
+        self._kept = 0 if edit is None else edit.number
+        if edit is not None:
+            self._changes += edit.changes
+            self._services.previews.changed(edit.changes)
         if self._timer is None:
-            self._timer = asyncio.get_running_loop().call_later(DELAY, self._tell)
+            self._since = self._last
+            self._timer = loop.call_later(DELAY, self._tell)
 
     def _tell(self) -> None:
+        loop = asyncio.get_running_loop()
+        under_way = self._services.session.revision != self._kept or loop.time() < self._last + DELAY
+        if under_way and loop.time() < self._since + AT_LATEST:
+            self._timer = loop.call_later(DELAY, self._tell)
+            return
         self._timer = None
         changes, self._changes = self._changes, []
-        self._services.previews.changed(changes)
+        self._services.previews.end_changed()
         self._services.breakpoints.changed(changes)
         events: dict[str | None, bytes] = {}
         for client in self._services.hub.subscribers(NAME):

@@ -22,12 +22,13 @@ NAME: Final = "MovePreview"
 
 
 class _Dragged:
-    __slots__ = ("client", "locked", "user")
+    __slots__ = ("client", "ending", "locked", "user")
 
     def __init__(self, client: Client, user: str, locked: str) -> None:
         self.client = client
         self.user = user
         self.locked = locked
+        self.ending = False
 
 
 class Previews:
@@ -45,7 +46,8 @@ class Previews:
         if preview.position is UNSET and preview.orientation is UNSET and preview.joints is UNSET:
             self._over(preview.id)
             return
-        if (dragged := self._dragged.get(preview.id)) is None or dragged.client is not client or dragged.user != user:
+        dragged = self._dragged.get(preview.id)
+        if dragged is None or dragged.ending or dragged.client is not client or dragged.user != user:
             self._dragged[preview.id] = _Dragged(client, user, locked)
         data = MovePreviewData(
             id=preview.id,
@@ -59,10 +61,16 @@ class Previews:
             self._look = asyncio.get_running_loop().call_later(LOOK_PERIOD, self._look_around)
 
     def changed(self, changes: Sequence[Change]) -> None:
-        """End the previews of what was changed or removed."""
+        """Note that things were changed or removed: that is where their previews lead to."""
         if self._dragged:
             for change in changes:
-                self._over(change.id)
+                if (dragged := self._dragged.get(change.id)) is not None:
+                    dragged.ending = True
+
+    def end_changed(self) -> None:
+        """End the previews of what was changed or removed."""
+        for item in [item for item, dragged in self._dragged.items() if dragged.ending]:
+            self._over(item)
 
     def close(self) -> None:
         """End with the server."""

@@ -66,8 +66,8 @@ class Session:
         self.removed_types: set[str] = set()
         """Object types of objects that were removed: those made for one object are deleted when the scene is saved."""
         self.history = History(settings.history_limit)
-        self.on_change: list[Callable[[Sequence[Change]], None]] = []
-        """Called with the changes of each edit that is on the disk, and with none when another document is open."""
+        self.on_change: list[Callable[[Edit | None], None]] = []
+        """Called with each edit once it is on the disk, and with None when another document is open."""
         self._services = services
         self._limit = settings.history_limit
         self._journal = Journal(settings.journal_database, self._take_back)
@@ -269,9 +269,9 @@ class Session:
 
     def _kept(self, future: "asyncio.Future[None]") -> None:
         if future.exception() is None:
-            changes = self._pending.popleft().edit.changes
+            edit = self._pending.popleft().edit
             for tell in self.on_change:
-                tell(changes)
+                tell(edit)
 
     def _take_back(self) -> None:
         """Undo all that is not on the disk: the journal cannot be written."""
@@ -326,7 +326,7 @@ class Session:
         self._unsaved = Unsaved()
         self._forget_snapshots()
         for tell in self.on_change:
-            tell(())
+            tell(None)
 
     async def save(self) -> None:
         """Save what has changes: the scene, the project, or both. Raises StorageError."""
