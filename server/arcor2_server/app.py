@@ -42,6 +42,7 @@ from arcor2_server.rpc import (  # noqa: F401
     locking,
     logic,
     object_types,
+    operation,
     orientations,
     parameters,
     perpendicular,

@@ -19,6 +19,7 @@ from arcor2_hw.data.events import (
     ProjectExceptionData,
     ShowMainScreenData,
 )
+from arcor2_hw.data.operation import ObjectHealthData
 from arcor2_hw.data.package import PackageStateEnum, PackageSummary
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.runtime import messages as m
@@ -71,7 +72,7 @@ class Execution:
         self._host: CellHost | None = None
         self._info: bytes | None = None
         self._before: bytes | None = None
-        self._board = DeviceBoard(lambda data: services.hub.broadcast(make_event("ObjectState", data)))
+        self._board = DeviceBoard(services.hub)
         self._run_number = 0
         self._stopped_by: str | None = None
         self._shared_of = ""
@@ -99,6 +100,10 @@ class Execution:
     def object_states(self) -> list[ObjectStateData]:
         """Give the connections of the objects of the running program."""
         return self._board.states() if self.busy else []
+
+    def object_healths(self) -> list[ObjectHealthData]:
+        """Give the health of the objects of the running program."""
+        return self._board.healths() if self.busy else []
 
     @property
     def action_in_progress(self) -> bytes | None:

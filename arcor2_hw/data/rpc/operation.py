@@ -82,4 +82,3 @@ class AcknowledgeStopArgs(Data, frozen=True):
 
     object_id: str
     code: str | Unset = UNSET
-    arm_id: str | Unset = UNSET

@@ -9,8 +9,11 @@ from arcor2_hw.data.base import UNSET, Data
 from arcor2_hw.data.cell import Cell, overlay, strangers
 from arcor2_hw.data.device import Alarm, Connection, Health
 from arcor2_hw.data.events import ObjectStateData
+from arcor2_hw.data.operation import ObjectHealthData
 from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.runtime.messages import DeviceChanged
+from arcor2_server.hub import Hub
+from arcor2_server.rpc.registry import RequestRefused, make_event
 
 log = structlog.get_logger(__name__)
 
@@ -51,14 +54,22 @@ def overlay_for(cell: Cell | None, scene: Scene) -> tuple[list[SceneObjectOverri
 
 
 class DeviceBoard:
-    """Keeps the newest word of each device. `tell` gets each change of a connection, once."""
+    """Keeps the newest word of each device, and tells clients each change of a connection or of health, once.
 
-    def __init__(self, tell: Callable[[ObjectStateData], None]) -> None:
-        self._tell = tell
+    told: called after a change of a connection was told.
+    """
+
+    def __init__(self, hub: Hub, told: Callable[[], None] = lambda: None) -> None:
+        self._hub = hub
+        self._told = told
         self._overlaid: Mapping[str, list[str]] = {}
         self._objects: dict[str, SceneObject] = {}
         self._said: dict[str, DeviceChanged] = {}
         self.answering = True
+
+    def _tell(self, data: ObjectStateData) -> None:
+        self._hub.broadcast(make_event("ObjectState", data))
+        self._told()
 
     def clear(self, reason: str = "") -> None:
         """Begin anew: what was connected is offline now, for a reason."""
@@ -84,6 +95,22 @@ class DeviceBoard:
         self._said[message.object_id] = message
         if before is None or before.connection is not message.connection:
             self._tell(self._state(message))
+        if before is None or _health(before) != _health(message):
+            self._hub.broadcast(make_event("ObjectHealth", _health(message)))
+
+    def healths(self) -> list[ObjectHealthData]:
+        """Give the health of every object, in the order of the scene."""
+        return [_health(self._word(object_id)) for object_id in self._objects]
+
+    def failed(self) -> list[str]:
+        """Name the objects that have failed, in the order of the scene."""
+        return [one.name for one in self._objects.values() if self._word(one.id).connection is Connection.FAILED]
+
+    def require_not_failed(self, object_id: str) -> None:
+        """RequestRefused when an object has failed, with its name and why."""
+        said, known = self._said.get(object_id), self._objects.get(object_id)
+        if said is not None and known is not None and said.connection is Connection.FAILED:
+            raise RequestRefused(f"{known.name} is not there: {said.reason or 'it could not be connected'}.")
 
     def states(self) -> list[ObjectStateData]:
         """Give the connection of every object, in the order of the scene."""
@@ -116,3 +143,7 @@ class DeviceBoard:
                 )
             )
         return found
+
+
+def _health(said: DeviceChanged) -> ObjectHealthData:
+    return ObjectHealthData(said.object_id, said.health, said.alarms, said.control_owner or UNSET)

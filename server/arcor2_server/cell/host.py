@@ -12,6 +12,7 @@ from typing import Any, Final, Protocol, TypeVar, cast
 import msgspec
 import structlog
 
+from arcor2_hw.data.operation import HoldKind
 from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, DeviceTimeout
 from arcor2_hw.runtime import messages as m
 
@@ -24,6 +25,8 @@ GOES_WITHIN: Final = 3.0
 """Seconds a host has to end by itself once it should; then it is killed."""
 LAST_WORDS: Final = 0.2
 """Seconds that the second sign of the end (socket or process) may come after the first."""
+HELD_WITHIN: Final = 15.0
+"""Seconds for a hold to begin, in which control may have to be taken, or for a robot to come to rest."""
 ANSWERS_WITHIN: Final = 5.0
 """Seconds beyond a call's own deadline after which the host itself is to blame for the missing answer."""
 
@@ -191,6 +194,19 @@ class CellHost:
         """Call `stop` past whatever goes on; of all devices when none is named. CellError, ConnectionLost."""
         number = next(self._number)
         await self._ask(number, m.StopMotion(number, object_id), None)
+
+    async def lease(self, object_id: str, hold: int, kind: HoldKind, until: float, **motion: Any) -> bytes:
+        """Let a robot be moved until a moment of the monotonic clock, 0 to let go; gives the scale as JSON, or empty.
+
+        motion: the further fields of the message. CellError, ConnectionLost, DeviceTimeout.
+        """
+        number = next(self._number)
+        return await self._ask(number, m.Lease(number, object_id, hold, kind, until, **motion), HELD_WITHIN)
+
+    async def retry(self, object_id: str) -> None:
+        """Make and connect an object anew that has failed. CellError, ConnectionLost."""
+        number = next(self._number)
+        await self._ask(number, m.RetryObject(number, object_id), None)
 
     async def _ask(self, number: int, message: m.ToHost, deadline: float | None) -> bytes:
         if self.reason:

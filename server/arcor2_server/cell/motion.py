@@ -23,6 +23,8 @@ FEATURES = {
     "inverse_kinematics": "compute inverse kinematics",
     "forward_kinematics": "compute forward kinematics",
     "hand_teaching": "be moved by hand",
+    "jog": "be jogged",
+    "acknowledge_stop": "be acknowledged from here: do it at the robot",
 }
 
 Told = Callable[[MoveEventType, str | Unset], Any]
@@ -42,10 +44,16 @@ def require_speed(speed: float) -> None:
         raise RequestRefused(f"The speed must be more than 0 and at most 1, not {speed:g}.")
 
 
-def require_not_moving(services: "Services", robot_id: str) -> None:
-    """RequestRefused while the robot moves by a request, or executes the running action."""
+def require_not_moving(services: "Services", robot_id: str, *, held: bool = False) -> None:
+    """RequestRefused while the robot moves by a request, is held, or executes the running action; or is not there.
+
+    held: whether the caller is the one who holds it.
+    """
     cell = services.cell
     name = cell.robot(robot_id).name
+    cell.board.require_not_failed(robot_id)
+    if not held and (holder := cell.held.holder(robot_id)) is not None:
+        raise RequestRefused(f"{name} is held by {holder}.")
     if robot_id in cell.moving:
         raise RequestRefused(f"{name} is moving.")
     if cell.running_action is not None and cell.running_action.object_id == robot_id:

@@ -8,21 +8,22 @@ import msgspec
 import structlog
 
 from arcor2_hw.actions.json_values import encode
-from arcor2_hw.data.base import UNSET, Unset
+from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.events import ActionResultData, Event, ObjectStateData, SceneStateData, SceneStateEnum
 from arcor2_hw.data.geometry import Pose
-from arcor2_hw.data.object_type import ObjectModel
+from arcor2_hw.data.operation import ObjectHealthData
 from arcor2_hw.data.robot import Joint
-from arcor2_hw.data.rpc import RobotEventKind
 from arcor2_hw.data.scene import Scene, SceneObject
-from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, DeviceTimeout
+from arcor2_hw.exceptions import Arcor2Error, ConnectionLost
 from arcor2_hw.runtime import messages as m
 from arcor2_server.cell.actions import RunningAction
-from arcor2_server.cell.devices import DeviceBoard, DeviceStatus, overlay_for
+from arcor2_server.cell.devices import DeviceBoard, DeviceStatus
+from arcor2_server.cell.holding import HeldRobots
 from arcor2_server.cell.host import CellHost
 from arcor2_server.cell.hosts import CellHosts
+from arcor2_server.cell.opening import opening
 from arcor2_server.cell.scene_task import SceneTask
-from arcor2_server.client import Client
+from arcor2_server.cell.streams import RobotStreams
 from arcor2_server.locks import PROJECT, SCENE, SERVER
 from arcor2_server.rpc.registry import RequestRefused, make_event
 
@@ -37,7 +38,6 @@ START_WITHIN: Final = 60.0
 """Seconds for importing object types (which may hang) and connecting; the host gives each device less."""
 STOP_WITHIN: Final = 5.0
 """Seconds in which the host says that it has closed the devices; it allows itself two."""
-_STREAMS: Final = {"RobotJoints": RobotEventKind.JOINTS, "RobotEef": RobotEventKind.EEF_POSE}
 
 
 class OnlineCell:
@@ -58,12 +58,13 @@ class OnlineCell:
         self._host: CellHost | None = None
         self._task: asyncio.Task[None] | None = None
         self._answer: asyncio.Future[m.ErrorData | None] | None = None
-        self._subscribers: dict[tuple[str, RobotEventKind], set[Client]] = {}
+        self.streams = RobotStreams(services.hub, self._say)
+        self.held = HeldRobots(services, self._online_host, self.moving)
         self.task = SceneTask(services.tasks)
-        self._board = DeviceBoard(self._tell_object)
+        self.board = DeviceBoard(services.hub, self._one_connected)
         self._background: set[asyncio.Task[None]] = set()
         self._preparing = asyncio.get_running_loop().call_later(SPARE_AFTER, self.hosts.prepare)
-        services.hub.on_leave.append(self._forget_client)
+        services.hub.on_leave += [self.streams.forget, self.held.forget]
 
     # -------------------------------------------------------------------------------- state
     @property
@@ -83,11 +84,15 @@ class OnlineCell:
 
     def devices(self) -> list[DeviceStatus]:
         """Give what the devices of the scene say of themselves; none while it is offline."""
-        return self._board.statuses() if self.state is not SceneStateEnum.STOPPED else []
+        return self.board.statuses() if self.state is not SceneStateEnum.STOPPED else []
 
     def object_states(self) -> list[ObjectStateData]:
         """Give the connections of the scene's objects; none while it is offline."""
-        return self._board.states() if self.state is not SceneStateEnum.STOPPED else []
+        return self.board.states() if self.state is not SceneStateEnum.STOPPED else []
+
+    def object_healths(self) -> list[ObjectHealthData]:
+        """Give the health of the scene's objects; none while it is offline."""
+        return self.board.healths() if self.state is not SceneStateEnum.STOPPED else []
 
     async def settled(self) -> SceneStateEnum:
         """Wait until the scene neither comes up nor goes down; gives its state then."""
@@ -95,10 +100,9 @@ class OnlineCell:
             await asyncio.wait([self._task])
         return self.state
 
-    def _tell_object(self, data: ObjectStateData) -> None:
-        self._services.hub.broadcast(make_event("ObjectState", data))
+    def _one_connected(self) -> None:
         if self.state is SceneStateEnum.STARTING:
-            self.task.connected(self._board.states())
+            self.task.connected(self.board.states())
 
     def _tell(self, state: SceneStateEnum, message: str = "") -> None:
         self.state = state
@@ -108,10 +112,10 @@ class OnlineCell:
         self._services.hub.broadcast(make_event("SceneState", SceneStateData(state, message or UNSET)))
 
     # -------------------------------------------------------------------------------- going online
-    async def begin_start(self, *, dry_run: bool = False) -> None:
+    async def begin_start(self, *, dry_run: bool = False, keep_going: bool = False) -> None:
         """Begin to bring the scene up: returns when that is allowed, the rest is told by SceneState.
 
-        RequestRefused, Locked.
+        keep_going: objects that cannot be made or connected are left out. RequestRefused, Locked.
         """
         services = self._services
         services.session.require_scene_open()
@@ -125,23 +129,26 @@ class OnlineCell:
             self.require_offline()
             if not dry_run:
                 self.state = SceneStateEnum.STARTING
-                self._task = asyncio.create_task(self._start(services.session.require_scene()), name="scene start")
+                self._task = asyncio.create_task(
+                    self._start(services.session.require_scene(), keep_going), name="scene start"
+                )
         finally:
             if self._task is None:
                 services.locks.release(SERVER, SCENE, PROJECT)
 
-    async def _start(self, scene: Scene) -> None:
+    async def _start(self, scene: Scene, keep_going: bool) -> None:
         self._tell(SceneStateEnum.STARTING)
-        self._board.clear()
+        self.board.clear()
         try:
-            problem = await self._bring_up(scene)
+            problem = await self._bring_up(scene, keep_going)
         except Arcor2Error as error:
             problem = str(error)
         except Exception as error:
             log.exception("scene start failed")
             problem = f"An error inside the server: {error}"
         if problem is None:
-            self._done(SceneStateEnum.STARTED)
+            failed = self.board.failed()
+            self._done(SceneStateEnum.STARTED, f"Not there: {', '.join(failed)}." if failed else "")
             self.hosts.prepare()
             return
         self._tell(SceneStateEnum.STOPPING, problem)
@@ -150,26 +157,11 @@ class OnlineCell:
             await host.close()
         self._gone_offline(problem)
 
-    async def _bring_up(self, scene: Scene) -> str | None:
+    async def _bring_up(self, scene: Scene, keep_going: bool) -> str | None:
         """Give why the scene did not come up, None when it did."""
-        services = self._services
-        self._board.show(scene.objects, {})
-        here, overlaid = overlay_for(services.settings.cell, scene)
-        self._board.show(scene.objects, overlaid)
-        names = {obj.type for obj in scene.objects}
-        models: dict[str, ObjectModel] = {}
-        for name in names:
-            model = services.types.meta(name).object_model
-            if not isinstance(model, Unset):
-                models[name] = model
-        project = services.session.project
-        message = m.OpenScene(
-            scene,
-            services.types.type_codes(names),
-            models,
-            [*([] if project is None else project.object_overrides), *here],
-            services.settings.streaming_period,
-        )
+        self.board.show(scene.objects, {})
+        message, overlaid = opening(self._services, scene, keep_going)
+        self.board.show(scene.objects, overlaid)
         self._answer = asyncio.get_running_loop().create_future()
         host = self._host = await self.hosts.take(self)
         host.send(message)
@@ -193,10 +185,11 @@ class OnlineCell:
 
     def _gone_offline(self, message: str = "") -> None:
         self._host = None
-        self._board.clear(message)
+        self.board.clear(message)
         self.results.clear()
+        self.held.offline(message)
         self.moving.clear()
-        self._subscribers.clear()
+        self.streams.clear()
         self._done(SceneStateEnum.STOPPED, message)
         self.hosts.prepare()
 
@@ -254,16 +247,16 @@ class OnlineCell:
         """Take a message of the host."""
         match message:
             case m.StreamEvent():
-                if host is self._host and (kind := _STREAMS.get(message.event)) is not None:
-                    clients = self._subscribers.get((message.object_id, kind))
-                    if clients:
-                        self._services.hub.stream(message.event, message.object_id, message.encoded, clients)
+                if host is self._host:
+                    self.streams.heard(message)
+            case m.HoldEnded():
+                self.held.ended(message)
             case m.SceneOpened():
                 self._answered(None)
             case m.SceneFailed() | m.SceneClosed():
                 self._answered(message.error)
             case m.DeviceChanged():
-                self._board.changed(message)
+                self.board.changed(message)
                 log.info(
                     "device",
                     id=message.object_id,
@@ -283,7 +276,7 @@ class OnlineCell:
     def host_silent(self, host: CellHost, silent: bool) -> None:
         """Note that the host does not answer, or answers again."""
         if host is self._host:
-            self._board.answering = not silent
+            self.board.answering = not silent
             log.warning("cell host does not answer" if silent else "cell host answers again", pid=host.pid)
 
     def host_ended(self, host: CellHost, reason: str) -> None:
@@ -319,6 +312,10 @@ class OnlineCell:
     async def cancel(self, object_id: str, action: str) -> None:
         """Call what cancels an action of an object, past the action."""
         await self._online_host().call(object_id, action, cancel=True, deadline=STOP_WITHIN)
+
+    async def retry(self, object_id: str) -> None:
+        """Make and connect an object anew that has failed."""
+        await self._online_host().retry(object_id)
 
     async def stop_motion(self, object_id: str = "") -> None:
         """Stop an object, or all, past whatever they do."""
@@ -368,28 +365,9 @@ class OnlineCell:
             raise RequestRefused(f"{robot.name} has one arm: do not name it.")
         return {} if arm_id is None else {"arm_id": arm_id}
 
-    # -------------------------------------------------------------------------------- subscriptions
-    def subscribe(self, client: Client, robot_id: str, what: RobotEventKind, send: bool) -> None:
-        """Send a robot's state to a client, or no longer; RequestRefused when it was not sent."""
-        clients = self._subscribers.setdefault((robot_id, what), set())
-        if send:
-            clients.add(client)
-        elif client not in clients:
-            raise RequestRefused("This was not subscribed to.")
-        else:
-            clients.discard(client)
-        self._tell_subscribed(robot_id)
-
-    def _tell_subscribed(self, robot_id: str) -> None:
-        wanted = {what: bool(self._subscribers.get((robot_id, what))) for what in RobotEventKind}
+    def _say(self, message: m.ToHost) -> None:
         if self._host is not None:
-            self._host.send(m.Subscribe(robot_id, wanted[RobotEventKind.JOINTS], wanted[RobotEventKind.EEF_POSE]))
-
-    def _forget_client(self, client: Client) -> None:
-        for (robot_id, _), clients in list(self._subscribers.items()):
-            if client in clients:
-                clients.discard(client)
-                self._tell_subscribed(robot_id)
+            self._host.send(message)
 
     # -------------------------------------------------------------------------------- in the background
     def spawn(self, work: Any, name: str) -> None:
@@ -416,6 +394,3 @@ def _json(value: Any) -> bytes:
     if isinstance(value, msgspec.Raw):
         return bytes(value)
     return encode(value).encode()
-
-
-__all__ = ["ConnectionLost", "DeviceTimeout", "OnlineCell"]

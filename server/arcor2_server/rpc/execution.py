@@ -26,6 +26,13 @@ async def start_scene(context: Context, args: None) -> None:  # noqa: ARG001
     await context.services.cell.begin_start(dry_run=context.dry_run)
 
 
+@rpc("StartSceneKeepGoing")
+async def start_scene_keep_going(context: Context, args: None) -> None:  # noqa: ARG001
+    """Bring the scene online without what cannot be connected; SceneState and ObjectState tell how it goes."""
+    context.services.cell.task.asked_by = context.client.name
+    await context.services.cell.begin_start(dry_run=context.dry_run, keep_going=True)
+
+
 @rpc("StopScene")
 async def stop_scene(context: Context, args: None) -> None:  # noqa: ARG001
     """Take the scene offline; SceneState tells how it goes."""
@@ -48,6 +55,7 @@ async def execute_action(context: Context, args: ExecuteActionArgs) -> None:
             raise RequestRefused(f"The action {name} is running.")
         object_id, _, method = action.type.partition("/")
         obj = session.scene_object(object_id)
+        cell.board.require_not_failed(object_id)
         if object_id in cell.moving:
             raise RequestRefused(f"{obj.name} is moving.")
         prepared = prepare(action, services.types.action(obj.type, method), session, cell.results)

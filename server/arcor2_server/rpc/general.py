@@ -104,6 +104,11 @@ async def subscribe_events(context: Context, args: SubscribeEventsArgs) -> None:
     if "ObjectState" in args.events:
         states = services.execution.object_states() or services.cell.object_states()
         tell += [make_event("ObjectState", state) for state in states]
+    if "ObjectHealth" in args.events:
+        healths = services.execution.object_healths() or services.cell.object_healths()
+        tell += [make_event("ObjectHealth", health) for health in healths]
+    if "RobotHold" in args.events:
+        tell += [make_event("RobotHold", hold) for hold in services.cell.held.states()]
     if "UserPresence" in args.events:
         tell += services.presence.everybody()
     if "TaskState" in args.events:

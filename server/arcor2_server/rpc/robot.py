@@ -125,7 +125,7 @@ async def get_robot_arms(context: Context, args: GetRobotArmsArgs) -> list[str]:
 async def register_for_robot_event(context: Context, args: RegisterForRobotEventArgs) -> None:
     """Send joints or end effector poses of a robot to this client, or no longer."""
     async with _reading(context, args.robot_id) as cell:
-        cell.subscribe(context.client, args.robot_id, args.what, args.send)
+        cell.streams.subscribe(context.client, args.robot_id, args.what, args.send)
 
 
 @rpc("InverseKinematics")

@@ -1,0 +1,279 @@
+"""Held motion in the server: who holds which robot, which press of the button it is, and what comes too late.
+
+The end of a lease is kept by the cell host; here is only what concerns people and their connections.
+"""
+
+import asyncio
+import itertools
+import math
+from collections.abc import Awaitable, Callable, Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+import msgspec
+import structlog
+
+from arcor2_hw.data.base import UNSET, Data, Unset
+from arcor2_hw.data.events import HandTeachingModeData
+from arcor2_hw.data.operation import HoldKind, RobotHoldData
+from arcor2_hw.data.rpc import HoldHandTeachingArgs, JogRobotArgs
+from arcor2_hw.data.rpc.operation import LONGEST_LEASE_MS
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.runtime import messages as m
+from arcor2_server.cell.host import CellHost
+from arcor2_server.client import Client
+from arcor2_server.rpc.registry import RequestRefused, make_event
+
+if TYPE_CHECKING:
+    from arcor2_server.services import Services
+
+log = structlog.get_logger(__name__)
+
+QUICKEST_OF: Final = 30.0
+"""Seconds; the quickest message of the last one or two of these spans is what others are compared with."""
+RESTS_WITHIN: Final = 5.0
+"""Seconds for a robot that is let go to come to rest; a stop that is obeyed takes a tenth of that."""
+
+Held = JogRobotArgs | HoldHandTeachingArgs
+
+
+class Delay:
+    """How much later the messages of one client come than its quickest, by its own clock and ours.
+
+    The clocks need not agree, and may drift: only the last minute counts.
+    """
+
+    def __init__(self) -> None:
+        self._begin = -math.inf
+        self._quickest = [math.inf, math.inf]
+
+    def of(self, sent_ms: float, arrived: float) -> float:
+        """Give the delay, s, of a message sent at `sent_ms` (their clock) that arrived at `arrived` (s, ours)."""
+        offset = arrived - sent_ms / 1e3
+        spans = (arrived - self._begin) / QUICKEST_OF
+        if spans >= 1.0:
+            self._begin = arrived
+            self._quickest = [self._quickest[1] if spans < 2.0 else math.inf, math.inf]
+        self._quickest[1] = min(self._quickest[1], offset)
+        return offset - min(self._quickest)
+
+
+class _Press:
+    """One press of the button: a user holds a robot."""
+
+    def __init__(self, client: Client, user: str, kind: HoldKind, args: Held, number: int) -> None:
+        loop = asyncio.get_running_loop()
+        self.client = client
+        self.user = user
+        self.kind = kind
+        self.robot_id = args.robot_id
+        self.arm_id = args.arm_id
+        self.press = args.hold
+        self.number = number
+        self.begun = False
+        self.over = False
+        self.reason = ""
+        """Why it is being ended from here; empty when it is not, or was let go."""
+        self.allowed: asyncio.Future[None] = loop.create_future()
+        self.ended: asyncio.Future[None] = loop.create_future()
+
+    def state(self, held: bool, reason: str = "") -> RobotHoldData:
+        """Give what RobotHold tells."""
+        return RobotHoldData(self.robot_id, self.kind, self.user, held, reason or UNSET, self.arm_id)
+
+
+class _Scale(Data, frozen=True):
+    scale: float
+
+
+class HeldRobots:
+    """At most one press of each robot. `host` gives the cell host, RequestRefused when the scene is offline."""
+
+    def __init__(self, services: "Services", host: Callable[[], CellHost], moving: set[str]) -> None:
+        self._services = services
+        self._host = host
+        self._moving = moving
+        self._numbers = itertools.count(1)
+        self._held: dict[str, _Press] = {}
+        self._spent: dict[Client, int] = {}
+        """By client, the newest press that has ended: it and those before never begin again."""
+        self._delays: dict[Client, Delay] = {}
+
+    def holder(self, robot_id: str) -> str | None:
+        """Name who holds a robot, None when nobody does."""
+        press = self._held.get(robot_id)
+        return None if press is None else press.user
+
+    def states(self) -> list[RobotHoldData]:
+        """Give the holds that have begun."""
+        return [press.state(True) for press in self._held.values() if press.begun]
+
+    # -------------------------------------------------------------------------------- leases
+    async def lease(
+        self,
+        client: Client,
+        user: str,
+        args: Held,
+        kind: HoldKind,
+        motion: Mapping[str, Any],
+        allow: Callable[[], Awaitable[None]],
+    ) -> float:
+        """Begin, renew or end a hold; gives the scale of the motion, 0 when it was let go.
+
+        motion: what the host's lease has beside. allow: raises what speaks against a new hold.
+        RequestRefused, CellError.
+        """
+        arrived = asyncio.get_running_loop().time()
+        if not 0 <= args.valid_ms <= LONGEST_LEASE_MS:
+            raise RequestRefused(f"valid_ms must be 0 to {LONGEST_LEASE_MS}, not {args.valid_ms}.")
+        if args.valid_ms == 0:
+            await self._let_go(client, args)
+            return 0.0
+        delay = self._delays.setdefault(client, Delay()).of(args.sent_ms, arrived)
+        until = arrived + args.valid_ms / 1e3 - delay
+        if until <= arrived:
+            raise RequestRefused(f"The request came {delay * 1e3:.0f} ms late: it was thrown away.")
+        press = self._held.get(args.robot_id)
+        if press is None or press.client is not client or press.press != args.hold or press.kind is not kind:
+            press = await self._begin(client, user, args, kind, until, allow)
+        elif not self._services.locks.holds(user, args.robot_id):
+            self._end(press, f"{user} does not hold the lock any more")
+            self._require_lock(user, args.robot_id)
+        else:
+            await asyncio.shield(press.allowed)
+        return await self._say(press, until, motion)
+
+    async def _say(self, press: _Press, until: float, motion: Mapping[str, Any]) -> float:
+        if press.over:
+            raise RequestRefused(f"The hold was ended: {press.reason or 'it was let go'}.")
+        try:
+            raw = await self._host().lease(
+                press.robot_id,
+                press.number,
+                press.kind,
+                until,
+                **motion,
+                arm_id=None if isinstance(press.arm_id, Unset) else press.arm_id,
+            )
+        except Arcor2Error:
+            if not (press.begun or press.over):  # the host may not even know of it
+                press.reason = "it could not begin"
+                await self._release(press, quietly=True)
+            raise
+        if not press.begun and not press.over:
+            press.begun = True
+            self._tell(press, True)
+        return msgspec.json.decode(raw, type=_Scale).scale
+
+    async def _begin(
+        self,
+        client: Client,
+        user: str,
+        args: Held,
+        kind: HoldKind,
+        until: float,
+        allow: Callable[[], Awaitable[None]],
+    ) -> _Press:
+        """Take hold of a robot; waits for the one before of the same client to come to rest."""
+        robot_id, loop = args.robot_id, asyncio.get_running_loop()
+        name = self._services.cell.robot(robot_id).name
+        self._require_unspent(client, args.hold)
+        if (former := self._held.get(robot_id)) is not None and former.client is client:
+            self._end(former, "" if former.press < args.hold else "another button was pressed")
+            await asyncio.wait({former.ended}, timeout=until - loop.time())
+            if loop.time() >= until:
+                raise RequestRefused(f"{name} is still coming to rest.")
+            self._require_unspent(client, args.hold)
+        if (former := self._held.get(robot_id)) is not None:
+            raise RequestRefused(f"{name} is held by {former.user}.")
+        self._require_lock(user, robot_id)
+        press = self._held[robot_id] = _Press(client, user, kind, args, next(self._numbers))
+        try:
+            await allow()
+            if press.over:
+                raise RequestRefused(f"The hold was ended: {press.reason}.")
+        except BaseException as error:
+            self._finish(press, "")
+            told = error if isinstance(error, Arcor2Error) else RequestRefused("The hold could not begin.")
+            press.allowed.set_exception(told)
+            press.allowed.exception()  # nobody may be waiting
+            raise
+        self._moving.add(robot_id)
+        press.allowed.set_result(None)
+        return press
+
+    def _require_unspent(self, client: Client, press: int) -> None:
+        if press <= self._spent.get(client, -1):
+            raise RequestRefused("That hold has ended: let go, and press again.")
+
+    def _require_lock(self, user: str, robot_id: str) -> None:
+        locks = self._services.locks
+        if not locks.holds(user, robot_id):
+            name, writer = self._services.cell.robot(robot_id).name, locks.writer_of(robot_id)
+            raise RequestRefused(f"{name} is locked by {writer}." if writer else f"Lock {name} before you move it.")
+
+    # -------------------------------------------------------------------------------- ends
+    async def _let_go(self, client: Client, args: Held) -> None:
+        """End a press and return when the robot is at rest; harmless when it has ended."""
+        press = self._held.get(args.robot_id)
+        if press is None or press.client is not client or press.press != args.hold:
+            self._spent[client] = max(self._spent.get(client, -1), args.hold)
+            return
+        await self._release(press)
+
+    def _end(self, press: _Press, reason: str) -> None:
+        """Begin to bring the robot to rest, for a reason that is told."""
+        if not press.over:
+            press.over, press.reason = True, press.reason or reason
+            self._services.cell.spawn(self._release(press, quietly=True), f"end of a hold of {press.robot_id}")
+
+    async def _release(self, press: _Press, *, quietly: bool = False) -> None:
+        press.over = True
+        try:
+            await self._host().lease(press.robot_id, press.number, press.kind, 0.0)
+        except Arcor2Error as error:
+            log.warning("held robot", robot=press.robot_id, reason=str(error), detail=error.detail)
+            if not quietly:
+                raise
+        finally:
+            self._finish(press, press.reason)  # unless the host has told
+
+    def ended(self, message: m.HoldEnded) -> None:
+        """Take note that a robot is at rest."""
+        press = self._held.get(message.object_id)
+        if press is not None and press.number == message.hold:
+            self._finish(press, "" if message.error is None else message.error.message)
+
+    def _finish(self, press: _Press, reason: str) -> None:
+        if press.ended.done():
+            return
+        press.over = True
+        press.reason = press.reason or reason
+        press.ended.set_result(None)
+        self._spent[press.client] = max(self._spent.get(press.client, -1), press.press)
+        if self._held.get(press.robot_id) is press:
+            del self._held[press.robot_id]
+            self._moving.discard(press.robot_id)
+        if press.client not in self._services.hub.clients:
+            self._spent.pop(press.client, None)
+        if press.begun:
+            self._tell(press, False, press.reason)
+
+    def _tell(self, press: _Press, held: bool, reason: str = "") -> None:
+        hub = self._services.hub
+        log.info("held robot", robot=press.robot_id, kind=press.kind.value, user=press.user, held=held, reason=reason)
+        hub.broadcast(make_event("RobotHold", press.state(held, reason)))
+        if press.kind is HoldKind.HAND_TEACHING:
+            data = HandTeachingModeData(press.robot_id, held, press.arm_id)
+            hub.broadcast(make_event("HandTeachingMode", data))
+
+    def forget(self, client: Client) -> None:
+        """Let go of what a client held that is gone."""
+        self._delays.pop(client, None)
+        self._spent.pop(client, None)
+        for press in [press for press in self._held.values() if press.client is client]:
+            self._end(press, f"{press.user} is not connected any more")
+
+    def offline(self, reason: str) -> None:
+        """Forget all: the scene is offline, and whatever moved was stopped by the host."""
+        for press in list(self._held.values()):
+            self._finish(press, reason or "the scene is offline")

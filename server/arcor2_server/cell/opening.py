@@ -1,0 +1,36 @@
+"""What the cell host is told in order to bring a scene up."""
+
+from typing import TYPE_CHECKING
+
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.object_type import ObjectModel
+from arcor2_hw.data.scene import Scene
+from arcor2_hw.runtime import messages as m
+from arcor2_server.cell.devices import overlay_for
+
+if TYPE_CHECKING:
+    from arcor2_server.services import Services
+
+
+def opening(services: "Services", scene: Scene, keep_going: bool) -> tuple[m.OpenScene, dict[str, list[str]]]:
+    """Give the message, and by object the names of the settings that the server's cell file lays over the scene's.
+
+    Raises NotFound, InvalidData.
+    """
+    here, overlaid = overlay_for(services.settings.cell, scene)
+    names = {obj.type for obj in scene.objects}
+    models: dict[str, ObjectModel] = {}
+    for name in names:
+        model = services.types.meta(name).object_model
+        if not isinstance(model, Unset):
+            models[name] = model
+    project = services.session.project
+    message = m.OpenScene(
+        scene,
+        services.types.type_codes(names),
+        models,
+        [*([] if project is None else project.object_overrides), *here],
+        services.settings.streaming_period,
+        keep_going=keep_going,
+    )
+    return message, overlaid

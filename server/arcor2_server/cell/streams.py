@@ -1,0 +1,80 @@
+"""Who is sent the joints and end effectors of which robot: at the streaming period, or at a rate of his own."""
+
+from collections.abc import Callable
+from typing import Final
+
+from arcor2_hw.data.rpc import RobotEventKind
+from arcor2_hw.runtime import messages as m
+from arcor2_server.client import Client
+from arcor2_server.hub import Hub
+from arcor2_server.rpc.registry import RequestRefused
+
+_KINDS: Final = {"RobotJoints": RobotEventKind.JOINTS, "RobotEef": RobotEventKind.EEF_POSE}
+
+
+class RobotStreams:
+    """The subscriptions; `say` tells the host, where there is one."""
+
+    def __init__(self, hub: Hub, say: Callable[[m.ToHost], None]) -> None:
+        self._hub = hub
+        self._say = say
+        self._subscribers: dict[tuple[str, RobotEventKind], set[Client]] = {}
+        self._rates: dict[tuple[str, RobotEventKind], dict[Client, float]] = {}
+
+    def subscribe(self, client: Client, robot_id: str, what: RobotEventKind, send: bool) -> None:
+        """Send a robot's state to a client, or no longer; RequestRefused when it was not sent."""
+        clients = self._subscribers.setdefault((robot_id, what), set())
+        if send:
+            clients.add(client)
+        elif client not in clients:
+            raise RequestRefused("This was not subscribed to.")
+        else:
+            clients.discard(client)
+        self._tell(robot_id)
+
+    def at_rate(self, client: Client, robot_id: str, what: RobotEventKind, rate: float, send: bool) -> None:
+        """Send a robot's state to a client `rate` times a second, or no longer; RequestRefused when it was not sent."""
+        rates = self._rates.setdefault((robot_id, what), {})
+        if send:
+            rates[client] = rate
+        elif rates.pop(client, None) is None:
+            raise RequestRefused("This was not streamed.")
+        self._tell_rates(robot_id)
+
+    def heard(self, message: m.StreamEvent) -> None:
+        """Pass on what the host has read, encoded once for all who are sent it."""
+        kind = _KINDS.get(message.event)
+        if kind is None:
+            return
+        key, rates = (message.object_id, kind), self._rates.get((message.object_id, kind), {})
+        if message.rate:
+            clients = {client for client, rate in rates.items() if rate == message.rate}
+            stream = f"{message.object_id}/{message.rate:g}"
+        else:
+            clients = self._subscribers.get(key, set()) - rates.keys()
+            stream = message.object_id
+        if clients:
+            self._hub.stream(message.event, stream, message.encoded, clients)
+
+    def forget(self, client: Client) -> None:
+        """Forget a client that left."""
+        for (robot_id, _), clients in list(self._subscribers.items()):
+            if client in clients:
+                clients.discard(client)
+                self._tell(robot_id)
+        for (robot_id, _), rates in list(self._rates.items()):
+            if rates.pop(client, None) is not None:
+                self._tell_rates(robot_id)
+
+    def clear(self) -> None:
+        """Forget all: the scene is offline."""
+        self._subscribers.clear()
+        self._rates.clear()
+
+    def _tell(self, robot_id: str) -> None:
+        wanted = {what: bool(self._subscribers.get((robot_id, what))) for what in RobotEventKind}
+        self._say(m.Subscribe(robot_id, wanted[RobotEventKind.JOINTS], wanted[RobotEventKind.EEF_POSE]))
+
+    def _tell_rates(self, robot_id: str) -> None:
+        rates = {what: sorted(set(self._rates.get((robot_id, what), {}).values())) for what in RobotEventKind}
+        self._say(m.Stream(robot_id, rates[RobotEventKind.JOINTS], rates[RobotEventKind.EEF_POSE]))

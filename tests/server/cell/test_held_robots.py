@@ -1,0 +1,418 @@
+"""Held motion as clients meet it: one holder, his lock, presses and late requests, events; acknowledging a stop."""
+
+import asyncio
+import json
+import math
+import time
+from typing import Any
+
+import msgspec
+import pytest
+
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.project import Action, ActionPoint, Flow, Project
+from arcor2_hw.data.role import Role
+from arcor2_hw.data.scene import Scene, SceneObject
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.rpc import operation as _operation  # noqa: F401 - for its handlers
+from arcor2_server.rpc.registry import RequestRefused
+
+from .conftest import Recorder, Server, action, robot_meta, serving
+
+ARM = """
+from arcor2_hw.data.robot import *
+
+class Arm(Robot):
+    _ABSTRACT = False
+
+    def __init__(self, obj_id, name, pose, settings=None):
+        super().__init__(obj_id, name, pose, settings)
+        self.jogs = []
+        self.stops = 0
+        self.hand = False
+        self.hands = []
+        self.safety = "normal"
+        self.confirmed = []
+        self.slow = 0.0
+
+    def get_end_effectors_ids(self): return {"tool"}
+    def get_end_effector_pose(self, end_effector): return Pose()
+    def robot_joints(self, include_gripper=False): return [Joint("j0", 0.5)]
+    def grippers(self): return set()
+    def suctions(self): return set()
+    def get_hand_teaching_mode(self): return self.hand
+    def set_hand_teaching_mode(self, enabled):
+        self.hand = enabled
+        self.hands.append(enabled)
+    def stop(self):
+        time.sleep(self.slow)
+        self.stops += 1
+    def jog(self, twist=None, joint_velocities=None, frame="world", valid_for=0.2, end_effector_id=None):
+        if self.safety != "normal": raise SafetyStop("protective stop of arm")
+        self.jogs.append([twist, joint_velocities, frame])
+    def move_to_pose(self, end_effector_id, target_pose: Pose, speed, safe=True, linear=True): pass
+    def state(self):
+        return RobotState(Mode.AUTOMATIC, Power.OPERATIONAL, Safety(self.safety), ProgramState.STOPPED,
+                          Control.REMOTE, False, 1.0)
+    def acknowledge_protective_stop(self, confirmed_by: str):
+        if self.safety != "protective_stop": raise Refused("arm is in no protective stop")
+        self.safety = "normal"
+        self.confirmed.append(["protective stop", confirmed_by])
+    def restart_safety(self, confirmed_by: str):
+        self.safety = "normal"
+        self.confirmed.append(["restart", confirmed_by])
+    def alarms(self): return self.standing if hasattr(self, "standing") else []
+    def acknowledge(self, code: str):
+        if code != "E7": raise NotFound(f"arm has no alarm {code}")
+        self.confirmed.append([code])
+
+    def report(self): return [self.jogs, self.stops, self.hands, self.confirmed]
+    def be(self, safety: str): self.safety = safety
+    def be_slow(self, slow: float): self.slow = slow
+    @action
+    def wave(self, *, an: str | None = None) -> None: pass
+"""
+OBJ, TABLE = "obj_arm", "obj_table"
+TURNED = Orientation.from_rotation_vector(0.0, 0.0, math.pi / 2)
+META = robot_meta("Arm", move_to_pose=True, stop=True, hand_teaching=True, jog=True, acknowledge_stop=True)
+SCENE = Scene(
+    "scene",
+    id="scn_1",
+    objects=[
+        SceneObject("arm", "Arm", Pose(), [], OBJ),
+        SceneObject("table", "Table", Pose(Position(1, 0, 0), TURNED), [], TABLE),
+    ],
+)
+TABLE_SOURCE = "class Table(GenericWithPose):\n    _ABSTRACT = False\n"
+PROJECT = Project(
+    "project",
+    "scn_1",
+    id="pro_1",
+    action_points=[
+        ActionPoint("top", Position(), id="acp_1", actions=[Action("wave", f"{OBJ}/wave", "act_wave", [], [Flow()])])
+    ],
+)
+
+
+async def with_arm(server: Server) -> None:
+    server.types.add("Arm", ARM, [action("wave")], META)
+    server.types.add("Table", TABLE_SOURCE)
+    await server.open(SCENE, PROJECT)
+    await server.start()
+    await server.services.locks.write_lock("alice", OBJ)
+    server.client.got.clear()
+
+
+class Hand:
+    """A hand at a button, of one client."""
+
+    def __init__(self, server: Server, client: Recorder | None = None) -> None:
+        self.server = server
+        self.client = client or server.client
+        self.number = 0
+
+    async def jog(self, valid_ms: int = 300, *, new: bool = False, sent_ms: float | None = None, **more: Any) -> Any:
+        self.number += new
+        if not more and valid_ms:
+            more = {"linear": {"x": 0.1}}
+        args = {"robot_id": OBJ, "hold": self.number, "valid_ms": valid_ms} | more
+        args["sent_ms"] = time.monotonic() * 1e3 if sent_ms is None else sent_ms
+        return await self.server.ask("JogRobot", args, self.client)
+
+    async def teach(self, valid_ms: int = 300, *, new: bool = False) -> Any:
+        self.number += new
+        args = {"robot_id": OBJ, "hold": self.number, "valid_ms": valid_ms, "sent_ms": time.monotonic() * 1e3}
+        return await self.server.ask("HoldHandTeaching", args, self.client)
+
+
+async def report(server: Server) -> tuple[Any, ...]:
+    return tuple(json.loads(await server.services.cell.call(OBJ, "report")))
+
+
+async def do(server: Server, method: str, **args: Any) -> None:
+    await server.services.cell.call(OBJ, method, args)
+
+
+async def join(server: Server, user: str, role: Role = Role.PROGRAMMER) -> Recorder:
+    client = Recorder(user)
+    client.role = role
+    server.services.hub.add(client)  # type: ignore[arg-type]
+    subscribe(server, client)
+    return client
+
+
+def subscribe(server: Server, client: Recorder) -> None:
+    server.services.hub.subscribe(client, {"RobotHold", "ObjectHealth", "ObjectState"}, True)  # type: ignore[arg-type]
+
+
+@serving(with_arm)
+async def test_jog_from_press_to_release(arm: Server) -> None:
+    subscribe(arm, arm.client)
+    hand = Hand(arm)
+    assert (await hand.jog(new=True)).scale == 1.0
+    assert await arm.client.event("RobotHold") == {
+        "robot_id": OBJ, "kind": "jog", "user": "alice", "held": True,
+    }  # fmt: skip
+    step = {"robot_id": OBJ, "end_effector_id": "tool", "axis": "x", "what": "position", "mode": "world", "step": 0.1}
+    with pytest.raises(RequestRefused, match="arm is held by alice"):
+        await arm.ask("StepRobotEef", step)
+    with pytest.raises(RequestRefused, match="arm is"):
+        await arm.ask("ExecuteAction", {"action_id": "act_wave"})
+    assert (await hand.jog(linear={"z": 0.5})).scale == 0.5
+    assert (await hand.jog(0)).scale == 0.0
+    told = await arm.client.event("RobotHold")
+    assert (told["held"], "reason" in told) == (False, False)
+    jogs, stops, *_ = await report(arm)
+    assert jogs == [[[0.1, 0, 0, 0, 0, 0], None, "world"], [[0, 0, 0.25, 0, 0, 0], None, "world"]]
+    assert stops == 1
+    with pytest.raises(RequestRefused, match="press again"):
+        await hand.jog()
+    await hand.jog(0)  # letting go twice does no harm
+    await arm.ask("ExecuteAction", {"action_id": "act_wave"})
+
+
+@serving(with_arm)
+async def test_one_holder_who_has_the_lock(arm: Server) -> None:
+    alice, bob = Hand(arm), Hand(arm, await join(arm, "bob"))
+    with pytest.raises(RequestRefused, match="arm is locked by alice"):
+        await bob.jog(new=True)
+    await alice.jog(new=True)
+    with pytest.raises(RequestRefused, match="arm is held by alice"):
+        await bob.jog(new=True)
+    with pytest.raises(RequestRefused, match="arm is held by alice"):
+        await bob.teach(new=True)
+    await arm.services.locks.write_unlock("alice", OBJ)
+    with pytest.raises(RequestRefused, match="Lock arm before"):
+        await alice.jog()
+    told = await bob.client.event("RobotHold", lambda data: not data["held"])
+    assert "alice does not hold the lock any more" in told["reason"]
+    assert (await report(arm))[1] == 1
+    await arm.services.locks.write_lock("bob", OBJ)
+    await bob.jog(new=True)
+    await bob.jog(0)
+
+
+@serving(with_arm)
+async def test_what_is_not_renewed_ends_and_needs_a_new_press(arm: Server) -> None:
+    subscribe(arm, arm.client)
+    hand = Hand(arm)
+    await hand.jog(100, new=True)
+    told = await arm.client.event("RobotHold", lambda data: not data["held"])
+    assert "not renewed in time" in told["reason"]
+    assert (await report(arm))[1] == 1
+    with pytest.raises(RequestRefused, match="press again"):
+        await hand.jog()
+    await hand.jog(new=True)
+    await hand.jog(0)
+
+
+@serving(with_arm)
+async def test_whose_connection_ends_lets_go(arm: Server) -> None:
+    bob = await join(arm, "bob")
+    hand = Hand(arm)
+    await hand.jog(new=True)
+    arm.services.hub.remove(arm.client)  # type: ignore[arg-type]
+    told = await bob.event("RobotHold", lambda data: not data["held"])
+    assert "alice is not connected" in told["reason"]
+    assert (await report(arm))[1] == 1
+    assert arm.services.cell.held.holder(OBJ) is None
+    assert arm.services.cell.moving == set()
+
+
+@serving(with_arm)
+async def test_late_requests_are_thrown_away(arm: Server) -> None:
+    """By the sender's clock, which is another one than ours."""
+    hand = Hand(arm)
+
+    def theirs(late: float = 0.0) -> float:
+        return (time.monotonic() - late) * 1e3 + 123_456.0
+
+    await hand.jog(new=True, sent_ms=theirs())
+    with pytest.raises(RequestRefused, match="ms late"):
+        await hand.jog(sent_ms=theirs(0.4))
+    with pytest.raises(RequestRefused, match="ms late"):
+        await hand.jog(new=True, sent_ms=theirs(5.0))
+    began = time.monotonic()
+    hand.number -= 1
+    await hand.jog(sent_ms=theirs(0.2))  # 0.1 s are left of it
+    while arm.services.cell.held.holder(OBJ):
+        assert time.monotonic() - began < 0.28, "what was lost on the way was not taken off"
+        await asyncio.sleep(0.005)
+    assert len((await report(arm))[0]) == 2
+
+
+@serving(with_arm)
+async def test_a_backlog_of_a_press_that_has_ended_does_not_move_it_again(arm: Server) -> None:
+    hand = Hand(arm)
+    await hand.jog(60, new=True)
+    await asyncio.sleep(0.3)
+    for outcome in await asyncio.gather(*(hand.jog() for _ in range(5)), return_exceptions=True):
+        assert isinstance(outcome, RequestRefused)
+    assert len((await report(arm))[0]) == 1
+
+
+@serving(with_arm)
+async def test_renewals_need_not_wait_for_answers_and_a_press_may_follow_at_once(arm: Server) -> None:
+    hand = Hand(arm)
+    burst = [asyncio.create_task(hand.jog(new=number == 0)) for number in range(4)]
+    assert {answer.scale for answer in await asyncio.gather(*burst)} == {1.0}
+    await do(arm, "be_slow", slow=0.1)
+    going = asyncio.create_task(hand.jog(0))
+    await asyncio.sleep(0)
+    assert (await hand.jog(new=True)).scale == 1.0  # once it stands
+    assert (await going).scale == 0.0
+    await hand.jog(0)
+
+
+@serving(with_arm)
+async def test_frames_and_joints(arm: Server) -> None:
+    hand = Hand(arm)
+    along_y = pytest.approx([0, 0.1, 0, 0, 0, 0.2], abs=1e-9)
+    what = {"linear": {"x": 0.1}, "angular": {"z": 0.2}}
+    await hand.jog(new=True, frame="user", object_id=TABLE, **what)
+    await hand.jog(frame="user", pose=msgspec.to_builtins(Pose(Position(5, 5, 5), TURNED)), **what)
+    for frame in ("robot", "tool"):
+        await hand.jog(frame=frame, **what)
+    await hand.jog(joints=[{"name": "j0", "value": 0.3}])
+    await hand.jog(0)
+    jogs = (await report(arm))[0]
+    assert [jog[2] for jog in jogs] == ["world", "world", "base", "tool", "world"]
+    assert jogs[0][0] == along_y
+    assert jogs[1][0] == along_y
+    assert jogs[2][0] == [0.1, 0, 0, 0, 0, 0.2]
+    assert jogs[4][:2] == [None, [0.3]]
+
+
+WRONG: list[tuple[dict[str, Any], str]] = [
+    ({"valid_ms": 301}, "valid_ms must be 0 to 300"),
+    ({"valid_ms": -1}, "valid_ms must be 0 to 300"),
+    ({"linear": None}, "either linear and angular velocity"),
+    ({"joints": [{"name": "j0", "value": 1.0}]}, "either linear and angular velocity"),
+    ({"frame": "user"}, "either an object or a pose"),
+    ({"frame": "user", "object_id": "obj_nobody"}, "obj_nobody"),
+    ({"object_id": TABLE}, "belongs to the frame user"),
+    ({"arm_id": "left"}, "has one arm"),
+    ({"robot_id": TABLE}, "table is not a robot"),
+    ({"end_effector_id": "claw"}, "no end effector 'claw'"),
+    ({"linear": None, "joints": [{"name": "j9", "value": 1.0}]}, "no joint j9"),
+    ({"linear": None, "joints": [{"name": "j0", "value": 1.0}] * 2}, "named twice"),
+]
+
+
+@serving(with_arm)
+async def test_wrong_arguments(arm: Server) -> None:
+    for number, (more, text) in enumerate(WRONG):
+        args = {"robot_id": OBJ, "hold": number, "valid_ms": 100, "linear": {"x": 0.1}} | more
+        args = {key: value for key, value in args.items() if value is not None}
+        with pytest.raises(Arcor2Error, match=text):
+            await arm.ask("JogRobot", args | {"sent_ms": time.monotonic() * 1e3})
+        assert arm.services.cell.moving == set(), text
+    assert (await report(arm))[0] == []
+
+
+@serving(with_arm)
+async def test_hand_teaching_while_held(arm: Server) -> None:
+    subscribe(arm, arm.client)
+    hand = Hand(arm)
+    await hand.teach(new=True)
+    told = await arm.client.event("HandTeachingMode")
+    assert told == {"robot_id": OBJ, "enabled": True}
+    await hand.teach()
+    assert arm.services.cell.held.states()[0].kind == "hand_teaching"
+    await hand.teach(0)
+    assert await arm.client.event("HandTeachingMode") == {"robot_id": OBJ, "enabled": False}
+    assert (await report(arm))[2] == [True, False]
+    await hand.teach(80, new=True)
+    await arm.client.event("HandTeachingMode", lambda data: not data["enabled"])
+    assert (await report(arm))[2] == [True, False] * 2
+    await arm.ask("HandTeachingMode", {"robot_id": OBJ, "enable": True})
+    with pytest.raises(RequestRefused, match="moved by hand"):
+        await hand.jog(new=True)
+    with pytest.raises(RequestRefused, match="moved by hand"):
+        await hand.teach(new=True)
+
+
+@serving(with_arm)
+async def test_stop_by_anybody_and_a_scene_that_goes_offline(arm: Server) -> None:
+    operator = await join(arm, "olga", Role.OPERATOR)
+    hand = Hand(arm)
+    await hand.jog(new=True)
+    await arm.ask("StopRobot", {"robot_id": OBJ}, operator)
+    told = await operator.event("RobotHold", lambda data: not data["held"])
+    assert "arm was stopped" in told["reason"]
+    with pytest.raises(Arcor2Error):
+        await hand.jog()
+    await hand.jog(new=True)
+    await arm.ask("StopScene")
+    told = await operator.event("RobotHold", lambda data: not data["held"])
+    assert told["reason"]
+    assert arm.services.cell.held.states() == []
+
+
+@serving(with_arm)
+async def test_a_type_that_cannot_be_jogged(arm: Server) -> None:
+    arm.types.robots["Arm"] = robot_meta("Arm", stop=True)
+    hand = Hand(arm)
+    with pytest.raises(RequestRefused, match="arm cannot be jogged"):
+        await hand.jog(new=True)
+    with pytest.raises(RequestRefused, match="arm cannot be moved by hand"):
+        await hand.teach(new=True)
+    with pytest.raises(RequestRefused, match="arm cannot be acknowledged from here"):
+        await arm.ask("AcknowledgeStop", {"object_id": OBJ})
+
+
+# ---------------------------------------------------------------------------------------------- acknowledging
+async def acknowledge(server: Server, client: Recorder | None = None, **args: Any) -> None:
+    await server.ask("AcknowledgeStop", {"object_id": OBJ} | args, client)
+
+
+@serving(with_arm)
+async def test_a_protective_stop_is_acknowledged_by_name(arm: Server) -> None:
+    subscribe(arm, arm.client)
+    operator = await join(arm, "olga", Role.OPERATOR)
+    hand = Hand(arm)
+    await hand.jog(new=True)
+    await do(arm, "be", safety="protective_stop")
+    with pytest.raises(Arcor2Error, match="protective stop of arm"):
+        await hand.jog()
+    told = await arm.client.event("RobotHold", lambda data: not data["held"])
+    assert "protective stop" in told["reason"]
+    with pytest.raises(Arcor2Error, match="protective stop of arm"):
+        await hand.jog(new=True)
+    await acknowledge(arm, operator)
+    assert (await report(arm))[3] == [["protective stop", "olga"]]
+    with pytest.raises(Arcor2Error, match="press again"):
+        await hand.jog()  # the button that is still pressed moves nothing
+    await hand.jog(new=True)
+    with pytest.raises(RequestRefused, match="arm is held by alice"):
+        await acknowledge(arm, operator)
+    await hand.jog(0)
+
+
+@serving(with_arm)
+async def test_what_cannot_be_acknowledged_and_by_whom(arm: Server) -> None:
+    operator, technician = await join(arm, "olga", Role.OPERATOR), await join(arm, "tom", Role.TECHNICIAN)
+    with pytest.raises(RequestRefused, match="no stop that could be"):
+        await acknowledge(arm, operator)
+    for safety, text in (("emergency_stop", "where it was pressed"), ("safeguard_stop", "guard")):
+        await do(arm, "be", safety=safety)
+        with pytest.raises(RequestRefused, match=text):
+            await acknowledge(arm, technician)
+    for safety in ("fault", "violation"):
+        await do(arm, "be", safety=safety)
+        with pytest.raises(RequestRefused, match="needs the role technician"):
+            await acknowledge(arm, operator)
+        await acknowledge(arm, technician)
+    assert (await report(arm))[3] == [["restart", "tom"]] * 2
+    with pytest.raises(RequestRefused, match="not logged in"):
+        await acknowledge(arm, Recorder(None))
+    with pytest.raises(RequestRefused, match="table is not a robot"):
+        await acknowledge(arm, object_id=TABLE)
+
+
+@serving(with_arm)
+async def test_an_alarm_of_any_device_by_its_code(arm: Server) -> None:
+    await acknowledge(arm, code="E7")
+    assert (await report(arm))[3] == [["E7"]]
+    with pytest.raises(Arcor2Error, match="no alarm E8"):
+        await acknowledge(arm, code="E8")
