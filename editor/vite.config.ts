@@ -29,6 +29,8 @@ function compressed(): Plugin {
 export default defineConfig({
   base: "/editor/",
   plugins: [react(), compressed()],
+  // From its sources, so that what is not used of it is left out.
+  resolve: { alias: [{ find: /^three$/, replacement: "three/src/Three.js" }] },
   build: {
     outDir: OUT,
     emptyOutDir: true,

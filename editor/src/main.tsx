@@ -2,6 +2,21 @@
 
 import { StrictMode } from "react";
 import { createRoot } from "react-dom/client";
+import { remembered, takeTokenFromAddress } from "./session/memory";
+import { join } from "./session/session";
+import { App } from "./ui/App";
+import "./ui/tokens.css";
+import "./ui/base.css";
 
+takeTokenFromAddress();
+// Who has been here before comes in by himself.
+const name = remembered("name");
+if (name) join(name, remembered("token"));
 const root = document.getElementById("root");
-if (root) createRoot(root).render(<StrictMode>ARCOR2-HW</StrictMode>);
+if (root) {
+  createRoot(root).render(
+    <StrictMode>
+      <App />
+    </StrictMode>,
+  );
+}

@@ -8,7 +8,6 @@
 export interface AcknowledgeStopArgs {
   object_id: string;
   code?: string;
-  arm_id?: string;
 }
 
 /** An action on an action point. */

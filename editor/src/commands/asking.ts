@@ -1,0 +1,55 @@
+/** How commands ask: a refusal becomes a notice with the server's sentence, and the caller learns that it failed. */
+
+import { ConnectionLost, Refused } from "../protocol/errors";
+import { LEAST_ROLE, type Requests } from "../protocol/types";
+import type { CallOptions } from "../protocol/client";
+import { call } from "../session/session";
+import type { State } from "../store/state";
+import { tell } from "../store/store";
+
+/** Ask; gives undefined after telling the user when it was refused, lost or too late. */
+export async function ask<N extends keyof Requests>(
+  request: N,
+  args?: Requests[N]["args"],
+  options?: CallOptions,
+): Promise<{ data: Requests[N]["data"] } | undefined> {
+  try {
+    return { data: await call(request, args, options) };
+  } catch (error) {
+    tell(error instanceof ConnectionLost ? "warn" : "error", sentence(error));
+    return undefined;
+  }
+}
+
+/** Give why a request would be refused, empty when it would be granted; nothing is changed. */
+export async function whyNot<N extends keyof Requests>(request: N, args?: Requests[N]["args"]): Promise<string> {
+  try {
+    await call(request, args, { dryRun: true });
+    return "";
+  } catch (error) {
+    if (error instanceof Refused) return error.message;
+    return sentence(error);
+  }
+}
+
+/** Do something while holding an item's write lock, which is given back in any case unless the request does that. */
+export async function holding<T>(id: string, work: () => Promise<T | undefined>, tree = false): Promise<T | undefined> {
+  if (!(await ask("WriteLock", { object_id: id, lock_tree: tree }))) return undefined;
+  try {
+    return await work();
+  } finally {
+    // Some requests unlock by themselves: then there is nothing to give back.
+    await call("WriteUnlock", { object_id: id }).catch(() => {});
+  }
+}
+
+export function sentence(error: unknown): string {
+  return error instanceof Error ? error.message : String(error);
+}
+
+/** Give why the user cannot ask this now, empty when he can: no connection, or a role that is too low. */
+export function barred(state: State, request: keyof Requests): string {
+  if (state.connection.status !== "ready") return "There is no connection to the server.";
+  if (state.connection.role < LEAST_ROLE[request]) return "Your role does not allow this.";
+  return "";
+}

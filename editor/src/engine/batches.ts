@@ -1,0 +1,100 @@
+/** Many equal small things drawn in one go: points, pucks, arrows. Each keeps its frame in the scene graph. */
+
+import { type BufferGeometry, Color, DynamicDrawUsage, InstancedMesh, type Material, Matrix4, type Object3D, type Scene } from "three";
+
+export interface Instance {
+  id: string;
+  /** Whose frame it has. */
+  frame: Object3D;
+  /** In that frame. */
+  offset: Matrix4;
+  color: Color;
+}
+
+const FIRST_SIZE = 64;
+const matrix = new Matrix4();
+
+/** One geometry and material, drawn at every instance. */
+export class Batch {
+  private mesh: InstancedMesh;
+  private readonly instances: Instance[] = [];
+
+  constructor(
+    private readonly scene: Scene,
+    private readonly geometry: BufferGeometry,
+    private readonly material: Material,
+  ) {
+    this.mesh = this.made(FIRST_SIZE);
+  }
+
+  add(instance: Instance): void {
+    this.instances.push(instance);
+  }
+
+  remove(instance: Instance): void {
+    const index = this.instances.indexOf(instance);
+    if (index < 0) return;
+    const last = this.instances.pop() as Instance;
+    if (last !== instance) this.instances[index] = last;
+  }
+
+  /** Take over where the frames are, and the colours. */
+  refresh(): void {
+    if (this.instances.length > this.mesh.instanceMatrix.count) {
+      this.scene.remove(this.mesh);
+      this.mesh.dispose();
+      this.mesh = this.made(this.instances.length * 2);
+    }
+    this.mesh.count = this.instances.length;
+    this.mesh.visible = this.mesh.count > 0;
+    this.instances.forEach((each, index) => {
+      this.mesh.setMatrixAt(index, matrix.multiplyMatrices(each.frame.matrixWorld, each.offset));
+      this.mesh.setColorAt(index, each.color);
+    });
+    this.mesh.instanceMatrix.needsUpdate = true;
+    if (this.mesh.instanceColor) this.mesh.instanceColor.needsUpdate = true;
+    this.mesh.computeBoundingSphere();
+  }
+
+  dispose(): void {
+    this.scene.remove(this.mesh);
+    this.mesh.dispose();
+    this.geometry.dispose();
+    this.material.dispose();
+  }
+
+  private made(size: number): InstancedMesh {
+    const mesh = new InstancedMesh(this.geometry, this.material, size);
+    mesh.instanceMatrix.setUsage(DynamicDrawUsage);
+    mesh.setColorAt(0, new Color(1, 1, 1)); // makes the attribute, so that the shader is compiled once
+    mesh.count = 0;
+    mesh.userData["batch"] = (index: number) => this.instances[index]?.id;
+    this.scene.add(mesh);
+    return mesh;
+  }
+}
+
+/** The batches by their names, made by what uses them first. */
+export class Batches {
+  private readonly byName = new Map<string, Batch>();
+
+  constructor(private readonly scene: Scene) {}
+
+  of(name: string, make: () => [BufferGeometry, Material]): Batch {
+    let batch = this.byName.get(name);
+    if (!batch) {
+      batch = new Batch(this.scene, ...make());
+      this.byName.set(name, batch);
+    }
+    return batch;
+  }
+
+  refresh(): void {
+    for (const batch of this.byName.values()) batch.refresh();
+  }
+
+  dispose(): void {
+    for (const batch of this.byName.values()) batch.dispose();
+    this.byName.clear();
+  }
+}

@@ -1,0 +1,126 @@
+/** The view: orbit around a point, or fly. z is up. Tells when something has to be drawn. */
+
+import { Box3, PerspectiveCamera, Sphere, Vector3 } from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+
+const START = new Vector3(1.5, -1.5, 1.25);
+const KEYS: Record<string, [number, number, number]> = {
+  KeyW: [0, 0, 1],
+  KeyS: [0, 0, -1],
+  KeyA: [-1, 0, 0],
+  KeyD: [1, 0, 0],
+  KeyE: [0, 1, 0],
+  KeyQ: [0, -1, 0],
+};
+/** m/s. */
+const FLY_SPEED = 0.8;
+
+export type ViewName = "home" | "top" | "front" | "side";
+
+export class View {
+  readonly camera = new PerspectiveCamera(50, 1, 0.01, 100);
+  private readonly controls: OrbitControls;
+  private readonly pressed = new Set<string>();
+  private readonly forget = new AbortController();
+
+  constructor(
+    private readonly element: HTMLElement,
+    private readonly changed: () => void,
+  ) {
+    this.camera.up.set(0, 0, 1);
+    this.camera.position.copy(START);
+    this.controls = new OrbitControls(this.camera, element);
+    this.controls.target.set(0.2, 0, 0.2);
+    this.controls.enableDamping = false; // it would draw on after the hand is off
+    this.controls.maxDistance = 40;
+    this.controls.minDistance = 0.05;
+    this.controls.zoomToCursor = true;
+    this.controls.addEventListener("change", changed);
+    this.controls.update();
+    const { signal } = this.forget;
+    element.addEventListener("keydown", (event) => this.key(event, true), { signal });
+    element.addEventListener("keyup", (event) => this.key(event, false), { signal });
+    element.addEventListener("blur", () => this.pressed.clear(), { signal });
+  }
+
+  resize(width: number, height: number): void {
+    this.camera.aspect = width / Math.max(1, height);
+    this.camera.updateProjectionMatrix();
+  }
+
+  /** Fly by the keys that are down, for the time since the last frame in s; gives whether it flies. */
+  fly(seconds: number): boolean {
+    if (this.pressed.size === 0) return false;
+    const step = new Vector3();
+    for (const key of this.pressed) step.add(new Vector3(...(KEYS[key] ?? [0, 0, 0])));
+    const forward = this.camera.getWorldDirection(new Vector3());
+    const right = new Vector3().crossVectors(forward, this.camera.up).normalize();
+    const move = new Vector3()
+      .addScaledVector(right, step.x)
+      .addScaledVector(this.camera.up, step.y)
+      .addScaledVector(forward, step.z)
+      .multiplyScalar(FLY_SPEED * Math.min(seconds, 0.1));
+    this.camera.position.add(move);
+    this.controls.target.add(move);
+    this.controls.update();
+    return true;
+  }
+
+  /** Show all of a box. */
+  fit(box: Box3): void {
+    if (box.isEmpty()) return;
+    const ball = box.getBoundingSphere(new Sphere());
+    const direction = new Vector3().subVectors(this.camera.position, this.controls.target).normalize();
+    // The narrower of the two angles of view has to hold it.
+    const half = Math.min(this.camera.fov, this.camera.fov * this.camera.aspect) * (Math.PI / 360);
+    const distance = Math.max(0.35, ball.radius / Math.sin(half));
+    this.controls.target.copy(ball.center);
+    this.camera.position.copy(ball.center).addScaledVector(direction, distance);
+    this.controls.update();
+    this.changed();
+  }
+
+  /** Look from a side, at what is looked at now. */
+  look(from: ViewName): void {
+    const distance = this.camera.position.distanceTo(this.controls.target);
+    const direction = {
+      home: new Vector3(1, -1, 0.75),
+      top: new Vector3(0, -1e-3, 1),
+      front: new Vector3(0, -1, 0.12),
+      side: new Vector3(1, 0, 0.12),
+    }[from].normalize();
+    this.camera.position.copy(this.controls.target).addScaledVector(direction, distance);
+    this.controls.update();
+    this.changed();
+  }
+
+  set(position: [number, number, number], target: [number, number, number]): void {
+    this.camera.position.set(...position);
+    this.controls.target.set(...target);
+    this.controls.update();
+    this.changed();
+  }
+
+  get target(): Vector3 {
+    return this.controls.target;
+  }
+
+  /** Off while something else is dragged. */
+  enable(on: boolean): void {
+    this.controls.enabled = on;
+  }
+
+  dispose(): void {
+    this.forget.abort();
+    this.controls.dispose();
+    this.element.style.touchAction = "";
+  }
+
+  private key(event: KeyboardEvent, down: boolean): void {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    if (!(event.code in KEYS)) return;
+    if (down) this.pressed.add(event.code);
+    else this.pressed.delete(event.code);
+    this.changed();
+  }
+}

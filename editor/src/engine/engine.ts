@@ -1,0 +1,411 @@
+/**
+ * The 3D view: shows items, follows robots, tells what was tapped. No React in it, and nothing is drawn unless
+ * something changed.
+ */
+
+import {
+  Box3,
+  DirectionalLight,
+  Fog,
+  GridHelper,
+  HemisphereLight,
+  Mesh,
+  PCFSoftShadowMap,
+  PlaneGeometry,
+  Scene,
+  ShadowMaterial,
+  SRGBColorSpace,
+  Vector3,
+  WebGLRenderer,
+} from "three";
+import type { Pose } from "../protocol/types";
+import type { Telemetry } from "../store/telemetry";
+import { Batches } from "./batches";
+import { View } from "./camera";
+import type { Item } from "./items";
+import { type Label, Labels } from "./labels";
+import { DARK, LIGHT, type Palette } from "./palette";
+import { type Hit, onFloor, pick } from "./picking";
+import { worldPose } from "./poses";
+import type { Context, Thing } from "./thing";
+import { LinkThing } from "./things/link";
+import { ObjectThing } from "./things/object";
+import { OrientationThing } from "./things/orientation";
+import { PointThing } from "./things/point";
+import { PuckThing } from "./things/puck";
+import { RobotThing } from "./things/robot";
+
+export type Quality = "low" | "high";
+
+export interface EngineOptions {
+  canvas: HTMLCanvasElement;
+  labels: HTMLElement;
+  telemetry: Telemetry;
+  asset: Context["asset"];
+  quality: Quality;
+  dark: boolean;
+}
+
+/** What a test may ask of an item. */
+export interface Probe {
+  kind: Item["kind"];
+  name: string;
+  pose: Pose;
+  /** Pixels from the view's upper left corner, of where its label would stand; null behind the camera. */
+  screen: { x: number; y: number } | null;
+  visible: boolean;
+  badge: string;
+  joints?: Record<string, number>;
+  endEffectors?: Pose[];
+}
+
+const WEIGHTS: Record<Item["kind"], number> = { robot: 40, object: 10, point: 20, action: 30, orientation: 5, logic: 0 };
+const SMALL = new Set<Item["kind"]>(["point", "orientation", "action", "logic"]);
+/** s between frames at low quality. */
+const SLOW = 1 / 30;
+
+export class Engine {
+  readonly view: View;
+  readonly scene = new Scene();
+  /** Frames drawn since the start. */
+  frames = 0;
+  onTap: (hits: Hit[], floor: Vector3 | null) => void = () => {};
+  /** Called after each drawn frame, for what is laid over the view. */
+  onFrame: () => void = () => {};
+
+  private readonly renderer: WebGLRenderer;
+  private readonly things = new Map<string, Thing>();
+  private readonly batches: Batches;
+  private readonly labels: Labels;
+  private readonly context: Context;
+  private readonly sun = new DirectionalLight(0xffffff, 2.1);
+  private readonly sky = new HemisphereLight(0xffffff, 0x8d8f94, 1.5);
+  private grid: GridHelper | null = null;
+  private palette: Palette = LIGHT;
+  private scheduled = 0;
+  private last = 0;
+  /** Frames of things may have changed since the last drawn frame. */
+  private dirty = true;
+  private width = 1;
+  private height = 1;
+  private hovered = "";
+  private readonly ends: (() => void)[] = [];
+  private down: { x: number; y: number; time: number } | null = null;
+
+  constructor(private readonly options: EngineOptions) {
+    const { canvas, quality } = options;
+    this.renderer = new WebGLRenderer({ canvas, antialias: quality !== "low", powerPreference: "low-power" });
+    this.renderer.outputColorSpace = SRGBColorSpace;
+    this.renderer.setPixelRatio(quality === "low" ? 1 : Math.min(2, window.devicePixelRatio));
+    this.renderer.shadowMap.enabled = quality === "high";
+    this.renderer.shadowMap.type = PCFSoftShadowMap;
+    this.renderer.shadowMap.autoUpdate = false;
+    this.view = new View(canvas, () => this.draw());
+    this.batches = new Batches(this.scene);
+    this.labels = new Labels(options.labels);
+    this.context = {
+      telemetry: options.telemetry,
+      palette: this.palette,
+      batches: this.batches,
+      asset: options.asset,
+      thing: (id) => this.things.get(id),
+      invalidate: () => this.invalidate(),
+    };
+    this.light();
+    this.setDark(options.dark);
+    this.ends.push(options.telemetry.subscribe((id) => this.reported(id)));
+    const ageing = setInterval(() => this.checkAges(), 500);
+    this.ends.push(() => clearInterval(ageing));
+    const watch = new ResizeObserver(() => this.resize());
+    watch.observe(canvas.parentElement ?? canvas);
+    this.ends.push(() => watch.disconnect());
+    this.listen(canvas);
+    this.resize();
+  }
+
+  /** Show these items and no others. What is the same object as before is left alone. */
+  show(items: Iterable<Item>): void {
+    const wanted = new Set<string>();
+    let changed = false;
+    for (const item of items) {
+      wanted.add(item.id);
+      let thing = this.things.get(item.id);
+      if (thing && thing.item.kind !== item.kind) {
+        this.remove(item.id, thing);
+        thing = undefined;
+      }
+      if (thing?.item === item) continue;
+      changed = true;
+      if (!thing) {
+        thing = make(item, this.context);
+        this.things.set(item.id, thing);
+      }
+      thing.update(item);
+    }
+    for (const [id, thing] of [...this.things]) {
+      if (wanted.has(id)) continue;
+      this.remove(id, thing);
+      changed = true;
+    }
+    if (!changed) return;
+    for (const thing of this.things.values()) this.hang(thing);
+    this.invalidate();
+  }
+
+  /** Show the label of what the pointer is on. */
+  hover(id: string): void {
+    if (id === this.hovered) return;
+    this.hovered = id;
+    this.draw();
+  }
+
+  setDark(dark: boolean): void {
+    this.palette = dark ? DARK : LIGHT;
+    this.context.palette = this.palette;
+    this.scene.background = this.palette.background;
+    this.scene.fog = new Fog(this.palette.background, 9, 26);
+    this.grid?.removeFromParent();
+    this.grid?.dispose();
+    this.grid = new GridHelper(20, 40, this.palette.gridStrong, this.palette.grid);
+    this.grid.rotateX(Math.PI / 2);
+    this.grid.position.z = -0.001;
+    this.scene.add(this.grid);
+    for (const thing of this.things.values()) thing.update(thing.item);
+    this.invalidate();
+  }
+
+  /** What lies under a place of the view, in pixels, the best first. */
+  pick(x: number, y: number, slack = 12): Hit[] {
+    this.place();
+    const roots = this.scene.children.filter((each) => each !== this.grid && !each.userData["ground"]);
+    return pick(x, y, { width: this.width, height: this.height }, this.view.camera, roots, slack, (id) => {
+      const kind = this.things.get(id)?.item.kind;
+      return kind !== undefined && SMALL.has(kind);
+    });
+  }
+
+  floor(x: number, y: number): Vector3 | null {
+    return onFloor(x, y, { width: this.width, height: this.height }, this.view.camera);
+  }
+
+  /** Bring an item, or all, into the view. */
+  focus(id?: string): void {
+    this.place();
+    const box = new Box3();
+    const spot = new Vector3();
+    for (const [key, thing] of this.things) {
+      if (id !== undefined && key !== id) continue;
+      box.expandByObject(thing.root);
+      box.expandByPoint(thing.anchor(spot));
+    }
+    if (id !== undefined) box.expandByScalar(0.12);
+    this.view.fit(box);
+  }
+
+  item(id: string): Probe | undefined {
+    const thing = this.things.get(id);
+    if (!thing) return undefined;
+    this.place();
+    this.view.camera.updateMatrixWorld();
+    const at = thing.anchor(new Vector3()).project(this.view.camera);
+    const probe: Probe = {
+      kind: thing.item.kind,
+      name: thing.item.name,
+      pose: worldPose(thing.root),
+      screen: at.z > 1 ? null : { x: ((at.x + 1) / 2) * this.width, y: ((1 - at.y) / 2) * this.height },
+      visible: thing.root.visible && at.z <= 1 && Math.abs(at.x) <= 1 && Math.abs(at.y) <= 1,
+      badge: thing.badge(),
+    };
+    if (thing instanceof RobotThing) {
+      const { telemetry } = this.context;
+      probe.joints = Object.fromEntries(
+        Object.entries(thing.robot?.joints ?? {}).map(([name, joint]) => [name, Number(joint.angle)]),
+      );
+      probe.endEffectors = telemetry.endEffectors(id).map((each) => each.pose);
+    }
+    return probe;
+  }
+
+  ids(): string[] {
+    return [...this.things.keys()];
+  }
+
+  /** Something moved or looks another way. */
+  invalidate(): void {
+    this.dirty = true;
+    this.draw();
+  }
+
+  /** A picture of the view as it is. */
+  async picture(type = "image/webp"): Promise<Blob | null> {
+    this.render();
+    return new Promise((resolve) => this.options.canvas.toBlob(resolve, type, 0.8));
+  }
+
+  dispose(): void {
+    for (const end of this.ends) end();
+    cancelAnimationFrame(this.scheduled);
+    for (const [id, thing] of [...this.things]) this.remove(id, thing);
+    this.batches.dispose();
+    this.labels.dispose();
+    this.grid?.dispose();
+    this.view.dispose();
+    this.sun.dispose();
+    this.renderer.dispose();
+  }
+
+  private light(): void {
+    this.sky.position.set(0, 0, 1);
+    this.sun.position.set(1.6, -1.1, 3.2);
+    this.sun.castShadow = true;
+    this.sun.shadow.mapSize.set(2048, 2048);
+    const { camera } = this.sun.shadow;
+    camera.left = camera.bottom = -2.2;
+    camera.right = camera.top = 2.2;
+    camera.far = 9;
+    this.sun.shadow.bias = -0.0005;
+    this.scene.add(this.sky, this.sun);
+    if (this.options.quality !== "high") return;
+    const ground = new Mesh(new PlaneGeometry(20, 20), new ShadowMaterial({ opacity: 0.22 }));
+    ground.receiveShadow = true;
+    ground.userData["ground"] = true;
+    ground.position.z = -0.0005;
+    this.scene.add(ground);
+  }
+
+  private remove(id: string, thing: Thing): void {
+    // What hangs on it gets its own place by `hang`, or goes by itself.
+    for (const other of this.things.values()) if (other.root.parent === thing.root) other.root.removeFromParent();
+    thing.dispose();
+    this.things.delete(id);
+  }
+
+  /** Put a thing into its parent's frame. */
+  private hang(thing: Thing): void {
+    const { parent } = thing.item as { parent?: string };
+    const frame = (parent !== undefined && this.things.get(parent)?.root) || this.scene;
+    if (thing.root.parent !== frame) frame.add(thing.root);
+  }
+
+  private reported(id: string): void {
+    const thing = this.things.get(id);
+    if (thing instanceof RobotThing && thing.moved()) this.invalidate();
+  }
+
+  private checkAges(): void {
+    for (const thing of this.things.values()) if (thing instanceof RobotThing && thing.checkAge()) this.invalidate();
+  }
+
+  private resize(): void {
+    const host = this.options.canvas.parentElement ?? this.options.canvas;
+    this.width = Math.max(1, host.clientWidth);
+    this.height = Math.max(1, host.clientHeight);
+    this.renderer.setSize(this.width, this.height, false);
+    this.view.resize(this.width, this.height);
+    this.draw();
+  }
+
+  private draw(): void {
+    if (this.scheduled) return;
+    this.scheduled = requestAnimationFrame((time) => {
+      this.scheduled = 0;
+      const seconds = (time - this.last) / 1000;
+      if (this.options.quality === "low" && seconds < SLOW * 0.9) {
+        this.draw();
+        return;
+      }
+      this.last = time;
+      const flying = this.view.fly(seconds);
+      this.render();
+      if (flying) this.draw();
+    });
+  }
+
+  /** Bring all frames up to date. */
+  private place(): boolean {
+    let moving = false;
+    if (!this.dirty) return moving;
+    this.dirty = false;
+    this.scene.updateMatrixWorld();
+    for (const thing of this.things.values()) moving = thing.frame() || moving;
+    this.scene.updateMatrixWorld();
+    for (const thing of this.things.values()) if (thing.item.kind !== "logic") thing.placed();
+    for (const thing of this.things.values()) if (thing.item.kind === "logic") thing.placed();
+    this.scene.updateMatrixWorld();
+    this.batches.refresh();
+    this.renderer.shadowMap.needsUpdate = true;
+    return moving;
+  }
+
+  private render(): void {
+    const moving = this.place();
+    this.renderer.render(this.scene, this.view.camera);
+    this.frames++;
+    this.labels.show(this.labelled(), this.view.camera, this.width, this.height);
+    this.onFrame();
+    if (moving) this.invalidate();
+  }
+
+  private labelled(): Label[] {
+    const found: Label[] = [];
+    for (const [id, thing] of this.things) {
+      const { item } = thing;
+      const badge = thing.badge();
+      const hovered = id === this.hovered;
+      const named = item.kind === "robot" || (item.kind === "action" && (item.running || item.role !== "action"));
+      if (item.faint >= 1 || !(item.selected || hovered || badge || named || item.kind === "object")) continue;
+      const weight = (item.selected ? 1000 : 0) + (hovered ? 500 : 0) + (badge ? 100 : 0) + WEIGHTS[item.kind];
+      found.push({ id, text: item.name, badge, selected: item.selected, weight, anchor: (target) => thing.anchor(target) });
+    }
+    return found;
+  }
+
+  /** A tap is short, and stays where it began: everything else turns the view. */
+  private listen(canvas: HTMLCanvasElement): void {
+    const place = (event: PointerEvent) => {
+      const box = canvas.getBoundingClientRect();
+      return { x: event.clientX - box.left, y: event.clientY - box.top };
+    };
+    const down = (event: PointerEvent) => {
+      this.down = event.isPrimary && event.button === 0 ? { ...place(event), time: event.timeStamp } : null;
+    };
+    const up = (event: PointerEvent) => {
+      const began = this.down;
+      this.down = null;
+      if (!began || !event.isPrimary) return;
+      const { x, y } = place(event);
+      if (Math.hypot(x - began.x, y - began.y) > 8 || event.timeStamp - began.time > 600) return;
+      this.onTap(this.pick(x, y, event.pointerType === "mouse" ? 6 : 16), this.floor(x, y));
+    };
+    const move = (event: PointerEvent) => {
+      if (event.pointerType !== "mouse" || event.buttons) return;
+      const { x, y } = place(event);
+      this.hover(this.pick(x, y, 4)[0]?.id ?? "");
+    };
+    canvas.addEventListener("pointerdown", down);
+    canvas.addEventListener("pointerup", up);
+    canvas.addEventListener("pointermove", move);
+    this.ends.push(() => {
+      canvas.removeEventListener("pointerdown", down);
+      canvas.removeEventListener("pointerup", up);
+      canvas.removeEventListener("pointermove", move);
+    });
+  }
+}
+
+function make(item: Item, context: Context): Thing {
+  switch (item.kind) {
+    case "object":
+      return new ObjectThing(item, context) as Thing;
+    case "robot":
+      return new RobotThing(item, context) as Thing;
+    case "point":
+      return new PointThing(item, context) as Thing;
+    case "orientation":
+      return new OrientationThing(item, context) as Thing;
+    case "action":
+      return new PuckThing(item, context) as Thing;
+    case "logic":
+      return new LinkThing(item, context) as Thing;
+  }
+}

@@ -1,0 +1,84 @@
+/** Names in the view: a few elements above the canvas, the most important first, none over another. */
+
+import type { PerspectiveCamera } from "three";
+import { Vector3 } from "three";
+
+/** At most so many: more are not read, and cost. */
+export const MOST_LABELS = 8;
+
+export interface Label {
+  id: string;
+  text: string;
+  badge: string;
+  selected: boolean;
+  /** The higher, the earlier. */
+  weight: number;
+  anchor: (target: Vector3) => Vector3;
+}
+
+const at = new Vector3();
+
+export class Labels {
+  private readonly elements = new Map<string, HTMLElement>();
+
+  constructor(private readonly host: HTMLElement) {}
+
+  /** Put the labels where their things are drawn now. */
+  show(labels: Label[], camera: PerspectiveCamera, width: number, height: number): void {
+    const placed: { left: number; top: number; right: number; bottom: number }[] = [];
+    const shown = new Set<string>();
+    const wanted = [...labels].sort((a, b) => b.weight - a.weight);
+    for (const label of wanted) {
+      if (shown.size >= MOST_LABELS) break;
+      label.anchor(at).project(camera);
+      if (at.z > 1 || Math.abs(at.x) > 1 || Math.abs(at.y) > 1) continue;
+      const x = ((at.x + 1) / 2) * width;
+      const y = ((1 - at.y) / 2) * height;
+      const element = this.element(label);
+      const half = element.offsetWidth / 2;
+      // Inside the view, even when what it names is at its edge.
+      const centre = Math.min(Math.max(x, half + 4), Math.max(half + 4, width - half - 4));
+      const top = Math.max(4, y - element.offsetHeight - 8);
+      const box = { left: centre - half, right: centre + half, top, bottom: top + element.offsetHeight };
+      if (placed.some((other) => overlap(box, other))) {
+        element.style.visibility = "hidden";
+        continue;
+      }
+      element.style.visibility = "visible";
+      element.style.transform = `translate(${Math.round(box.left)}px, ${Math.round(box.top)}px)`;
+      placed.push(box);
+      shown.add(label.id);
+    }
+    for (const [id, element] of this.elements) {
+      if (shown.has(id)) continue;
+      element.remove();
+      this.elements.delete(id);
+    }
+  }
+
+  dispose(): void {
+    for (const element of this.elements.values()) element.remove();
+    this.elements.clear();
+  }
+
+  private element(label: Label): HTMLElement {
+    let element = this.elements.get(label.id);
+    if (!element) {
+      element = document.createElement("div");
+      element.className = "view-label";
+      element.append(document.createElement("span"), document.createElement("small"));
+      this.elements.set(label.id, element);
+      this.host.append(element);
+    }
+    const [name, badge] = element.children as unknown as [HTMLElement, HTMLElement];
+    if (name.textContent !== label.text) name.textContent = label.text;
+    if (badge.textContent !== label.badge) badge.textContent = label.badge;
+    badge.hidden = !label.badge;
+    element.dataset["selected"] = String(label.selected);
+    return element;
+  }
+}
+
+function overlap(a: { left: number; top: number; right: number; bottom: number }, b: typeof a): boolean {
+  return a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+}

@@ -1,0 +1,78 @@
+/** What is under the pointer or the crosshair: all candidates, the best first. */
+
+import { type Camera, type Intersection, type Object3D, Raycaster, Vector2, Vector3 } from "three";
+
+export interface Hit {
+  id: string;
+  /** In the world. */
+  point: Vector3;
+  /** Outward normal of the surface in the world, where there is one. */
+  normal: Vector3 | null;
+  /** m from the camera. */
+  distance: number;
+}
+
+/** Fingers are wide, and points small: further rays around the pointer, at so many pixels. */
+const AROUND: [number, number][] = [0, 1, 2, 3, 4, 5, 6, 7].map((n) => [Math.cos((n * Math.PI) / 4), Math.sin((n * Math.PI) / 4)]);
+
+const caster = new Raycaster();
+const place = new Vector2();
+
+export interface Size {
+  width: number;
+  height: number;
+}
+
+/**
+ * Give what lies under a place of the view, in pixels from its upper left corner. What the ray itself meets comes
+ * first, near before far; then what is within `slack` pixels. `small` tells the ids that are hard to hit: they come
+ * before large ones behind or just in front of them.
+ */
+export function pick(
+  x: number,
+  y: number,
+  size: Size,
+  camera: Camera,
+  roots: Object3D[],
+  slack: number,
+  small: (id: string) => boolean,
+): Hit[] {
+  const found = new Map<string, Hit & { score: number }>();
+  const look = (dx: number, dy: number, penalty: number, onlySmall: boolean) => {
+    place.set(((x + dx) / size.width) * 2 - 1, 1 - ((y + dy) / size.height) * 2);
+    caster.setFromCamera(place, camera);
+    for (const each of caster.intersectObjects(roots, true)) {
+      const id = idOf(each);
+      if (id === undefined || (onlySmall && !small(id))) continue;
+      const score = each.distance * (small(id) ? 0.85 : 1) * (1 + penalty);
+      const known = found.get(id);
+      if (known && known.score <= score) continue;
+      const normal = each.face ? each.face.normal.clone().transformDirection(each.object.matrixWorld) : null;
+      found.set(id, { id, point: each.point.clone(), normal, distance: each.distance, score });
+    }
+  };
+  look(0, 0, 0, false);
+  if (slack > 0) for (const [dx, dy] of AROUND) look(dx * slack, dy * slack, 0.03, true);
+  return [...found.values()].sort((a, b) => a.score - b.score).map(({ score: _, ...hit }) => hit);
+}
+
+function idOf(hit: Intersection): string | undefined {
+  const batch = hit.object.userData["batch"] as ((index: number) => string | undefined) | undefined;
+  if (batch) return hit.instanceId === undefined ? undefined : batch(hit.instanceId);
+  for (let each: Object3D | null = hit.object; each; each = each.parent) {
+    if (!each.visible) return undefined;
+    const id = each.userData["item"] as string | undefined;
+    if (id !== undefined) return id;
+  }
+  return undefined;
+}
+
+/** Where the ray meets the floor (z = 0), within `far` m. */
+export function onFloor(x: number, y: number, size: Size, camera: Camera, far = 20): Vector3 | null {
+  place.set((x / size.width) * 2 - 1, 1 - (y / size.height) * 2);
+  caster.setFromCamera(place, camera);
+  const { origin, direction } = caster.ray;
+  if (direction.z >= -1e-6) return null;
+  const distance = -origin.z / direction.z;
+  return distance < far ? origin.clone().addScaledVector(direction, distance) : null;
+}

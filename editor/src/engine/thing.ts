@@ -1,0 +1,70 @@
+/** The picture of one item, and what it is given by the engine. */
+
+import { type Material, type Object3D, Vector3 } from "three";
+import type { Telemetry } from "../store/telemetry";
+import type { Batches } from "./batches";
+import type { Item } from "./items";
+import type { Palette } from "./palette";
+
+export interface Context {
+  telemetry: Telemetry;
+  palette: Palette;
+  batches: Batches;
+  /** Read an asset of the server. */
+  asset: (id: string) => Promise<{ name: string; content: ArrayBuffer }>;
+  /** The thing with an id, for what connects two. */
+  thing: (id: string) => Thing | undefined;
+  /** Something has to be drawn anew. */
+  invalidate: () => void;
+}
+
+export abstract class Thing<I extends Item = Item> {
+  /** Its frame, a child of its parent's; things that are drawn by a batch have nothing in it. */
+  abstract readonly root: Object3D;
+  abstract item: I;
+
+  constructor(protected readonly context: Context) {}
+
+  /** Show another state of the item. */
+  abstract update(item: I): void;
+
+  /** Called before each drawn frame when something moved; gives whether it goes on moving by itself. */
+  frame(): boolean {
+    return false;
+  }
+
+  /** Called after all frames are known, for what depends on where others are. */
+  placed(): void {}
+
+  /** Where its label stands, in the world. */
+  anchor(target: Vector3): Vector3 {
+    return this.root.getWorldPosition(target);
+  }
+
+  /** A word beside the name, when something is to be told. */
+  badge(): string {
+    return "";
+  }
+
+  dispose(): void {
+    this.root.removeFromParent();
+    disposeTree(this.root);
+  }
+}
+
+/** Mark an object and what is below it as the picture of an item, for picking. */
+export function ownedBy(root: Object3D, id: string): void {
+  root.traverse((each) => {
+    each.userData["item"] = id;
+  });
+}
+
+/** Free what the graphics card holds of a tree; shared geometry and material are marked and stay. */
+export function disposeTree(root: Object3D): void {
+  root.traverse((each) => {
+    const mesh = each as { geometry?: { dispose(): void; userData?: object }; material?: Material | Material[] };
+    if (each.userData["shared"]) return;
+    mesh.geometry?.dispose();
+    for (const material of [mesh.material ?? []].flat()) material.dispose();
+  });
+}

@@ -1,0 +1,160 @@
+/** A step of the logic: a bow from one puck to the next, whose colour, dash and label tell its branch. */
+
+import {
+  type BufferGeometry,
+  CanvasTexture,
+  ConeGeometry,
+  Group,
+  LinearFilter,
+  Mesh,
+  MeshBasicMaterial,
+  QuadraticBezierCurve3,
+  Quaternion,
+  Sprite,
+  SpriteMaterial,
+  TubeGeometry,
+  Vector3,
+} from "three";
+import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
+import type { LinkItem } from "../items";
+import { ownedBy, Thing, type Context } from "../thing";
+
+/** m. */
+const RADIUS = 0.0028;
+/** Lengths of dash and gap in m; none: unbroken. */
+const DASHES: Record<LinkItem["branch"], [number, number] | null> = {
+  always: null,
+  true: [0.05, 0.014],
+  false: [0.014, 0.014],
+  value: [0.03, 0.02],
+};
+const Z = new Vector3(0, 1, 0);
+
+export class LinkThing extends Thing<LinkItem> {
+  readonly root = new Group();
+  item: LinkItem;
+  private readonly material = new MeshBasicMaterial();
+  private readonly line = new Mesh(undefined, this.material);
+  private label: Sprite | null = null;
+  private labelled = "";
+  private drawn = "";
+  private readonly from = new Vector3();
+  private readonly to = new Vector3();
+  private readonly middle = new Vector3();
+
+  constructor(item: LinkItem, context: Context) {
+    super(context);
+    this.item = item;
+    this.root.add(this.line);
+    ownedBy(this.root, item.id);
+  }
+
+  update(item: LinkItem): void {
+    this.item = item;
+    const { palette } = this.context;
+    const color = item.selected ? palette.selected : palette.link[item.branch];
+    this.material.color.copy(color);
+    const label = `${item.condition}#${color.getHexString()}`;
+    if (label !== this.labelled) {
+      this.labelled = label;
+      this.label?.material.map?.dispose();
+      this.label?.material.dispose();
+      this.label?.removeFromParent();
+      this.label = item.condition ? text(item.condition, `#${color.getHexString()}`, `#${palette.background.getHexString()}`) : null;
+      if (this.label) {
+        this.label.userData["item"] = item.id;
+        this.root.add(this.label);
+        this.drawn = "";
+      }
+    }
+  }
+
+  override placed(): void {
+    const { from, to } = this.item;
+    const start = this.context.thing(from);
+    const end = this.context.thing(to);
+    this.root.visible = start !== undefined && end !== undefined && this.item.faint < 1;
+    if (!start || !end) return;
+    start.anchor(this.from);
+    end.anchor(this.to);
+    const drawn = [...this.from.toArray(), ...this.to.toArray()].map((one) => one.toFixed(4)).join() + this.item.branch;
+    if (drawn === this.drawn) return;
+    this.drawn = drawn;
+    this.line.geometry.dispose();
+    this.line.geometry = this.bow();
+    this.label?.position.copy(this.middle);
+  }
+
+  override anchor(target: Vector3): Vector3 {
+    return target.copy(this.middle);
+  }
+
+  override dispose(): void {
+    this.label?.material.map?.dispose();
+    super.dispose();
+  }
+
+  private bow(): BufferGeometry {
+    const length = Math.max(1e-3, this.from.distanceTo(this.to));
+    const control = new Vector3().addVectors(this.from, this.to).multiplyScalar(0.5);
+    control.z += Math.min(0.25, 0.03 + length * 0.3);
+    const curve = new QuadraticBezierCurve3(this.from.clone(), control, this.to.clone());
+    curve.getPoint(0.5, this.middle);
+    const pieces: BufferGeometry[] = [];
+    const dash = DASHES[this.item.branch];
+    const full = curve.getLength();
+    if (!dash) pieces.push(new TubeGeometry(curve, 14, RADIUS, 5));
+    else {
+      const [on, off] = dash;
+      const most = Math.max(on + off, full / 40); // of long lines the dashes grow, not their number
+      for (let at = 0; at < full; at += most) {
+        const from = at / full;
+        const to = Math.min(1, (at + (most * on) / (on + off)) / full);
+        const part = new QuadraticBezierCurve3(...subdivided(curve, from, to));
+        pieces.push(new TubeGeometry(part, 3, RADIUS, 5));
+      }
+    }
+    const head = new ConeGeometry(0.008, 0.022, 8);
+    head.applyQuaternion(new Quaternion().setFromUnitVectors(Z, curve.getTangentAt(0.86)));
+    const at = curve.getPointAt(0.86);
+    pieces.push(head.translate(at.x, at.y, at.z));
+    const whole = mergeGeometries(pieces);
+    for (const piece of pieces) piece.dispose();
+    return whole;
+  }
+}
+
+/** The part of a quadratic curve between two of its parameters is one, too. */
+function subdivided(curve: QuadraticBezierCurve3, a: number, b: number): [Vector3, Vector3, Vector3] {
+  const start = curve.getPoint(a);
+  const end = curve.getPoint(b);
+  const tangent = new Vector3().subVectors(curve.v1, curve.v0).lerp(new Vector3().subVectors(curve.v2, curve.v1), a);
+  return [start, start.clone().addScaledVector(tangent, b - a), end];
+}
+
+/** A word on a plate that always faces the camera. */
+function text(word: string, ink: string, plate: string): Sprite {
+  const canvas = document.createElement("canvas");
+  const pen = canvas.getContext("2d") as CanvasRenderingContext2D;
+  const font = "600 40px system-ui, sans-serif";
+  pen.font = font;
+  canvas.width = Math.ceil(Math.min(600, pen.measureText(word).width)) + 40;
+  canvas.height = 64;
+  pen.fillStyle = plate;
+  pen.beginPath();
+  pen.roundRect(0, 0, canvas.width, canvas.height, 20);
+  pen.fill();
+  pen.lineWidth = 4;
+  pen.strokeStyle = ink;
+  pen.stroke();
+  pen.fillStyle = ink;
+  pen.font = font;
+  pen.textBaseline = "middle";
+  pen.fillText(word, 20, 34, 600);
+  const map = new CanvasTexture(canvas);
+  map.minFilter = LinearFilter;
+  const sprite = new Sprite(new SpriteMaterial({ map, depthTest: false, transparent: true }));
+  sprite.scale.set((canvas.width / canvas.height) * 0.036, 0.036, 1);
+  sprite.renderOrder = 5;
+  return sprite;
+}

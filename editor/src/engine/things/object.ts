@@ -1,0 +1,121 @@
+/** An object of the scene: its collision model, or a marker where it has none. */
+
+import {
+  AxesHelper,
+  BoxGeometry,
+  type BufferGeometry,
+  CylinderGeometry,
+  EdgesGeometry,
+  Group,
+  LineBasicMaterial,
+  LineSegments,
+  Mesh,
+  MeshStandardMaterial,
+  OctahedronGeometry,
+  SphereGeometry,
+  Vector3,
+} from "three";
+import type { ObjectItem, Shape } from "../items";
+import { setPose } from "../poses";
+import { disposeTree, ownedBy, Thing, type Context } from "../thing";
+
+export class ObjectThing extends Thing<ObjectItem> {
+  readonly root = new Group();
+  item: ObjectItem;
+  private shape = "";
+  private readonly material = new MeshStandardMaterial({ roughness: 0.75, metalness: 0.05 });
+  private readonly edges = new LineBasicMaterial({ transparent: true, opacity: 0.35 });
+  /** Counts shapes, so that a mesh that comes late does not replace a newer one. */
+  private loading = 0;
+  private height = 0.05;
+
+  constructor(item: ObjectItem, context: Context) {
+    super(context);
+    this.item = item;
+  }
+
+  update(item: ObjectItem): void {
+    this.item = item;
+    setPose(this.root, item.pose);
+    const shape = JSON.stringify(item.shape);
+    if (shape !== this.shape) {
+      this.shape = shape;
+      this.build(item.shape);
+    }
+    const { palette } = this.context;
+    const color = item.selected ? palette.selected : item.trouble ? palette.trouble : item.lockedBy ? palette.locked : palette.object;
+    this.material.color.copy(color);
+    this.edges.color.copy(item.selected ? palette.selected : palette.gridStrong);
+    this.material.transparent = item.faint > 0 || item.shape.kind === "none";
+    this.material.opacity = 1 - item.faint;
+    this.material.depthWrite = item.faint < 0.5;
+    this.root.visible = item.faint < 1;
+  }
+
+  override anchor(target: Vector3): Vector3 {
+    return this.root.getWorldPosition(target).setZ(target.z + this.height);
+  }
+
+  override badge(): string {
+    return this.item.lockedBy ? `locked by ${this.item.lockedBy}` : "";
+  }
+
+  override dispose(): void {
+    this.loading++;
+    super.dispose();
+    this.material.dispose();
+    this.edges.dispose();
+  }
+
+  private build(shape: Shape): void {
+    const mine = ++this.loading;
+    for (const child of [...this.root.children]) {
+      // Items that hang on this one stay.
+      if (child.userData["item"] !== this.item.id) continue;
+      child.removeFromParent();
+      disposeTree(child);
+    }
+    switch (shape.kind) {
+      case "box":
+        return this.show(new BoxGeometry(...shape.size));
+      case "cylinder":
+        return this.show(new CylinderGeometry(shape.radius, shape.radius, shape.height, 32).rotateX(Math.PI / 2));
+      case "sphere":
+        return this.show(new SphereGeometry(shape.radius, 32, 20));
+      case "none": {
+        const axes = new AxesHelper(0.08);
+        ownedBy(axes, this.item.id);
+        this.root.add(axes);
+        return this.show(new OctahedronGeometry(0.03));
+      }
+      case "mesh":
+        void this.load(shape.asset, mine);
+    }
+  }
+
+  private async load(asset: string, mine: number): Promise<void> {
+    try {
+      const [{ loadMesh }, file] = await Promise.all([import("../loaders/mesh"), this.context.asset(asset)]);
+      const geometry = await loadMesh(file.content, file.name || asset);
+      if (mine === this.loading) this.show(geometry);
+      else geometry.dispose();
+    } catch (error) {
+      if (mine !== this.loading) return;
+      console.warn(`the mesh ${asset} of ${this.item.name} cannot be shown:`, error);
+      this.show(new OctahedronGeometry(0.03));
+    }
+  }
+
+  private show(geometry: BufferGeometry): void {
+    const mesh = new Mesh(geometry, this.material);
+    mesh.castShadow = mesh.receiveShadow = true;
+    geometry.computeBoundingBox();
+    this.height = Math.max(0.02, geometry.boundingBox?.max.z ?? 0);
+    const count = geometry.index?.count ?? geometry.getAttribute("position").count;
+    // Outlines make shapes readable without shadows; of dense meshes they would be a tangle.
+    if (count < 3000) mesh.add(new LineSegments(new EdgesGeometry(geometry, 30), this.edges));
+    ownedBy(mesh, this.item.id);
+    this.root.add(mesh);
+    this.context.invalidate();
+  }
+}

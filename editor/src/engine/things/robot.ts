@@ -1,0 +1,171 @@
+/** A robot: its URDF moved by live joints, or a stand-in; a frame at each end effector; greyed when nothing is heard. */
+
+import {
+  AxesHelper,
+  CylinderGeometry,
+  Group,
+  Matrix4,
+  Mesh,
+  MeshStandardMaterial,
+  type Object3D,
+  SphereGeometry,
+  Vector3,
+} from "three";
+import type { URDFRobot } from "urdf-loader";
+import { STALE } from "../../store/telemetry";
+import type { RobotItem } from "../items";
+import { setPose } from "../poses";
+import { disposeTree, ownedBy, Thing, type Context } from "../thing";
+
+/** rad or m: what moves less is not drawn anew. */
+const STILL = 1e-4;
+const inverse = new Matrix4();
+const tip = new Vector3();
+
+export class RobotThing extends Thing<RobotItem> {
+  readonly root = new Group();
+  item: RobotItem;
+  /** Null until it is loaded, and where the type has none. */
+  robot: URDFRobot | null = null;
+  private readonly body = new Group();
+  private readonly tips = new Map<string, Object3D>();
+  private readonly shown = new Map<string, number>();
+  private readonly material = new MeshStandardMaterial({ roughness: 0.55, metalness: 0.1 });
+  private urdf: string | null = null;
+  private stale = false;
+
+  constructor(item: RobotItem, context: Context) {
+    super(context);
+    this.item = item;
+    this.root.add(this.body);
+  }
+
+  update(item: RobotItem): void {
+    this.item = item;
+    setPose(this.root, item.pose);
+    if (item.urdf !== this.urdf) {
+      this.urdf = item.urdf;
+      void this.load(item.urdf);
+    }
+    this.root.visible = item.faint < 1;
+    this.checkAge();
+    this.paint();
+  }
+
+  /** Whether what was reported differs from what is shown. */
+  moved(): boolean {
+    const reported = this.context.telemetry.latest(this.item.id)?.joints;
+    if (reported && this.robot) {
+      for (const [name, value] of reported) {
+        if (Math.abs((this.shown.get(name) ?? Infinity) - value) > STILL) return true;
+      }
+    }
+    return this.context.telemetry.endEffectors(this.item.id).some(({ arm_id, end_effector_id, pose }) => {
+      const known = this.tips.get(`${arm_id ?? ""}/${end_effector_id}`);
+      if (!known) return true;
+      const { x, y, z } = pose.position;
+      this.root.worldToLocal(tip.set(x, y, z));
+      return known.position.distanceToSquared(tip) > STILL * STILL;
+    });
+  }
+
+  override frame(): boolean {
+    this.placeTips();
+    const drawn = this.context.telemetry.interpolated(this.item.id);
+    if (!drawn || !this.robot) return false;
+    for (const [name, value] of drawn.joints) {
+      this.shown.set(name, value);
+      this.robot.joints[name]?.setJointValue(value);
+    }
+    return !drawn.settled;
+  }
+
+  /** Look whether the robot is still heard of; gives whether that changed. */
+  checkAge(): boolean {
+    const stale = this.item.online && this.context.telemetry.age(this.item.id) > STALE;
+    if (stale === this.stale) return false;
+    this.stale = stale;
+    this.paint();
+    return true;
+  }
+
+  override anchor(target: Vector3): Vector3 {
+    return this.root.getWorldPosition(target).setZ(target.z + 0.02);
+  }
+
+  override badge(): string {
+    if (this.item.lockedBy) return `locked by ${this.item.lockedBy}`;
+    return this.stale ? "not heard of: shown where it was" : "";
+  }
+
+  override dispose(): void {
+    this.urdf = null;
+    super.dispose();
+    this.material.dispose();
+  }
+
+  private paint(): void {
+    const { palette } = this.context;
+    const { selected, trouble, faint } = this.item;
+    this.material.color.copy(selected ? palette.selected : trouble ? palette.trouble : this.stale ? palette.locked : palette.robot);
+    this.material.transparent = faint > 0 || this.stale;
+    this.material.opacity = (1 - faint) * (this.stale ? 0.55 : 1);
+  }
+
+  private placeTips(): void {
+    const { telemetry } = this.context;
+    const seen = new Set<string>();
+    for (const { arm_id, end_effector_id, pose } of telemetry.endEffectors(this.item.id)) {
+      const key = `${arm_id ?? ""}/${end_effector_id}`;
+      seen.add(key);
+      let frame = this.tips.get(key);
+      if (!frame) {
+        frame = new Group().add(new AxesHelper(0.07));
+        ownedBy(frame, this.item.id);
+        this.tips.set(key, frame);
+        this.root.add(frame);
+      }
+      // Reported in the world; the robot's own frame may be another.
+      setPose(frame, pose);
+      frame.updateMatrix();
+      inverse.copy(this.root.matrixWorld).invert().multiply(frame.matrix).decompose(frame.position, frame.quaternion, frame.scale);
+    }
+    for (const [key, frame] of this.tips) {
+      if (seen.has(key)) continue;
+      frame.removeFromParent();
+      disposeTree(frame);
+      this.tips.delete(key);
+    }
+  }
+
+  private async load(asset: string): Promise<void> {
+    const current = () => this.urdf === asset;
+    let robot: URDFRobot | null = null;
+    if (asset) {
+      try {
+        const [{ loadRobot }, file] = await Promise.all([import("../loaders/urdf"), this.context.asset(asset)]);
+        robot = await loadRobot(file.content, this.material);
+      } catch (error) {
+        console.warn(`the model ${asset} of ${this.item.name} cannot be shown:`, error);
+      }
+    }
+    if (!current()) return;
+    for (const child of [...this.body.children]) {
+      child.removeFromParent();
+      disposeTree(child);
+    }
+    this.robot = robot;
+    this.shown.clear();
+    this.body.add(robot ?? this.standIn());
+    ownedBy(this.body, this.item.id);
+    this.context.invalidate();
+  }
+
+  /** A foot and a column: a robot stands here, and its type has no model. */
+  private standIn(): Object3D {
+    const foot = new Mesh(new CylinderGeometry(0.09, 0.1, 0.05, 32).rotateX(Math.PI / 2).translate(0, 0, 0.025), this.material);
+    const column = new Mesh(new CylinderGeometry(0.055, 0.065, 0.14, 32).rotateX(Math.PI / 2).translate(0, 0, 0.12), this.material);
+    const head = new Mesh(new SphereGeometry(0.07, 24, 16).translate(0, 0, 0.2), this.material);
+    return new Group().add(foot, column, head);
+  }
+}

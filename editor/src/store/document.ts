@@ -1,0 +1,126 @@
+/** What events make of the open document: pure functions. */
+
+import type { Action, ActionPoint, Project, Scene, ServerEvent } from "../protocol/types";
+import { byId, keep, put, without } from "./records";
+import type { OpenDocument } from "./state";
+
+/** Take a scene, and the project on it, apart. */
+export function opened(scene: Scene, project: Project | null): OpenDocument {
+  const { objects, ...bareScene } = scene;
+  const doc: OpenDocument = {
+    scene: bareScene,
+    project: null,
+    unsaved: isUnsaved(project ?? scene),
+    objects: byId(objects),
+    points: {},
+    orientations: {},
+    joints: {},
+    actions: {},
+    logic: {},
+    parameters: {},
+    overrides: {},
+  };
+  if (!project) return doc;
+  const { action_points, parameters, functions: _, logic, object_overrides, ...bareProject } = project;
+  let full: OpenDocument = { ...doc, project: bareProject, logic: byId(logic), parameters: byId(parameters) };
+  for (const point of action_points) full = withPoint(full, point);
+  full.overrides = Object.fromEntries(
+    object_overrides.map((each) => [each.id, Object.fromEntries(each.parameters.map((one) => [one.name, one]))]),
+  );
+  return full;
+}
+
+function isUnsaved(of: { modified?: string; int_modified?: string }): boolean {
+  if (!of.modified) return true;
+  return of.int_modified !== undefined && Date.parse(of.int_modified) > Date.parse(of.modified);
+}
+
+/** A point with all that is on it, in place of what was known of it. */
+function withPoint(doc: OpenDocument, point: ActionPoint): OpenDocument {
+  const { orientations, robot_joints, actions, ...bare } = point;
+  const of = <T extends { id: string }>(items: T[]) => byId(items.map((item) => ({ ...item, pointId: point.id })));
+  const elsewhere = (item: { pointId: string }) => item.pointId !== point.id;
+  return {
+    ...doc,
+    points: put(doc.points, point.id, bare),
+    orientations: { ...keep(doc.orientations, elsewhere), ...of(orientations) },
+    joints: { ...keep(doc.joints, elsewhere), ...of(robot_joints) },
+    actions: { ...keep(doc.actions, elsewhere), ...of(actions) },
+  };
+}
+
+function withoutPoint(doc: OpenDocument, id: string): OpenDocument {
+  const elsewhere = (item: { pointId: string }) => item.pointId !== id;
+  return {
+    ...doc,
+    points: without(doc.points, id),
+    orientations: keep(doc.orientations, elsewhere),
+    joints: keep(doc.joints, elsewhere),
+    actions: keep(doc.actions, elsewhere),
+  };
+}
+
+/** An item of a point: added to the one it names, changed where it is, or gone. */
+function onPoint<T extends { id: string }>(
+  record: Record<string, T & { pointId: string }>,
+  event: { change_type?: string; parent_id?: string },
+  item: T,
+): Record<string, T & { pointId: string }> {
+  if (event.change_type === "remove") return without(record, item.id);
+  const pointId = event.parent_id ?? record[item.id]?.pointId;
+  if (pointId === undefined) return record;
+  return put(record, item.id, { ...record[item.id], ...item, pointId });
+}
+
+/** Give the document after an event; the same one when the event is about something else. */
+export function changed(doc: OpenDocument, event: ServerEvent): OpenDocument {
+  const removed = event.change_type === "remove";
+  switch (event.event) {
+    case "SceneSaved":
+    case "ProjectSaved":
+      return { ...doc, unsaved: false };
+    case "SceneChanged":
+      if (event.data.id !== doc.scene.id || removed) return doc;
+      return { ...doc, scene: { ...doc.scene, ...event.data }, unsaved: doc.unsaved || !doc.project };
+    case "ProjectChanged":
+      if (event.data.id !== doc.project?.id || removed) return doc;
+      return { ...doc, project: { ...doc.project, ...event.data }, unsaved: true };
+    case "SceneObjectChanged": {
+      const objects = removed ? without(doc.objects, event.data.id) : put(doc.objects, event.data.id, event.data);
+      return { ...doc, objects, unsaved: true };
+    }
+    case "ActionPointChanged": {
+      const point = event.data;
+      if (removed) return { ...withoutPoint(doc, point.id), unsaved: true };
+      if (event.change_type === "update" && "actions" in point) {
+        return { ...withPoint(doc, point as ActionPoint), unsaved: true };
+      }
+      const { id, name, position, parent, display_name, description } = point;
+      const bare = { id, name, position, parent, display_name, description };
+      return { ...doc, points: put(doc.points, id, bare), unsaved: true };
+    }
+    case "OrientationChanged":
+      return { ...doc, orientations: onPoint(doc.orientations, event, event.data), unsaved: true };
+    case "JointsChanged":
+      return { ...doc, joints: onPoint(doc.joints, event, event.data), unsaved: true };
+    case "ActionChanged":
+      return { ...doc, actions: onPoint(doc.actions, event, event.data as Action), unsaved: true };
+    case "LogicItemChanged": {
+      const logic = removed ? without(doc.logic, event.data.id) : put(doc.logic, event.data.id, event.data);
+      return { ...doc, logic, unsaved: true };
+    }
+    case "ProjectParameterChanged": {
+      const { id } = event.data;
+      const parameters = removed ? without(doc.parameters, id) : put(doc.parameters, id, event.data);
+      return { ...doc, parameters, unsaved: true };
+    }
+    case "OverrideUpdated": {
+      const id = event.parent_id ?? "";
+      const mine = doc.overrides[id] ?? {};
+      const now = removed ? without(mine, event.data.name) : put(mine, event.data.name, event.data);
+      return { ...doc, overrides: put(doc.overrides, id, now), unsaved: true };
+    }
+    default:
+      return doc;
+  }
+}

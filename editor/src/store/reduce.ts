@@ -1,0 +1,236 @@
+/** What an event makes of the state: a pure function; what is not named stays. */
+
+import type { ServerEvent } from "../protocol/types";
+import { changed, opened } from "./document";
+import { put, without } from "./records";
+import { NO_PROGRAM, OFFLINE, type Notice, type State } from "./state";
+
+/** How many are kept. */
+const NOTICES = 200;
+const TRACE = 1000;
+let numberOfNotice = 0;
+
+export function notice(state: State, level: Notice["level"], text: string): Pick<State, "notices"> {
+  const added = { id: ++numberOfNotice, level, text, time: Date.now() };
+  return { notices: [...state.notices, added].slice(-NOTICES) };
+}
+
+/** Forget what belongs to the document that was open. */
+const CLOSED = {
+  doc: null,
+  live: OFFLINE,
+  history: null,
+  previews: {},
+  breakpoints: {},
+  reach: {},
+} satisfies Partial<State>;
+
+export function reduce(state: State, event: ServerEvent): Partial<State> {
+  if (state.doc) {
+    const doc = changed(state.doc, event);
+    if (doc !== state.doc) return { doc, ...lists(state, event), ui: stillThere(state, doc) };
+  }
+  switch (event.event) {
+    case "OpenScene":
+      return open(state, opened(event.data.scene, null));
+    case "OpenProject":
+      return open(state, opened(event.data.scene, event.data.project));
+    case "SceneClosed":
+    case "ProjectClosed":
+      return { ...CLOSED, view: { ...state.view, user: {}, shared: {} }, ui: { ...state.ui, selection: null, tool: "" } };
+    case "ShowMainScreen":
+      return {
+        ...CLOSED,
+        program: { ...state.program, running: [] },
+        lists: { ...state.lists, shown: event.data.what, highlight: event.data.highlight ?? "" },
+      };
+    case "SceneChanged":
+    case "ProjectChanged":
+    case "PackageChanged":
+      return lists(state, event);
+    case "ObjectsLocked":
+      return {
+        locks: { ...state.locks, ...Object.fromEntries(event.data.object_ids.map((id) => [id, event.data.owner])) },
+      };
+    case "ObjectsUnlocked":
+      return { locks: without(state.locks, ...event.data.object_ids) };
+    case "UserPresence":
+      return {
+        users: event.data.online
+          ? put(state.users, event.data.user, event.data)
+          : without(state.users, event.data.user),
+      };
+    case "MovePreview": {
+      const { position, orientation, joints, id } = event.data;
+      const over = !position && !orientation && !joints;
+      return { previews: over ? without(state.previews, id) : put(state.previews, id, event.data) };
+    }
+    case "ChangedObjectTypes": {
+      const names = event.data.map((type) => type.type);
+      const given = Object.fromEntries(event.data.map((type) => [type.type, type]));
+      const byName =
+        event.change_type === "remove"
+          ? without(state.types.byName, ...names)
+          : { ...state.types.byName, ...given };
+      return { types: { ...state.types, byName, actions: without(state.types.actions, ...names) } };
+    }
+    case "HistoryChanged":
+      return { history: event.data };
+    case "BreakpointsChanged":
+      if (event.data.project_id !== state.doc?.project?.id) return {};
+      return { breakpoints: Object.fromEntries(event.data.ids.map((id) => [id, true])) };
+    case "ReachabilityChanged": {
+      const key = [event.data.robot_id, event.data.arm_id ?? "", event.data.end_effector_id].join("/");
+      const known = Object.fromEntries((state.reach[key]?.items ?? []).map((item) => [item.id, item]));
+      for (const item of event.data.items) known[item.id] = item;
+      return { reach: put(state.reach, key, { ...event.data, items: Object.values(known) }) };
+    }
+    case "ViewStateChanged":
+      return viewState(state, event.data);
+    case "Notification": {
+      const level = event.data.level === "Info" ? "info" : event.data.level === "Warn" ? "warn" : "error";
+      return notice(state, level, event.data.message);
+    }
+    case "TaskState":
+      return { tasks: put(state.tasks, event.data.id, event.data) };
+    default:
+      return live(state, event) ?? program(state, event) ?? {};
+  }
+}
+
+function open(state: State, doc: NonNullable<State["doc"]>): Partial<State> {
+  const same = state.doc?.scene.id === doc.scene.id && state.doc.project?.id === doc.project?.id;
+  if (same) return { doc, ui: stillThere(state, doc) };
+  return { ...CLOSED, doc, ui: { ...state.ui, selection: null, tool: "" } };
+}
+
+/** The selection, unless what was selected is gone. */
+function stillThere(state: State, doc: NonNullable<State["doc"]>): State["ui"] {
+  const selection = state.ui.selection;
+  if (!selection) return state.ui;
+  const { id } = selection;
+  const there = [doc.objects, doc.points, doc.orientations, doc.joints, doc.actions, doc.logic].some((of) => id in of);
+  return there ? state.ui : { ...state.ui, selection: null };
+}
+
+/** What the lists of the home screen become. */
+function lists(state: State, event: ServerEvent): Partial<State> {
+  const removed = event.change_type === "remove";
+  const merged = <T extends { id: string }>(items: T[] | null, item: T): T[] | null => {
+    if (!items) return null;
+    const rest = items.filter((each) => each.id !== item.id);
+    if (removed) return rest;
+    const known = items.find((each) => each.id === item.id);
+    return [...rest, { ...known, ...item }];
+  };
+  switch (event.event) {
+    case "SceneChanged":
+      return { lists: { ...state.lists, scenes: merged(state.lists.scenes, event.data as never) } };
+    case "ProjectChanged":
+      return { lists: { ...state.lists, projects: merged(state.lists.projects, event.data) } };
+    case "PackageChanged":
+      return { lists: { ...state.lists, packages: merged(state.lists.packages, event.data) } };
+    default:
+      return {};
+  }
+}
+
+function viewState(state: State, data: import("../protocol/types").ViewState): Partial<State> {
+  const open = state.doc?.project?.id ?? state.doc?.scene.id;
+  const part = data.document === "" ? "general" : data.document === open ? data.scope : null;
+  if (part === null || (data.scope === "user" && data.user !== undefined && data.user !== state.connection.user)) {
+    return {};
+  }
+  const values = { ...state.view[part] };
+  for (const [key, value] of Object.entries(data.values)) {
+    if (value === null) delete values[key];
+    else values[key] = value;
+  }
+  return { view: { ...state.view, [part]: values } };
+}
+
+/** The scene in operation; null when the event is about something else. */
+function live(state: State, event: ServerEvent): Partial<State> | null {
+  const now = state.live;
+  const become = (change: Partial<typeof now>) => ({ live: { ...now, ...change } });
+  switch (event.event) {
+    case "SceneState": {
+      const { state: next, message = "" } = event.data;
+      if (next === "stopped") return { live: { ...OFFLINE, message: message || now.message } };
+      if (next === "starting") return { live: { ...OFFLINE, state: next, message } };
+      return become({ state: next, message });
+    }
+    case "ObjectState":
+      return become({ objects: put(now.objects, event.data.object_id, event.data) });
+    case "ObjectHealth":
+      return become({ health: put(now.health, event.data.object_id, event.data) });
+    case "RobotHold": {
+      const { robot_id, held } = event.data;
+      return become({ holds: held ? put(now.holds, robot_id, event.data) : without(now.holds, robot_id) });
+    }
+    case "HandTeachingMode":
+      return become({ handTeaching: put(now.handTeaching, event.data.robot_id, event.data.enabled) });
+    case "RobotMoveToPose":
+    case "RobotMoveToJoints":
+    case "RobotMoveToActionPointOrientation":
+    case "RobotMoveToActionPointJoints": {
+      const { move_event_type: phase, robot_id, message } = event.data;
+      const moving = phase === "start" ? put(now.moving, robot_id, event.event) : without(now.moving, robot_id);
+      const told = phase === "failed" ? notice(state, "error", message || "The robot did not reach its goal.") : {};
+      return { ...become({ moving }), ...told };
+    }
+    case "ActionExecution":
+      return become({ executing: event.data.action_id, result: null });
+    case "ActionResult":
+      return become({ executing: "", result: event.data });
+    case "ActionCancelled":
+      return become({ executing: "" });
+    case "ProcessState": {
+      const { id, state: phase, message } = event.data;
+      return phase === "failed" ? notice(state, "error", message || `${id} failed.`) : {};
+    }
+    default:
+      return null;
+  }
+}
+
+/** The program in operation; null when the event is about something else. */
+function program(state: State, event: ServerEvent): Partial<State> | null {
+  const now = state.program;
+  const become = (change: Partial<typeof now>) => ({ program: { ...now, ...change } });
+  switch (event.event) {
+    case "PackageState": {
+      const { state: next, package_id = "" } = event.data;
+      if (next === "started") return { program: { ...NO_PROGRAM, runs: now.runs, state: next, packageId: package_id } };
+      return become({
+        state: next,
+        packageId: package_id || now.packageId,
+        running: next === "stopped" ? [] : now.running,
+      });
+    }
+    case "PackageInfo":
+      return {
+        ...become({ packageId: event.data.package_id, packageName: event.data.package_name }),
+        doc: { ...opened(event.data.scene, event.data.project), unsaved: false },
+        live: OFFLINE,
+      };
+    case "ActionStateBefore": {
+      const id = event.data.action_id;
+      return id ? become({ running: [...now.running.filter((each) => each !== id), id] }) : {};
+    }
+    case "ActionStateAfter":
+      return become({ running: now.running.filter((each) => each !== event.data.action_id) });
+    case "ProjectException":
+      return become({ exception: event.data });
+    case "ExecutionTrace": {
+      const rest = now.trace.filter((each) => each.run === event.data.run && each.number !== event.data.number);
+      return become({ trace: [...rest, event.data].slice(-TRACE) });
+    }
+    case "RunChanged": {
+      const rest = now.runs.filter((each) => each.number !== event.data.number);
+      return become({ runs: [event.data, ...rest].sort((a, b) => b.number - a.number) });
+    }
+    default:
+      return null;
+  }
+}

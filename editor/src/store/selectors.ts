@@ -1,0 +1,20 @@
+/** Questions that several places ask of the state. */
+
+import type { PackageStateEnum } from "../protocol/types";
+import type { State } from "./state";
+
+/** States in which a program has the devices. */
+export const RUNNING: ReadonlySet<PackageStateEnum> = new Set(["started", "running", "stopping", "pausing", "paused", "resuming"]);
+
+export const isRunning = (state: State): boolean => RUNNING.has(state.program.state);
+export const isConnected = (state: State): boolean => state.connection.status === "ready";
+export const isOnline = (state: State): boolean => state.live.state === "started";
+
+/** Id of the document that is open: the project's, or the scene's. */
+export const openId = (state: State): string => state.doc?.project?.id ?? state.doc?.scene.id ?? "";
+
+/** Who else holds a thing; empty when nobody does, or the user himself. */
+export function heldBy(state: State, id: string): string {
+  const owner = state.locks[id];
+  return owner && owner !== state.connection.user ? owner : "";
+}

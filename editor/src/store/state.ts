@@ -1,0 +1,207 @@
+/**
+ * What the editor knows, by subject. All but `ui` and `connection` comes from the server; nothing of that is changed
+ * here on the user's word: an edit is a request, and what it does comes back as an event.
+ *
+ * What moves at 30 Hz is not here but in telemetry.ts.
+ */
+
+import type {
+  Action,
+  ActionResultData,
+  BareActionPoint,
+  BareProject,
+  BareScene,
+  HistoryChangedData,
+  ListProjectsData,
+  ListScenesData,
+  LogicItem,
+  MovePreviewData,
+  NamedOrientation,
+  ObjectAction,
+  ObjectHealthData,
+  ObjectStateData,
+  ObjectTypeMeta,
+  PackageStateEnum,
+  PackageSummary,
+  Parameter,
+  ProjectExceptionData,
+  ProjectParameter,
+  ProjectRobotJoints,
+  ReachabilityData,
+  RobotHoldData,
+  RobotMeta,
+  Run,
+  SceneObject,
+  SceneStateEnum,
+  SystemInfoData,
+  TaskStateData,
+  TraceEntry,
+  UserPresenceData,
+} from "../protocol/types";
+
+/** `joining`: connected, being let in and told what there is. `lost`: was there and is being looked for. */
+export type ConnectionStatus = "left" | "connecting" | "joining" | "ready" | "lost" | "refused";
+
+export interface Connection {
+  status: ConnectionStatus;
+  /** Why it is lost or refused, as a sentence. */
+  reason: string;
+  user: string;
+  /** 1 to 5; the server says it by refusing, and by the token. */
+  role: number;
+  server: SystemInfoData | null;
+}
+
+export type Of<T> = T & { pointId: string };
+
+/** The open scene, and the project if one is open. */
+export interface OpenDocument {
+  scene: BareScene;
+  project: BareProject | null;
+  unsaved: boolean;
+  objects: Record<string, SceneObject>;
+  points: Record<string, BareActionPoint>;
+  orientations: Record<string, Of<NamedOrientation>>;
+  joints: Record<string, Of<ProjectRobotJoints>>;
+  actions: Record<string, Of<Action>>;
+  logic: Record<string, LogicItem>;
+  parameters: Record<string, ProjectParameter>;
+  /** By object, by the parameter's name. */
+  overrides: Record<string, Record<string, Parameter>>;
+}
+
+export interface Lists {
+  /** null until they are known. */
+  scenes: ListScenesData[] | null;
+  projects: ListProjectsData[] | null;
+  packages: PackageSummary[] | null;
+  /** Which of the lists the server would show, and what in it. */
+  shown: "ScenesList" | "ProjectsList" | "PackagesList";
+  highlight: string;
+}
+
+export interface Types {
+  byName: Record<string, ObjectTypeMeta>;
+  robots: Record<string, RobotMeta>;
+  /** Actions by type, asked for when they are first needed. */
+  actions: Record<string, ObjectAction[]>;
+}
+
+/** The scene in operation. */
+export interface Live {
+  state: SceneStateEnum;
+  message: string;
+  objects: Record<string, ObjectStateData>;
+  health: Record<string, ObjectHealthData>;
+  holds: Record<string, RobotHoldData>;
+  /** Robots that move, with what they are doing. */
+  moving: Record<string, string>;
+  handTeaching: Record<string, boolean>;
+  /** The action that is tried out, and how the last one ended. */
+  executing: string;
+  result: ActionResultData | null;
+}
+
+/** The program in operation. */
+export interface Program {
+  state: PackageStateEnum;
+  packageId: string;
+  packageName: string;
+  /** Actions that run now. */
+  running: string[];
+  exception: ProjectExceptionData | null;
+  trace: TraceEntry[];
+  runs: Run[];
+}
+
+export interface Notice {
+  id: number;
+  level: "info" | "warn" | "error";
+  text: string;
+  time: number;
+}
+
+export type Kind = "object" | "point" | "orientation" | "joints" | "action" | "logic";
+
+export interface Selection {
+  kind: Kind;
+  id: string;
+}
+
+export interface Ui {
+  selection: Selection | null;
+  /** What the pointer or the crosshair is on. */
+  hovered: string;
+  /** The tool of the left rail that is open. */
+  tool: string;
+  theme: "system" | "light" | "dark";
+  /** The device asks for dark colours. */
+  systemDark: boolean;
+  leftHanded: boolean;
+  quality: "auto" | "low" | "high";
+}
+
+export interface State {
+  connection: Connection;
+  lists: Lists;
+  types: Types;
+  doc: OpenDocument | null;
+  /** Owners by what they hold. */
+  locks: Record<string, string>;
+  users: Record<string, UserPresenceData>;
+  previews: Record<string, MovePreviewData>;
+  history: HistoryChangedData | null;
+  breakpoints: Record<string, true>;
+  /** By robot, arm and end effector, then by orientation or joints. */
+  reach: Record<string, ReachabilityData>;
+  /** Shared and own view state of the open document, and of none (stars, settings). */
+  view: { user: Record<string, unknown>; shared: Record<string, unknown>; general: Record<string, unknown> };
+  live: Live;
+  program: Program;
+  tasks: Record<string, TaskStateData>;
+  notices: Notice[];
+  ui: Ui;
+}
+
+export const OFFLINE: Live = {
+  state: "stopped",
+  message: "",
+  objects: {},
+  health: {},
+  holds: {},
+  moving: {},
+  handTeaching: {},
+  executing: "",
+  result: null,
+};
+
+export const NO_PROGRAM: Program = {
+  state: "undefined",
+  packageId: "",
+  packageName: "",
+  running: [],
+  exception: null,
+  trace: [],
+  runs: [],
+};
+
+export function initialState(): State {
+  return {
+    connection: { status: "left", reason: "", user: "", role: 5, server: null },
+    lists: { scenes: null, projects: null, packages: null, shown: "ProjectsList", highlight: "" },
+    types: { byName: {}, robots: {}, actions: {} },
+    doc: null,
+    locks: {},
+    users: {},
+    previews: {},
+    history: null,
+    breakpoints: {},
+    reach: {},
+    view: { user: {}, shared: {}, general: {} },
+    live: OFFLINE,
+    program: NO_PROGRAM,
+    tasks: {},
+    notices: [],
+    ui: { selection: null, hovered: "", tool: "", theme: "system", systemDark: false, leftHanded: false, quality: "auto" },
+  };
+}

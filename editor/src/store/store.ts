@@ -1,0 +1,40 @@
+/** The one store, and how React looks at it. */
+
+import { useStore } from "zustand";
+import { createStore } from "zustand/vanilla";
+import type { ServerEvent } from "../protocol/types";
+import { notice, reduce } from "./reduce";
+import { initialState, type Connection, type Notice, type Selection, type State, type Ui } from "./state";
+
+export const store = createStore<State>(initialState);
+
+/** Look at a part of the state; the component is drawn again when that part is another one. */
+export function useEditor<T>(select: (state: State) => T): T {
+  return useStore(store, select);
+}
+
+export const now = (): State => store.getState();
+
+export function applyEvent(event: ServerEvent): void {
+  store.setState((state) => reduce(state, event));
+}
+
+export function setConnection(change: Partial<Connection>): void {
+  store.setState((state) => ({ connection: { ...state.connection, ...change } }));
+}
+
+export function setUi(change: Partial<Ui>): void {
+  store.setState((state) => ({ ui: { ...state.ui, ...change } }));
+}
+
+export function select(selection: Selection | null): void {
+  setUi({ selection });
+}
+
+export function tell(level: Notice["level"], text: string): void {
+  store.setState((state) => notice(state, level, text));
+}
+
+export function dismiss(id: number): void {
+  store.setState((state) => ({ notices: state.notices.filter((each) => each.id !== id) }));
+}

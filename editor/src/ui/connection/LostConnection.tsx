@@ -1,0 +1,28 @@
+/** Says that the server is away. The view stays, and can be looked at; it comes back by itself. */
+
+import { client } from "../../session/session";
+import { useEditor } from "../../store/store";
+import { Icon } from "../kit/icons";
+import { Button } from "../kit/kit";
+import "./lost.css";
+
+export function LostConnection() {
+  const { status, reason } = useEditor((state) => state.connection);
+  if (status === "ready") return null;
+  return (
+    <div className="lost" role="alert">
+      <Icon name="warn" />
+      <p>
+        <strong>{status === "joining" ? "The server is back." : "No connection to the server."}</strong>{" "}
+        {status === "joining"
+          ? "Reading what has changed…"
+          : `What you see is as it was. ${reason ? `${reason} ` : ""}Trying again…`}
+      </p>
+      {status === "lost" && (
+        <Button look="plain" onPress={() => client.hurry()}>
+          Try now
+        </Button>
+      )}
+    </div>
+  );
+}

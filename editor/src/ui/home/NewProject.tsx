@@ -1,0 +1,35 @@
+/** Asks for the name and the scene of a new project. */
+
+import { useState } from "react";
+import * as documents from "../../commands/documents";
+import { useEditor } from "../../store/store";
+import { AskName } from "../kit/kit";
+
+export function NewProject({ onClose }: { onClose: () => void }) {
+  const scenes = useEditor((state) => state.lists.scenes) ?? [];
+  const projects = useEditor((state) => state.lists.projects) ?? [];
+  const newest = [...scenes].sort((a, b) => (b.modified ?? "").localeCompare(a.modified ?? ""))[0];
+  const [scene, setScene] = useState(newest?.id ?? "");
+  const [logic, setLogic] = useState(true);
+  return (
+    <AskName title="New project" yes="Make and open" taken={projects.map((each) => each.name)} onYes={(name) => void documents.newProject(scene, name, "", logic)} onClose={onClose}>
+      <div className="field">
+        <label htmlFor="scene-of-project">Scene</label>
+        <select id="scene-of-project" value={scene} onChange={(event) => setScene(event.target.value)}>
+          {scenes.map((each) => (
+            <option key={each.id} value={each.id}>
+              {each.name}
+            </option>
+          ))}
+        </select>
+      </div>
+      <label className="check">
+        <input type="checkbox" checked={logic} onChange={(event) => setLogic(event.target.checked)} />
+        <span>
+          Steps are connected here
+          <span className="quiet small"> – without, the project holds points for a script written by hand</span>
+        </span>
+      </label>
+    </AskName>
+  );
+}

@@ -1,0 +1,45 @@
+/** The first screen: a name, and a token where the server asks for one. The name is remembered. */
+
+import { type FormEvent, useState } from "react";
+import { remember, remembered } from "../../session/memory";
+import { join } from "../../session/session";
+import { useEditor } from "../../store/store";
+import { Button, Field, Waiting } from "../kit/kit";
+import "./join.css";
+
+export function Join() {
+  const { status, reason } = useEditor((state) => state.connection);
+  const [name, setName] = useState(() => remembered("name"));
+  const [token, setToken] = useState(() => remembered("token"));
+  const asksForToken = status === "refused" && /token/i.test(reason);
+  const trying = status === "connecting" || status === "joining";
+  const submit = (event: FormEvent) => {
+    event.preventDefault();
+    const clean = name.trim();
+    if (!clean) return;
+    remember("name", clean);
+    remember("token", token.trim());
+    join(clean, token.trim());
+  };
+  return (
+    <main className="join">
+      <form onSubmit={submit}>
+        <h1>ARCOR2-HW</h1>
+        <p className="quiet">Set up, program and run this workplace, together with everyone who is here.</p>
+        <Field label="Your name" value={name} onChange={setName} autoFocus autoComplete="nickname" maxLength={60} hint="Others see it beside what you work on." />
+        {(asksForToken || token) && (
+          <Field label="Token" type="password" value={token} onChange={setToken} autoComplete="off" hint="Who looks after the server makes it: arcor2-hw token add" />
+        )}
+        {status === "refused" && (
+          <p role="alert" className="notice-line bad">
+            {reason}
+          </p>
+        )}
+        {trying && <Waiting>{reason ? `${reason} Trying again…` : "Connecting…"}</Waiting>}
+        <Button look="primary" type="submit" isDisabled={!name.trim() || status === "joining"}>
+          Join
+        </Button>
+      </form>
+    </main>
+  );
+}

@@ -1,0 +1,37 @@
+/** Icons, drawn for 24 × 24 in the colour of the text. They always stand beside a word, or have a label. */
+
+const PATHS = {
+  home: "M4 11l8-7 8 7v9h-5v-6H9v6H4z",
+  save: "M5 4h11l3 3v13H5zM8 4v5h7V4M8 20v-6h8v6",
+  undo: "M9 7L4 12l5 5M4 12h10a6 6 0 0 1 0 12",
+  redo: "M15 7l5 5-5 5M20 12H10a6 6 0 0 0 0 12",
+  close: "M6 6l12 12M18 6L6 18",
+  more: "M5 12h.01M12 12h.01M19 12h.01",
+  plus: "M12 5v14M5 12h14",
+  tree: "M5 5h6M5 5v14h4M5 12h4M13 12h6M13 19h6",
+  plug: "M9 3v5M15 3v5M6 8h12v3a6 6 0 0 1-12 0zM12 17v4",
+  robot: "M6 21h8M10 21v-5l-4-5 6-6 6 3M12 5a1 1 0 1 0 0 .01",
+  search: "M10.500 4a6.500 6.500 0 1 0 0 13 6.500 6.500 0 0 0 0-13zM15.500 15.500L21 21",
+  people: "M9 11a3.500 3.500 0 1 0 0-7 3.500 3.500 0 0 0 0 7zM2.500 20a6.500 6.500 0 0 1 13 0M16 4.500a3.500 3.500 0 0 1 0 6.500M18 14.500a6.500 6.500 0 0 1 3.500 5.500",
+  zoom: "M4 9V4h5M20 9V4h-5M4 15v5h5M20 15v5h-5",
+  info: "M12 11v6M12 7.500v.01M12 3a9 9 0 1 0 0 18 9 9 0 0 0 0-18z",
+  warn: "M12 4L2.500 20h19zM12 10v5M12 17.500v.01",
+  check: "M4 12.500l5 5L20 6.500",
+  play: "M7 4l13 8-13 8z",
+  settings: "M4 7h9M17 7h3M15 5v4M4 17h3M11 17h9M9 15v4",
+  list: "M4 6h16M4 12h16M4 18h16",
+  box: "M4 8l8-4 8 4v8l-8 4-8-4zM4 8l8 4 8-4M12 12v8",
+  point: "M12 9a3 3 0 1 0 0 6 3 3 0 0 0 0-6zM12 2v4M12 18v4M2 12h4M18 12h4",
+  action: "M4 14c0-2 3.600-3.500 8-3.500s8 1.500 8 3.500-3.600 3.500-8 3.500S4 16 4 14z",
+  lock: "M6 11h12v9H6zM8.500 11V8a3.500 3.500 0 0 1 7 0v3",
+} as const;
+
+export type IconName = keyof typeof PATHS;
+
+export function Icon({ name, size = 20 }: { name: IconName; size?: number }) {
+  return (
+    <svg width={size} height={size} viewBox="0 0 24 24" fill="none" stroke="currentColor" strokeWidth="1.900" strokeLinecap="round" strokeLinejoin="round" aria-hidden="true">
+      <path d={PATHS[name]} />
+    </svg>
+  );
+}

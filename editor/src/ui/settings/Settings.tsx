@@ -1,0 +1,56 @@
+/** How the screen looks: on this device only. */
+
+import { useEffect } from "react";
+import { remember, remembered } from "../../session/memory";
+import type { Ui } from "../../store/state";
+import { setUi, useEditor } from "../../store/store";
+import { type Choice, More } from "../kit/kit";
+
+const THEMES: Record<Ui["theme"], string> = { system: "Colours as the device has them", light: "Light", dark: "Dark" };
+const dark = window.matchMedia("(prefers-color-scheme: dark)");
+
+export function useTheme(): "light" | "dark" {
+  const wanted = useEditor((state) => state.ui.theme);
+  const system = useEditor((state) => state.ui.systemDark);
+  return wanted === "system" ? (system ? "dark" : "light") : wanted;
+}
+
+/** Take over what this browser remembers, and follow the device's colours. */
+export function useScreenSettings(): void {
+  const theme = useTheme();
+  const left = useEditor((state) => state.ui.leftHanded);
+  useEffect(() => {
+    const follow = () => setUi({ systemDark: dark.matches });
+    setUi({ theme: (remembered("theme") || "system") as Ui["theme"], leftHanded: remembered("hand") === "left", systemDark: dark.matches });
+    dark.addEventListener("change", follow);
+    return () => dark.removeEventListener("change", follow);
+  }, []);
+  useEffect(() => {
+    document.documentElement.dataset["theme"] = theme;
+    document.documentElement.dataset["hand"] = left ? "left" : "right";
+  }, [theme, left]);
+}
+
+export function Settings() {
+  const { theme, leftHanded } = useEditor((state) => state.ui);
+  const choices: Choice[] = [
+    ...(Object.keys(THEMES) as Ui["theme"][]).map((each) => ({
+      id: each,
+      label: THEMES[each],
+      icon: each === theme ? ("check" as const) : undefined,
+      act: () => {
+        setUi({ theme: each });
+        remember("theme", each === "system" ? "" : each);
+      },
+    })),
+    {
+      id: "hand",
+      label: leftHanded ? "Controls for the right hand" : "Controls for the left hand",
+      act: () => {
+        setUi({ leftHanded: !leftHanded });
+        remember("hand", leftHanded ? "" : "left");
+      },
+    },
+  ];
+  return <More label="Screen settings" icon="settings" choices={choices} />;
+}

@@ -1,0 +1,33 @@
+/** The tools: icon and word. One that cannot be used says why when it is tapped. */
+
+import { ToggleButton } from "react-aria-components";
+import { setUi, tell, useEditor } from "../../store/store";
+import { Icon } from "../kit/icons";
+import { TOOLS } from "./tools";
+
+export function Rail() {
+  const state = useEditor((each) => each);
+  const open = state.ui.tool;
+  return (
+    <nav className="rail" aria-label="Tools">
+      {TOOLS.filter((tool) => tool.shown?.(state) ?? true).map((tool) => {
+        const why = tool.barred?.(state) ?? "";
+        return (
+          <ToggleButton
+            key={tool.id}
+            className="rail-tool"
+            isSelected={open === tool.id}
+            aria-disabled={why !== "" || undefined}
+            onChange={(on) => {
+              if (why) tell("info", `${tool.label}: ${why}`);
+              else setUi({ tool: on ? tool.id : "" });
+            }}
+          >
+            <Icon name={tool.icon} size={24} />
+            {tool.label}
+          </ToggleButton>
+        );
+      })}
+    </nav>
+  );
+}

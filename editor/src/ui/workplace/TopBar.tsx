@@ -1,0 +1,81 @@
+/** Above the view: what is open and whether it is saved, undo, online or offline, who is here. */
+
+import { useState } from "react";
+import { barred } from "../../commands/asking";
+import * as documents from "../../commands/documents";
+import { goOffline, goOnline } from "../../commands/operation";
+import { leave } from "../../session/session";
+import { isRunning } from "../../store/selectors";
+import { useEditor } from "../../store/store";
+import { Button, Confirm, More } from "../kit/kit";
+import { People } from "../people/People";
+import { Settings } from "../settings/Settings";
+
+export function TopBar() {
+  const doc = useEditor((state) => state.doc);
+  const history = useEditor((state) => state.history);
+  const live = useEditor((state) => state.live.state);
+  const running = useEditor(isRunning);
+  const cannotSave = useEditor((state) => barred(state, state.doc?.project ? "SaveProject" : "SaveScene"));
+  const cannotUndo = useEditor((state) => barred(state, "Undo"));
+  const [asking, setAsking] = useState(false);
+  if (!doc) return null;
+  const { unsaved } = doc;
+  const busy = running || live !== "stopped";
+  return (
+    <header className="bar topbar">
+      <Button
+        look="plain"
+        icon="home"
+        aria-label="Close, and go to the lists"
+        isDisabled={busy || cannotSave !== ""}
+        onPress={() => (unsaved ? setAsking(true) : void documents.close(false))}
+      />
+      <div className="document">
+        <h1>{doc.project?.name ?? doc.scene.name}</h1>
+        <p className="quiet small">
+          {doc.project ? `on ${doc.scene.name} · ` : "scene · "}
+          <span className={unsaved ? "tag warn" : ""}>{running ? "running" : unsaved ? "not saved" : "saved"}</span>
+        </p>
+      </div>
+      <Button icon="save" className="word-on-wide" isDisabled={!unsaved || running || cannotSave !== ""} onPress={() => void documents.save()} aria-label="Save">
+        <span>Save</span>
+      </Button>
+      <Button look="plain" icon="undo" aria-label={history?.undo ? `Undo ${history.undo.text}` : "Nothing to undo"} isDisabled={!history?.undo || cannotUndo !== ""} onPress={() => void documents.undo()} />
+      <Button look="plain" icon="redo" aria-label={history?.redo ? `Redo ${history.redo.text}` : "Nothing to redo"} isDisabled={!history?.redo || cannotUndo !== ""} onPress={() => void documents.redo()} />
+      <LiveSwitch />
+      <People />
+      <Settings />
+      <More label="More" choices={[{ id: "leave", label: "Leave", icon: "close", act: leave }]} />
+      {asking && (
+        <Confirm title="Close without saving?" yes="Throw the changes away" onClose={() => setAsking(false)} onYes={() => void documents.close(true)}>
+          <p>What was changed since it was saved would be lost, also what others have changed.</p>
+        </Confirm>
+      )}
+    </header>
+  );
+}
+
+const WORDS = { stopped: "Go online", starting: "Going online…", started: "Online", stopping: "Going offline…" };
+
+function LiveSwitch() {
+  const live = useEditor((state) => state.live.state);
+  const running = useEditor(isRunning);
+  const cannot = useEditor((state) => barred(state, "StartScene"));
+  const objects = useEditor((state) => state.live.objects);
+  const wrong = Object.values(objects).filter((each) => each.state === "failed" || each.state === "lost").length;
+  const busy = live === "starting" || live === "stopping";
+  return (
+    <Button
+      className={`live ${live}`}
+      icon="plug"
+      aria-pressed={live === "started"}
+      isDisabled={busy || running || cannot !== ""}
+      onPress={() => void (live === "stopped" ? goOnline() : goOffline())}
+      aria-label={live === "started" ? "Online. Press to go offline" : WORDS[live]}
+    >
+      <span>{running ? "Program runs" : WORDS[live]}</span>
+      {wrong > 0 && <span className="tag bad">{wrong} in trouble</span>}
+    </Button>
+  );
+}

@@ -1,0 +1,94 @@
+/** The view in the middle: gives the engine what to show, and takes its taps. The engine is loaded when it is needed. */
+
+import { useEffect, useRef, useState } from "react";
+import type { Engine, Quality } from "../../engine/engine";
+import { readAsset } from "../../session/assets";
+import { setEngine } from "../../session/engine";
+import { now, select, setUi, store, useEditor } from "../../store/store";
+import { telemetry } from "../../store/telemetry";
+import { ItemMaker } from "../../viewmodel/items";
+import { Button, Waiting } from "../kit/kit";
+import { selectionOf } from "../names";
+import { useTheme } from "../settings/Settings";
+
+export function View3D() {
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const labels = useRef<HTMLDivElement>(null);
+  const [engine, setMine] = useState<Engine | null>(null);
+  const [failed, setFailed] = useState("");
+  const theme = useTheme();
+  const quality = useEditor((state) => state.ui.quality);
+  const themeAtStart = useRef(theme);
+
+  useEffect(() => {
+    let ended = false;
+    let made: Engine | null = null;
+    const maker = new ItemMaker();
+    let stop = () => {};
+    const begin = async () => {
+      const { Engine } = await import("../../engine/engine");
+      if (ended || !canvas.current || !labels.current) return;
+      made = new Engine({ canvas: canvas.current, labels: labels.current, telemetry, asset: readAsset, quality: chosen(quality), dark: themeAtStart.current === "dark" });
+      const shown = made;
+      shown.onTap = (hits) => {
+        const state = now();
+        const found = hits.map((hit) => selectionOf(state, hit.id)).filter((each) => each !== null);
+        // A tap on what is selected goes to what is behind it: so everything can be reached.
+        const at = found.findIndex((each) => each.id === state.ui.selection?.id);
+        const next = found[(at + 1) % Math.max(1, found.length)] ?? null;
+        select(next);
+        if (next) setUi({ tool: "" });
+      };
+      shown.show(maker.items(now()));
+      shown.focus();
+      stop = store.subscribe((state, before) => {
+        shown.show(maker.items(state));
+        if (state.doc && state.doc.scene.id !== before.doc?.scene.id) shown.focus();
+      });
+      setEngine(shown);
+      setMine(shown);
+    };
+    begin().catch((error: unknown) => setFailed(error instanceof Error ? error.message : String(error)));
+    return () => {
+      ended = true;
+      stop();
+      setEngine(null);
+      setMine(null);
+      made?.dispose();
+    };
+  }, [quality]);
+
+  useEffect(() => {
+    themeAtStart.current = theme;
+    engine?.setDark(theme === "dark");
+  }, [engine, theme]);
+
+  return (
+    <main className="view">
+      <canvas ref={canvas} key={quality} tabIndex={0} aria-label="3D view of the workplace. Keys W, A, S, D, Q and E fly; the list of things has the same for the keyboard." />
+      <div ref={labels} className="view-labels" aria-hidden="true" />
+      {!engine && !failed && <Waiting>Preparing the view…</Waiting>}
+      {failed && (
+        <p className="view-failed" role="alert">
+          The 3D view cannot be shown on this device: {failed} Lists and panels work without it.
+        </p>
+      )}
+      {engine && (
+        <div className="view-buttons">
+          <Button icon="zoom" aria-label="Show all" onPress={() => engine.focus()} />
+          <Button onPress={() => engine.view.look("top")}>Top</Button>
+          <Button onPress={() => engine.view.look("front")}>Front</Button>
+          <Button onPress={() => engine.view.look("side")}>Side</Button>
+        </div>
+      )}
+    </main>
+  );
+}
+
+/** `?q=low` and `?q=high` choose; else a device with few cores gets the light one. */
+function chosen(quality: "auto" | Quality): Quality {
+  if (quality !== "auto") return quality;
+  const asked = new URLSearchParams(location.search).get("q");
+  if (asked === "low" || asked === "high") return asked;
+  return navigator.hardwareConcurrency <= 4 ? "low" : "high";
+}

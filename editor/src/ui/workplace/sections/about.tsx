@@ -1,0 +1,45 @@
+/** What the selected thing is, who holds it, how it is. */
+
+import { theEngine } from "../../../session/engine";
+import { heldBy } from "../../../store/selectors";
+import { useEditor } from "../../../store/store";
+import { Icon } from "../../kit/icons";
+import { Button } from "../../kit/kit";
+import { KINDS, nameOf } from "../../names";
+import type { Section } from "../sections";
+
+const Body: Section["Body"] = ({ selection: { kind, id } }) => {
+  const holder = useEditor((state) => heldBy(state, id));
+  const type = useEditor((state) => state.doc?.objects[id]?.type ?? "");
+  const description = useEditor((state) => state.types.byName[type]?.description ?? "");
+  const action = useEditor((state) => state.doc?.actions[id]);
+  const by = useEditor((state) => (action ? nameOf(state, action.type.split("/")[0] ?? "") : ""));
+  const state = useEditor((each) => each.live.objects[id]);
+  return (
+    <>
+      <p>
+        {action ? `${by}: ${words(action.type.split("/")[1] ?? "")}` : type || KINDS[kind]}
+        {state && <span className={`tag ${TONE[state.state] ?? ""}`}>{state.state}</span>}
+      </p>
+      {state?.reason && <p className="small">{state.reason}</p>}
+      {description && <p className="quiet small">{description}</p>}
+      {holder && (
+        <p className="tag warn">
+          <Icon name="lock" size={16} /> {holder} works on it
+        </p>
+      )}
+      <Button icon="zoom" onPress={() => theEngine()?.focus(id)}>
+        Zoom to it
+      </Button>
+    </>
+  );
+};
+
+export const TONE: Record<string, string> = { online: "good", back: "good", lost: "bad", failed: "bad", connecting: "warn" };
+
+/** An action's name as words. */
+function words(name: string): string {
+  return name.replaceAll("_", " ");
+}
+
+export const about: Section = { id: "about", title: "About", applies: () => true, Body };

@@ -1,0 +1,23 @@
+/**
+ * The tools of the left rail: at most six, each an icon and a word. A tool is a folder beside this file that exports
+ * one of these; its panel stands at the right while it is open.
+ */
+
+import type { ComponentType } from "react";
+import type { State } from "../../store/state";
+import type { IconName } from "../kit/icons";
+import { devices } from "./tools/devices";
+import { things } from "./tools/things";
+
+export interface Tool {
+  id: string;
+  label: string;
+  icon: IconName;
+  /** Absent from the rail while this is false: what makes no sense in a scene, say. */
+  shown?: (state: State) => boolean;
+  /** Why it cannot be used now, as a sentence; empty when it can. */
+  barred?: (state: State) => string;
+  Panel: ComponentType;
+}
+
+export const TOOLS: readonly Tool[] = [things, devices];

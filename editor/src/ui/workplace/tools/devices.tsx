@@ -1,0 +1,59 @@
+/** Each device's connection and condition, in words; one that failed can be tried again by itself. */
+
+import { barred } from "../../../commands/asking";
+import { retryObject } from "../../../commands/operation";
+import { useEditor } from "../../../store/store";
+import { serves } from "../../../session/session";
+import { Button } from "../../kit/kit";
+import { TONE } from "../sections/about";
+import type { Tool } from "../tools";
+
+const STATES: Record<string, string> = {
+  offline: "offline",
+  connecting: "connecting…",
+  online: "online",
+  lost: "connection lost",
+  back: "online again",
+  failed: "not reached",
+};
+
+function Panel() {
+  const live = useEditor((state) => state.live);
+  const doc = useEditor((state) => state.doc);
+  const cannot = useEditor((state) => barred(state, "RetryObject"));
+  const objects = Object.values(doc?.objects ?? {}).sort((a, b) => a.name.localeCompare(b.name));
+  return (
+    <>
+      {live.state === "stopped" && <p className="quiet">The workplace is offline. {live.message}</p>}
+      <ul className="devices">
+        {objects.map((object) => {
+          const state = live.objects[object.id];
+          const health = live.health[object.id];
+          const failed = state?.state === "failed" || state?.state === "lost";
+          return (
+            <li key={object.id}>
+              <div className="device-head">
+                <strong>{object.name}</strong>
+                <span className={`tag ${TONE[state?.state ?? ""] ?? ""}`}>{STATES[state?.state ?? "offline"]}</span>
+              </div>
+              {state?.reason && <p className="small">{state.reason}</p>}
+              {health?.alarms.map((alarm) => (
+                <p key={alarm.code} className="small alarm">
+                  {alarm.text}
+                  {alarm.remedy && <span className="quiet"> {alarm.remedy}</span>}
+                </p>
+              ))}
+              {failed && live.state === "started" && serves("RetryObject") && (
+                <Button isDisabled={cannot !== ""} onPress={() => void retryObject(object.id)} aria-label={`Try ${object.name} again`}>
+                  Try again
+                </Button>
+              )}
+            </li>
+          );
+        })}
+      </ul>
+    </>
+  );
+}
+
+export const devices: Tool = { id: "devices", label: "Devices", icon: "plug", Panel };

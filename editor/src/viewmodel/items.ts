@@ -1,0 +1,200 @@
+/** From the state to what the 3D view shows: pure, and the same object for what did not change. */
+
+import type { Item, LinkItem, OrientationItem, Shape } from "../engine/items";
+import type { LogicItem, ObjectTypeMeta, Position } from "../protocol/types";
+import type { OpenDocument, State } from "../store/state";
+
+export const START = "START";
+export const END = "END";
+
+/** Where START and END stand until somebody puts them elsewhere. */
+const PLACES: Record<string, Position> = { START: { x: -0.3, y: -0.3, z: 0.02 }, END: { x: -0.3, y: 0.3, z: 0.02 } };
+const NO_PLACE = { x: 0, y: 0, z: 0 };
+const UPRIGHT = { position: NO_PLACE, orientation: { x: 0, y: 0, z: 0, w: 1 } };
+
+/** Makes the items of states that follow each other. */
+export class ItemMaker {
+  private known = new Map<string, { inputs: unknown[]; item: Item }>();
+
+  items(state: State): Item[] {
+    const { doc } = state;
+    if (!doc) {
+      this.known.clear();
+      return [];
+    }
+    const before = this.known;
+    this.known = new Map();
+    const found: Item[] = [];
+    const add = (id: string, inputs: unknown[], make: () => Item) => {
+      const known = before.get(id);
+      const same = known && known.inputs.length === inputs.length && known.inputs.every((each, n) => each === inputs[n]);
+      const kept = same ? known : { inputs, item: make() };
+      this.known.set(id, kept);
+      found.push(kept.item);
+    };
+    const { selection } = state.ui;
+    const me = state.connection.user;
+    const common = (id: string, name: string) => ({
+      id,
+      name,
+      selected: selection?.id === id,
+      lockedBy: lockedBy(state, id, me),
+      faint: faintness(state, id),
+    });
+    const tell = (id: string) => [selection?.id === id, lockedBy(state, id, me), faintness(state, id)];
+
+    for (const object of Object.values(doc.objects)) {
+      const type = state.types.byName[object.type];
+      const robot = state.types.robots[object.type];
+      if (!object.pose && !robot) continue; // shown in lists alone
+      const trouble = isTrouble(state, object.id);
+      const online = state.live.state === "started" || state.program.running.length > 0;
+      const preview = state.previews[object.id];
+      add(object.id, [object, type, robot, trouble, robot && online, preview, ...tell(object.id)], () => {
+        const pose = {
+          position: preview?.position ?? object.pose?.position ?? NO_PLACE,
+          orientation: preview?.orientation ?? object.pose?.orientation ?? UPRIGHT.orientation,
+        };
+        const base = { ...common(object.id, object.name), pose, trouble };
+        if (robot) return { ...base, kind: "robot", urdf: robot.urdf_package_filename ?? "", online };
+        return { ...base, kind: "object", shape: shapeOf(type) };
+      });
+    }
+    for (const point of Object.values(doc.points)) {
+      const preview = state.previews[point.id]?.position;
+      const breakpoint = point.id in state.breakpoints;
+      add(point.id, [point, preview, breakpoint, ...tell(point.id)], () => ({
+        ...common(point.id, point.name),
+        kind: "point",
+        parent: point.parent,
+        position: preview ?? point.position,
+        breakpoint,
+      }));
+    }
+    const reach = bestReach(state);
+    for (const one of Object.values(doc.orientations)) {
+      const preview = state.previews[one.id]?.orientation;
+      add(one.id, [one, preview, reach[one.id], ...tell(one.id)], () => ({
+        ...common(one.id, one.name),
+        kind: "orientation",
+        parent: one.pointId,
+        orientation: preview ?? one.orientation,
+        reach: reach[one.id] ?? "",
+      }));
+    }
+    this.pucks(state, doc, add, common, tell);
+    for (const item of Object.values(doc.logic)) {
+      add(item.id, [item, ...tell(item.id)], () => link(item, common(item.id, "")));
+    }
+    return found;
+  }
+
+  private pucks(
+    state: State,
+    doc: OpenDocument,
+    add: (id: string, inputs: unknown[], make: () => Item) => void,
+    common: (id: string, name: string) => Omit<Item, "kind"> & { id: string; name: string; selected: boolean; lockedBy: string; faint: number },
+    tell: (id: string) => unknown[],
+  ): void {
+    const levels = new Map<string, number>();
+    const colours = Object.keys(doc.objects);
+    for (const action of Object.values(doc.actions)) {
+      const level = levels.get(action.pointId) ?? 0;
+      levels.set(action.pointId, level + 1);
+      const running = state.program.running.includes(action.id) || state.live.executing === action.id;
+      const breakpoint = action.id in state.breakpoints;
+      const colour = Math.max(0, colours.indexOf(action.type.split("/")[0] ?? ""));
+      const place = state.view.shared[`place/${action.id}`];
+      add(action.id, [action, level, running, breakpoint, colour, place, ...tell(action.id)], () => ({
+        ...common(action.id, action.name),
+        kind: "action",
+        ...(isPosition(place) ? { position: place } : { parent: action.pointId }),
+        level,
+        role: "action",
+        running,
+        breakpoint,
+        colour,
+      }));
+    }
+    if (!doc.project?.has_logic) return;
+    for (const [id, role] of [
+      [START, "start"],
+      [END, "end"],
+    ] as const) {
+      const place = state.view.shared[`place/${id}`];
+      add(id, [place, ...tell(id)], () => ({
+        ...common(id, role === "start" ? "Start" : "End"),
+        kind: "action",
+        position: isPosition(place) ? place : (PLACES[id] ?? NO_PLACE),
+        level: 0,
+        role,
+        running: false,
+        breakpoint: false,
+        colour: 0,
+      }));
+    }
+  }
+}
+
+function isPosition(value: unknown): value is Position {
+  const { x, y, z } = (value ?? {}) as Record<string, unknown>;
+  return [x, y, z].every((each) => typeof each === "number" && Number.isFinite(each));
+}
+
+function lockedBy(state: State, id: string, me: string): string {
+  const owner = state.locks[id];
+  return owner && owner !== me ? owner : "";
+}
+
+function faintness(state: State, id: string): number {
+  const blocked = state.view.user["blocklist"];
+  if (Array.isArray(blocked) && blocked.includes(id)) return 1;
+  const opacity = (state.view.user["opacity"] as Record<string, unknown> | undefined)?.[id];
+  return typeof opacity === "number" ? 1 - Math.min(1, Math.max(0, opacity)) : 0;
+}
+
+function isTrouble(state: State, id: string): boolean {
+  const connection = state.live.objects[id]?.state;
+  const health = state.live.health[id]?.health;
+  return connection === "lost" || connection === "failed" || health === "failure";
+}
+
+export function shapeOf(type: ObjectTypeMeta | undefined): Shape {
+  const model = type?.object_model;
+  if (model?.box) return { kind: "box", size: [model.box.size_x, model.box.size_y, model.box.size_z] };
+  if (model?.cylinder) return { kind: "cylinder", radius: model.cylinder.radius, height: model.cylinder.height };
+  if (model?.sphere) return { kind: "sphere", radius: model.sphere.radius };
+  if (model?.mesh) return { kind: "mesh", asset: model.mesh.asset_id };
+  return { kind: "none" };
+}
+
+const GOODNESS: OrientationItem["reach"][] = ["reachable", "near_limit", "unknown", "in_collision", "out_of_reach"];
+
+/** How an orientation can be reached by the robot that reaches it best. */
+function bestReach(state: State): Record<string, OrientationItem["reach"]> {
+  const best: Record<string, OrientationItem["reach"]> = {};
+  for (const robot of Object.values(state.reach)) {
+    for (const { id, reach } of robot.items) {
+      const known = best[id];
+      if (!known || GOODNESS.indexOf(reach) < GOODNESS.indexOf(known)) best[id] = reach;
+    }
+  }
+  return best;
+}
+
+function link(item: LogicItem, base: Omit<LinkItem, "kind" | "from" | "to" | "condition" | "branch">): LinkItem {
+  const { condition } = item;
+  const branch = !condition ? "always" : condition.value === "true" ? "true" : condition.value === "false" ? "false" : "value";
+  const words = branch === "true" ? "yes" : branch === "false" ? "no" : condition ? plain(condition.value) : "";
+  return { ...base, kind: "logic", from: item.start, to: item.end, condition: words, branch };
+}
+
+/** A value as people write it: the JSON of text has quotes. */
+export function plain(json: string): string {
+  try {
+    const value: unknown = JSON.parse(json);
+    return typeof value === "string" ? value : JSON.stringify(value);
+  } catch {
+    return json;
+  }
+}
