@@ -103,6 +103,7 @@ async def running_services(settings: ServerSettings) -> AsyncIterator[Services]:
         stack.push_async_callback(services.close_shared)
         stack.push_async_callback(services.cell.close)
         stack.push_async_callback(services.execution.close)
+        await temporary.recover(services)
         yield services
 
 

@@ -30,6 +30,10 @@ MAX_UPLOAD: Final = 128 * 1024 * 1024
 """Bytes of a zip that is sent as a file."""
 _CHUNK: Final = 1 << 20
 _ID: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,127}")
+_TEMPORARY: Final = ".temporary-"
+"""Begins the name of the file that says that a package is there for one run; its content is the project's id."""
+_UNFINISHED: Final = (".new-", ".old-", ".pkg_")
+"""Begin the names of directories that are being written or deleted."""
 _NEVER_BUILT: Final = PackageMeta("N/A", "1970-01-01T00:00:00+00:00")
 
 
@@ -107,9 +111,44 @@ class Packages:
         summary = self.summary(package_id)
         try:
             self._discard(self.directory(package_id))
+            self._mark(package_id).unlink(missing_ok=True)
         except OSError as error:
             raise StorageError(f"The package {package_id} cannot be deleted: {error.strerror}.") from error
         return summary
+
+    def note_temporary(self, package_id: str, project_id: str) -> None:
+        """Note that a package will be there for one run of a project: after a crash `sweep` takes it. StorageError."""
+        try:
+            self._root.mkdir(parents=True, exist_ok=True)
+            _write_whole(self._mark(package_id), project_id.encode())
+        except OSError as error:
+            raise StorageError(f"Packages cannot be written: {error.strerror}.") from error
+
+    def forget_temporary(self, package_id: str) -> None:
+        """Take back `note_temporary`; the package, if there is one, is deleted. StorageError."""
+        try:
+            if (path := self.checked(package_id)).exists():
+                self._discard(path)
+            self._mark(package_id).unlink(missing_ok=True)
+        except OSError as error:
+            raise StorageError(f"The package {package_id} cannot be deleted: {error.strerror}.") from error
+
+    def sweep(self) -> list[str]:
+        """Delete what a crash left behind, at the start; gives the projects that were being run. StorageError."""
+        projects: list[str] = []
+        try:
+            for mark in sorted(self._root.glob(f"{_TEMPORARY}*")):
+                projects.append(mark.read_text(errors="replace"))
+                self.forget_temporary(mark.name.removeprefix(_TEMPORARY))
+            for path in self._root.glob(".*"):
+                if path.is_dir() and path.name.startswith(_UNFINISHED):
+                    shutil.rmtree(path, ignore_errors=True)
+        except OSError as error:
+            raise StorageError(f"Packages cannot be read: {error.strerror}.") from error
+        return projects
+
+    def _mark(self, package_id: str) -> Path:
+        return self._root / f"{_TEMPORARY}{package_id}"
 
     def zipped(self, package_id: str) -> IO[bytes]:
         """Give a package as a zip, in a file that is gone when it is closed; NotFound, StorageError."""

@@ -162,10 +162,10 @@ class BuildService:
             source,
         )
 
-    async def build(self, project_id: str, package_name: str) -> str:
-        """Write the package of a saved project among the packages; gives its id."""
+    async def build(self, project_id: str, package_name: str, package_id: str = "") -> str:
+        """Write the package of a saved project among the packages, under a new id unless one is given; gives the id."""
         made_of = await self.gather(project_id, package_name)
-        package_id = new_id("pkg")
+        package_id = package_id or new_id("pkg")
         directory = self._services.settings.packages_dir / package_id
         await asyncio.to_thread(lambda: package.write(_made(made_of), directory))
         return package_id

@@ -5,6 +5,7 @@ import contextlib
 
 import structlog
 
+from arcor2_hw.data.base import new_id
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.data.events import ChangeType, Event, MainScreen, OpenProjectData, SceneStateEnum, ShowMainScreenData
 from arcor2_hw.data.project import Project
@@ -61,11 +62,11 @@ class _Run:
                 await self._close()
         except Exception as error:
             self._services.execution.reserved = False
+            await self._discard_package()
             if not built.done():
                 _settle(built, error)
                 return
             log.exception("project not run")
-            await self._discard_package()
             return
         except BaseException:
             built.cancel()
@@ -91,7 +92,7 @@ class _Run:
         """Delete the package without a word: nobody was told of it, or nobody is there any more."""
         if self._package:
             with contextlib.suppress(Arcor2Error):
-                await asyncio.to_thread(self._services.execution.packages.delete, self._package)
+                await asyncio.to_thread(self._services.execution.packages.forget_temporary, self._package)
 
     def _tell(self, event: Event) -> None:
         self._services.hub.broadcast(event)
@@ -108,8 +109,10 @@ class _Run:
         if services.cell.state not in (SceneStateEnum.STOPPED, SceneStateEnum.STARTED):
             raise RequestRefused(f"The scene is {services.cell.state.value}: wait until that is over.")
         name = f"Temporary package for project '{project.name}'."
+        self._package = new_id("pkg")
+        await asyncio.to_thread(services.execution.packages.note_temporary, self._package, project.id)
         with services.tasks.running(TaskKind.BUILD, f"Building {project.name} to run it", self._how.by):
-            self._package = await services.build.build(project.id, name)
+            await services.build.build(project.id, name, self._package)
         return project
 
     async def _close(self) -> None:
@@ -141,15 +144,30 @@ class _Run:
 
     async def _open_again(self, project: Project) -> None:
         """Open the project as it is saved now; without it, clients get the list of projects."""
-        services, session = self._services, self._services.session
         try:
-            project = await services.storage.project(project.id)
-            scene = await services.storage.scene(project.scene_id)
-            if problems := project_problems(scene, project, services.types):
-                raise RequestRefused(" ".join(problems))
-            await session.show(scene, project)
+            opened = await _open(self._services, project.id)
         except Arcor2Error as error:
             log.warning("project not opened again", project=project.name, reason=str(error))
             self._tell(make_event("ShowMainScreen", ShowMainScreenData(MainScreen.PROJECTS_LIST, project.id)))
             return
-        self._tell(make_event("OpenProject", OpenProjectData(scene, project)))
+        self._tell(make_event("OpenProject", opened))
+
+
+async def _open(services: Services, project_id: str) -> OpenProjectData:
+    """Open a project as it is saved. RequestRefused, NotFound, StorageError."""
+    project = await services.storage.project(project_id)
+    scene = await services.storage.scene(project.scene_id)
+    if problems := project_problems(scene, project, services.types):
+        raise RequestRefused(" ".join(problems))
+    await services.session.show(scene, project)
+    return OpenProjectData(scene, project)
+
+
+async def recover(services: Services) -> None:
+    """After a crash: delete the package of a project that was being run, and open the project again."""
+    try:
+        projects = await asyncio.to_thread(services.execution.packages.sweep)
+        if services.session.scene is None and len(projects) == 1:
+            await _open(services, projects[0])
+    except Arcor2Error as error:
+        log.warning("a run that a crash ended is not cleared up", reason=str(error))

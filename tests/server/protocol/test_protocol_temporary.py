@@ -1,6 +1,7 @@
 """The open project is run as a package of its own, and is open again afterwards."""
 
 import asyncio
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -168,3 +169,29 @@ async def test_a_server_that_ends_meanwhile_leaves_no_package_and_opens_the_proj
     async with open_stage(tmp_path) as stage:
         project_again = stage.services.session.require_project()
         assert (project_again.name, stage.services.session.has_changes) == ("round", False)
+
+
+async def test_a_server_that_was_killed_meanwhile_clears_up_at_its_next_start(tmp_path: Path) -> None:
+    """The directory as it was in mid-run, as a kill or a power cut leaves it."""
+    left, data = tmp_path / "left", tmp_path / "data"
+    data.mkdir()
+    async with open_stage(data) as stage:
+        alice = await stage.person("alice")
+        await project(stage, alice)
+        await alice.ask("TemporaryPackage")
+        await happens(alice, "ActionStateBefore")
+        await until(lambda: stage.services.runs._writing is None)  # what is asked for here is what is on the disk
+        await asyncio.to_thread(shutil.copytree, data, left)
+    packages = left / "packages"
+    (package,) = packages.glob("pkg_*")
+    for unfinished in (".new-x", ".old-y", f".{package.name}-z"):
+        (packages / unfinished).mkdir()
+    kept = packages / "pkg_kept"
+    shutil.copytree(package, kept)
+    async with open_stage(left) as stage:
+        opened = stage.services.session.require_project()
+        assert (opened.name, stage.services.session.has_changes) == ("round", False)
+        assert list(packages.iterdir()) == [kept]
+        (run,) = stage.services.runs.newest(10)
+        assert (run.end, run.temporary, run.project_name, run.started_by) == ("lost", True, "round", "alice")
+        assert "server" in str(run.error)
