@@ -73,4 +73,4 @@ def averaged(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOption
                 f"residual {residual:.0f} px",
                 Reason.IMPLAUSIBLE,
             )
-    return Found(inverted(pose), covariance, list(seen), errors, lens.parameters.fx, left_out)
+    return Found(inverted(pose), covariance, list(seen), errors, lens.parameters, left_out)

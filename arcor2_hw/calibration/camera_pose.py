@@ -4,13 +4,15 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
+import cv2
 import numpy as np
 
 from arcor2_hw.calibration.averaging import averaged, weight_of
 from arcor2_hw.calibration.boards import check_pose
 from arcor2_hw.calibration.camera_results import CameraPose, MarkerError, PoseOptions
+from arcor2_hw.calibration.drawing import GOOD, Canvas, error_picture
 from arcor2_hw.calibration.layout import Layout
-from arcor2_hw.calibration.lens import Lens
+from arcor2_hw.calibration.lens import Array, Lens
 from arcor2_hw.calibration.pictures import Picture, grey_of, same_size
 from arcor2_hw.calibration.pose_problem import Hints, Seen
 from arcor2_hw.calibration.pose_search import Found, search
@@ -129,11 +131,12 @@ def _result(
     used = [e for e in errors if e.used]
     residual = math.sqrt(sum(e.residual**2 * e.corners for e in used) / sum(e.corners for e in used))
     places = {each.key for each in seen} - found.left_out
-    grade, verdict = _verdict(places, position, orientation, residual, errors, found.parameters_f)
+    grade, verdict = _verdict(places, position, orientation, residual, errors, found.parameters.fx)
     total = len(layout.markers) + len(layout.boards)
     weights = {each.key: weight_of(found.pose, each, options) for each in seen}
     return CameraPose(
         pose=Pose.from_matrix(origin_from_camera),
+        parameters=found.parameters,
         quality=float(np.clip(sum(weights[key] for key in places) / total, 0.0, 1.0)),
         residual=residual,
         markers=errors,
@@ -195,3 +198,46 @@ def _verdict(
         text += f" The markers' places do not quite agree with each other, by some {off * 1000:.1f} mm."
         grade = Grade.USABLE
     return grade, text
+
+
+def draw_camera_pose(picture: Picture, parameters: CameraParameters, layout: Layout, result: CameraPose) -> bytes:
+    """Draw where markers should be with that pose onto the picture, by how much they are off, and the verdict: PNG.
+
+    parameters: as find_camera_pose was given them; drawn is with those of the result.
+
+    Raises InvalidPicture, InvalidData, CalibrationRefused as find_camera_pose.
+    """
+    grey = grey_of(picture)
+    lens = Lens(parameters, grey.shape[1], grey.shape[0])
+    seen = sight_of([grey], lens, layout, 0.0, math.inf).seen
+    if isinstance(result.parameters, CameraParameters):
+        lens = Lens(result.parameters, grey.shape[1], grey.shape[0])
+    camera_from_origin = inverted(result.pose.matrix())
+    canvas: Canvas = cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR).astype(np.uint8)
+    unused = {error.name for error in result.markers if not error.used}
+    for outline in _outlines(layout):
+        camera = outline @ camera_from_origin[:3, :3].T + camera_from_origin[:3, 3]
+        if camera[:, 2].min() > 0:
+            pixels = lens.pixels(camera[:, :2] / camera[:, 2:])
+            if np.abs(pixels).max() < 10 * lens.width:
+                cv2.polylines(canvas, [np.rint(pixels * 16).astype(np.int32)], True, GOOD, 2, cv2.LINE_AA, 4)
+    views = []
+    for each in seen:
+        camera = each.points @ camera_from_origin[:3, :3].T + camera_from_origin[:3, 3]
+        expected = lens.pixels(camera[:, :2] / camera[:, 2:])
+        views.append((each.name, each.pixels, expected - each.pixels, each.name not in unused))
+    return error_picture((lens.width, lens.height), views, result.verdict.split(" (")[0] + ".", canvas)
+
+
+def _outlines(layout: Layout) -> list[Array]:
+    """Give the corners of all that is listed, 4 × 3 each, m, in the origin's frame."""
+    result = []
+    for marker in layout.markers:
+        half = (marker.size if isinstance(marker.size, float | int) else layout.size) / 2
+        result.append((marker.pose.matrix(), half, half))
+    result += [(b.pose.matrix(), b.columns * b.square / 2, b.rows * b.square / 2) for b in layout.boards]
+    corners = np.array([[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]])
+    return [
+        np.column_stack((corners * (width, height), np.zeros(4))) @ matrix[:3, :3].T + matrix[:3, 3]
+        for matrix, width, height in result
+    ]

@@ -77,7 +77,9 @@ class CameraPose(Data, frozen=True):
     markers and boards. residual: px, root mean square. covariance: 6 × 6, of a small displacement (x, y, z in m) and
     rotation (rotation vector in rad, turned after the pose), both in the origin's frame. position_deviation: m,
     standard deviation along its worst axis. orientation_deviation: rad, likewise. blur: px, standard deviation of the
-    markers' edges. verdict: one sentence or two for the operator.
+    markers' edges. parameters: the intrinsics with which the pose explains the picture; they differ from the given ones
+    by as much as the picture shows them to be off, within what is known of them. verdict: one sentence or two for the
+    operator.
     """
 
     pose: Pose
@@ -92,6 +94,7 @@ class CameraPose(Data, frozen=True):
     pictures: int
     grade: Grade
     verdict: str
+    parameters: CameraParameters | Unset = UNSET
 
     def estimated(self, *, inverse: bool = False) -> EstimatedPose:
         """Give it as the protocol has it; with `inverse`, the pose of the origin in the camera's frame."""

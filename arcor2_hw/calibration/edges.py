@@ -27,7 +27,7 @@ _CLEAR: Final = 1.8
 _LEAST_CONTRAST: Final = 0.02
 """Of the range of grey values."""
 _WIDEST: Final = 4.0
-"""px to each side of an edge, along its normal."""
+"""px to each side of an edge, along its normal; more in a blurred picture."""
 _NARROWEST: Final = 1.5
 _ROUNDS: Final = 4
 _SHIFT_DEVIATION: Final = 0.3
@@ -57,13 +57,14 @@ class Measured:
     """A measured marker.
 
     corners: 4 × 2, px. information: 8 × 8, the inverse of their covariance, px⁻². blur: px, standard deviation of an
-    edge. shift: px, by which edges lie towards the light. contrast: of the range of light.
+    edge. cell: px, width of a cell. shift: px, by which edges lie towards the light. contrast: of the range of light.
     """
 
     number: int
     corners: Array
     information: Array
     blur: float
+    cell: float
     shift: float
     contrast: float
 
@@ -163,7 +164,7 @@ def measure(
     pixels, corner_slopes = lens.pixels_and_slopes(corner_rays)
     by_corner = np.einsum("nij,njk->nik", corner_slopes, _by_h(h, chart.corners, corner_rays)).reshape(8, 8)
     covariance = by_corner @ covariance_h @ by_corner.T + _CORNER_FLOOR**2 * np.eye(8)
-    return Measured(number, pixels, np.linalg.inv(covariance), blur, shift, contrast)
+    return Measured(number, pixels, np.linalg.inv(covariance), blur, float(np.median(sight.cell)), shift, contrast)
 
 
 def _mapped(h: Array, points: Array) -> Array:
@@ -227,7 +228,9 @@ def _crossings(
     picture: npt.NDArray[np.float32], at: Array, sight: _Sight, blur: float
 ) -> tuple[Array, npt.NDArray[np.bool_], float, float] | None:
     """Measure by how much edges lie off along their normals: offsets, which are valid, the blur, the contrast."""
-    reach = np.minimum(np.maximum(0.45 * sight.cell, _NARROWEST), _WIDEST / np.maximum(sight.slant, 0.3))
+    reach = np.minimum(
+        np.maximum(0.45 * sight.cell, _NARROWEST), max(_WIDEST, 3.0 * blur) / np.maximum(sight.slant, 0.3)
+    )
     across = reach[:, None] * _UNIT
     map_x = (at[:, 0:1] + sight.ways[:, 0:1] * across).astype(np.float32)
     map_y = (at[:, 1:2] + sight.ways[:, 1:2] * across).astype(np.float32)

@@ -43,9 +43,11 @@ class Lens:
         self.matrix: Array = np.array([[p.fx, 0.0, p.cx], [0.0, p.fy, p.cy], [0.0, 0.0, 1.0]])
         self.coefficients: Array = np.array(p.dist_coefs, dtype=np.float64)
         corners = np.array([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]])
-        back = self.pixels(self.rays(corners))
-        miss = float(np.abs(back - corners).max())
-        if not miss < _ROUND_TRIP:
+        rays = self.rays(corners)
+        miss = float(np.abs(self.pixels(rays) - corners).max())
+        # From the middle to the corners the picture must not turn back on itself.
+        _, slopes = self.pixels_and_slopes(np.concatenate([rays * part for part in np.linspace(0.05, 1.0, 20)]))
+        if not (miss < _ROUND_TRIP and np.linalg.det(slopes).min() > 0):
             raise InvalidData(
                 "the camera's distortion cannot be undone in the corners of the picture: "
                 "its coefficients are wrong, or of another lens model",
@@ -90,6 +92,11 @@ class Lens:
         """Give fx, fy, cx, cy and the coefficients as one vector."""
         p = self.parameters
         return np.array([p.fx, p.fy, p.cx, p.cy, *p.dist_coefs])
+
+    def changed(self, change: Array) -> CameraParameters:
+        """Give the intrinsics changed by that much (as `numbers`)."""
+        fx, fy, cx, cy, *coefficients = map(float, self.numbers + change)
+        return CameraParameters(fx, fy, cx, cy, coefficients)
 
     def _changed(self, change: Array) -> tuple[Array, Array]:
         fx, fy, cx, cy = self.numbers[:4] + change[:4]

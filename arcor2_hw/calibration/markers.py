@@ -85,7 +85,7 @@ def measured(grey: Grey, lens: Lens, dictionary: MarkerDictionary, found: list[t
             other = _measured(grey, _TONES[1], lens, chart, number, corners)
             if other is not None and (fine is None or abs(other.shift) < abs(fine.shift)):
                 fine, tone = other, _TONES[1]
-        result[index] = fine or Measured(number, corners, np.eye(8) / _COARSE**2, float("nan"), 0.0, 0.0)
+        result[index] = fine or Measured(number, corners, np.eye(8) / _COARSE**2, float("nan"), 0.0, 0.0, 0.0)
     return [result[index] for index in range(len(found))]
 
 

@@ -11,6 +11,7 @@ from arcor2_hw.calibration.lens import Array, Lens
 from arcor2_hw.calibration.pose_problem import Hints, PoseProblem, Seen, Solution
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.calibration.rigid import apart, inverted
+from arcor2_hw.data.camera import CameraParameters
 
 _TRIED: Final = 4
 """How many of the best starts are followed."""
@@ -23,13 +24,16 @@ _SAME: Final = (0.002, 0.004)
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """A pose (camera_from_origin), its covariance (of the camera in the origin's frame: m, rad), errors in px."""
+    """A pose (camera_from_origin), errors in px, the lens that goes with it.
+
+    covariance: of the camera in the origin's frame, m and rad.
+    """
 
     pose: Array
     covariance: Array
     seen: list[Seen]
     errors: list[Array]
-    parameters_f: float
+    parameters: CameraParameters
     left_out: set[tuple[str, int]] = field(default_factory=set)
 
 
@@ -42,11 +46,7 @@ def search(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOptions)
         kept = [each for each in seen if each.key not in left_out]
         problem = PoseProblem(lens, kept, hints, deviations) if left_out else everything
         best = solve(problem, options)
-        worst, worst_key = 0.0, kept[0].key
-        for each, errors in zip(kept, problem.errors(best.pose, best.change) or (), strict=True):
-            residual = float(np.sqrt(np.mean(np.sum(errors**2, axis=1))))
-            if residual > worst:
-                worst, worst_key = residual, each.key
+        worst, worst_key = worst_of(problem, best)
         if worst <= options.largest_residual:
             break
         names = {each.key: each.name for each in kept}
@@ -67,11 +67,14 @@ def search(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOptions)
     left = everything.errors(best.pose, best.change)
     if left is None:
         raise CalibrationRefused("The markers contradict each other.", reason=Reason.IMPLAUSIBLE)
-    return Found(best.pose, covariance_of(best), list(seen), left, lens.parameters.fx, left_out)
+    return Found(best.pose, covariance_of(best), list(seen), left, lens.changed(best.change * deviations), left_out)
 
 
 def solve(problem: PoseProblem, options: PoseOptions) -> Solution:
-    """Give the best pose of a problem. Raises CalibrationRefused when another one is as good, or there is none."""
+    """Give the best pose of a problem. Raises CalibrationRefused when another one is as good, or there is none.
+
+    One that contradicts what is seen is given all the same: which of several is best does not matter then.
+    """
     starts = [start for start in problem.starts() if np.isfinite(problem.typical(start))]
     if not starts:
         raise CalibrationRefused("No pose of the camera explains the picture.", reason=Reason.NOT_CONVERGED)
@@ -93,6 +96,8 @@ def solve(problem: PoseProblem, options: PoseOptions) -> Solution:
             Reason.IMPLAUSIBLE if found else Reason.NOT_CONVERGED,
         )
     best = allowed[0]
+    if worst_of(problem, best)[0] > options.largest_residual:
+        return best
     for other in allowed[1:]:
         distance, angle = apart(inverted(best.pose), inverted(other.pose))
         if other.cost - best.cost < _TELL_APART and distance > 2 * options.largest_deviation:
@@ -104,6 +109,14 @@ def solve(problem: PoseProblem, options: PoseOptions) -> Solution:
                 Reason.AMBIGUOUS,
             )
     return best
+
+
+def worst_of(problem: PoseProblem, solution: Solution) -> tuple[float, tuple[str, int]]:
+    """Give the residual, px, of what fits a pose worst, and which that is."""
+    errors = problem.errors(solution.pose, solution.change) or []
+    residuals = [float(np.sqrt(np.mean(np.sum(each**2, axis=1)))) for each in errors]
+    index = int(np.argmax(residuals))
+    return residuals[index], problem.seen[index].key
 
 
 def covariance_of(solution: Solution) -> Array:

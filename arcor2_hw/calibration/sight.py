@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from arcor2_hw.calibration.markers import detect, measured
 from arcor2_hw.calibration.pictures import Grey, sharpness_of
 from arcor2_hw.calibration.pose_problem import Seen
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
+
+_RESOLVED: Final = 0.33
+"""Part of a cell's width that an edge may be wide (standard deviation)."""
 
 
 @dataclass(frozen=True)
@@ -39,22 +43,23 @@ def sight_of(greys: Sequence[Grey], lens: Lens, layout: Layout, blur_threshold: 
         name = "The picture" if len(greys) == 1 else f"Picture {picture}"
         here, widths, strangers = _in_picture(grey, picture, lens, layout, name)
         others |= strangers
-        typical = float(np.median(widths)) if widths else float("nan")
-        if typical > largest_blur:
+        typical = float(np.median([blur for blur, _ in widths])) if widths else float("nan")
+        if np.median([blur / min(largest_blur, _RESOLVED * cell) for blur, cell in widths] or [0.0]) > 1.0:
             raise CalibrationRefused(
                 f"{name} is blurred: the markers' edges are {typical:.1f} px wide. Is the camera in focus, and did it "
                 "stand still?",
-                f"at most {largest_blur:.1f} px",
+                f"at most {largest_blur:.1f} px, and a third of a cell",
                 Reason.BLURRED,
             )
-        if not here and (sharpness := sharpness_of(grey)) < blur_threshold:
+        measured_at_all = bool(widths) or any(each.square is None for each in here)
+        if not measured_at_all and not strangers and (sharpness := sharpness_of(grey)) < blur_threshold:
             raise CalibrationRefused(
-                f"{name} shows no marker and is blurred, or shows nothing at all. Is the lens clean, and the light on?",
+                f"{name} is blurred, or shows nothing at all. Is the camera in focus, the lens clean and the light on?",
                 f"variance of the Laplacian {sharpness:.0f}, at least {blur_threshold:.0f}",
                 Reason.BLURRED,
             )
         seen += here
-        blurs += widths
+        blurs += [blur for blur, _ in widths]
     if not seen:
         raise CalibrationRefused(_missing(layout, others), reason=Reason.NO_MARKER)
     return Sighting(seen, float(np.median(blurs)) if blurs else float("nan"))
@@ -62,8 +67,8 @@ def sight_of(greys: Sequence[Grey], lens: Lens, layout: Layout, blur_threshold: 
 
 def _in_picture(
     grey: Grey, picture: int, lens: Lens, layout: Layout, name: str
-) -> tuple[list[Seen], list[float], set[int]]:
-    """Give what is seen in one picture, the widths of markers' edges, and numbers of markers that are not listed."""
+) -> tuple[list[Seen], list[tuple[float, float]], set[int]]:
+    """Give what is seen in one picture, widths of markers' edges and cells, and numbers of markers not listed."""
     found: dict[MarkerDictionary, list[tuple[int, Array]]] = {}
     for dictionary in {layout.dictionary} | {board.dictionary for board in layout.boards}:
         own_boards = [board for board in layout.boards if board.dictionary == dictionary]
@@ -79,13 +84,13 @@ def _in_picture(
                 reason=Reason.IMPLAUSIBLE,
             )
     seen: list[Seen] = []
-    widths: list[float] = []
+    widths: list[tuple[float, float]] = []
     for each in measured(grey, lens, layout.dictionary, own):
         marker = listed[each.number]
         size = float(marker.size) if isinstance(marker.size, float | int) else layout.size
         seen.append(seen_marker(each, marker.pose.matrix(), size, picture))
         if np.isfinite(each.blur):
-            widths.append(each.blur)
+            widths.append((each.blur, each.cell))
     used = set(numbers)
     for index, board in enumerate(layout.boards):
         made = board_of(board)
