@@ -1,0 +1,224 @@
+"""Starting a scene without what cannot be connected, retrying it; robots streamed at a client's own rate."""
+
+import asyncio
+import itertools
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from arcor2_hw.data.geometry import Position
+from arcor2_hw.data.project import Action, ActionPoint, Flow, Project
+from arcor2_hw.data.scene import Scene
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.rpc import general as _general  # noqa: F401 - for its handlers
+from arcor2_server.rpc import operation as _operation  # noqa: F401 - for its handlers
+from arcor2_server.rpc.registry import RequestRefused
+from tests.runtime.conftest import scene_object
+
+from .conftest import PATIENCE, Recorder, Server, action, robot_meta, serving
+
+BOX = """
+from arcor2_hw.data.device import Alarm, Health, Severity
+
+@dataclass
+class BoxSettings(Settings):
+    file: str
+
+class Box(Generic):
+    _ABSTRACT = False
+    def __init__(self, obj_id: str, name: str, settings: BoxSettings) -> None:
+        super().__init__(obj_id, name, settings)
+        self.hot = False
+    def connect(self, timeout: float = 2.0) -> None:
+        if not os.path.exists(self.settings.file):
+            raise NotConnected("nobody at 192.0.2.7:502")
+    @property
+    def health(self): return Health.OFF_SPEC if self.hot else Health.NORMAL
+    def alarms(self):
+        stamp = "2026-01-01T00:00:00+00:00"
+        return [Alarm("hot", Severity.WARNING, "it is hot", "let it cool", stamp)] if self.hot else []
+    def heat(self) -> None: self.hot = True
+    @action
+    def open(self, *, an: str | None = None) -> bool: return True
+"""
+
+
+class Boxes:
+    """A scene of two boxes, of which one is there."""
+
+    def __init__(self, server: Server) -> None:
+        self.server = server
+        directory = server.services.settings.data_dir
+        self.here, self.away = directory / "here", directory / "away"
+
+    async def open(self) -> None:
+        self.here.touch()
+        objects = [scene_object(name, "Box", file=str(directory)) for name, directory in self._files()]
+        actions = [Action(f"open_{name}", f"obj_{name}/open", f"act_{name}", [], [Flow()]) for name, _ in self._files()]
+        point = ActionPoint("top", Position(), id="acp_1", actions=actions)
+        self.server.types.add("Box", BOX, [action("open", "boolean")])
+        await self.server.open(
+            Scene("scene", id="scn_1", objects=objects), Project("project", "scn_1", id="pro_1", action_points=[point])
+        )
+
+    def _files(self) -> list[tuple[str, Path]]:
+        return [("here", self.here), ("away", self.away)]
+
+
+def subscribed(server: Server, *events: str) -> Recorder:
+    server.services.hub.subscribe(server.client, set(events), True)  # type: ignore[arg-type]
+    return server.client
+
+
+@serving()
+async def test_the_scene_comes_up_without_it_and_a_retry_brings_it_in(server: Server) -> None:
+    boxes, client = Boxes(server), subscribed(server, "ObjectState")
+    await boxes.open()
+    with pytest.raises(RequestRefused, match="offline"):
+        await server.ask("RetryObject", {"object_id": "obj_away"})
+    await server.ask("StartSceneKeepGoing")
+    failed = await client.event("ObjectState", lambda data: data["state"] == "failed")
+    assert failed["object_id"] == "obj_away"
+    assert "192.0.2.7:502" in failed["reason"]
+    assert (await client.state("started"))["message"] == "Not there: away."
+    with pytest.raises(RequestRefused, match="online"):
+        await server.ask("StartSceneKeepGoing")
+
+    with pytest.raises(RequestRefused, match=r"away is not there: .*192\.0\.2\.7:502"):
+        await server.ask("ExecuteAction", {"action_id": "act_away"})
+    await server.ask("ExecuteAction", {"action_id": "act_here"})
+    assert (await client.event("ActionResult"))["results"] == ["true"]
+    async with asyncio.timeout(PATIENCE):  # what is told of one that is there comes with the next look at it
+        while [one.state for one in server.services.cell.object_states()] != ["online", "failed"]:
+            await asyncio.sleep(0.01)
+
+    with pytest.raises(Arcor2Error, match=r"192\.0\.2\.7:502"):
+        await server.ask("RetryObject", {"object_id": "obj_away"})
+    boxes.away.touch()
+    client.got.clear()
+    await server.ask("RetryObject", {"object_id": "obj_away"})
+    told = [await client.event("ObjectState") for _ in range(2)]
+    assert [one["state"] for one in told] == ["connecting", "online"]
+    await server.ask("ExecuteAction", {"action_id": "act_away"})
+    assert (await client.event("ActionResult"))["results"] == ["true"]
+    with pytest.raises(Arcor2Error, match="away has not failed"):
+        await server.ask("RetryObject", {"object_id": "obj_away"})
+    with pytest.raises(Arcor2Error, match="obj_nobody"):
+        await server.ask("RetryObject", {"object_id": "obj_nobody"})
+    await server.ask("StopScene")
+    assert "message" not in await client.state("stopped")
+
+
+@serving()
+async def test_what_keeps_a_scene_from_starting_is_the_same(server: Server) -> None:
+    boxes = Boxes(server)
+    with pytest.raises(RequestRefused, match="No scene is open"):
+        await server.ask("StartSceneKeepGoing")
+    await boxes.open()
+    boxes.away.touch()
+    await server.ask("StartSceneKeepGoing")
+    assert "message" not in await server.client.state("started")  # all is there
+    await server.ask("StopScene")
+    await server.client.state("stopped")
+    boxes.away.unlink()
+    await server.ask("StartScene")
+    assert "192.0.2.7:502" in (await server.client.state("stopping"))["message"]
+    await server.client.state("stopped")
+
+
+@serving()
+async def test_health_and_alarms_are_told(server: Server) -> None:
+    boxes, client = Boxes(server), subscribed(server, "ObjectHealth")
+    await boxes.open()
+    boxes.away.touch()
+    await server.start()
+    await server.services.cell.call("obj_here", "heat")
+    hot = await client.event("ObjectHealth", lambda data: data["health"] == "off_spec" and data["alarms"])
+    assert hot["object_id"] == "obj_here"
+    assert [alarm["remedy"] for alarm in hot["alarms"]] == ["let it cool"]
+    assert [one.health for one in server.services.cell.object_healths()] == ["off_spec", "normal"]
+
+
+ARM = """
+class Arm(Robot):
+    _ABSTRACT = False
+    def get_end_effectors_ids(self): return {"tool"}
+    def get_end_effector_pose(self, end_effector): return Pose()
+    def robot_joints(self, include_gripper=False): return [Joint("turn", time.monotonic())]
+    def grippers(self): return set()
+    def suctions(self): return set()
+"""
+
+
+class Slow(Recorder):
+    """A client that takes nothing, of which only the newest of each stream waits."""
+
+    def __init__(self, user: str) -> None:
+        super().__init__(user)
+        self.newest: dict[str, dict[str, Any]] = {}
+
+    def put_newest(self, stream: str, message: bytes) -> None:
+        self.newest[stream] = json.loads(message)
+
+
+async def with_arm(server: Server) -> None:
+    server.types.add("Arm", ARM, robot=robot_meta("Arm"))
+    await server.open(Scene("scene", id="scn_1", objects=[scene_object("arm", "Arm", pose=True)]))
+    await server.start()
+
+
+def joints(client: Recorder) -> list[dict[str, Any]]:
+    return [event["data"] for event in client.got if event["event"] == "RobotJoints"]
+
+
+@serving(with_arm)
+async def test_a_robot_is_streamed_at_the_rate_that_each_client_wants(arm: Server) -> None:
+    quick, other, slow = arm.client, Recorder("bob"), Slow("carl")
+    for client in (other, slow):
+        arm.services.hub.add(client)  # type: ignore[arg-type]
+    what = {"robot_id": "obj_arm", "what": "joints"}
+    for client in (quick, other, slow):
+        await arm.ask("RegisterForRobotEvent", what | {"send": True}, client)
+    await arm.ask("StreamRobot", what | {"rate": 30}, quick)
+    await arm.ask("StreamRobot", what | {"rate": 30}, slow)
+    await asyncio.sleep(0.2)
+    quick.got.clear()
+    await asyncio.sleep(1.0)
+    seen = joints(quick)
+    assert 15 <= len(seen) <= 36
+    assert all("time_ms" in data for data in seen), "it gets the ordinary events too"
+    steps = [after["time_ms"] - before["time_ms"] for before, after in itertools.pairwise(seen)]
+    assert all(step > 0.0 for step in steps)
+    assert 30.0 <= sum(steps) / len(steps) <= 60.0
+    assert joints(other)
+    assert all("time_ms" not in data for data in joints(other))
+    (newest,) = slow.newest.values()
+    assert time.monotonic() * 1e3 - newest["data"]["time_ms"] < 500.0
+
+    await arm.ask("StreamRobot", what | {"send": False}, quick)
+    await asyncio.sleep(0.1)
+    quick.got.clear()
+    await asyncio.sleep(0.3)
+    assert joints(quick)
+    assert all("time_ms" not in data for data in joints(quick))
+    with pytest.raises(RequestRefused, match="not streamed"):
+        await arm.ask("StreamRobot", what | {"send": False}, quick)
+
+
+@serving(with_arm)
+async def test_what_cannot_be_streamed(arm: Server) -> None:
+    what = {"robot_id": "obj_arm", "what": "eef_pose"}
+    for rate in (0.5, 31.0):
+        with pytest.raises(RequestRefused, match="1 to 30 Hz"):
+            await arm.ask("StreamRobot", what | {"rate": rate})
+    with pytest.raises(Arcor2Error, match="obj_nobody"):
+        await arm.ask("StreamRobot", what | {"robot_id": "obj_nobody"})
+    await arm.ask("StreamRobot", what)
+    await arm.client.event("RobotEef", lambda data: "time_ms" in data)
+    await arm.ask("StopScene")
+    await arm.client.state("stopped")
+    with pytest.raises(RequestRefused, match="offline"):
+        await arm.ask("StreamRobot", what)
