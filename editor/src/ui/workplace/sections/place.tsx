@@ -1,6 +1,6 @@
 /** Where the selected thing stands: position in mm, rotation in degrees. */
 
-import type { Orientation, Position } from "../../../protocol/types";
+import type { Position } from "../../../protocol/types";
 import { useEditor } from "../../../store/store";
 import { rollPitchYaw } from "../../../viewmodel/rotations";
 import { nameOf } from "../../names";
