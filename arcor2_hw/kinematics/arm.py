@@ -91,6 +91,7 @@ class Arm:
         self.tip_in_last = self._behind @ self.tool
         lengths = [float(np.linalg.norm(origin[:3, 3])) for origin, _, _ in self._moving[1:]]
         self.length = max(sum(lengths) + float(np.linalg.norm(self.tip_in_last[:3, 3])), 1e-3)
+        self._scale = np.where(self._rows < 3, self.length, 1.0)[:, None]
         self.centre = self._moving[0][0][:3, 3]
         self.reach = self.length + self._slides
 
@@ -135,12 +136,13 @@ class Arm:
 
     def dexterity(self, q: Array) -> Dexterity:
         """Tell how well the arm moves in a configuration."""
-        jacobian = self.jacobian_in_tip(q)[self.rows]
-        values = np.linalg.svd(jacobian, compute_uv=False)
-        scaled = jacobian.copy()
-        scaled[: np.count_nonzero(self.rows < 3)] /= self.length
-        smallest = float(np.linalg.svd(scaled, compute_uv=False)[-1])
+        values = np.linalg.svd(self.jacobian_in_tip(q)[self.rows], compute_uv=False)
+        smallest = self.smallest(q)
         return Dexterity(float(np.prod(values)), smallest, smallest < NEAR_SINGULAR)
+
+    def smallest(self, q: Array) -> float:
+        """Give the smallest singular value of the Jacobian whose lengths are divided by the arm's, see `Dexterity`."""
+        return float(np.linalg.svd(self.jacobian_in_tip(q)[self.rows] / self._scale, compute_uv=False)[-1])
 
     @property
     def rows(self) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":

@@ -30,6 +30,9 @@ EXACT: Final = 1e-8
 SAME: Final = 1e-3
 """rad or m by which some joint of two distinct solutions differs at least."""
 _LEAST_DAMPING: Final = 1e-9
+_PATIENCE: Final = 8
+_PROGRESS: Final = 0.8
+"""Rounds after which at most this share of the error has to be left."""
 _STEP: Final = 0.7
 """rad, or m, that a joint goes in one round at most."""
 
@@ -104,6 +107,10 @@ class InverseKinematics:
             found = [other for q in found for other in self._all_turns(q)]
         return sorted(found, key=lambda q: float(np.sum((q - near) ** 2)))
 
+    def candidates(self, target: Array, seed: Array | None = None) -> Iterator[Array]:
+        """Give joints for a pose one after the other, nearest to `seed` first, each found when it is asked for."""
+        return self._nearest_first(target, self._checked(target, seed))
+
     def _checked(self, target: Array, seed: Array | None) -> Array:
         if target.shape != (4, 4) or not np.isfinite(target).all():
             raise OutOfReach(f"The pose for {self.arm.model.name} has numbers that are not finite.")
@@ -118,13 +125,9 @@ class InverseKinematics:
         if float(np.linalg.norm(target[:3, 3] - self.arm.centre)) > self.arm.reach + self._tolerance[0]:
             return
         if self._form is not None:
-            some = False
-            for q in self._computed(target, seed):
-                some = True
-                yield q
-            if some:
-                return
-        yield from self._searched(target, seed, everything)
+            yield from self._computed(target, seed)
+        else:
+            yield from self._searched(target, seed, everything)
 
     def _computed(self, target: Array, seed: Array) -> Iterator[Array]:
         assert self._form is not None
@@ -201,9 +204,14 @@ class InverseKinematics:
         error, size = self._error(goal, q)
         damping = 1e-4
         jacobian: Array | None = None
-        for _ in range(rounds):
+        before = np.inf
+        for number in range(rounds):
             if size < EXACT:
                 break
+            if number % _PATIENCE == 0:
+                if size > _PROGRESS * before:  # a minimum that is none of nothing, or the way along a limit
+                    break
+                before = size
             if jacobian is None:
                 jacobian = arm.jacobian_in_tip(q)[self._rows]
             step = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + damping * np.eye(len(error)), error)

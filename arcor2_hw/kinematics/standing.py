@@ -44,7 +44,8 @@ class Part:
 class StandingRobot:
     """One robot of a world. q: its present joint values, in the model's order. parts: shapes and what is held.
 
-    margin: m by which the world's bodies have to be away to count as free.
+    margin: m by which the world's bodies have to be away to count as free. revision: grows when what is asked of the
+    robot may have another answer in the same joints: it stands elsewhere, holds something else, may touch something.
 
     Not safe for two threads at once.
     """
@@ -55,6 +56,7 @@ class StandingRobot:
         self.model = model
         self.q = np.array(q, dtype=np.float64)
         self.held: dict[str, Held] = {}
+        self.revision = 0
         self._touching: frozenset[frozenset[str]] | None = None
         self.place(base)
 
@@ -66,6 +68,7 @@ class StandingRobot:
 
     def rebuild(self) -> None:
         """Make the shapes anew, after something was taken or put down."""
+        self.revision += 1
         self.parts: list[Part] = []
         for each in self.model.collision:
             body, frame = self.tree.bodies[each.link]
@@ -106,6 +109,13 @@ class StandingRobot:
             if self.margin:
                 placed.getAABB().expand(self.margin)
         self.manager.update()
+
+    def box(self, q: Array) -> Array:
+        """Give the corners (2, 3) of the box around what moves, in joint values."""
+        self.pose(q)
+        corners = [(box.min_, box.max_) for box in (self.parts[number].object.getAABB() for number in self.moving)]
+        every = np.array(corners).reshape(-1, 2, 3)
+        return np.array((every[:, 0].min(axis=0, initial=np.inf), every[:, 1].max(axis=0, initial=-np.inf)))
 
     def link_frames(self, q: Array) -> dict[str, Array]:
         """Give the links' frames in the world, (4, 4)."""

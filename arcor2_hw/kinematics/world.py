@@ -263,7 +263,8 @@ class CollisionWorld:
                     self._manager.registerObject(body.object)
                     self._manager.setup()
                 self._changed(np.array((body.box, body.box)), name)
-        for name in {each.split("/")[0] for each in (one, other)} & self.robots.keys():
+        for name in {self._held.get(each, each.split("/")[0]) for each in (one, other)} & self.robots.keys():
+            self.robots[name].revision += 1
             self._robot_changed(self.robots[name], None)
 
     def _may_touch(self, part: Part, robot: str, names: tuple[str, ...]) -> bool:

@@ -1,0 +1,179 @@
+"""Which poses an arm reaches: for many at once, and anew only where something changed that matters."""
+
+import collections
+import enum
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from arcor2_hw.data.base import Data
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.kinematics.arm import NEAR_SINGULAR, Arm
+from arcor2_hw.kinematics.inverse import InverseKinematics
+from arcor2_hw.kinematics.shapes import Array
+from arcor2_hw.kinematics.world import CollisionWorld
+
+KEPT: Final = 20_000
+"""Poses whose answers are kept."""
+
+
+class Reach(enum.StrEnum):
+    """How an arm reaches a pose."""
+
+    REACHABLE = "reachable"
+    NEAR_LIMIT = "near_limit"
+    IN_COLLISION = "in_collision"
+    OUT_OF_REACH = "out_of_reach"
+
+
+class Judgement(Data, frozen=True):
+    """How an arm reaches a pose, in which joints (the arm's), and why not better: a sentence, empty when it is well."""
+
+    reach: Reach
+    joints: tuple[float, ...] = ()
+    reason: str = ""
+
+
+class _Candidates:
+    """Joints that reach a pose, found one after the other as they are asked for, and kept."""
+
+    def __init__(self, found: Iterator[Array]) -> None:
+        self._coming = found
+        self._known: list[Array] = []
+
+    def __iter__(self) -> Iterator[Array]:
+        yield from self._known
+        for q in self._coming:
+            self._known.append(q)
+            yield q
+
+
+@dataclass(eq=False, slots=True)
+class _Kept:
+    target: Array
+    candidates: _Candidates
+    judgement: Judgement | None = None
+    revision: int = -1
+    state: tuple[int, bytes] = (-1, b"")
+    box: Array | None = None
+
+
+class Reachability:
+    """Judges poses for one arm of a robot of a collision world.
+
+    Answers are kept by pose. A change of the world asks the question anew only for those answers whose configurations
+    come near to what changed, and even then joints are not searched for again. Not safe for two threads at once.
+
+    computed, checked: how often joints were searched for, and how often collisions were looked for, to see that.
+    """
+
+    def __init__(self, world: CollisionWorld, robot: str, arm: Arm) -> None:
+        self._world, self._name, self.arm = world, robot, arm
+        self._standing = world.robot(robot)
+        self._inverse = InverseKinematics(arm)
+        self._kept: collections.OrderedDict[tuple[float, ...], _Kept] = collections.OrderedDict()
+        self._stand()
+        self._near_what: dict[int, Array | None] = {}
+        self.computed = 0
+        self.checked = 0
+
+    def judge(self, poses: Iterable[Pose]) -> list[Judgement]:
+        """Tell for each pose in the world how the arm reaches it."""
+        if not np.array_equal(self._base, self._standing.base):
+            self._kept.clear()
+            self._stand()
+        self._near_what = {}
+        # What the robot is and holds, and how its other joints stand, is part of every answer.
+        others = np.delete(self._standing.q, self.arm.indices)
+        state = (self._standing.revision, others.tobytes())
+        return [self._judged(pose, state) for pose in poses]
+
+    def forget(self) -> None:
+        """Forget all answers."""
+        self._kept.clear()
+
+    def _stand(self) -> None:
+        self._base = self._standing.base
+        self._root_from_world = np.linalg.inv(self._base)
+
+    # -------------------------------------------------------------------------------- one pose
+    def _judged(self, pose: Pose, state: tuple[int, bytes]) -> Judgement:
+        at, turn = pose.position, pose.orientation
+        key = (at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w)
+        kept = self._kept.get(key)
+        if kept is None:
+            self.computed += 1
+            target = self._root_from_world @ pose.matrix()
+            kept = self._kept[key] = _Kept(target, _Candidates(self._inverse.candidates(target)))
+            if len(self._kept) > KEPT:
+                self._kept.popitem(last=False)
+        else:
+            self._kept.move_to_end(key)
+        if kept.judgement is None or kept.state != state or self._touched(kept):
+            self.checked += 1
+            kept.judgement, kept.box = self._looked_at(kept.candidates, kept.target)
+        kept.state, kept.revision = state, self._world.revision
+        return kept.judgement
+
+    def _touched(self, kept: _Kept) -> bool:
+        """Tell whether something changed near the configurations that an answer rests on."""
+        if kept.revision == self._world.revision or kept.box is None:
+            return False
+        if kept.revision not in self._near_what:
+            self._near_what[kept.revision] = self._changes_since(kept.revision)
+        boxes = self._near_what[kept.revision]
+        if boxes is None:
+            return True
+        return bool(((boxes[:, 0] <= kept.box[1]) & (boxes[:, 1] >= kept.box[0])).all(axis=1).any())
+
+    def _changes_since(self, revision: int) -> Array | None:
+        """Give the boxes (n, 2, 3) around what changed, None when that is no longer known."""
+        changes = self._world.changed_since(revision)
+        if changes is None:
+            return None
+        return np.array([change.box for change in changes if change.name != self._name]).reshape(-1, 2, 3)
+
+    def _looked_at(self, candidates: _Candidates, target: Array) -> tuple[Judgement, Array | None]:
+        """Judge, and give the box around the configurations that were looked at; None: no collision matters."""
+        second: Judgement | None = None
+        hit: Judgement | None = None
+        boxes: list[Array] = []
+        for q in candidates:
+            whole = self.arm.whole(q, self._standing.q)
+            free = self._world.is_free(self._name, whole)
+            boxes.append(self._standing.box(whole))
+            joints = tuple(map(float, q))
+            if not free:
+                hit = hit or Judgement(Reach.IN_COLLISION, joints, self._collision(whole))
+                continue
+            reason = self._reservation(q)
+            if not reason:
+                return Judgement(Reach.REACHABLE, joints), _around(boxes)
+            second = second or Judgement(Reach.NEAR_LIMIT, joints, reason)
+        if best := second or hit:
+            return best, _around(boxes)
+        return Judgement(Reach.OUT_OF_REACH, reason=self._why_not(target)), None
+
+    def _collision(self, whole: Array) -> str:
+        found = self._world.contacts(self._name, whole)
+        return f"It is reached only in collision: {found[0] if found else 'too close to something'}."
+
+    def _reservation(self, q: Array) -> str:
+        if near := self.arm.near_limits(q):
+            return f"{', '.join(near)} would be near {'its limit' if len(near) == 1 else 'their limits'}."
+        if self.arm.smallest(q) < NEAR_SINGULAR:
+            return "The arm would be near a singularity."
+        return ""
+
+    def _why_not(self, target: Array) -> str:
+        distance = float(np.linalg.norm(target[:3, 3] - self.arm.centre))
+        if distance > self.arm.reach:
+            return f"It is {distance:.2f} m from the robot, which reaches {self.arm.reach:.2f} m at most."
+        return "The robot does not reach it with this orientation."
+
+
+def _around(boxes: list[Array]) -> Array:
+    every = np.array(boxes)
+    return np.array((every[:, 0].min(axis=0), every[:, 1].max(axis=0)))
