@@ -36,7 +36,7 @@ class PoseOptions(Data, frozen=True):
 
     method: PoseMethod = "joint"
     blur_threshold: float = 150.0
-    largest_blur: float = 4.0
+    largest_blur: float = 2.5
     min_distance: float = 0.3
     max_distance: float = 2.0
     largest_deviation: float = 0.004
@@ -125,7 +125,7 @@ class HandEyeOptions(Data, frozen=True):
     largest_residual: float = 2.0
     largest_deviation: float = 0.003
     blur_threshold: float = 150.0
-    largest_blur: float = 4.0
+    largest_blur: float = 2.5
 
 
 class HandEyeMethod(Data, frozen=True):

@@ -15,8 +15,10 @@ from arcor2_hw.calibration.pictures import Grey, sharpness_of
 from arcor2_hw.calibration.pose_problem import Seen
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 
-_RESOLVED: Final = 0.33
-"""Part of a cell's width that an edge may be wide (standard deviation)."""
+_RESOLVED: Final = 0.25
+"""Part of a cell's width that an edge may be wide (standard deviation); what is wider cannot be measured there."""
+_SHARP: Final = 1.4
+"""px, that any edge may be wide."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +46,11 @@ def sight_of(greys: Sequence[Grey], lens: Lens, layout: Layout, blur_threshold: 
         here, widths, strangers = _in_picture(grey, picture, lens, layout, name)
         others |= strangers
         typical = float(np.median([blur for blur, _ in widths])) if widths else float("nan")
-        if np.median([blur / min(largest_blur, _RESOLVED * cell) for blur, cell in widths] or [0.0]) > 1.0:
+        if np.median([blur / min(largest_blur, max(_RESOLVED * cell, _SHARP)) for blur, cell in widths] or [0.0]) > 1.0:
             raise CalibrationRefused(
                 f"{name} is blurred: the markers' edges are {typical:.1f} px wide. Is the camera in focus, and did it "
                 "stand still?",
-                f"at most {largest_blur:.1f} px, and a third of a cell",
+                f"at most {largest_blur:.1f} px, and a quarter of a cell",
                 Reason.BLURRED,
             )
         measured_at_all = bool(widths) or any(each.square is None for each in here)
