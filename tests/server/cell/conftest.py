@@ -23,6 +23,7 @@ from arcor2_server.hub import Hub
 from arcor2_server.locks import Locks
 from arcor2_server.rpc import execution as _execution  # noqa: F401 - for their handlers
 from arcor2_server.rpc import robot as _robot  # noqa: F401 - for their handlers
+from arcor2_server.rpc import runs as _runs  # noqa: F401 - for their handlers
 from arcor2_server.rpc.registry import HANDLERS, Context
 from arcor2_server.services import Services
 from arcor2_server.session import Session

@@ -1,0 +1,206 @@
+"""The history of runs, the trace of actions, breakpoints that are shared, and pausing by a person's command."""
+
+import asyncio
+import time
+from typing import Any
+
+import pytest
+
+from arcor2_hw.data.editor import Run, RunEnd, TraceEntry
+from arcor2_hw.data.scene import Scene
+from arcor2_hw.runtime import messages as m
+from arcor2_server import runs
+from arcor2_server.hub import Hub
+from arcor2_server.runs import Runs
+from arcor2_server.settings import ServerSettings
+from arcor2_server.storage import Storage
+from arcor2_server.storage.shared import SharedData
+from tests.runtime.conftest import scene_object
+from tests.server.cell.conftest import Recorder, Server, serving
+from tests.server.cell.test_execution import LAMP, PROJECT, until_stopped, write
+
+EVENTS = {"RunChanged", "ExecutionTrace"}
+
+
+def subscribe(server: Server, *names: str) -> None:
+    server.services.hub.subscribe(server.client, set(names) or EVENTS, True)  # type: ignore[arg-type]
+
+
+async def newest(server: Server) -> Run:
+    found: list[Run] = (await server.ask("ListRuns", {"limit": 1})).runs
+    return found[0]
+
+
+def told(server: Server, name: str) -> list[dict[str, Any]]:
+    return [event["data"] for event in server.client.got if event["event"] == name]
+
+
+@serving()
+async def test_a_run_is_noted_from_its_start_to_its_end(server: Server) -> None:
+    subscribe(server)
+    assert (await server.ask("ListRuns", {})).runs == []
+    assert (await server.ask("GetExecutionTrace", {})).run == 0
+    write(server, 'for n in ("a", "b"): lamp.blink(2, an=n)')
+    await server.ask("RunPackage", {"id": "pkg_1"})
+    await until_stopped(server)
+    async with asyncio.timeout(5):  # names are added beside the run
+        while (await newest(server)).package_name != "demo":
+            await asyncio.sleep(0.01)
+    run = await newest(server)
+    assert (run.number, run.package_id, run.started_by, run.end) == (1, "pkg_1", "alice", RunEnd.FINISHED)
+    assert (run.project_id, run.project_name, run.project_modified) == (PROJECT.id, PROJECT.name, PROJECT.modified)
+    assert isinstance(run.ended, str)
+    assert run.started < run.ended
+    assert (run.actions, run.temporary, run.start_paused) == (2, False, False)
+    assert (run.last_action.id, run.last_action.name) == ("act_b", "b")  # type: ignore[union-attr]
+    ends = [event["end"] for event in told(server, "RunChanged")]
+    assert (ends[0], ends[-1]) == ("running", "finished")
+    trace = told(server, "ExecutionTrace")
+    assert [(entry["number"], "duration" in entry) for entry in trace] == [(1, False), (1, True), (2, False), (2, True)]
+    assert trace[0] | {"started": ""} == {
+        "run": 1,
+        "number": 1,
+        "action_id": "act_a",
+        "name": "a",
+        "started": "",
+        "parameters": ["2"],
+    }
+    assert trace[1]["results"] == ["2"]
+    answer = await server.ask("GetExecutionTrace", {"limit": 1})
+    assert (answer.run, [entry.number for entry in answer.entries]) == (1, [2])
+    answer = await server.ask("GetExecutionTrace", {"before": 2})
+    assert [entry.action_id for entry in answer.entries] == ["act_a"]
+
+
+@serving()
+async def test_how_runs_end(server: Server) -> None:
+    subscribe(server)
+    write(server, 'lamp.blink(1, an="a")\nlamp.wait(an="b")', "pkg_wait")
+    write(server, 'lamp.blink(1, an="a")\nlamp.blink("x" + 1, an="b")', "pkg_script")
+    write(server, 'lamp.hold_all("soon", an="c")', "pkg_action")
+    bob = Recorder("bob")
+    server.services.hub.add(bob)  # type: ignore[arg-type]
+    await server.ask("RunPackage", {"id": "pkg_wait", "start_paused": True})
+    await server.client.state("paused", "PackageState")
+    assert ((await newest(server)).end, (await newest(server)).start_paused) == (RunEnd.RUNNING, True)
+    await server.ask("ResumePackage")
+    await server.client.event("ActionStateBefore", lambda data: data["action_id"] == "act_b")
+    await server.ask("StopPackage", client=bob)
+    await server.client.state("stopped", "PackageState")
+    run = await newest(server)
+    assert (run.end, run.started_by, run.stopped_by) == (RunEnd.STOPPED, "alice", "bob")
+    assert run.last_action.name == "b"  # type: ignore[union-attr]
+
+    await server.ask("RunPackage", {"id": "pkg_script"})
+    await server.client.state("stopped", "PackageState")
+    run = await newest(server)
+    assert (run.end, run.error_type, run.last_action.name) == (RunEnd.FAILED, "TypeError", "a")  # type: ignore[union-attr]
+    assert run.error
+
+    await server.ask("RunPackage", {"id": "pkg_action"}, client=bob)
+    exception = await server.client.event("ProjectException")
+    await server.client.state("stopped", "PackageState")
+    run = await newest(server)
+    assert (run.end, run.error, run.started_by) == (RunEnd.FAILED, exception["message"], "bob")
+
+    await server.ask("RunPackage", {"id": "pkg_wait"})
+    await server.client.event("ActionStateBefore", lambda data: data["action_id"] == "act_b")
+    host = server.services.execution._host
+    assert host is not None
+    host.kill()
+    await server.client.state("stopped", "PackageState")
+    run = await newest(server)
+    assert (run.end, run.error_type) == (RunEnd.LOST, "ConnectionLost")
+    numbers = [one.number for one in (await server.ask("ListRuns", {"package_id": "pkg_wait"})).runs]
+    assert numbers == [4, 1]
+    assert [one.number for one in (await server.ask("ListRuns", {"before": 3, "project_id": PROJECT.id})).runs] == [
+        2,
+        1,
+    ]
+    assert (await server.ask("ListRuns", {"project_id": "pro_none"})).runs == []
+
+
+@serving()
+async def test_an_exception_names_its_action(server: Server) -> None:
+    server.types.add("Lamp", LAMP)
+    write(server, 'lamp.blink(1, an="a")\nlamp.hold_all("soon", an="b")')
+    subscribe(server)
+    await server.ask("RunPackage", {"id": "pkg_1"})
+    exception = await server.client.event("ProjectException")
+    assert exception["action_id"] == "act_b"
+    assert exception["message"].startswith("lamp")
+    entries = (await server.ask("GetExecutionTrace", {})).entries
+    assert entries[0].error
+    assert entries[0].action_id == "act_b"
+
+
+# ---------------------------------------------------------------------------------------------- shared breakpoints
+class Shared:
+    """What users set on a project, in place of the database."""
+
+    def __init__(self, *ids: str) -> None:
+        self.kept = (set(ids), "alice")
+
+    async def breakpoints(self, project_id: str) -> tuple[set[str], str]:
+        assert project_id == PROJECT.id
+        return self.kept
+
+    async def put_breakpoints(self, project_id: str, ids: set[str], user: str) -> None:
+        self.kept = (ids, user)
+
+
+@serving()
+async def test_shared_breakpoints_count_when_asked_for_and_may_change(server: Server) -> None:
+    shared: Any = Shared("act_b", "acp_gone")
+    server.services.breakpoints._data = shared
+    await server.open(Scene("scene", id="scn_1", objects=[scene_object("lamp", "Lamp")]), PROJECT)
+    write(server, 'for n in ("a", "b", "c", "a"): lamp.blink(2, an=n)')
+    await server.ask("RunPackage", {"id": "pkg_1"})  # not asked for
+    assert "paused" not in await until_stopped(server)
+    server.client.got.clear()
+    await server.ask("RunPackage", {"id": "pkg_1", "shared_breakpoints": True, "breakpoints": ["act_c"]})
+    for expected in ("act_b", "act_c"):
+        await server.client.event("ActionStateBefore", lambda data, wanted=expected: data["action_id"] == wanted)
+        await server.client.state("paused", "PackageState")
+        await server.services.breakpoints.change(PROJECT.id, {"act_a"}, {"act_b"}, "bob")
+        await server.ask("ResumePackage")
+    await server.client.event("ActionStateBefore", lambda data: data["action_id"] == "act_a")
+    await server.client.state("paused", "PackageState")
+    await server.ask("ResumePackage")
+    await server.client.state("stopped", "PackageState")
+    await server.services.breakpoints.change(PROJECT.id, set(), {"act_a"}, "bob")  # nobody runs whom it would concern
+
+
+# ---------------------------------------------------------------------------------------------- kept
+async def test_the_newest_runs_and_actions_are_kept(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runs, "KEPT", 5)
+    monkeypatch.setattr(runs, "KEPT_ACTIONS", 3)
+    storage = await Storage.open(ServerSettings(data_dir=tmp_path))
+    try:
+        kept = Runs(Hub())
+        await kept.open(SharedData(storage))
+        for _ in range(8):
+            number = kept.begin("pkg", by="", temporary=False, start_paused=False)
+            for action in range(1, 6):
+                kept.began(m.ActionBegan(action, "act", "a", time.time()))
+                kept.ended(m.ActionEnded(action, 0.1))
+            if number != 8:
+                kept.end(number, RunEnd.FINISHED)
+        assert [run.number for run in kept.newest(100)] == [8, 7, 6, 5, 4]
+        assert kept.newest(1)[0].actions == 5
+        _, entries = kept.trace(100)
+        assert [entry.number for entry in entries] == [5, 4, 3]
+        assert isinstance(entries[0], TraceEntry)
+        kept.ended(m.ActionEnded(1, 0.1))  # not kept any more
+        await kept.close()
+        again = Runs(Hub())
+        await again.open(SharedData(storage))
+        await again.close()
+        assert [(run.number, run.end.value) for run in again.newest(100)] == [
+            (8, "lost"),
+            *((number, "finished") for number in (7, 6, 5, 4)),
+        ]
+        assert again.begin("pkg", by="", temporary=False, start_paused=False) == 9
+        await again.close()
+    finally:
+        await storage.close()
