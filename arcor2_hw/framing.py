@@ -7,9 +7,14 @@ _PREFIX: Final = struct.Struct("<I")
 PREFIX_SIZE: Final = _PREFIX.size
 
 
+def prefix(length: int) -> bytes:
+    """Give what stands in front of a message of so many bytes."""
+    return _PREFIX.pack(length)
+
+
 def framed(body: bytes) -> bytes:
     """Give a message with its length in front."""
-    return _PREFIX.pack(len(body)) + body
+    return prefix(len(body)) + body
 
 
 def body_length(prefix: bytes, limit: int) -> int:

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import msgspec
 
-from arcor2_hw.compute.world import Body, RobotModel
+from arcor2_hw.compute.world import RobotModel, Thing
 
 if TYPE_CHECKING:
+    from arcor2_hw.compute.standing_world import StandingWorld
     from arcor2_hw.kinematics import model
 
 MODELS: Final = 16
@@ -21,15 +22,25 @@ class Desk:
 
     def __init__(self, progress: Callable[[float, str], None]) -> None:
         self.progress = progress
-        self.bodies: dict[str, Body] = {}
         self._models: OrderedDict[bytes, model.RobotModel] = OrderedDict()
+        self._changes: list[tuple[Sequence[Thing], Sequence[str]]] = []
+        self._world: StandingWorld | None = None
 
-    def change(self, put: Sequence[Body], remove: Sequence[str]) -> None:
+    def change(self, put: Sequence[Thing], remove: Sequence[str]) -> None:
         """Change the world; nothing is read of it before a computation needs it."""
-        for key in remove:
-            self.bodies.pop(key, None)
-        for body in put:
-            self.bodies[body.id] = body
+        self._changes.append((put, remove))
+
+    def world(self) -> "StandingWorld":
+        """Give the world as it is now. Raises ModelError, BadMesh ... for what of it cannot be used."""
+        from arcor2_hw.compute.standing_world import StandingWorld
+
+        if self._world is None:
+            self._world = StandingWorld(self.robot)
+        changes, self._changes = self._changes, []
+        for put, remove in changes:
+            self._world.change(put, remove)
+        self._world.settle()
+        return self._world
 
     def robot(self, wanted: RobotModel) -> "model.RobotModel":
         """Give a robot's model as it stands in itself, read once. Raises ModelError and its kinds."""

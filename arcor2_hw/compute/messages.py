@@ -11,7 +11,7 @@ from msgspec import Struct
 
 from arcor2_hw import framing
 from arcor2_hw.compute.tasks import AnyTask
-from arcor2_hw.compute.world import Body
+from arcor2_hw.compute.world import Thing
 
 MAX_MESSAGE: Final = 512 * 1024 * 1024
 """Bytes; the pictures of an intrinsic calibration, or of a hand-eye one, come together."""
@@ -25,11 +25,11 @@ class Work(Struct, frozen=True, tag=True):
 
 
 class ChangeWorld(Struct, frozen=True, tag=True):
-    """Take bodies out, and put others in, in place of those of the same ids. Bodies that are refused fail the next
-    Work that needs the world.
+    """Take things out, and put others in, in place of those of the same ids. One that cannot be used fails the Works
+    that need the world, until it goes.
     """
 
-    put: list[Body]
+    put: list[Thing]
     remove: list[str]
 
 
@@ -62,15 +62,19 @@ FromWorker = Done | Failed | Progress
 
 decode_to_worker: Any = msgspec.msgpack.Decoder(ToWorker).decode
 decode_from_worker: Any = msgspec.msgpack.Decoder(FromWorker).decode
-encode_value = msgspec.msgpack.Encoder().encode
+_encoder = msgspec.msgpack.Encoder()
+encode_value = _encoder.encode
 
 
-def encode(message: ToWorker | FromWorker) -> bytes:
+def encode(message: ToWorker | FromWorker) -> bytearray:
     """Give a message with its length in front; ValueError for one that is too long."""
-    body = encode_value(message)
-    if len(body) > MAX_MESSAGE:
-        raise ValueError(f"a message of {len(body)} bytes is longer than {MAX_MESSAGE}")
-    return framing.framed(body)
+    buffer = bytearray(framing.PREFIX_SIZE)
+    _encoder.encode_into(message, buffer, framing.PREFIX_SIZE)  # pictures are large: they are copied but once
+    size = len(buffer) - framing.PREFIX_SIZE
+    if size > MAX_MESSAGE:
+        raise ValueError(f"a message of {size} bytes is longer than {MAX_MESSAGE}")
+    buffer[: framing.PREFIX_SIZE] = framing.prefix(size)
+    return buffer
 
 
 def body_length(prefix: bytes) -> int:

@@ -1,5 +1,6 @@
 """Everything that can be asked of the compute workers. Imports no numerics."""
 
 from arcor2_hw.compute.calibration_tasks import CalibrationTask
+from arcor2_hw.compute.kinematics_tasks import KinematicsTask
 
-AnyTask = CalibrationTask
+AnyTask = CalibrationTask | KinematicsTask

@@ -1,5 +1,6 @@
 """What stands in the way, as the compute worker is told of it. Imports no numerics."""
 
+from collections.abc import Mapping
 from typing import Any, Final
 
 from msgspec import Struct, field
@@ -48,13 +49,21 @@ class CylinderShape(Struct, frozen=True, tag="cylinder"):
 Shape = BoxShape | SphereShape | CylinderShape | MeshShape
 
 
-class Body(Struct, frozen=True):
-    """Something of a shape at a pose in the world. name: as a person knows it."""
+class Holder(Struct, frozen=True):
+    """The link of a robot that holds a body. touching: links that it may touch besides."""
+
+    robot: str
+    link: str
+    touching: list[str] = field(default_factory=list)
+
+
+class Body(Struct, frozen=True, tag="body"):
+    """Something of a shape at a pose in the world; where something holds it, in the frame of that link."""
 
     id: str
-    name: str
     shape: Shape
     pose: Pose
+    holder: Holder | None = None
 
 
 class RobotModel(Struct, frozen=True):
@@ -68,12 +77,17 @@ class RobotModel(Struct, frozen=True):
     settings: dict[str, Any] = field(default_factory=dict)
 
 
-class StandingRobot(Struct, frozen=True):
-    """A robot that stands in the way with its joints as they are."""
+class StandingRobot(Struct, frozen=True, tag="robot"):
+    """A robot with its joints as they are; without: in its middle position."""
 
     id: str
     model: RobotModel
-    joints: list[Joint]
+    joints: list[Joint] = field(default_factory=list)
+
+
+Thing = Body | StandingRobot
+World = Mapping[str, Thing]
+"""Everything that stands in the way, by id."""
 
 
 def shape_of(model: Box | Sphere | Cylinder) -> Shape:

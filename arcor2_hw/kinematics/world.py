@@ -398,7 +398,8 @@ class CollisionWorld:
     def ray(self, start: Position, end: Position, ignore: Iterable[str] = (), inflation: float = 0.0) -> RayHit | None:
         """Give what a straight line meets first, None when it is free. Robots stand as they are now.
 
-        `ignore`: ids of bodies and robots that are no obstacle. `inflation`: sizes count as larger by so much, m.
+        `ignore`: ids of bodies and robots that are no obstacle; what such a robot holds still is one. `inflation`: sizes
+        count as larger by so much, m.
         Raises InvalidData for numbers that are not finite.
         """
         a, b = np.array([*start]), np.array([*end])
@@ -423,10 +424,8 @@ class CollisionWorld:
             if bodies[number].name not in ignore:
                 yield bodies[number].name, bodies[number].shape, bodies[number].pose
         for robot in self.robots.values():
-            if robot.name in ignore:
-                continue
             frames = robot.link_frames(robot.q)
-            for each in robot.model.collision:
+            for each in robot.model.collision if robot.name not in ignore else ():
                 yield f"{robot.name}/{each.link}", each.shape, frames[each.link] @ each.origin
             for held in robot.held.values():
                 if held.name not in ignore:

@@ -2,14 +2,13 @@
 
 import asyncio
 from collections import deque
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, TypeVar
 
 import structlog
 
 from arcor2_hw.compute.task import ComputeBusy, ComputeStopped, Room, Task
-from arcor2_hw.compute.world import Body
+from arcor2_hw.compute.world import World
 from arcor2_server.compute_process import ComputeProcess, Told
 
 log = structlog.get_logger(__name__)
@@ -23,7 +22,7 @@ MOST_WAITING: Final = 1000
 class _Question:
     task: Task[Any]
     within: float
-    world: Mapping[str, Body] | None
+    world: World | None
     told: Told | None
     answer: asyncio.Future[Any] = field(default_factory=lambda: asyncio.get_running_loop().create_future())
 
@@ -132,7 +131,7 @@ class Compute:
         task: Task[R],
         *,
         within: float | None = None,
-        world: Mapping[str, Body] | None = None,
+        world: World | None = None,
         told: Told | None = None,
         background: bool = False,
     ) -> R:

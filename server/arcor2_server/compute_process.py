@@ -17,7 +17,7 @@ from arcor2_hw import exceptions
 from arcor2_hw.calibration.refusals import CalibrationRefused
 from arcor2_hw.compute import messages as m
 from arcor2_hw.compute.task import ComputeStopped, ComputeTimeout, NotInstalled, Room, Task
-from arcor2_hw.compute.world import Body
+from arcor2_hw.compute.world import Thing, World
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.framing import PREFIX_SIZE
 
@@ -49,7 +49,7 @@ class ComputeProcess:
         self.process = process
         self._reader = reader
         self._writer = writer
-        self._told: dict[str, Body] = {}
+        self._told: dict[str, Thing] = {}
         """The world as this process knows it."""
         self._lines: deque[str] = deque(maxlen=LINES)
         self._output = asyncio.create_task(self._read_output(), name=f"output of compute worker {process.pid}")
@@ -87,7 +87,7 @@ class ComputeProcess:
         """Tell whether the process can be asked."""
         return self.process.returncode is None and not self._reader.at_eof() and not self._writer.is_closing()
 
-    async def ask(self, task: Task[Any], within: float, world: Mapping[str, Body] | None, told: Told | None) -> Any:
+    async def ask(self, task: Task[Any], within: float, world: World | None, told: Told | None) -> Any:
         """Give the answer. Raises what the computation raises; ComputeStopped, ComputeTimeout when there is none."""
         try:
             async with asyncio.timeout(within + START_WITHIN):
@@ -106,7 +106,7 @@ class ComputeProcess:
             raise error_of(message)
         return msgspec.msgpack.decode(message.value, type=task.gives)
 
-    async def _send_world(self, world: Mapping[str, Body]) -> None:
+    async def _send_world(self, world: World) -> None:
         """Tell the process what changed since it was told last."""
         known = self._told
         put = [body for key, body in world.items() if (old := known.get(key)) is not body and old != body]

@@ -1,0 +1,134 @@
+"""What the kinematics worker does for each task; Pinocchio and coal are imported by the functions that need them."""
+
+import math
+from typing import TYPE_CHECKING
+
+from arcor2_hw.compute import kinematics_tasks as t
+from arcor2_hw.compute.desk import Desk
+from arcor2_hw.compute.world import MeshShape
+from arcor2_hw.data.base import UNSET, Unset
+from arcor2_hw.data.editor import Reach
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.robot import Joint
+
+if TYPE_CHECKING:
+    from arcor2_hw.kinematics.model import RobotModel
+    from arcor2_hw.kinematics.shapes import Array
+    from arcor2_hw.kinematics.world import CollisionWorld
+
+
+# ------------------------------------------------------------------------------------------------ one robot
+def description(task: t.DescribeRobot, desk: Desk) -> t.RobotDescription:
+    """Give what a model says."""
+    from arcor2_hw.kinematics.shapes import triangles_of
+
+    model = desk.robot(task.model)
+    joints = [
+        t.JointRange(joint.name, joint.kind == "prismatic", *map(_finite, (joint.lower, joint.upper, joint.velocity)))
+        for joint in model.joints
+    ]
+    triangles = sum(len(triangles_of(part.shape).triangles) for part in model.visual or model.collision)
+    links = list(model.description.links)
+    return t.RobotDescription(model.name, joints, list(model.end_effectors), links, triangles)
+
+
+def _finite(value: float) -> float | Unset:
+    return float(value) if math.isfinite(value) else UNSET
+
+
+def forward(task: t.SolveForward, desk: Desk) -> Pose:
+    """Give the pose of an end effector in the world."""
+    model = desk.robot(task.model)
+    arm = model.arm(named_end_effector(model, task.end_effector))
+    return task.model.base * arm.pose(arm.values(task.joints))
+
+
+def named_end_effector(model: "RobotModel", name: str) -> str:
+    """Give the link of an end effector: that of its name, or, where a model has but one, that one."""
+    if name not in model.description.links and len(model.end_effectors) == 1:
+        return next(iter(model.end_effectors))
+    return name
+
+
+def inverse(task: t.SolveInverse, desk: Desk) -> list[Joint]:
+    """Give joints of the chain to an end effector."""
+    import numpy as np
+
+    from arcor2_hw.kinematics.inverse import blocked_in
+
+    world = desk.world()
+    standing = world.collisions.robot(task.robot)
+    solver = world.inverse(task.robot, named_end_effector(standing.model, task.end_effector))
+    arm = solver.arm
+    others = standing.q if task.start is None else standing.model.values(task.start, standing.q)
+    blocked = blocked_in(world.collisions, task.robot, arm, others) if task.avoid_collisions else None
+    target = np.linalg.inv(standing.base) @ task.pose.matrix()
+    seed = arm.of(others) if task.start is not None else None
+    return arm.named(solver.solve(target, seed, blocked))
+
+
+# ------------------------------------------------------------------------------------------------ reachability
+def judged_poses(task: t.JudgePoses, desk: Desk) -> list[t.Judged]:
+    """Judge poses."""
+    world = desk.world()
+    model = world.collisions.robot(task.robot).model
+    found = world.reachability(task.robot, named_end_effector(model, task.end_effector)).judge(task.poses)
+    return [t.Judged(Reach(each.reach.value), each.reason) for each in found]
+
+
+def judged_joints(task: t.JudgeJoints, desk: Desk) -> list[t.Judged]:
+    """Judge joints."""
+    collisions = desk.world().collisions
+    model = collisions.robot(task.robot).model
+    return [_judged(collisions, task.robot, model, joints) for joints in task.joints]
+
+
+def _judged(collisions: "CollisionWorld", robot: str, model: "RobotModel", joints: list[Joint]) -> t.Judged:
+    from arcor2_hw.kinematics.errors import ModelError
+
+    try:
+        q = model.values(joints)
+    except ModelError as error:
+        return t.Judged(Reach.UNKNOWN, str(error))
+    for column, joint in enumerate(model.joints):
+        if not joint.lower - 1e-6 <= q[column] <= joint.upper + 1e-6:
+            return t.Judged(Reach.OUT_OF_REACH, f"The joint {joint.name} is beyond its limits.")
+    if contacts := collisions.contacts(robot, q):
+        return t.Judged(Reach.IN_COLLISION, f"There it is in collision: {contacts[0]}.")
+    near = [name for end_effector in model.end_effectors for name in _near(model, end_effector, q)]
+    if near:
+        return t.Judged(Reach.NEAR_LIMIT, f"{', '.join(dict.fromkeys(near))}: near a limit.")
+    return t.Judged(Reach.REACHABLE)
+
+
+def _near(model: "RobotModel", end_effector: str, q: "Array") -> list[str]:
+    arm = model.arm(end_effector)
+    return arm.near_limits(arm.of(q))
+
+
+# ------------------------------------------------------------------------------------------------ the world
+def checked_lines(task: t.CheckLines, desk: Desk) -> list[t.LineHit | None]:
+    """Give what lines meet first."""
+    collisions = desk.world().collisions
+    hits = [collisions.ray(line.start, line.end, task.ignore, task.inflation) for line in task.lines]
+    return [None if hit is None else t.LineHit(hit.name, hit.share) for hit in hits]
+
+
+def placed_in_link(task: t.PlaceInLink, desk: Desk) -> Pose:
+    """Give a pose in the frame of a link."""
+    from arcor2_hw.exceptions import NotFound
+
+    model = desk.robot(task.model)
+    frames = model.link_poses(model.values(task.joints))
+    if task.link not in frames:
+        raise NotFound(f"{model.name} has no link {task.link!r}; there are {', '.join(frames)}.")
+    return (task.model.base * Pose.from_matrix(frames[task.link])).inverted() * task.pose
+
+
+def mesh_facts(task: t.ReadMesh, _: Desk) -> t.MeshFacts:
+    """Give how large a mesh is."""
+    from arcor2_hw.compute.standing_world import mesh_of
+
+    mesh = mesh_of(MeshShape(task.file, task.scale))
+    size = mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)
+    return t.MeshFacts(len(mesh.triangles), (float(size[0]), float(size[1]), float(size[2])))

@@ -1,0 +1,203 @@
+"""The collision world in the worker, kept as it is told: only what changed is read and placed anew."""
+
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Final
+
+from arcor2_hw.compute.world import (
+    Body,
+    BoxShape,
+    CylinderShape,
+    MeshShape,
+    RobotModel,
+    SphereShape,
+    StandingRobot,
+    Thing,
+)
+from arcor2_hw.exceptions import Arcor2Error, NotFound
+from arcor2_hw.kinematics import model, shapes
+from arcor2_hw.kinematics.errors import BadMesh
+from arcor2_hw.kinematics.inverse import InverseKinematics
+from arcor2_hw.kinematics.meshes import read_mesh
+from arcor2_hw.kinematics.reach import Reachability
+from arcor2_hw.kinematics.source import MAX_MESH
+from arcor2_hw.kinematics.world import CollisionWorld
+
+MESHES: Final = 64
+"""Meshes that are kept, those that were used last."""
+
+
+class StandingWorld:
+    """`collisions` is the world itself; `settle` brings it to what `change` told."""
+
+    def __init__(self, load: Callable[[RobotModel], model.RobotModel]) -> None:
+        self.collisions = CollisionWorld()
+        self._load = load
+        self._things: dict[str, Thing] = {}
+        self._placed: dict[str, Thing] = {}
+        """What stands in `collisions`."""
+        self._waiting: dict[str, None] = {}
+        """Ids of what changed since, in their order."""
+        self._unusable: dict[str, Arcor2Error] = {}
+        self._meshes: OrderedDict[tuple[str, tuple[float, float, float]], shapes.TriangleMesh] = OrderedDict()
+        self._reach: dict[tuple[str, str], Reachability] = {}
+        self._inverse: dict[tuple[str, str], InverseKinematics] = {}
+
+    def change(self, put: Sequence[Thing], remove: Sequence[str]) -> None:
+        """Note what came, went or changed."""
+        for key in remove:
+            self._things.pop(key, None)
+            self._waiting[key] = None
+        for thing in put:
+            self._things[thing.id] = thing
+            self._waiting[thing.id] = None
+
+    def settle(self) -> None:
+        """Bring the world to what it should be. Raises the error of what cannot be used, each time until it goes."""
+        waiting, self._waiting = list(self._waiting), {}
+        again = self._let_go(waiting)
+        for key in sorted([*waiting, *again], key=self._order):
+            self._unusable.pop(key, None)
+            thing = self._things.get(key)
+            try:
+                self._put(key, thing)
+            except Arcor2Error as error:
+                self._drop(key)
+                self._unusable[key] = error
+        if self._unusable:
+            raise next(iter(self._unusable.values()))
+
+    def _order(self, key: str) -> int:
+        """Robots come first, then what stands by itself, then what they hold; what goes, before all."""
+        thing = self._things.get(key)
+        if thing is None:
+            return 0
+        return 1 if isinstance(thing, StandingRobot) else 2 if thing.holder is None else 3
+
+    def _let_go(self, waiting: Sequence[str]) -> list[str]:
+        """Give the ids of what has to be held anew, since its robot is made anew or goes."""
+        gone = {
+            key
+            for key in waiting
+            if isinstance(old := self._placed.get(key), StandingRobot) and not _same_robot(old, self._things.get(key))
+        }
+        return [
+            key
+            for key, thing in self._things.items()
+            if isinstance(thing, Body)
+            and thing.holder is not None
+            and key not in waiting
+            and (thing.holder.robot in gone or (key in self._unusable and thing.holder.robot in waiting))
+        ]
+
+    # -------------------------------------------------------------------------------- one thing
+    def _put(self, key: str, thing: Thing | None) -> None:
+        old = self._placed.get(key)
+        match thing:
+            case None:
+                self._drop(key)
+                return
+            case StandingRobot():
+                if not _same_robot(old, thing):
+                    self._drop(key)
+                self._stand(thing, key in self._placed)
+            case Body():
+                if isinstance(old, StandingRobot):
+                    self._drop(key)
+                self._place(thing, old if isinstance(old, Body) else None)
+        self._placed[key] = thing
+
+    def _stand(self, robot: StandingRobot, stands: bool) -> None:
+        world = self.collisions
+        if not stands:
+            world.add_robot(robot.id, self._load(robot.model), robot.model.base)
+        else:
+            world.move_robot(robot.id, robot.model.base)
+        standing = world.robot(robot.id)
+        if robot.joints:
+            world.set_joints(robot.id, standing.model.values(robot.joints, standing.q))
+
+    def _place(self, body: Body, old: Body | None) -> None:
+        world, pose = self.collisions, body.pose
+        if body.holder is not None:
+            if body.holder.robot not in world.robots:
+                raise NotFound(f"{body.id} is held by {body.holder.robot}, which is not there.")
+            standing = world.robot(body.holder.robot)
+            frames = standing.link_frames(standing.q)
+            if body.holder.link not in frames:
+                raise NotFound(f"{body.id} is held by {body.holder.link}, which is no link of {body.holder.robot}.")
+            pose = type(pose).from_matrix(frames[body.holder.link] @ pose.matrix())
+        if old is not None and old.shape == body.shape:
+            world.move(body.id, pose)
+        else:
+            world.put(body.id, self._shape(body), pose)
+        if body.holder is not None:
+            world.attach(body.id, body.holder.robot, body.holder.link, touching=body.holder.touching)
+
+    def _drop(self, key: str) -> None:
+        old = self._placed.pop(key, None)
+        if isinstance(old, StandingRobot):
+            self.collisions.remove_robot(key)
+            for kept in (self._reach, self._inverse):
+                for pair in [pair for pair in kept if pair[0] == key]:
+                    del kept[pair]
+        elif old is not None:
+            self.collisions.delete(key)
+
+    # -------------------------------------------------------------------------------- shapes
+    def _shape(self, body: Body) -> shapes.Shape:
+        match body.shape:
+            case BoxShape(size):
+                return shapes.Box(*size)
+            case SphereShape(radius):
+                return shapes.Sphere(radius)
+            case CylinderShape(radius, height):
+                return shapes.Cylinder(radius, height)
+            case MeshShape():
+                return self.mesh(body.shape)
+
+    def mesh(self, shape: MeshShape) -> shapes.TriangleMesh:
+        """Give a mesh, read once. Raises BadMesh naming it."""
+        key = (shape.file.path, shape.scale)
+        found = self._meshes.pop(key, None)
+        if found is None:
+            found = mesh_of(shape)
+        self._meshes[key] = found
+        while len(self._meshes) > MESHES:
+            self._meshes.popitem(last=False)
+        return found
+
+    # -------------------------------------------------------------------------------- what is kept of robots
+    def reachability(self, robot: str, end_effector: str) -> Reachability:
+        """Give what judges poses of an end effector. NotFound."""
+        key = (robot, end_effector)
+        if key not in self._reach:
+            arm = self.collisions.robot(robot).model.arm(end_effector)
+            self._reach[key] = Reachability(self.collisions, robot, arm)
+        return self._reach[key]
+
+    def inverse(self, robot: str, end_effector: str) -> InverseKinematics:
+        """Give what solves for an end effector. NotFound."""
+        key = (robot, end_effector)
+        if key not in self._inverse:
+            self._inverse[key] = InverseKinematics(self.collisions.robot(robot).model.arm(end_effector))
+        return self._inverse[key]
+
+
+def mesh_of(shape: MeshShape) -> shapes.TriangleMesh:
+    """Read a mesh. Raises BadMesh naming it."""
+    path = Path(shape.file.path)
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_MESH + 1)
+    except OSError as error:
+        raise BadMesh(f"The mesh {shape.file.name} cannot be read: {error.strerror}.") from error
+    return read_mesh(content, shape.file.name, shape.scale)
+
+
+def _same_robot(old: Thing | None, new: Thing | None) -> bool:
+    """Tell whether a robot is the same but for where it stands and its joints."""
+    if not isinstance(old, StandingRobot) or not isinstance(new, StandingRobot):
+        return False
+    return old.model.urdf == new.model.urdf and old.model.settings == new.model.settings

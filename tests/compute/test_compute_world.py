@@ -1,0 +1,291 @@
+"""Kinematics in the worker: the world that it is told of, again after it was killed, and what is asked of it."""
+
+import asyncio
+import math
+import os
+import signal
+import time
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+import pytest_asyncio
+
+import arcor2_drivers.universal_robots
+from arcor2_hw.compute import kinematics_tasks as t
+from arcor2_hw.compute.task import ComputeStopped, Room
+from arcor2_hw.compute.world import (
+    Body,
+    BoxShape,
+    CylinderShape,
+    Holder,
+    KeptFile,
+    MeshShape,
+    RobotModel,
+    SphereShape,
+    StandingRobot,
+    Thing,
+)
+from arcor2_hw.data.editor import Reach
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.robot import Joint
+from arcor2_hw.exceptions import InvalidData, KinematicsError, NotFound
+from arcor2_server.compute import Compute
+
+UR5E = KeptFile(str(Path(arcor2_drivers.universal_robots.__path__[0]) / "urdf" / "ur5e"), "ur5e")
+DOWN = Orientation(1, 0, 0, 0)
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def compute() -> AsyncIterator[Compute]:
+    made = Compute(idle=60.0)
+    await made.run(t.DescribeRobot(RobotModel(UR5E)))
+    yield made
+    await made.close()
+
+
+pytestmark = pytest.mark.asyncio(loop_scope="module")
+
+
+def robot(base: Pose | None = None, joints: list[Joint] | None = None) -> StandingRobot:
+    return StandingRobot("arm", RobotModel(UR5E, base or Pose()), joints or [])
+
+
+def world(*things: Thing) -> dict[str, Thing]:
+    return {thing.id: thing for thing in things}
+
+
+def box(key: str, x: float, y: float, z: float, *size: float, holder: Holder | None = None) -> Body:
+    return Body(key, BoxShape((size[0], size[1], size[2])), Pose(Position(x, y, z)), holder)
+
+
+async def forward(compute: Compute, joints: list[Joint], base: Pose | None = None) -> Pose:
+    return await compute.run(t.SolveForward(RobotModel(UR5E, base or Pose()), "tcp", joints))
+
+
+# ------------------------------------------------------------------------------------------------ robots
+async def test_joints_and_poses_belong_together(compute: Compute) -> None:
+    base = Pose(Position(0.5, -0.2, 0.7), Orientation(0, 0, math.sin(0.4), math.cos(0.4)))
+    target = base * Pose(Position(0.4, 0.2, 0.3), DOWN)
+    solve = t.SolveInverse("arm", "tcp", target)
+    joints = await compute.run(solve, world=world(robot(base)))
+    there = await forward(compute, joints, base)
+    assert there.position.distance_to(target.position) < 1e-6
+    assert there.orientation.angle_to(target.orientation) < 1e-5
+    # Near to where one begins: other joints that lead there too.
+    start = [Joint(joint.name, joint.value + 0.05) for joint in joints]
+    near = await compute.run(t.SolveInverse("arm", "tcp", target, start), world=world(robot(base)))
+    assert [joint.value for joint in near] == pytest.approx([joint.value for joint in joints], abs=1e-5)
+
+
+async def test_what_cannot_be_reached_says_why(compute: Compute) -> None:
+    far = t.SolveInverse("arm", "tcp", Pose(Position(3, 0, 0), DOWN))
+    with pytest.raises(KinematicsError, match="cannot reach") as raised:
+        await compute.run(far, world=world(robot()))
+    assert raised.value.code == "out_of_reach"
+    target = Pose(Position(0.4, 0.2, 0.3), DOWN)
+    around = box("crate", 0.4, 0.2, 0.3, 0.3, 0.3, 0.3)
+    with pytest.raises(KinematicsError, match="crate") as raised:
+        await compute.run(t.SolveInverse("arm", "tcp", target), world=world(robot(), around))
+    assert raised.value.code == "in_collision"
+    await compute.run(t.SolveInverse("arm", "tcp", target, avoid_collisions=False), world=world(robot(), around))
+    # The name of the only end effector may be the driver's own.
+    joints = await joints_of(compute)
+    assert await compute.run(t.SolveForward(RobotModel(UR5E), "gripper", joints)) == await forward(compute, joints)
+
+
+async def joints_of(compute: Compute) -> list[Joint]:
+    found = await compute.run(t.DescribeRobot(RobotModel(UR5E)))
+    return [Joint(joint.name, 0.1) for joint in found.joints]
+
+
+async def test_a_model_is_described(compute: Compute) -> None:
+    found = await compute.run(t.DescribeRobot(RobotModel(UR5E)))
+    assert (found.name, len(found.joints), found.end_effectors) == ("ur5e", 6, ["tcp"])
+    assert all(joint.lower == -joint.upper for joint in found.joints[3:])  # type: ignore[operator]
+    assert found.triangles > 100
+    longer = await compute.run(
+        t.SolveForward(RobotModel(UR5E, settings={"tcp_z": 0.1}), "tcp", [Joint(j.name, 0.0) for j in found.joints])
+    )
+    short = await forward(compute, [Joint(j.name, 0.0) for j in found.joints])
+    assert longer.position.distance_to(short.position) == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "code", "words"),
+    [
+        ("lost.urdf", b"", "robot_model", "XML"),
+        ("mesh.urdf", b'<robot name="r"><link name="a"><visual><geometry><mesh filename="b.stl"/></geometry></visual>'
+         b'</link><link name="b"/><joint name="j" type="revolute"><parent link="a"/><child link="b"/>'
+         b'<limit lower="0" upper="1" velocity="1"/></joint></robot>', "missing_mesh", "b.stl"),
+        ("loop.urdf", b'<robot name="r"><link name="a"/><link name="b"/>'
+         b'<joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint>'
+         b'<joint name="k" type="continuous"><parent link="b"/><child link="a"/></joint></robot>', "joint_loop", "j"),
+        ("flat.urdf", b'<robot name="r"><link name="a">'
+         b'<collision><geometry><box size="1 0 1"/></geometry></collision>'
+         b'</link><link name="b"/>'
+         b'<joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint></robot>',
+         "zero_length", "link a"),
+        ("zip.zip", b"PK\x03\x04 no archive", "robot_model", "zip"),
+    ],
+)  # fmt: skip
+async def test_a_model_that_cannot_be_used_says_what_is_wrong(
+    compute: Compute, tmp_path: Path, name: str, content: bytes, code: str, words: str
+) -> None:
+    path = tmp_path / "content"
+    path.write_bytes(content)
+    model = RobotModel(KeptFile(str(path), name))
+    with pytest.raises(InvalidData, match=words) as raised:
+        await compute.run(t.DescribeRobot(model))
+    assert raised.value.code == code
+    with pytest.raises(InvalidData, match=words):
+        await compute.run(t.JudgePoses("arm", "tcp", [Pose()]), world=world(StandingRobot("arm", model)))
+
+
+# ------------------------------------------------------------------------------------------------ reachability
+async def test_reachability_follows_what_changes(compute: Compute) -> None:
+    poses = [Pose(Position(0.4, 0.2, 0.3), DOWN), Pose(Position(0.4, -0.4, 0.3), DOWN), Pose(Position(2, 0, 0), DOWN)]
+    judge = t.JudgePoses("arm", "tcp", poses)
+    crate = box("crate", 0.4, 0.2, 0.3, 0.2, 0.2, 0.2)
+
+    async def reach(*things: Thing) -> list[Reach]:
+        return [each.reach for each in await compute.run(judge, world=world(*things))]
+
+    free, far = Reach.REACHABLE, Reach.OUT_OF_REACH
+    assert await reach(robot()) == [free, free, far]
+    assert await reach(robot(), crate) == [Reach.IN_COLLISION, free, far]
+    assert await reach(robot(), box("crate", 0.4, -0.4, 0.3, 0.2, 0.2, 0.2)) == [free, Reach.IN_COLLISION, far]
+    assert await reach(robot(Pose(Position(1.6, 0, 0)))) == [far, far, free]
+    judged = await compute.run(judge, world=world(robot(), crate))
+    assert "crate" in judged[0].reason
+    assert "reaches" in judged[2].reason
+
+
+async def test_joints_are_judged(compute: Compute) -> None:
+    names = [joint.name for joint in await joints_of(compute)]
+
+    def joints(*values: float) -> list[Joint]:
+        return [Joint(name, value) for name, value in zip(names, values, strict=True)]
+
+    up = joints(0, -1.2, 1.0, -1.4, -1.57, 0)
+    asked = [up, joints(0, -1.2, 1.0, -1.4, -1.57, 7.0), joints(0, -1.2, 3.1, -1.4, -1.57, 0), up[:3]]
+    judge = t.JudgeJoints("arm", asked)
+    found = await compute.run(judge, world=world(robot()))
+    assert found[0].reach is Reach.REACHABLE
+    assert found[1].reach is Reach.OUT_OF_REACH
+    assert names[5] in found[1].reason
+    assert found[2].reach in (Reach.IN_COLLISION, Reach.NEAR_LIMIT)
+    assert found[3].reach is Reach.UNKNOWN
+    there = (await forward(compute, up)).position
+    found = await compute.run(judge, world=world(robot(), box("crate", *there, 0.1, 0.1, 0.1)))
+    assert found[0].reach is Reach.IN_COLLISION
+
+
+# ------------------------------------------------------------------------------------------------ the world
+PYRAMID = b"""solid pyramid
+""" + b"".join(
+    b"facet normal 0 0 0\nouter loop\n%s\nendloop\nendfacet\n"
+    % b"\n".join(b"vertex %d %d %d" % corner for corner in facet)
+    for facet in (
+        ((0, 0, 0), (0, 1, 0), (1, 0, 0)),
+        ((0, 0, 0), (1, 0, 0), (0, 0, 1)),
+        ((0, 0, 0), (0, 0, 1), (0, 1, 0)),
+        ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    )
+) + b"endsolid pyramid\n"  # fmt: skip
+
+
+async def line(compute: Compute, *things: Thing, ignore: tuple[str, ...] = ()) -> str | None:
+    check = t.CheckLines([t.Line(Position(-2, 0.2, 0.2), Position(2, 0.2, 0.2))], ignore=list(ignore))
+    (hit,) = await compute.run(check, world=world(*things))
+    return None if hit is None else hit.id
+
+
+async def test_lines_meet_what_stands_there(compute: Compute, tmp_path: Path) -> None:
+    stl = tmp_path / "content"
+    stl.write_bytes(PYRAMID)
+    mesh = Body("tent", MeshShape(KeptFile(str(stl), "tent.stl")), Pose())
+    ball = Body("ball", SphereShape(0.3), Pose(Position(-1.2, 0.2, 0.2)))
+    can = Body("can", CylinderShape(0.1, 1.0), Pose(Position(-1.8, 0.2, 0.2)))
+    assert await line(compute) is None
+    assert await line(compute, mesh) == "tent"
+    assert await line(compute, mesh, ball) == "ball"
+    assert await line(compute, mesh, ball, can) == "can"
+    assert await line(compute, mesh, ball, can, ignore=("can", "ball")) == "tent"
+    assert await line(compute, ball, ignore=("ball",)) is None
+    small = Body("tent", MeshShape(KeptFile(str(stl), "tent.stl"), (0.1, 0.1, 0.1)), Pose())
+    assert await line(compute, small) is None
+    facts = await compute.run(t.ReadMesh(KeptFile(str(stl), "tent.stl"), (2.0, 1.0, 1.0)))
+    assert (facts.triangles, facts.size) == (4, (2.0, 1.0, 1.0))
+
+
+async def test_a_mesh_that_cannot_be_used_is_named_until_it_goes(compute: Compute, tmp_path: Path) -> None:
+    bad = tmp_path / "content"
+    bad.write_bytes(PYRAMID.replace(b"vertex 1 0 0", b"vertex nan 0 0"))
+    tent = Body("tent", MeshShape(KeptFile(str(bad), "tent.stl")), Pose())
+    for _ in range(2):
+        with pytest.raises(InvalidData, match=r"tent\.stl") as raised:
+            await line(compute, tent)
+        assert raised.value.code == "bad_mesh"
+    assert await line(compute) is None
+    with pytest.raises(InvalidData, match=r"gone\.stl"):
+        await line(compute, Body("gone", MeshShape(KeptFile(str(tmp_path / "gone"), "gone.stl")), Pose()))
+
+
+async def test_what_is_held_moves_along(compute: Compute) -> None:
+    names = [joint.name for joint in await joints_of(compute)]
+    joints = [Joint(name, value) for name, value in zip(names, (0.3, -1.2, 1.0, -1.4, -1.57, 0), strict=True)]
+    at = await forward(compute, joints)
+    model = RobotModel(UR5E)
+    part = Pose(at.position + Position(0, 0, -0.1))
+    in_link = await compute.run(t.PlaceInLink(model, joints, "tcp", part))
+    held = Body("part", BoxShape((0.05, 0.05, 0.05)), in_link, Holder("arm", "tcp"))
+
+    async def met(joints: list[Joint]) -> str | None:
+        where = (await forward(compute, joints)) * in_link
+        away = Position(0, 0.04, 0)  # aside of the arm itself
+        check = t.CheckLines([t.Line(where.position + away, where.position)], ignore=["arm"])
+        (hit,) = await compute.run(check, world=world(robot(joints=joints), held))
+        return None if hit is None else hit.id
+
+    assert await met(joints) == "part"
+    moved = [Joint(joint.name, joint.value + 0.4) for joint in joints]
+    assert await met(moved) == "part"
+    # The robot is made anew with another tool: what it holds is in the same place of the same link.
+    longer = StandingRobot("arm", RobotModel(UR5E, settings={"tcp_z": 0.2}), joints)
+    check = t.CheckLines([t.Line(part.position + Position(0, 0.04, 0), part.position)], ignore=["arm"])
+    assert await compute.run(check, world=world(longer, held)) == [None]
+    assert await met(joints) == "part"
+    with pytest.raises(NotFound, match="held by arm"):
+        await compute.run(check, world=world(held))
+    with pytest.raises(NotFound, match="no link 'nose'"):
+        await compute.run(t.PlaceInLink(model, joints, "nose", part))
+
+
+async def test_a_worker_that_is_started_anew_is_told_again() -> None:
+    compute = Compute(idle=60.0)
+    crate = box("crate", 0, 0.2, 0.2, 0.2, 0.2, 0.2)
+    assert await line(compute, crate, robot(Pose(Position(0, 3, 0)))) == "crate"
+    pid = compute.pid(Room.KINEMATICS)
+    assert pid is not None
+    os.kill(pid, signal.SIGSTOP)
+    asked = asyncio.create_task(line(compute, crate))
+    await asyncio.sleep(0.05)
+    os.kill(pid, signal.SIGKILL)
+    with pytest.raises(ComputeStopped, match="the safety of a line"):
+        await asked
+    assert await line(compute, crate) == "crate"
+    assert compute.pid(Room.KINEMATICS) not in (None, pid)
+    await compute.close()
+
+
+async def test_a_thousand_bodies_stay_fast(compute: Compute) -> None:
+    """Only differences are told: the second question of the same world costs hardly more than that of an empty one."""
+    things = [box(f"b{n}", n % 10 + 3.0, n // 10 % 10, n // 100, 0.2, 0.2, 0.2) for n in range(1000)]
+    assert await line(compute, *things) is None
+    begun = time.perf_counter()
+    for number in range(20):
+        things[number] = box(f"b{number}", number % 10 + 4.0, 50.0, 0.0, 0.2, 0.2, 0.2)
+        assert await line(compute, *things) is None
+    assert (time.perf_counter() - begun) / 20 < 0.1
+    assert await line(compute) is None
