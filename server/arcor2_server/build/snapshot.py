@@ -5,13 +5,17 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from arcor2_hw.analysis import Enumeration
 from arcor2_hw.exceptions import InvalidProject
 from arcor2_server.build.naming import Names
 from arcor2_server.build.style import docstring
-from arcor2_server.object_types import PackageType
+
+if TYPE_CHECKING:
+    from arcor2_server.object_types import (
+        PackageType,  # with it comes the database, which the command line has no use for
+    )
 
 FOLDER: Final = "object_types"
 _LEFT_OUT: Final = frozenset({"__pycache__", ".mypy_cache", ".ruff_cache", ".pytest_cache"})
@@ -63,7 +67,7 @@ def _files_below(folder: Path) -> Iterator[Path]:
             yield path
 
 
-def _inside(one: PackageType, folder: Path) -> tuple[str, str]:
+def _inside(one: "PackageType", folder: Path) -> tuple[str, str]:
     """Give the dotted name of a driver's folder, and of the type's module within it ("" for the folder itself)."""
     module = one.entry_point.partition(":")[0].split(".")
     for end in range(1, len(module) + 1):
@@ -77,7 +81,7 @@ def _inside(one: PackageType, folder: Path) -> tuple[str, str]:
     )
 
 
-def _check_own(one: PackageType, path: Path, content: bytes, own: str) -> None:
+def _check_own(one: "PackageType", path: Path, content: bytes, own: str) -> None:
     """Refuse a driver that imports itself by its full name: the package would run the hub's code, not its own.
 
     Likewise one that imports, with more dots than its file lies deep, from outside of its folder.
@@ -97,7 +101,7 @@ def _check_own(one: PackageType, path: Path, content: bytes, own: str) -> None:
             )
 
 
-def _given(one: PackageType, own: str, copied: str, inner: str, kinds: Iterable[Enumeration]) -> bytes:
+def _given(one: "PackageType", own: str, copied: str, inner: str, kinds: Iterable[Enumeration]) -> bytes:
     """Give the module that stands for an installed type: its class, and the enumerations that its actions take."""
     place = f".{copied}{'.' if inner else ''}{inner}"
     given = {one.entry_point.partition(":")[2] or one.name: place}
@@ -114,7 +118,7 @@ def _given(one: PackageType, own: str, copied: str, inner: str, kinds: Iterable[
     return "\n".join([about, "", *lines, ""]).encode()
 
 
-def files_of(types: Iterable[PackageType], enumerations: Mapping[str, Iterable[Enumeration]]) -> dict[str, bytes]:
+def files_of(types: "Iterable[PackageType]", enumerations: Mapping[str, Iterable[Enumeration]]) -> dict[str, bytes]:
     """Give the files of object types by their path in a package.
 
     `enumerations`: by type, what its actions take. Raises InvalidProject naming the type that cannot be copied.

@@ -1,6 +1,5 @@
 """`arcor2-hw device export | check`: a cell.yaml out of a scene, and a look at the devices that one names."""
 
-import asyncio
 import subprocess
 import sys
 from pathlib import Path
@@ -11,13 +10,10 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
-from arcor2_hw.client import Client
-from arcor2_hw.data import rpc
 from arcor2_hw.data.cell import Cell, exported, read_cell, write_cell
 from arcor2_hw.data.found import Checked
-from arcor2_hw.data.scene import Scene
-from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound
-from arcor2_server.cli.package import DEFAULT_URL, Url
+from arcor2_hw.exceptions import InvalidData, NotFound
+from arcor2_server.cli.reaching import HERE, Server, run
 from arcor2_server.cli.status import ExitStatus
 from arcor2_server.cli.tables import console
 
@@ -30,31 +26,28 @@ CHECKED_WITHIN: Final = 60.0
 def export(
     *,
     scene: Annotated[str | None, Parameter(help="Name or id of the scene; may be left out when there is one.")] = None,
-    url: Url = DEFAULT_URL,
+    server: Server = HERE,
 ) -> int:
     """Write the devices of a server's scene as a cell.yaml to standard output."""
-    try:
-        cell = asyncio.run(_exported(url, scene))
-    except NotFound as error:
-        sys.stderr.write(f"arcor2-hw device export: {error}\n")
-        return ExitStatus.NOT_FOUND
-    except Arcor2Error as error:
-        sys.stderr.write(f"arcor2-hw device export: {error}\n")
-        return ExitStatus.NO_SERVER
-    sys.stdout.write(write_cell(cell).decode())
-    return ExitStatus.OK
+
+    async def work() -> None:
+        sys.stdout.write(write_cell(await _exported(server, scene)).decode())
+
+    return run("device export", work)
 
 
-async def _exported(url: str, wanted: str | None) -> Cell:
-    async with Client(url) as client:
-        scenes = await client.call("ListScenes")
+async def _exported(server: Server, wanted: str | None) -> Cell:
+    async with server.client() as client:
+        scenes = await client.list_scenes()
         named = [scene for scene in scenes if wanted is None or wanted in (scene.id, scene.name)]
         if not named:
-            raise NotFound(f"the server at {url} has no scene {wanted}" if scenes else f"{url} has no scenes")
+            raise NotFound(
+                f"the server at {client.url} has no scene {wanted}" if scenes else f"{client.url} has no scenes"
+            )
         if len(named) > 1:
             raise NotFound(f"say which scene with --scene: {', '.join(sorted(scene.name for scene in named))}")
-        scene: Scene = await client.call("GetScene", rpc.IdArgs(named[0].id))
-        types = await client.call("GetObjectTypes")
+        scene = await client.get_scene(named[0].id)
+        types = await client.get_object_types()
         return exported(scene, {one.type for one in types if VIRTUAL in (one.type, one.base)})
 
 

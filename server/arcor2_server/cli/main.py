@@ -21,9 +21,13 @@ app = App(
 )
 app.command("arcor2_server.cli.serve:serve", help="Run the server until it is told to end.")
 app.command("arcor2_server.cli.demo:demo", help="Bring up the demo workplace and run its program.")
+app.command("arcor2_server.cli.scene:app", name="scene", help="List, export, import, check and compare scenes.")
+app.command("arcor2_server.cli.project:app", name="project", help="List, export, import, check and compare projects.")
 app.command("arcor2_server.cli.package:app", name="package", help="List the packages of a server, or run one.")
 app.command(
-    "arcor2_server.cli.object_type:app", name="object-type", help="Bring object types into a server, or take them out."
+    "arcor2_server.cli.object_type:app",
+    name="object-type",
+    help="Bring object types into a server, compare them.",
 )
 app.command("arcor2_server.cli.token:app", name="token", help="Say who may connect to a server, and in which role.")
 app.command("arcor2_server.cli.device:app", name="device", help="List, find, check devices; write a driver.")

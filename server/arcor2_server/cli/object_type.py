@@ -1,44 +1,20 @@
-"""`arcor2-hw object-type`: bring object types into a running server, list them, take them out."""
+"""`arcor2-hw object-type`: bring object types into a running server, list them, take them out, compare them."""
 
 import ast
-import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-import httpx
 from cyclopts import App, Parameter
-from rich.console import Console
-from rich.table import Table
 
 from arcor2_hw.analysis import Library, SourceFile, module_name
-from arcor2_server.cli.package import DEFAULT_URL, Url
+from arcor2_hw.client import Rest
+from arcor2_server.cli import exchanging as x
+from arcor2_server.cli.reaching import HERE, Failed, Server, run
 from arcor2_server.cli.status import ExitStatus
+from arcor2_server.exchange.archive import Archive
+from arcor2_server.exchange.gathering import Source
 
-app = App(name="object-type", help="Bring object types into a running server, list them, take them out.")
-TIMEOUT = 10.0
-
-
-class Failed(Exception):
-    """A command that ends with a status of its own and one line."""
-
-    def __init__(self, status: ExitStatus, line: str) -> None:
-        super().__init__(line)
-        self.status = status
-
-
-def _request(url: str, method: str, path: str, body: Any = None) -> Any:
-    base = url.replace("ws://", "http://", 1).replace("wss://", "https://", 1)
-    try:
-        answer = httpx.request(method, f"{base.rstrip('/')}{path}", json=body, timeout=TIMEOUT)
-    except httpx.HTTPError as error:
-        raise Failed(ExitStatus.NO_SERVER, f"no server answers at {url}: {error}") from error
-    if answer.is_success:
-        return answer.json()
-    try:
-        text = answer.json()["message"]
-    except (ValueError, KeyError, TypeError):
-        text = f"the server answers {answer.status_code}"
-    raise Failed(ExitStatus.NOT_FOUND if answer.status_code == httpx.codes.NOT_FOUND else ExitStatus.FAILED, text)
+app = App(name="object-type", help="Bring object types into a server, list, check and compare them, take them out.")
 
 
 def _read(file: Path) -> str:
@@ -70,14 +46,14 @@ def _may_be_placed(file: SourceFile) -> bool:
     return analysis.is_object_type and not analysis.meta.abstract
 
 
-def _in_order(given: dict[str, SourceFile], url: str) -> list[SourceFile]:
+async def _in_order(given: dict[str, SourceFile], rest: Rest) -> list[SourceFile]:
     """Give files each behind those it needs; Failed when one has a problem, with what the server has taken in too."""
     library = Library(given.values())
     if any(library.analyse(name).problem for name in given):
-        for entry in _request(url, "GET", "/object-types"):
-            if entry["id"] not in given:
-                stored = _request(url, "GET", f"/object-types/{entry['id']}")
-                library.add(SourceFile(stored["id"], module_name(stored["id"]), stored["source"]))
+        for entry in await rest.object_types():
+            if entry.id not in given:
+                stored = await rest.object_type(entry.id)
+                library.add(SourceFile(stored.id, module_name(stored.id), stored.source))
     ordered: dict[str, SourceFile] = {}
     for name, file in given.items():
         analysis = library.analyse(name)
@@ -88,27 +64,18 @@ def _in_order(given: dict[str, SourceFile], url: str) -> list[SourceFile]:
     return list(ordered.values())
 
 
-def _run(command: str, work: Any) -> int:
-    try:
-        work()
-    except Failed as error:
-        sys.stderr.write(f"arcor2-hw object-type {command}: {error}\n")
-        return error.status
-    return ExitStatus.OK
-
-
 @app.command
 def add(
     *files: Path,
     name: Annotated[str | None, Parameter(help="The class, when a file declares several object types.")] = None,
-    url: Url = DEFAULT_URL,
+    server: Server = HERE,
 ) -> int:
     """Bring in object types from Python files, new or changed. The files are read, not imported.
 
     Bases, mixins and other modules that they import relatively are given with them, or were brought in before.
     """
 
-    def work() -> None:
+    async def work() -> None:
         if not files or (name is not None and len(files) > 1):
             raise Failed(ExitStatus.USAGE, "give the files of the object types; --name only with one file")
         given: dict[str, SourceFile] = {}
@@ -116,33 +83,91 @@ def add(
             source = _read(file)
             chosen = _class_in(source, file, name)
             given[chosen] = SourceFile(chosen, module_name(chosen), source, str(file))
-        for one in _in_order(given, url):
-            _request(url, "PUT", "/object-types", {"id": one.name, "name": one.name, "source": one.source})
-            Console().print(f"{one.name} added")
+        async with server.client() as client:
+            for one in await _in_order(given, client.rest):
+                source = one.source if isinstance(one.source, str) else one.source.decode()
+                await client.rest.put_object_type(one.name, source)
+                x.out().print(f"{one.name} added")
 
-    return _run("add", work)
+    return run("object-type add", work)
 
 
 @app.command(name="list")
-def list_types(*, url: Url = DEFAULT_URL) -> int:
+def list_types(*, as_json: x.Json = False, server: Server = HERE) -> int:
     """Show the object types that were brought into a server."""
 
-    def work() -> None:
-        entries = _request(url, "GET", "/object-types")
-        table = Table("name", "modified", box=None, pad_edge=False)
-        for entry in entries:
-            table.add_row(entry["name"], entry.get("modified", ""))
-        Console().print(table if entries else "No object types were brought in.")
+    async def work() -> None:
+        async with server.client() as client:
+            x.show_list(await client.rest.object_types(), "object types that were brought in", as_json)
 
-    return _run("list", work)
+    return run("object-type list", work)
 
 
 @app.command
-def remove(name: str, *, url: Url = DEFAULT_URL) -> int:
+def remove(name: str, *, server: Server = HERE) -> int:
     """Take an object type out of a server."""
 
-    def work() -> None:
-        _request(url, "DELETE", f"/object-types/{name}")
-        Console().print(f"{name} removed")
+    async def work() -> None:
+        async with server.client() as client:
+            await client.rest.delete_object_type(name)
+        x.out().print(f"{name} removed")
 
-    return _run("remove", work)
+    return run("object-type remove", work)
+
+
+@app.command
+def export(
+    *names: Annotated[str, Parameter(help="Object types that were brought in.")],
+    output: x.Output = None,
+    force: x.Force = False,
+    server: Server = HERE,
+) -> int:
+    """Write object types into one file, with their bases, mixins, models and meshes."""
+
+    async def work() -> None:
+        if not names:
+            raise Failed(ExitStatus.USAGE, "give the names of the object types")
+        async with server.client() as client:
+            archive = await Source(client).object_types(names)
+        path = output or Path(f"{names[0]}.zip")
+        x.write(archive, path, force)
+
+    return run("object-type export", work)
+
+
+@app.command(name="import")
+def import_types(
+    file: Annotated[Path, Parameter(help="What `arcor2-hw object-type export` wrote.")],
+    *,
+    overwrite: x.Overwrite = None,
+    dry_run: x.DryRun = False,
+    server: Server = HERE,
+) -> int:
+    """Bring the object types of a file into a server, with their models and meshes.
+
+    What is there already and the same is left alone. What differs is named and nothing is done, unless --overwrite
+    allows it: types (with their models), assets, or all.
+    """
+    return run("object-type import", lambda: x.bring_in(file, "object-type", server, overwrite or [], None, dry_run))
+
+
+@app.command
+def validate(*files: Annotated[Path, Parameter(help="Export files.")], as_json: x.Json = False) -> int:
+    """Check export files without a server. For a Python file there is `arcor2-hw analyse`."""
+    return run("object-type validate", lambda: x.validate(list(files), "object-type", as_json))
+
+
+async def _one(source: Source, name: str) -> Archive:
+    return await source.object_types([name])
+
+
+@app.command
+def diff(
+    old: Annotated[str, Parameter(help="An export file, or the name of an object type of the server.")],
+    new: Annotated[str, Parameter(help="Likewise: what it is compared with.")],
+    *,
+    as_json: x.Json = False,
+    server: Server = HERE,
+) -> int:
+    """Show what differs between two object types and what they need; the status tells whether anything does."""
+    return run("object-type diff", lambda: x.compare(old, new, "object-type", server, _one, as_json))

@@ -1,6 +1,5 @@
 """`arcor2-hw package`: list packages, and run one while following what it does."""
 
-import asyncio
 import sys
 from typing import Annotated
 
@@ -8,27 +7,28 @@ from cyclopts import App, Parameter
 from rich.console import Console
 from rich.table import Table
 
-from arcor2_hw.client import Client
-from arcor2_hw.data import rpc
+from arcor2_hw.client import RequestFailed
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.package import PackageStateEnum, PackageSummary
-from arcor2_hw.exceptions import Arcor2Error, NotFound
+from arcor2_hw.exceptions import ConnectionLost, NotFound
+from arcor2_server.cli.reaching import HERE, Failed, Server, run
 from arcor2_server.cli.status import ExitStatus
 
 app = App(name="package", help="List the packages of a running server, or run one.")
 
-Url = Annotated[str, Parameter(name="--url", help="Where the server listens.")]
-DEFAULT_URL = "ws://127.0.0.1:6789"
-
 
 @app.command(name="list")
-def list_packages(*, url: Url = DEFAULT_URL) -> int:
+def list_packages(*, server: Server = HERE) -> int:
     """Show the packages of a running server."""
-    try:
-        summaries = asyncio.run(_summaries(url))
-    except Arcor2Error as error:
-        sys.stderr.write(f"arcor2-hw package list: {error}\n")
-        return ExitStatus.NO_SERVER
+
+    async def work() -> None:
+        async with server.client() as client:
+            _show(sorted(await client.list_packages(), key=lambda summary: summary.package_meta.built))
+
+    return run("package list", work)
+
+
+def _show(summaries: list[PackageSummary]) -> None:
     table = Table("id", "name", "project", "built", "executed", box=None, pad_edge=False)
     for summary in summaries:
         meta, project = summary.package_meta, summary.project_meta
@@ -40,13 +40,6 @@ def list_packages(*, url: Url = DEFAULT_URL) -> int:
             "never" if isinstance(meta.executed, Unset) else meta.executed,
         )
     Console().print(table if summaries else "There are no packages: build one from a project first.")
-    return ExitStatus.OK
-
-
-async def _summaries(url: str) -> list[PackageSummary]:
-    async with Client(url) as client:
-        summaries: list[PackageSummary] = await client.call("ListPackages")
-        return sorted(summaries, key=lambda summary: summary.package_meta.built)
 
 
 @app.command(name="run")
@@ -54,31 +47,31 @@ def run_package(
     package: Annotated[str, Parameter(help="Id of the package, or its name: then the newest one of that name.")],
     *,
     paused: Annotated[bool, Parameter(help="Pause before the first action.")] = False,
-    url: Url = DEFAULT_URL,
+    server: Server = HERE,
 ) -> int:
     """Run a package on a running server and follow it to its end."""
     try:
-        return asyncio.run(_run(url, package, paused))
+        return run("package run", lambda: _run(server, package, paused))
     except KeyboardInterrupt:
         sys.stderr.write("arcor2-hw package run: no longer followed; the program goes on, stop it with StopPackage\n")
         return ExitStatus.INTERRUPTED
-    except Arcor2Error as error:
-        sys.stderr.write(f"arcor2-hw package run: {error}\n")
-        return ExitStatus.PROGRAM_FAILED
 
 
-async def _run(url: str, wanted: str, paused: bool) -> int:
+async def _run(server: Server, wanted: str, paused: bool) -> ExitStatus:
     console = Console(highlight=False)
-    async with Client(url) as client:
-        summaries: list[PackageSummary] = await client.call("ListPackages")
+    async with server.client() as client:
+        summaries = await client.list_packages()
         named = sorted(
             (summary for summary in summaries if wanted in (summary.id, summary.package_meta.name)),
             key=lambda summary: summary.package_meta.built,
         )
         if not named:
-            raise NotFound(f"The server at {url} has no package {wanted}.")
+            raise NotFound(f"The server at {client.url} has no package {wanted}.")
         chosen = named[-1].id
-        await client.call("RunPackage", rpc.RunPackageArgs(chosen, start_paused=paused))
+        try:
+            await client.run_package(chosen, start_paused=paused)
+        except RequestFailed as error:
+            raise Failed(ExitStatus.PROGRAM_FAILED, str(error)) from error
         actions: dict[str, str] = {}
         problem = ""
         async for event in client.events():
@@ -95,6 +88,8 @@ async def _run(url: str, wanted: str, paused: bool) -> int:
                     console.print(f"[dim]{event.data.state}[/dim]")
                     if event.data.state is PackageStateEnum.STOPPED:
                         break
+        else:
+            raise ConnectionLost(f"The connection to {client.url} broke: the program may go on.")
         if problem:
             sys.stderr.write(f"arcor2-hw package run: {problem}\n")
             return ExitStatus.PROGRAM_FAILED

@@ -4,7 +4,7 @@ import enum
 
 
 class ExitStatus(enum.IntEnum):
-    """Kept stable: scripts test it. Every status but OK comes with one line on standard error."""
+    """Kept stable: scripts test it. Every status but OK comes with a line on standard error."""
 
     OK = 0
     FAILED = 1
@@ -35,5 +35,13 @@ class ExitStatus(enum.IntEnum):
     """Other machines would reach a server that asks nobody for a token."""
     CERTIFICATE_UNUSABLE = 14
     """The certificate or its key cannot be read, or do not belong together."""
+    DIFFERENT = 15
+    """What was compared is not the same."""
+    DOCUMENT_PROBLEMS = 16
+    """A scene, a project or an export file is damaged, or not sound."""
+    CONFLICT = 17
+    """Something else is there already, or is open."""
+    NOT_PERMITTED = 18
+    """The token is missing or not valid, or its role is too low."""
     INTERRUPTED = 130
     """Ctrl-C (128 + SIGINT)."""

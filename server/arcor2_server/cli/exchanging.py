@@ -1,0 +1,201 @@
+"""What `scene`, `project` and `object-type` share: export, import, validate and diff of export files."""
+
+import asyncio
+import re
+import sys
+from collections.abc import Awaitable, Callable, Collection
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import msgspec
+from cyclopts import Parameter
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from arcor2_hw.analysis import SourceFile, installed_types
+from arcor2_hw.client.rest import Listed
+from arcor2_hw.data.base import Unset
+from arcor2_hw.exceptions import InvalidPackage
+from arcor2_server.cli.reaching import Failed, Server
+from arcor2_server.cli.status import ExitStatus
+from arcor2_server.cli.tables import console
+from arcor2_server.exchange import archive as archives
+from arcor2_server.exchange.archive import Archive, Kind
+from arcor2_server.exchange.bringing import Part, Target, renamed
+from arcor2_server.exchange.differences import Difference, differences, names_of, told
+from arcor2_server.exchange.findings import Known, find
+from arcor2_server.exchange.gathering import Source
+
+Output = Annotated[Path | None, Parameter(name=["--output", "-o"], help="The file; NAME.zip when not given.")]
+Force = Annotated[bool, Parameter(help="Replace the file when there is one.", negative=())]
+Json = Annotated[bool, Parameter(name="--json", help="Print JSON for programs.", negative=())]
+Overwrite = Annotated[
+    list[Part] | None,
+    Parameter(negative=(), help="What may take the place of something else that is there; may be given repeatedly."),
+]
+DryRun = Annotated[bool, Parameter(help="Say what would be done, and do nothing.", negative=())]
+
+_MARKS: Final = {"added": "[green]+[/]", "removed": "[red]-[/]", "changed": "[yellow]~[/]"}
+_LINES: Final = {"+": "green", "-": "red", "@": "cyan"}
+
+
+def out() -> Console:
+    """Give where a command prints; a pipe gets whole lines."""
+    return console()
+
+
+def print_json(value: Any) -> None:
+    """Print JSON that people can read, too."""
+    sys.stdout.write(msgspec.json.format(msgspec.json.encode(value), indent=2).decode() + "\n")
+
+
+def installed() -> list[SourceFile]:
+    """Give the sources of the object types that are installed here."""
+    return [one.file for one in installed_types() if one.file is not None]
+
+
+def show_list(entries: list[Listed], what: str, as_json: bool) -> None:
+    """Show a list of documents."""
+    if as_json:
+        print_json(entries)
+        return
+    table = Table("name", "modified", "id", "description", box=None, pad_edge=False)
+    for entry in sorted(entries, key=lambda one: one.name):
+        about = "" if isinstance(entry.description, Unset) else escape(entry.description)
+        table.add_row(escape(entry.name), entry.modified, entry.id, about)
+    out().print(table if entries else f"There are no {what}.")
+
+
+# ------------------------------------------------------------------------------------------------ files
+def read(path: Path, kind: Kind | None = None) -> Archive:
+    """Read an export file; every refusal names it."""
+    try:
+        archive = archives.read(path)
+    except InvalidPackage as error:
+        raise InvalidPackage(f"{path}: {error}") from error
+    if kind is not None and archive.kind != kind:
+        article = "an" if archive.kind[0] == "o" else "a"
+        raise Failed(ExitStatus.USAGE, f"{path} holds {article} {archive.kind}: use arcor2-hw {archive.kind}")
+    return archive
+
+
+def write(archive: Archive, output: Path | None, force: bool) -> None:
+    """Write an export file and say what is in it."""
+    path = output or Path(re.sub(r"[^\w.-]+", "_", archive.name).strip("._") + ".zip")
+    if path.exists() and not force:
+        raise Failed(ExitStatus.CONFLICT, f"{path} is there already (--force would replace it)")
+    archives.write(archive, path)
+    parts = [f"{archive.kind} {archive.name}"]
+    if archive.project is not None and archive.scene is not None:
+        parts.append(f"its scene {archive.scene.name}")
+    for count, one, many in (
+        (0 if archive.kind == "object-type" else len(archive.types), "object type", "object types"),
+        (len(archive.assets), "asset", "assets"),
+    ):
+        if count:
+            parts.append(f"{count} {one if count == 1 else many}")
+    out().print(escape(f"{path}: {', '.join(parts)}"), soft_wrap=True)
+    ours = {one.name for one in installed_types() if one.distribution == "arcor2-hw"}
+    if foreign := [name for name in archive.installed if name not in ours]:
+        out().print(f"The other server must have installed: {', '.join(foreign)}", soft_wrap=True)
+
+
+# ------------------------------------------------------------------------------------------------ commands
+async def bring_in(
+    path: Path, kind: Kind, server: Server, overwrite: Collection[Part], name: str | None, dry_run: bool
+) -> None:
+    """Import a file into a server."""
+    archive = await asyncio.to_thread(read, path, kind)
+    if name is not None:
+        archive = renamed(archive, name)
+    async with server.client() as client:
+        target = Target(client, archive, overwrite)
+        try:
+            steps = await target.plan(await asyncio.to_thread(installed))
+        except InvalidPackage as error:
+            raise InvalidPackage(f"{path}: {error}") from error
+        if not dry_run:
+            await target.carry_out()
+    words = {"new": "would be new", "replaced": "would be replaced", "same": "is the same"} if dry_run else {}
+    for step in steps:
+        out().print(escape(f"{step.kind} {step.name}: {words.get(step.verb, step.verb)}"), soft_wrap=True)
+
+
+async def validate(paths: list[Path], kind: Kind, as_json: bool) -> ExitStatus:
+    """Check files without a server; every problem names the entry at fault."""
+    if not paths:
+        raise Failed(ExitStatus.USAGE, "give the files to check")
+    files = installed()
+    worst = ExitStatus.OK
+    reported: list[dict[str, Any]] = []
+    for path in paths:
+        try:
+            archive = read(path, kind)
+            findings = list(find(archive, Known(archive, files)))
+        except InvalidPackage as error:
+            entry, _, text = str(error).removeprefix(f"{path}: ").partition(": ")
+            reported.append(
+                {"file": str(path), "entry": entry if text else "", "text": text or entry, "level": "error"}
+            )
+            continue
+        reported += [{"file": str(path), **msgspec.to_builtins(finding)} for finding in findings]
+        if not as_json and not any(finding.level == "error" for finding in findings):
+            out().print(escape(f"{path}: {archive.kind} {archive.name} is sound"), soft_wrap=True)
+    if as_json:
+        print_json(reported)
+    for one in reported:
+        line = ": ".join(part for part in (one["file"], one["entry"], one["text"]) if part)
+        if one["level"] == "error":
+            worst = ExitStatus.DOCUMENT_PROBLEMS
+            sys.stderr.write(f"arcor2-hw {kind} validate: {line}\n")
+        elif not as_json:
+            out().print(escape(f"note: {line}"), soft_wrap=True)
+    return worst
+
+
+def _is_file(wanted: str) -> bool:
+    """Tell whether a file is meant, not a name on a server."""
+    return wanted.endswith(".zip") or Path(wanted).is_file()
+
+
+async def compare(
+    old: str, new: str, kind: Kind, server: Server, export: Callable[[Source, str], Awaitable[Archive]], as_json: bool
+) -> ExitStatus:
+    """Compare two exports, each a file or what a server has of that name."""
+
+    async def side(wanted: str) -> Archive:
+        if _is_file(wanted):
+            return await asyncio.to_thread(read, Path(wanted), kind)
+        async with server.client() as client:
+            return await export(Source(client), wanted)
+
+    before, after = await side(old), await side(new)
+    found = differences(before, after)
+    if as_json:
+        print_json(found)
+    else:
+        names = names_of(before, after)
+        for one in found:
+            _show(one, names)
+    if not found:
+        if not as_json:
+            out().print("There is no difference.")
+        return ExitStatus.OK
+    sys.stderr.write(f"arcor2-hw {kind} diff: {old} and {new} differ in {len(found)} places\n")
+    return ExitStatus.DIFFERENT
+
+
+def _show(one: Difference, names: dict[str, str]) -> None:
+    old, new = (("" if value is msgspec.UNSET else told(value, names)) for value in (one.old, one.new))
+    values = ""
+    if not isinstance(one.text, Unset):
+        values = ":"
+    elif one.change == "changed":
+        values = f": {old} → {new}"
+    elif old or new:
+        values = f" ({old or new})"
+    out().print(f"{_MARKS[one.change]} {escape(' › '.join(one.path))}{escape(values)}", soft_wrap=True)
+    for line in [] if isinstance(one.text, Unset) else one.text:
+        style = _LINES.get(line[:1], "")
+        out().print(f"    [{style}]{escape(line)}[/]" if style else f"    {escape(line)}", soft_wrap=True)

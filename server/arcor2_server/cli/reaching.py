@@ -1,0 +1,93 @@
+"""How a command reaches a server, and with which status it ends when that fails."""
+
+import asyncio
+import ssl
+import sys
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+from cyclopts import Parameter
+
+from arcor2_hw.client import Client, Forbidden, NotAdmitted
+from arcor2_hw.exceptions import (
+    Arcor2Error,
+    Conflict,
+    ConnectionLost,
+    DeviceTimeout,
+    InvalidData,
+    InvalidPackage,
+    InvalidProject,
+    NotConnected,
+    NotFound,
+)
+from arcor2_server.cli.status import ExitStatus
+
+DEFAULT_URL: Final = "ws://127.0.0.1:6789"
+
+
+class Failed(Exception):
+    """A command that ends with a status of its own and one line."""
+
+    def __init__(self, status: ExitStatus, line: str) -> None:
+        super().__init__(line)
+        self.status = status
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Server:
+    """Where the server is, and how it lets us in."""
+
+    url: Annotated[str, Parameter(help="Where the server listens.", env_var="ARCOR2_HW_URL")] = DEFAULT_URL
+    token: Annotated[
+        str | None, Parameter(help="What `arcor2-hw token add` gave; better in the variable ARCOR2_HW_TOKEN.")
+    ] = None
+    ca: Annotated[Path | None, Parameter(help="Certificate to trust, when the server made its own.")] = None
+
+    def client(self) -> Client:
+        """Make a client that gives up at the first loss. Raises Failed when the certificate cannot be used."""
+        tls = None
+        if self.ca is not None:
+            try:
+                tls = ssl.create_default_context(cafile=self.ca)
+            except OSError as error:  # ssl.SSLError is one
+                raise Failed(ExitStatus.CERTIFICATE_UNUSABLE, f"{self.ca} cannot be used: {error}") from error
+        return Client(self.url, token=self.token, tls=tls, reconnect=False)
+
+
+HERE: Final = Server()
+
+_STATUSES: Final[tuple[tuple[tuple[type[Arcor2Error], ...], ExitStatus], ...]] = (
+    ((NotAdmitted, Forbidden), ExitStatus.NOT_PERMITTED),
+    ((ConnectionLost, NotConnected, DeviceTimeout), ExitStatus.NO_SERVER),
+    ((NotFound,), ExitStatus.NOT_FOUND),
+    ((Conflict,), ExitStatus.CONFLICT),
+    ((InvalidPackage, InvalidProject, InvalidData), ExitStatus.DOCUMENT_PROBLEMS),
+)
+
+
+def status_of(error: Arcor2Error) -> ExitStatus:
+    """Give the status for an error."""
+    return next((status for kinds, status in _STATUSES if isinstance(error, kinds)), ExitStatus.FAILED)
+
+
+def run(command: str, work: Callable[[], Awaitable[Any]]) -> int:
+    """Run a command to its end: what it returns as a status, else OK; for an error its status and one line."""
+
+    def fail(error: Exception, status: ExitStatus) -> ExitStatus:
+        text = " ".join(str(error).split())
+        sys.stderr.write(f"arcor2-hw {command}: {text}\n")
+        return status
+
+    async def working() -> Any:
+        return await work()
+
+    try:
+        given = asyncio.run(working())
+    except Failed as error:
+        return fail(error, error.status)
+    except Arcor2Error as error:
+        return fail(error, status_of(error))
+    return given if isinstance(given, ExitStatus) else ExitStatus.OK

@@ -1,0 +1,294 @@
+"""The export file, a zip: documents as JSON, object types as source, models and assets as they are kept."""
+
+import ast
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path, PurePosixPath
+from typing import Any, Final, Literal, TypeVar
+
+import msgspec
+from msgspec import UNSET, field
+
+from arcor2_hw.analysis import module_name
+from arcor2_hw.data.base import Data, Unset, is_valid_name
+from arcor2_hw.data.object_type import Mesh, Model3dType, ObjectModel, ObjectTypeSource
+from arcor2_hw.data.project import Project, ProjectParameter
+from arcor2_hw.data.scene import Scene, SceneObjectOverride
+from arcor2_hw.exceptions import InvalidPackage, NotFound, StorageError
+from arcor2_server.build import importing, package
+
+T = TypeVar("T")
+Kind = Literal["scene", "project", "object-type"]
+
+FORMAT: Final = 1
+HEAD: Final = "export.json"
+SCENE: Final = "data/scene.json"
+PROJECT: Final = "data/project.json"
+SCRIPT: Final = "script.py"
+PARAMETERS: Final = "data/parameters.json"
+OVERRIDES: Final = "data/object_parameters.json"
+LARGEST: Final = 512 * 1024 * 1024
+"""Bytes of all that is read of a file: meshes are large, and a zip may lie."""
+
+
+class AssetFile(Data, frozen=True):
+    """An asset: its content, and the name of the file that it was uploaded as."""
+
+    content: bytes
+    file_name: str = ""
+
+
+class Archive(Data, frozen=True):
+    """What an export file holds.
+
+    types: the uploaded ones by name, each with its model. installed: those that the other server must have installed.
+    assets: by id. script: of a project that was written by hand. parameters, overrides: what is kept beside a project.
+    from_package: it was read of an execution package, which carries no assets.
+    """
+
+    kind: Kind
+    scene: Scene | None = None
+    project: Project | None = None
+    script: str | None = None
+    types: dict[str, ObjectTypeSource] = field(default_factory=dict)
+    installed: list[str] = field(default_factory=list)
+    assets: dict[str, AssetFile] = field(default_factory=dict)
+    parameters: list[ProjectParameter] = field(default_factory=list)
+    overrides: list[SceneObjectOverride] = field(default_factory=list)
+    from_package: bool = False
+
+    @property
+    def name(self) -> str:
+        """How what was exported is called."""
+        document = self.project or self.scene
+        return document.name if document is not None else next(iter(self.types), "")
+
+
+class _Asset(Data, frozen=True):
+    id: str
+    file: str
+    file_name: str = ""
+
+
+class _Head(Data, frozen=True):
+    """export.json. types: class by file."""
+
+    format: int
+    kind: Kind
+    types: dict[str, str] = field(default_factory=dict)
+    installed: list[str] = field(default_factory=list)
+    assets: list[_Asset] = field(default_factory=list)
+
+
+# ------------------------------------------------------------------------------------------------ writing
+def _json(value: Any) -> bytes:
+    return msgspec.json.format(msgspec.json.encode(value), indent=2) + b"\n"
+
+
+def files_of(archive: Archive) -> dict[str, bytes]:
+    """Give the files of an export by path."""
+    files: dict[str, bytes] = {}
+    types: dict[str, str] = {}
+    for name, one in archive.types.items():
+        module = module_name(name)
+        types[f"object_types/{module}.py"] = name
+        files[f"object_types/{module}.py"] = one.source.encode()
+        if not isinstance(one.model, Unset):
+            files[f"data/models/{module}.json"] = _json(one.model)
+    assets = []
+    for number, (key, asset) in enumerate(sorted(archive.assets.items()), 1):
+        path = f"assets/{number:04}"
+        assets.append(_Asset(key, path, asset.file_name))
+        files[path] = asset.content
+    if archive.scene is not None:
+        files[SCENE] = _json(archive.scene)
+    if archive.project is not None:
+        files[PROJECT] = _json(archive.project)
+    if archive.script is not None:
+        files[SCRIPT] = archive.script.encode()
+    if archive.parameters:
+        files[PARAMETERS] = _json(archive.parameters)
+    if archive.overrides:
+        files[OVERRIDES] = _json(archive.overrides)
+    files[HEAD] = _json(_Head(FORMAT, archive.kind, types, sorted(archive.installed), assets))
+    return files
+
+
+def write(archive: Archive, path: Path) -> None:
+    """Write the file, which appears whole or not at all; the same content gives the same bytes. StorageError."""
+    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        try:
+            partial.write_bytes(package.to_zip(files_of(archive)))
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
+    except OSError as error:
+        raise StorageError(f"{path} cannot be written: {error.strerror or error}") from error
+
+
+# ------------------------------------------------------------------------------------------------ reading
+def _wanted(path: PurePosixPath) -> bool:
+    match path.parts:
+        case ("export.json",) | ("script.py",):
+            return True
+        case ("data", name):
+            return name.endswith(".json")
+        case ("data", "models", name):
+            return name.endswith(".json")
+        case ("object_types", name):
+            return name.endswith(".py") and name != "__init__.py"
+        case ("assets", _):
+            return True
+    return False
+
+
+def _document(files: Mapping[str, bytes], path: str, kind: type[T]) -> T:
+    try:
+        return msgspec.json.decode(files[path], type=kind)
+    except KeyError:
+        raise InvalidPackage(f"{path}: it is missing.") from None
+    except (msgspec.MsgspecError, RecursionError) as error:
+        # msgspec says where: `$.objects[2].pose.position`.
+        raise InvalidPackage(f"{path}: {error}") from error
+
+
+def _text(files: Mapping[str, bytes], path: str) -> str:
+    try:
+        return files[path].decode("utf-8-sig")
+    except KeyError:
+        raise InvalidPackage(f"{path}: it is missing.") from None
+    except UnicodeDecodeError as error:
+        raise InvalidPackage(f"{path}: it is no text: {error}") from error
+
+
+def _types(files: Mapping[str, bytes], head: _Head) -> dict[str, ObjectTypeSource]:
+    types: dict[str, ObjectTypeSource] = {}
+    for path, name in head.types.items():
+        if not is_valid_name(name) or path != f"object_types/{module_name(name)}.py":
+            raise InvalidPackage(f"{HEAD}: {path[:80]!r} cannot hold an object type {name[:80]!r}.")
+        types[name] = ObjectTypeSource(name, _text(files, path), model=_model(files, name))
+    stray = {path for path in files if path.startswith("object_types/")} - head.types.keys()
+    stray |= {path for path in files if path.startswith("data/models/")} - {_model_path(name) for name in types}
+    if stray:
+        raise InvalidPackage(f"{min(stray)}: it belongs to no object type that {HEAD} names.")
+    return types
+
+
+def _model_path(name: str) -> str:
+    return f"data/models/{module_name(name)}.json"
+
+
+def _model(files: Mapping[str, bytes], name: str) -> ObjectModel | Unset:
+    path = _model_path(name)
+    if path not in files:
+        return UNSET
+    model = _document(files, path, ObjectModel)
+    if model.type is Model3dType.NONE:
+        return UNSET
+    if model.model().id != name:
+        raise InvalidPackage(f"{path}: it is the model of {model.model().id[:80]!r}, not of {name}.")
+    return model
+
+
+def _checked_id(document: Scene | Project, path: str) -> None:
+    key = document.id
+    if not key or len(key) > importing.MAX_ID or not key.isprintable() or "/" in key or key in (".", ".."):
+        raise InvalidPackage(f"{path}: {key[:80]!r} is no usable id.")
+
+
+def read(path: Path) -> Archive:
+    """Read an export file, or an execution package. Nothing of it is unpacked to disk, and nothing is run.
+
+    Raises NotFound when there is no such file, InvalidPackage naming the entry that is damaged, StorageError.
+    """
+    if not path.is_file():
+        raise NotFound(f"There is no file {path}.")
+    files = package.from_zip(path, _wanted, LARGEST)
+    if HEAD not in files:
+        if {SCRIPT, PROJECT} <= files.keys():
+            return _from_package(path)
+        raise InvalidPackage(f"It is no export of arcor2-hw: {HEAD} is missing.")
+    head = _document(files, HEAD, _Head)
+    if head.format != FORMAT:
+        raise InvalidPackage(f"{HEAD}: format {head.format} is of another version; this one reads {FORMAT}.")
+    scene = _document(files, SCENE, Scene) if head.kind != "object-type" else None
+    project = _document(files, PROJECT, Project) if head.kind == "project" else None
+    for document, place in ((scene, SCENE), (project, PROJECT)):
+        if document is not None:
+            _checked_id(document, place)
+    types = _types(files, head)
+    if head.kind == "object-type" and not types:
+        raise InvalidPackage(f"{HEAD}: it names no object type.")
+    return Archive(
+        head.kind,
+        scene,
+        project,
+        _text(files, SCRIPT) if SCRIPT in files else None,
+        types,
+        head.installed,
+        _assets(files, head.assets),
+        _document(files, PARAMETERS, list[ProjectParameter]) if PARAMETERS in files else [],
+        _document(files, OVERRIDES, list[SceneObjectOverride]) if OVERRIDES in files else [],
+    )
+
+
+def _assets(files: Mapping[str, bytes], named: Iterable[_Asset]) -> dict[str, AssetFile]:
+    assets: dict[str, AssetFile] = {}
+    for one in named:
+        if one.file not in files or not one.file.startswith("assets/"):
+            raise InvalidPackage(f"{HEAD}: the asset {one.id[:80]!r} should be in {one.file[:80]!r}, which is missing.")
+        if one.id in assets:
+            raise InvalidPackage(f"{HEAD}: the asset {one.id[:80]!r} is named twice.")
+        assets[one.id] = AssetFile(files[one.file], one.file_name)
+    return assets
+
+
+def _from_package(path: Path) -> Archive:
+    """Read an execution package; its script counts only where it is the program itself."""
+    given = importing.read(path)
+    return Archive(
+        "project",
+        given.scene,
+        given.project,
+        given.script if given.needs_source else None,
+        given.types,
+        given.installed,
+        from_package=True,
+    )
+
+
+# ------------------------------------------------------------------------------------------------ what is needed
+def needed_modules(source: str) -> set[str]:
+    """Give the neighbours that an object type's module imports (`from .arm import Arm`), as far as it can be read."""
+    found: set[str] = set()
+    try:
+        tree = ast.parse(source)
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return found  # what is wrong with it is for the analysis to say
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.level == 1:
+            found |= {node.module.partition(".")[0]} if node.module else {alias.name for alias in node.names}
+    return found
+
+
+def with_needed(names: Iterable[str], sources: Mapping[str, ObjectTypeSource]) -> dict[str, ObjectTypeSource]:
+    """Give the sources of these types and of the bases, mixins and other modules that they import."""
+    of_module = {module_name(name): name for name in sources}
+    chosen: dict[str, ObjectTypeSource] = {}
+    waiting = sorted(set(names) & sources.keys(), reverse=True)
+    while waiting:
+        name = waiting.pop()
+        if name in chosen:
+            continue
+        chosen[name] = sources[name]
+        waiting += [of_module[module] for module in needed_modules(sources[name].source) if module in of_module]
+    return dict(sorted(chosen.items()))
+
+
+def mesh_of(one: ObjectTypeSource) -> str | None:
+    """Give the id of the asset that the model of a type needs."""
+    if isinstance(one.model, Unset) or one.model.type is not Model3dType.MESH:
+        return None
+    model = one.model.model()
+    return model.asset_id if isinstance(model, Mesh) else None

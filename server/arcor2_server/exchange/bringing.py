@@ -1,0 +1,210 @@
+"""From an export into a server: what differs from what is there is refused unless it may be replaced."""
+
+import hashlib
+import tempfile
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from msgspec import UNSET
+from msgspec.structs import replace
+
+from arcor2_hw.analysis import SourceFile, module_name
+from arcor2_hw.client import Client, NothingThere
+from arcor2_hw.client.rest import Listed
+from arcor2_hw.data.base import Data, Unset, new_id
+from arcor2_hw.data.object_type import ObjectTypeSource
+from arcor2_hw.data.project import Project
+from arcor2_hw.data.scene import Scene
+from arcor2_hw.exceptions import Conflict, DeviceTimeout, InvalidPackage
+from arcor2_server.exchange.archive import Archive, AssetFile, with_needed
+from arcor2_server.exchange.findings import Known, find
+from arcor2_server.exchange.gathering import Source
+
+Part = Literal["all", "scene", "project", "types", "assets"]
+"""What of an export may take the place of something else on the server."""
+Verb = Literal["new", "replaced", "same"]
+_UNTIMED: Final[dict[str, Any]] = {"created": UNSET, "modified": UNSET, "int_modified": UNSET}
+FIRST_WORD: Final = 5.0
+"""Seconds in which the server's greeting, which says what is open, has to come."""
+
+
+class Step(Data, frozen=True):
+    """One thing of an export, and what becomes of it on the server."""
+
+    verb: Verb
+    kind: str
+    name: str
+
+
+def renamed(archive: Archive, name: str) -> Archive:
+    """Give the export as a copy: its document gets another name and an id of its own. The rest stays what it is."""
+    if archive.project is not None:
+        return replace(archive, project=replace(archive.project, id=new_id("pro"), name=name))
+    if archive.scene is not None:
+        return replace(archive, scene=replace(archive.scene, id=new_id("scn"), name=name))
+    raise InvalidPackage("an object type cannot be brought in under another name")
+
+
+class Target:
+    """A server that an export is brought into."""
+
+    def __init__(self, client: Client, archive: Archive, overwrite: Collection[Part]) -> None:
+        self._client = client
+        self._rest = client.rest
+        self._source = Source(client)
+        self._archive = archive
+        self._overwrite = overwrite
+        self._conflicts: list[str] = []
+        self.steps: list[Step] = []
+        self._work: list[Step] = []
+
+    async def plan(self, installed: list[SourceFile]) -> list[Step]:
+        """Give what would be done. Nothing is changed.
+
+        Raises InvalidPackage naming the first entry that is at fault, Conflict naming all that stands in the way.
+        """
+        archive = self._archive
+        await self._check(installed)
+        await self._plan_assets(archive.assets)
+        await self._plan_types(archive.types)
+        if archive.scene is not None:
+            await self._plan_document("scene", archive.scene, await self._rest.scenes())
+        if archive.project is not None:
+            await self._plan_document("project", archive.project, await self._rest.projects())
+        await self._check_open()
+        if self._conflicts:
+            raise Conflict(" ".join(self._conflicts))
+        return self.steps
+
+    async def _check(self, installed: list[SourceFile]) -> None:
+        archive, client = self._archive, self._client
+        metas = {meta.type: meta for meta in await client.get_object_types()}
+        uploaded = await self._source.uploaded()
+        for name in archive.types:
+            if name in metas and name not in uploaded:
+                self._conflicts.append(f"The object type {name} is installed there and cannot be replaced.")
+        used = set() if archive.scene is None else {obj.type for obj in archive.scene.objects}
+        actions = {
+            name: {action.name: action for action in await client.get_actions(name)}
+            for name in used & metas.keys() - archive.types.keys()
+        }
+        robots = {robot.type: robot for robot in await client.get_robot_meta()}
+        # Sources that are there already may be what those of the export import.
+        there = [_file(one) for name, one in uploaded.items() if name not in archive.types]
+        local = [file for file in installed if file.name not in uploaded]
+        known = Known(archive, [*local, *there], metas, actions, robots)
+        for finding in find(archive, known, [asset.id for asset in await self._rest.assets()]):
+            if finding.level == "error":
+                raise InvalidPackage(f"{finding.entry}: {finding.text}")
+
+    def _may(self, part: Part, what: str) -> None:
+        if not {part, "all"} & set(self._overwrite):
+            self._conflicts.append(f"{what} is there already and differs (--overwrite {part} would replace it).")
+
+    def _note(self, kind: str, name: str, same: bool, new: bool) -> None:
+        step = Step("same" if same else "new" if new else "replaced", kind, name)
+        self.steps.append(step)
+        if not same:
+            self._work.append(step)
+
+    async def _plan_assets(self, assets: dict[str, AssetFile]) -> None:
+        there = {asset.id for asset in await self._rest.assets()}
+        with tempfile.TemporaryDirectory(prefix="arcor2-import-") as directory:
+            for key, asset in assets.items():
+                same = False
+                if key in there:
+                    file = Path(directory) / "asset"
+                    await self._rest.download_asset(key, file)
+                    with file.open("rb") as content:
+                        theirs = hashlib.file_digest(content, "sha256").digest()
+                    same = theirs == hashlib.sha256(asset.content).digest()
+                    if not same:
+                        self._may("assets", f"The asset {key}")
+                self._note("asset", key, same, key not in there)
+
+    async def _plan_types(self, types: dict[str, ObjectTypeSource]) -> None:
+        there = await self._source.uploaded()
+        for name in types:
+            new, old = types[name], there.get(name)
+            same = old is not None and (old.source, old.model) == (new.source, new.model)
+            if old is not None and not same:
+                self._may("types", f"The object type {name}")
+            self._note("object type", name, same, old is None)
+
+    async def _plan_document(
+        self, kind: Literal["scene", "project"], given: Scene | Project, there: list[Listed]
+    ) -> None:
+        old: Scene | Project | None = None
+        if any(one.id == given.id for one in there):
+            old = await (self._rest.scene(given.id) if kind == "scene" else self._rest.project(given.id))
+        if any(one.name == given.name and one.id != given.id for one in there):
+            self._conflicts.append(f"Another {kind} is named {given.name}: bring this one in with --name.")
+        same = old is not None and replace(old, **_UNTIMED) == replace(given, **_UNTIMED)
+        if kind == "project" and same:
+            same = await self._same_beside(given.id)
+        if old is not None and not same:
+            self._may(kind, f"The {kind} {old.name}")
+        self._note(kind, given.name, same, old is None)
+
+    async def _same_beside(self, key: str) -> bool:
+        """Tell whether the script and what is kept beside the project are the same, too."""
+        archive, rest = self._archive, self._rest
+        if archive.script is not None:
+            try:
+                if await rest.project_script(key) != archive.script:
+                    return False
+            except NothingThere:
+                if archive.script:
+                    return False
+        kept = await rest.kept_parameters(key), await rest.kept_overrides(key)
+        return kept == (archive.parameters, archive.overrides)
+
+    async def _check_open(self) -> None:
+        """Refuse to change a document that somebody has open: to save it later would undo the import unseen."""
+        try:
+            greeting = await self._client.next_event(timeout=FIRST_WORD)
+        except DeviceTimeout:
+            return
+        opened: list[Scene | Project] = []
+        if greeting.event == "OpenScene":
+            opened = [greeting.data.scene]
+        elif greeting.event == "OpenProject":
+            opened = [greeting.data.scene, greeting.data.project]
+        changed = {step.kind for step in self._work}
+        for kind, given in (("scene", self._archive.scene), ("project", self._archive.project)):
+            if given is not None and kind in changed and any(one.id == given.id for one in opened):
+                self._conflicts.append(f"The {kind} {given.name} is open there: close it first.")
+
+    async def carry_out(self) -> None:
+        """Do what was planned, what others refer to first. What was cut short is ended by doing it again."""
+        archive, rest = self._archive, self._rest
+        work = {(step.kind, step.name) for step in self._work}
+        for key, asset in archive.assets.items():
+            if ("asset", key) in work:
+                await rest.upload_asset(key, asset.content, file_name=asset.file_name or key, replace=True)
+        for name in _bases_first(archive.types):
+            if ("object type", name) in work:
+                one = archive.types[name]
+                model = None if isinstance(one.model, Unset) else one.model.model()
+                if model is not None:
+                    await rest.put_model(model)
+                await rest.put_object_type(name, one.source, model)
+        scene, project = archive.scene, archive.project
+        if scene is not None and ("scene", scene.name) in work:
+            await rest.put_scene(scene)
+        if project is not None and ("project", project.name) in work:
+            await rest.put_project(project)
+            if archive.script is not None:
+                await rest.put_project_script(project.id, archive.script)
+            await rest.put_kept_parameters(project.id, archive.parameters)
+            await rest.put_kept_overrides(project.id, archive.overrides)
+
+
+def _file(one: ObjectTypeSource) -> SourceFile:
+    return SourceFile(one.id, module_name(one.id), one.source)
+
+
+def _bases_first(types: dict[str, ObjectTypeSource]) -> list[str]:
+    """Give the types each behind those that it imports, as far as they do not import each other."""
+    return sorted(types, key=lambda name: len(with_needed([name], types)))

@@ -1,0 +1,157 @@
+"""What differs between two exports: entry by entry, found by their ids and told by their names."""
+
+import difflib
+import hashlib
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any, Final, Literal
+
+import msgspec
+from msgspec import UNSET
+
+from arcor2_hw.data.base import Data, Unset
+from arcor2_hw.data.object_type import ObjectTypeSource
+from arcor2_hw.data.project import END, START
+from arcor2_server.exchange.archive import Archive
+
+TIMES: Final = frozenset({"created", "modified", "int_modified"})
+"""When something was saved is no difference."""
+WHOLE: Final = (frozenset("xyz"), frozenset("xyzw"))
+"""A position or an orientation is one value."""
+
+
+_ID: Final = re.compile(r"[a-z]+_[0-9a-f]{32}")
+
+
+class Difference(Data, frozen=True):
+    """One entry that is only in one of two exports, or not the same in both.
+
+    path: names from the outside in ("scene", "objects", "tester", "pose", "position"). old, new: JSON values, UNSET
+    where there is none. text: lines of a unified diff, where a source or script differs.
+    """
+
+    change: Literal["added", "removed", "changed"]
+    path: list[str]
+    old: Any = UNSET
+    new: Any = UNSET
+    text: list[str] | Unset = UNSET
+
+
+def differences(old: Archive, new: Archive) -> list[Difference]:
+    """Give what differs. The order of a document's entries, and when it was saved, are no differences."""
+    return list(_compare(_tree(old), _tree(new), [], names_of(old, new)))
+
+
+def names_of(*archives: Archive) -> dict[str, str]:
+    """Give what people call the things that have an id; the last export counts most."""
+    names = {START: START, END: END}
+    for archive in archives:
+        names |= _names(archive)
+    return names
+
+
+def _tree(archive: Archive) -> dict[str, Any]:
+    return {
+        "scene": UNSET if archive.scene is None else msgspec.to_builtins(archive.scene),
+        "project": UNSET if archive.project is None else msgspec.to_builtins(archive.project),
+        "script": UNSET if archive.script is None else _Text(archive.script),
+        "object types": {name: _type(one) for name, one in archive.types.items()},
+        "installed": dict.fromkeys(archive.installed, "needed"),
+        "assets": {
+            key: f"{len(asset.content)} bytes, SHA-256 {hashlib.sha256(asset.content).hexdigest()[:16]}"
+            for key, asset in archive.assets.items()
+        },
+        "kept parameters": msgspec.to_builtins(archive.parameters),
+        "kept overrides": msgspec.to_builtins(archive.overrides),
+    }
+
+
+def _type(one: ObjectTypeSource) -> dict[str, Any]:
+    model = UNSET if isinstance(one.model, Unset) else msgspec.to_builtins(one.model)
+    return {"source": _Text(one.source), "model": model}
+
+
+class _Text(str):
+    """A text of many lines, whose differences are told by line."""
+
+    __slots__ = ()
+
+
+def _names(archive: Archive) -> dict[str, str]:
+    names = {START: START, END: END}
+    if archive.scene is not None:
+        names |= {obj.id: obj.name for obj in archive.scene.objects}
+    project = archive.project
+    if project is not None:
+        names |= {one.id: one.name for one in project.parameters}
+        for point in project.action_points:
+            names[point.id] = point.name
+            for one in (*point.orientations, *point.robot_joints, *point.actions):
+                names[one.id] = one.name  # type: ignore[attr-defined]
+        for item in project.logic:
+            branch = "" if isinstance(item.condition, Unset) else f" if {item.condition.value}"
+            start, end = (names.get(key.partition("/")[0], key) for key in (item.start, item.end))
+            names[item.id] = f"{start} → {end}{branch}"
+    return names
+
+
+def _compare(old: Any, new: Any, path: list[str], names: Mapping[str, str]) -> Iterator[Difference]:
+    if isinstance(old, list) and isinstance(new, list):
+        before, after = _keyed(old), _keyed(new)
+        if before is not None and after is not None:
+            old, new = before, after
+    if isinstance(old, dict) and isinstance(new, dict) and not _is_one_value(old, new):
+        for key in [*old, *(key for key in new if key not in old)]:
+            if key not in TIMES:
+                yield from _compare(old.get(key, UNSET), new.get(key, UNSET), [*path, names.get(key, key)], names)
+        return
+    if old == new:
+        return
+    if isinstance(old, _Text) and isinstance(new, _Text):
+        lines = difflib.unified_diff(old.splitlines(), new.splitlines(), lineterm="", n=2)
+        yield Difference("changed", path, text=list(lines)[2:])
+        return
+    change: Literal["added", "removed", "changed"] = "changed"
+    if old is UNSET or new is UNSET:
+        change = "added" if old is UNSET else "removed"
+    yield Difference(change, path, _plain(old), _plain(new))
+
+
+def _is_one_value(old: dict[str, Any], new: dict[str, Any]) -> bool:
+    return old.keys() == new.keys() and frozenset(old) in WHOLE
+
+
+def _keyed(items: list[Any]) -> dict[str, Any] | None:
+    """Give a list of things with ids, or else names, by these; None for a list of anything else."""
+    for key in ("id", "name"):
+        if all(isinstance(item, dict) and item.get(key) for item in items):
+            found = {item[key]: item for item in items}
+            if len(found) == len(items):
+                return found
+    return None
+
+
+def _plain(value: Any) -> Any:
+    """Give a value as JSON can hold it: an object type's source is not repeated as a whole."""
+    if isinstance(value, _Text):
+        return f"{len(value.splitlines())} lines"
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items() if item is not UNSET}
+    if isinstance(value, list):
+        return [_plain(item) for item in value]
+    return value
+
+
+def told(value: Any, names: Mapping[str, str]) -> str:
+    """Give a value in a few words, with names where it has ids."""
+    match value:
+        case dict() if frozenset(value) in WHOLE:
+            return f"({', '.join(f'{float(one):g}' for one in value.values())})"
+        case dict():
+            kind = value.get("type")
+            return told(kind, names) if isinstance(kind, str) else ""
+        case list():
+            return f"{len(value)} entries"
+        case str():
+            return _ID.sub(lambda found: names.get(found[0], found[0]), value)
+    return msgspec.json.encode(value).decode()

@@ -1,0 +1,167 @@
+"""What is wrong with an export file, found without a server: each finding names the entry at fault."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Literal
+
+from arcor2_hw.analysis import SourceFile
+from arcor2_hw.data.base import Data, Unset
+from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta
+from arcor2_hw.data.project import END, START, Project
+from arcor2_hw.data.robot import RobotMeta
+from arcor2_hw.data.scene import Scene
+from arcor2_hw.exceptions import Arcor2Error, InvalidProject, NotFound
+from arcor2_server.build import script
+from arcor2_server.build.candidates import Candidates
+from arcor2_server.exchange.archive import PROJECT, SCENE, SCRIPT, Archive, mesh_of
+from arcor2_server.session.checks import project_findings, scene_findings
+
+
+class Finding(Data, frozen=True):
+    """What is wrong, and where: the file in the export and the entry in it.
+
+    level: an error keeps it from being opened or run; a note does not (a program that is not finished yet).
+    """
+
+    entry: str
+    text: str
+    level: Literal["error", "note"] = "error"
+
+
+class Known:
+    """Object types as those of the export and the installed ones say, else as the server that they go to says.
+
+    elsewhere: what the server knows: metadata, actions by type, and robots.
+    """
+
+    def __init__(
+        self,
+        archive: Archive,
+        installed: Iterable[SourceFile],
+        elsewhere: Mapping[str, ObjectTypeMeta] | None = None,
+        actions: Mapping[str, Mapping[str, ObjectAction]] | None = None,
+        robots: Mapping[str, RobotMeta] | None = None,
+    ) -> None:
+        self.candidates = Candidates(installed, archive.types)
+        self._given = archive.types
+        self._elsewhere = elsewhere or {}
+        self._actions = actions or {}
+        self._robots = robots or {}
+
+    def _from_elsewhere(self, name: str) -> bool:
+        return name in self._elsewhere and name not in self._given
+
+    def meta(self, name: str) -> ObjectTypeMeta:
+        """Give one type; NotFound."""
+        return self._elsewhere[name] if self._from_elsewhere(name) else self.candidates.meta(name)
+
+    def action(self, type_name: str, name: str) -> ObjectAction:
+        """Give one action; NotFound."""
+        if not self._from_elsewhere(type_name):
+            return self.candidates.action(type_name, name)
+        try:
+            return self._actions[type_name][name]
+        except KeyError:
+            raise NotFound(f"The object type {type_name} has no action {name!r}.") from None
+
+    def robot_meta(self, name: str) -> RobotMeta:
+        """Give the features of a robot type; NotFound when it is none."""
+        if not self._from_elsewhere(name):
+            return self.candidates.robot_meta(name)
+        try:
+            return self._robots[name]
+        except KeyError:
+            raise NotFound(f"The object type {name} is no robot.") from None
+
+
+def find(archive: Archive, types: Known, assets: Iterable[str] | None = None) -> Iterator[Finding]:
+    """Give what is wrong with an export. `assets`: ids that the server has already; None where none is asked."""
+    there = {*archive.assets, *(assets or ())}
+    for name, one in archive.types.items():
+        analysis = types.candidates.analysis(name)
+        if analysis.problem is not None:
+            yield Finding(f"object_types/{name}", str(analysis.problem))
+        for action in analysis.actions:
+            if action.disabled:
+                why = "" if isinstance(action.problem, Unset) else f": {action.problem}"
+                yield Finding(f"object_types/{name}.{action.name}", f"The action cannot be used{why}", "note")
+        mesh = mesh_of(one)
+        if mesh is not None and mesh not in there:
+            text = f"The mesh needs the asset {mesh!r}, which is missing."
+            yield Finding(
+                f"data/models of {name}", text, "note" if archive.from_package and assets is None else "error"
+            )
+    errors = False
+    for entry, text in _document_findings(archive, types):
+        errors = True
+        yield Finding(entry, text)
+    if archive.project is not None and archive.scene is not None:
+        yield from _program(archive, archive.scene, archive.project, types, errors)
+
+
+def _document_findings(archive: Archive, types: Known) -> Iterator[tuple[str, str]]:
+    scene, project = archive.scene, archive.project
+    if scene is None:
+        return
+    scene_names = {f"objects[{index}]": obj.name for index, obj in enumerate(scene.objects)}
+    if project is None:
+        for entry, text in scene_findings(scene, types):
+            yield _titled(SCENE, entry, scene_names), text
+    else:
+        names = scene_names | _project_names(project)
+        for entry, text in project_findings(scene, project, types):
+            document, _, inner = entry.partition(".")
+            yield _titled(SCENE if document == "scene" else PROJECT, inner, names), text
+        yield from _logic(project)
+    yield from _ids_twice(SCENE, [scene.id, *(obj.id for obj in scene.objects)])
+    if project is not None:
+        ids = [project.id, *(one.id for one in project.parameters), *(item.id for item in project.logic)]
+        for point in project.action_points:
+            ids += [point.id, *(one.id for one in point.orientations), *(one.id for one in point.robot_joints)]
+            ids += [action.id for action in point.actions]
+        yield from _ids_twice(PROJECT, ids)
+
+
+def _project_names(project: Project) -> dict[str, str]:
+    names = {f"parameters[{index}]": one.name for index, one in enumerate(project.parameters)}
+    for index, point in enumerate(project.action_points):
+        at = f"action_points[{index}]"
+        names[at] = point.name
+        names |= {f"{at}.actions[{number}]": one.name for number, one in enumerate(point.actions)}
+        names |= {f"{at}.robot_joints[{number}]": one.name for number, one in enumerate(point.robot_joints)}
+    return names
+
+
+def _titled(path: str, entry: str, names: Mapping[str, str]) -> str:
+    name = names.get(entry)
+    return f"{path}: {entry}" if name is None else f"{path}: {entry} ({name})"
+
+
+def _ids_twice(path: str, ids: list[str]) -> Iterator[tuple[str, str]]:
+    for key, count in Counter(ids).items():
+        if not key:
+            yield path, "An entry has no id."
+        elif count > 1:
+            yield path, f"The id {key} is given to {count} entries."
+
+
+def _logic(project: Project) -> Iterator[tuple[str, str]]:
+    known = {action.id for point in project.action_points for action in point.actions}
+    for index, item in enumerate(project.logic):
+        for place in {item.start.partition("/")[0], item.end.partition("/")[0]} - {START, END} - known:
+            yield f"{PROJECT}: logic[{index}]", f"The step leads from or to an action {place}, which is not there."
+
+
+def _program(archive: Archive, scene: Scene, project: Project, types: Known, errors: bool) -> Iterator[Finding]:
+    if not project.has_logic:
+        try:
+            script.check_syntax(archive.script or "")
+        except InvalidProject as error:
+            yield Finding(SCRIPT, str(error))
+    elif not errors:
+        try:
+            script.from_logic(scene, project, types.candidates.facts(scene))
+        except NotFound:
+            return  # a type of the server's alone: it is asked when it builds
+        except Arcor2Error as error:
+            yield Finding(f"{PROJECT}: logic", f"It cannot be built yet: {error}", "note")

@@ -1,0 +1,549 @@
+"""`arcor2-hw scene | project | object-type`: out of one server, into another, checked and compared."""
+
+import asyncio
+import json
+import zipfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+from msgspec import UNSET
+from msgspec.structs import replace
+
+from arcor2_hw.analysis import module_name
+from arcor2_hw.client import Client
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.object_type import Box, Mesh, ObjectModel
+from arcor2_hw.data.parameter import Parameter
+from arcor2_hw.data.project import ActionParameter, Flow, ProjectParameter
+from arcor2_hw.data.role import Role
+from arcor2_server.cli.main import app
+from arcor2_server.cli.status import ExitStatus
+from arcor2_server.tokens import TokenFile
+from tests.runtime.older_sources import SOURCES
+from tests.server.core.serving import ServerProcess
+
+pytestmark = pytest.mark.timeout(120)
+
+CRATE = '''"""A crate with a mesh."""
+
+from arcor2_hw.actions import action
+from arcor2_hw.objects import CollisionObject
+
+
+class Crate(CollisionObject):
+    """A crate."""
+
+    _ABSTRACT = False
+
+    @action
+    def open_lid(self, angle: float, *, an: str | None = None) -> bool:
+        """Open the lid."""
+        assert 0.0 <= angle <= 2.0
+        return angle > 1.0
+'''
+MESH = b"solid crate" + bytes(range(256)) * 400
+SCRIPT = "def main() -> None:\n    print('by hand')\n"
+
+
+class Ran(NamedTuple):
+    status: int
+    out: str
+    err: str
+
+
+class Place(NamedTuple):
+    """Two servers: what is built on the first goes to the second."""
+
+    first: str
+    second: str
+    loop: asyncio.Runner
+    directory: Path
+
+    def ask(self, url: str, work: Callable[[Client], Any]) -> Any:
+        async def asked() -> Any:
+            async with Client(url) as client:
+                return await work(client)
+
+        return self.loop.run(asked())
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
+    directory: Path = tmp_path_factory.mktemp("exchange")
+    first, second = ServerProcess(directory / "first"), ServerProcess(directory / "second")
+    with asyncio.Runner() as loop:
+        loop.run(_started(first, second))
+        made = Place(first.url, second.url, loop, directory)
+        try:
+            loop.run(_filled(first.url))
+            yield made
+        finally:
+            loop.run(_stopped(first, second))
+
+
+async def _started(*servers: ServerProcess) -> None:
+    await asyncio.gather(*(server.start() for server in servers))
+
+
+async def _stopped(*servers: ServerProcess) -> None:
+    await asyncio.gather(*(server.stop() for server in servers))
+
+
+async def _filled(url: str) -> None:
+    """A scene with a mesh, a virtual box, types that lean on each other; a project with logic and one by hand."""
+    async with Client(url, "author") as author:
+        rest = author.rest
+        for name in ("KinematicsMixin", "AbstractArm", "ArmM1"):
+            await rest.put_object_type(name, SOURCES[name])
+        await rest.upload_asset("crate_mesh", MESH, file_name="crate.stl")
+        await rest.put_model(Mesh("Crate", "crate_mesh"))
+        await rest.put_object_type("Crate", CRATE, Mesh("Crate", "crate_mesh"))
+        await author.new_scene("bench", description="to be exported")
+        await author.add_object_to_scene(name="crate", type="Crate", pose=Pose())
+        await author.add_object_to_scene(name="time", type="TimeActions")
+        arm = [Parameter("url", "string", '"http://127.0.0.1:1"')]
+        await author.add_object_to_scene(name="arm", type="ArmM1", pose=Pose(), parameters=arm)
+        wall = ObjectModel.of(Box("Wall", 1.0, 0.1, 1.0))
+        await author.add_virtual_collision_object_to_scene(name="Wall", pose=Pose(), model=wall)
+        await author.save_scene()
+        scene = await author.get_scene((await author.list_scenes())[0].id)
+        ids = {obj.name: obj.id for obj in scene.objects}
+        await author.new_project(scene_id=scene.id, name="open it")
+        await author.add_project_parameter(name="angle", type="double", value="1.5")
+        parameter = (await author.next_event("ProjectParameterChanged")).data
+        await author.add_action_point(name="lid", position=Position(0.1, 0.2, 0.3))
+        point = (await author.next_event("ActionPointChanged")).data
+        await author.write_lock(point.id)
+        await author.add_action_point_orientation(action_point_id=point.id, orientation=Orientation(), name="down")
+        await author.write_unlock(point.id)
+        await author.add_action(
+            action_point_id=point.id,
+            name="open_the_lid",
+            type=f"{ids['crate']}/open_lid",
+            parameters=[ActionParameter("angle", "project_parameter", json.dumps(parameter.id))],
+            flows=[Flow(outputs=["opened"])],
+        )
+        first = (await author.next_event("ActionChanged")).data
+        await author.add_action(
+            action_point_id=point.id,
+            name="wait",
+            type=f"{ids['time']}/sleep",
+            parameters=[ActionParameter("seconds", "double", "0.1")],
+            flows=[Flow()],
+        )
+        second = (await author.next_event("ActionChanged")).data
+        for start, end in (("START", first.id), (first.id, second.id), (second.id, "END")):
+            await author.add_logic_item(start=start, end=end)
+        await author.save_project()
+        project = (await author.list_projects())[0]
+        await author.close_project()
+        await rest.put_kept_parameters(project.id, [ProjectParameter("beside", "integer", "3", id="prm_beside")])
+        await author.new_project(scene_id=scene.id, name="by hand", has_logic=False)
+        await author.save_project()
+        by_hand = next(one for one in await author.list_projects() if one.name == "by hand")
+        await author.close_project()
+        await rest.put_project_script(by_hand.id, SCRIPT)
+
+
+@pytest.fixture
+def cli(place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Any:
+    """Run the command line in this process, in a directory of its own."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("ARCOR2_HW_TOKEN", raising=False)
+
+    def run(*words: str, at: str = "") -> Ran:
+        capsys.readouterr()
+        status = app([*words, "--url", at] if at else list(words))
+        told = capsys.readouterr()
+        assert status == 0 or told.err.startswith(f"arcor2-hw {words[0]} {words[1]}: "), told.err
+        return Ran(status, told.out, told.err)
+
+    return run
+
+
+def _named(items: list[dict[str, Any]], name: str) -> dict[str, Any]:
+    return next(item for item in items if item["name"] == name)
+
+
+def repacked(source: Path, target: Path, change: Callable[[dict[str, bytes]], None]) -> Path:
+    """Write an export with other content."""
+    with zipfile.ZipFile(source) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    change(files)
+    with zipfile.ZipFile(target, "w") as archive:
+        for name, content in files.items():
+            archive.writestr(name, content)
+    return target
+
+
+def changed(path: str, change: Callable[[Any], None]) -> Callable[[dict[str, bytes]], None]:
+    """Change one JSON document of an export."""
+
+    def work(files: dict[str, bytes]) -> None:
+        document = json.loads(files[path])
+        change(document)
+        files[path] = json.dumps(document).encode()
+
+    return work
+
+
+def test_a_project_moves_to_an_empty_server_with_all_it_needs_and_builds_there(cli: Any, place: Place) -> None:
+    listed = cli("project", "list", at=place.first)
+    assert [line.split("  ")[0] for line in listed.out.splitlines()[1:]] == ["by hand", "open it"]
+    done = cli("project", "export", "open it", at=place.first)
+    assert done == (0, "open_it.zip: project open it, its scene bench, 5 object types, 1 asset\n", "")
+    with zipfile.ZipFile("open_it.zip") as archive:
+        assert {name for name in archive.namelist() if name.startswith("object_types/")} == {
+            f"object_types/{module_name(name)}.py"
+            for name in ("ArmM1", "AbstractArm", "KinematicsMixin", "Crate", "Wall")
+        }
+    # The same content is the same file, and none is overwritten by accident.
+    first = Path("open_it.zip").read_bytes()
+    again = cli("project", "export", "open it", at=place.first)
+    assert (again.status, "--force" in again.err) == (ExitStatus.CONFLICT, True)
+    assert cli("project", "export", "open it", "--force", at=place.first).status == 0
+    assert Path("open_it.zip").read_bytes() == first
+    assert cli("project", "validate", "open_it.zip") == (0, "open_it.zip: project open it is sound\n", "")
+
+    dry = cli("project", "import", "open_it.zip", "--dry-run", at=place.second)
+    assert dry.status == 0
+    assert "project open it: would be new" in dry.out
+    assert cli("project", "list", at=place.second).out == "There are no projects.\n"
+    assert "scene bench: new" in cli("project", "import", "open_it.zip", at=place.second).out
+    both = [place.ask(url, _picture) for url in (place.first, place.second)]
+    assert both[1] == both[0]
+
+    async def build(client: Client) -> str:
+        await client.register_user("ann")
+        built = await client.build_project(project_id=(await client.list_projects())[0].id, package_name="moved")
+        return built.package_id
+
+    assert place.ask(place.second, build).startswith("pkg_")
+    # Once more: nothing is left to do. Nothing differs.
+    once_more = cli("project", "import", "open_it.zip", at=place.second)
+    assert {line.partition(": ")[2] for line in once_more.out.splitlines()} == {"same"}
+    same = cli("project", "diff", "open_it.zip", "open it", at=place.second)
+    assert same == (0, "There is no difference.\n", "")
+
+
+async def _picture(client: Client) -> Any:
+    """All that belongs to the project, but for the times."""
+    rest = client.rest
+    listed = {one.name: one.id for one in await rest.projects()}
+    project = await rest.project(listed["open it"])
+    scene = await rest.scene(project.scene_id)
+    untimed = [replace(one, created=UNSET, modified=UNSET, int_modified=UNSET) for one in (project, scene)]
+    types = {one.id: (await rest.object_type(one.id)).source for one in await rest.object_types()}
+    models = [await rest.model(name) for name in await rest.models()]
+    disabled = [meta.type for meta in await client.get_object_types() if meta.disabled]
+    kept = await rest.kept_parameters(project.id)
+    return untimed, types, sorted(models, key=lambda model: model.id), disabled, kept
+
+
+def test_what_differs_is_named_and_replaced_only_when_it_may_be(cli: Any, place: Place) -> None:
+    assert cli("project", "export", "open it", "-o", "out.zip", at=place.first).status == 0
+    cli("project", "import", "out.zip", "--overwrite", "all", at=place.second)
+
+    def alter(files: dict[str, bytes]) -> None:
+        changed("data/scene.json", lambda scene: scene["objects"][0]["pose"]["position"].update(x=9.0))(files)
+        changed("data/project.json", lambda project: _named(project["parameters"], "angle").update(value="0.5"))(files)
+        files["object_types/crate.py"] += b"\n# changed\n"
+        files["assets/0001"] += b"more"
+
+    repacked(Path("out.zip"), Path("other.zip"), alter)
+    refused = cli("project", "import", "other.zip", at=place.second)
+    assert refused.status == ExitStatus.CONFLICT
+    for what in ("The asset crate_mesh", "The object type Crate", "The scene bench", "The project open it"):
+        assert f"{what} is there already and differs" in refused.err
+    partly = cli("project", "import", "other.zip", "--overwrite", "types", "--overwrite", "assets", at=place.second)
+    assert (partly.status, "The object type" in partly.err, "The scene bench" in partly.err) == (17, False, True)
+    compared = cli("project", "diff", "open it", "other.zip", at=place.second)
+    assert compared.status == ExitStatus.DIFFERENT
+    lines = compared.out.splitlines()
+    assert "~ scene › objects › crate › pose › position: (0, 0, 0) → (9, 0, 0)" in lines
+    assert "~ project › parameters › angle › value: 1.5 → 0.5" in lines
+    assert "    +# changed" in lines
+    assert any(line.startswith("~ assets › crate_mesh: ") for line in lines)
+    assert "4 places" in compared.err
+    found = json.loads(cli("project", "diff", "open it", "other.zip", "--json", at=place.second).out)
+    assert {
+        "change": "changed",
+        "path": ["project", "parameters", "angle", "value"],
+        "old": "1.5",
+        "new": "0.5",
+    } in found
+
+    done = cli("project", "import", "other.zip", "--overwrite", "all", at=place.second)
+    assert done.out.count(": replaced") == 4
+    assert cli("project", "diff", "other.zip", "open it", at=place.second).status == 0
+    cli("project", "import", "out.zip", "--overwrite", "all", at=place.second)
+
+    # What somebody has open is not changed under him.
+    ann = Client(place.second, "ann")
+
+    async def open_it() -> None:
+        await ann.open()
+        listed = {one.name: one.id for one in await ann.list_projects()}
+        await ann.open_project(listed["open it"])
+
+    async def leave() -> None:
+        await ann.close_project()
+        await ann.close()
+
+    place.loop.run(open_it())
+    open_there = cli("project", "import", "other.zip", "--overwrite", "all", at=place.second)
+    place.loop.run(leave())
+    assert open_there.status == ExitStatus.CONFLICT
+    assert "The scene bench is open there: close it first." in open_there.err
+    assert "The project open it is open there: close it first." in open_there.err
+
+
+def test_a_copy_gets_a_name_and_an_id_of_its_own(cli: Any, place: Place) -> None:
+    assert cli("scene", "export", "bench", at=place.first).out.startswith("bench.zip: scene bench, ")
+    cli("scene", "import", "bench.zip", "--overwrite", "all", at=place.second)
+    assert cli("scene", "import", "bench.zip", "--name", "bench two", at=place.second).status == 0
+    listed = {one["name"]: one["id"] for one in json.loads(cli("scene", "list", "--json", at=place.second).out)}
+    assert listed.keys() >= {"bench", "bench two"}
+    assert listed["bench"] != listed["bench two"]
+    taken = cli("scene", "import", "bench.zip", "--name", "bench two", at=place.second)
+    assert (taken.status, "--name" in taken.err) == (ExitStatus.CONFLICT, True)
+    differing = cli("scene", "diff", "bench", "bench two", at=place.second)
+    assert [line.split(":")[0] for line in differing.out.splitlines()] == ["~ scene › name", "~ scene › id"]
+
+
+def test_a_project_by_hand_keeps_its_script_and_a_package_comes_back(cli: Any, place: Place) -> None:
+    assert cli("project", "export", "by hand", at=place.first).status == 0
+    assert cli("project", "import", "by_hand.zip", "--overwrite", "all", at=place.second).status == 0
+
+    async def look(client: Client) -> tuple[str, Any]:
+        listed = {one.name: one.id for one in await client.rest.projects()}
+        await client.rest.publish(listed["by hand"], place.directory / "package.zip")
+        return await client.rest.project_script(listed["by hand"]), None
+
+    assert place.ask(place.second, look)[0] == SCRIPT
+    package = str(place.directory / "package.zip")
+    checked = cli("project", "validate", package)
+    assert (checked.status, "note: " in checked.out and "'crate_mesh', which is missing" in checked.out) == (0, True)
+    assert "project by hand: same" in cli("project", "import", package, at=place.second).out
+    other = cli("project", "diff", package, "open it", at=place.second)
+    assert (other.status, "- script" in other.out, "+ project › logic › open_the_lid → wait" in other.out) == (
+        15,
+        True,
+        True,
+    )
+
+
+def test_object_types_move_with_what_they_lean_on(cli: Any, place: Place) -> None:
+    done = cli("object-type", "export", "ArmM1", at=place.first)
+    assert done.out == "ArmM1.zip: object-type AbstractArm\n" or done.out.startswith("ArmM1.zip: ")
+    with zipfile.ZipFile("ArmM1.zip") as archive:
+        assert sum(name.startswith("object_types/") for name in archive.namelist()) == 3
+    assert cli("object-type", "validate", "ArmM1.zip").status == 0
+    cli("object-type", "import", "ArmM1.zip", "--overwrite", "all", at=place.second)
+    assert "ArmM1: same" in cli("object-type", "import", "ArmM1.zip", at=place.second).out
+    assert cli("object-type", "diff", "ArmM1.zip", "ArmM1", at=place.second).status == 0
+    repacked(
+        Path("ArmM1.zip"),
+        Path("renamed.zip"),
+        lambda files: files.update(
+            {"object_types/arm_m1.py": files["object_types/arm_m1.py"].replace(b"arm-m1", b"m2")}
+        ),
+    )
+    source = cli("object-type", "diff", "ArmM1.zip", "renamed.zip")
+    assert (source.status, "~ object types › ArmM1 › source:" in source.out) == (ExitStatus.DIFFERENT, True)
+
+    def forget(files: dict[str, bytes]) -> None:
+        del files["object_types/abstract_arm.py"]
+        changed("export.json", lambda head: head["types"].pop("object_types/abstract_arm.py"))(files)
+
+    lonely = repacked(Path("ArmM1.zip"), Path("lonely.zip"), forget)
+    broken = cli("object-type", "validate", str(lonely))
+    assert broken.status == ExitStatus.DOCUMENT_PROBLEMS
+    assert "object_types/ArmM1: " in broken.err
+    assert "abstract_arm" in broken.err
+    listed = cli("object-type", "list", "--json", at=place.second)
+    assert "ArmM1" in [one["name"] for one in json.loads(listed.out)]
+    wrong_kind = cli("scene", "import", "ArmM1.zip", at=place.second)
+    assert (wrong_kind.status, "arcor2-hw object-type" in wrong_kind.err) == (ExitStatus.USAGE, True)
+    assert cli("object-type", "export", "UR5e", at=place.first).status == ExitStatus.NOT_FOUND
+    assert cli("object-type", "export", at=place.first).status == ExitStatus.USAGE
+
+
+BROKEN: dict[str, tuple[str, Callable[[Any], None], str]] = {
+    "a number is a text": (
+        "data/scene.json",
+        lambda scene: scene["objects"][0]["pose"]["position"].update(x="far"),
+        "data/scene.json: Expected `float`, got `str` - at `$.objects[0].pose.position.x`",
+    ),
+    "a type that is nowhere": (
+        "data/scene.json",
+        lambda scene: scene["objects"][0].update(type="Barrel"),
+        "data/scene.json: objects[0] (crate): crate: the object type Barrel is not known",
+    ),
+    "a setting that is missing": (
+        "data/scene.json",
+        lambda scene: scene["objects"][2].update(parameters=[]),
+        "data/scene.json: objects[2] (arm): arm: the setting url is missing",
+    ),
+    "an action of nothing": (
+        "data/project.json",
+        lambda project: project["action_points"][0]["actions"][1].update(type="obj_1/sleep"),
+        "data/project.json: action_points[0].actions[1] (wait): ",
+    ),
+    "a parameter that is missing": (
+        "data/project.json",
+        lambda project: project["action_points"][0]["actions"][0].update(parameters=[]),
+        "data/project.json: action_points[0].actions[0] (open_the_lid): open_the_lid: the parameter angle is missing",
+    ),
+    "a point that hangs on itself": (
+        "data/project.json",
+        lambda project: project["action_points"][0].update(parent=project["action_points"][0]["id"]),
+        "data/project.json: action_points[0] (lid): The action point lid hangs on itself",
+    ),
+    "a step to nowhere": (
+        "data/project.json",
+        lambda project: project["logic"][1].update(end="act_gone"),
+        "data/project.json: logic[1]: The step leads from or to an action act_gone",
+    ),
+    "one id for two": (
+        "data/project.json",
+        lambda project: project["logic"][1].update(id=project["logic"][0]["id"]),
+        "is given to 2 entries",
+    ),
+    "another scene": (
+        "data/project.json",
+        lambda project: project.update(scene_id="scn_other"),
+        "data/project.json: scene_id: The project open it belongs to another scene than bench",
+    ),
+    "no id": ("data/scene.json", lambda scene: scene.update(id="a/b"), "data/scene.json: 'a/b' is no usable id"),
+    "a later format": (
+        "export.json",
+        lambda head: head.update(format=2),
+        "export.json: format 2 is of another version",
+    ),
+    "an asset that is not there": (
+        "export.json",
+        lambda head: head.update(assets=[]),
+        "data/models of Crate: The mesh needs the asset 'crate_mesh', which is missing",
+    ),
+    "an asset from outside": (
+        "export.json",
+        lambda head: head["assets"][0].update(file="../secret"),
+        "export.json: the asset 'crate_mesh' should be in '../secret', which is missing",
+    ),
+    "a source from outside": (
+        "export.json",
+        lambda head: head["types"].update({"data/scene.json": "Crate"}),
+        "export.json: 'data/scene.json' cannot hold an object type 'Crate'",
+    ),
+    "a model of another type": (
+        "data/models/crate.json",
+        lambda model: model["mesh"].update(id="Wall"),
+        "data/models/crate.json: it is the model of 'Wall', not of Crate",
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def exported(place: Place) -> Path:
+    path = place.directory / "exported.zip"
+    if not path.exists():
+        assert app(["project", "export", "open it", "-o", str(path), "--url", place.first]) == 0
+    return path
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_the_entry_at_fault_is_named_without_a_server_and_nothing_is_brought_in(
+    cli: Any, exported: Path, place: Place, case: str
+) -> None:
+    path, change, told = BROKEN[case]
+    repacked(exported, Path("broken.zip"), changed(path, change))
+    checked = cli("project", "validate", "broken.zip")
+    assert checked.status == ExitStatus.DOCUMENT_PROBLEMS
+    assert told in checked.err
+    (first, *_) = json.loads(cli("project", "validate", "--json", "broken.zip").out)
+    assert (first["file"], first["level"]) == ("broken.zip", "error")
+    assert first["entry"] or "id " in first["text"]
+    if case not in ("an asset that is not there",):  # it may be on the server
+        brought = cli("project", "import", "broken.zip", "--overwrite", "all", at=place.second)
+        assert brought.status == ExitStatus.DOCUMENT_PROBLEMS
+
+
+def _bomb(archive: zipfile.ZipFile) -> None:
+    archive.writestr("assets/0099", b"\0" * (3 << 20), zipfile.ZIP_DEFLATED)
+
+
+def _link(archive: zipfile.ZipFile) -> None:
+    entry = zipfile.ZipInfo("assets/0002")
+    entry.external_attr = 0o120777 << 16
+    archive.writestr(entry, "/etc/passwd")
+
+
+@pytest.mark.parametrize(
+    ("spoil", "told"),
+    [
+        (lambda archive: archive.writestr("../evil.py", "x"), "outside of itself"),
+        (lambda archive: archive.writestr("/evil.py", "x"), "outside of itself"),
+        (_link, "no file"),
+        (lambda archive: archive.writestr("object_types/extra.py", "x = 1"), "belongs to no object type"),
+        (_bomb, "larger than"),
+    ],
+)
+def test_a_file_from_outside_is_not_trusted(
+    cli: Any, exported: Path, spoil: Any, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("arcor2_server.exchange.archive.LARGEST", 2 << 20)
+    Path("evil.zip").write_bytes(exported.read_bytes())
+    with zipfile.ZipFile("evil.zip", "a") as archive:
+        spoil(archive)
+    checked = cli("project", "validate", "evil.zip")
+    assert (checked.status, told in checked.err) == (ExitStatus.DOCUMENT_PROBLEMS, True), checked.err
+    assert {path.name for path in Path().iterdir()} == {"evil.zip"}
+
+
+def test_what_cannot_be_done_is_said_with_a_status(cli: Any, place: Place, exported: Path, tmp_path: Path) -> None:
+    Path("none.zip").write_text("no zip")
+    half = Path("half.zip")
+    half.write_bytes(exported.read_bytes()[:2000])
+    for words, status, told in (
+        (("scene", "list", "--url", "ws://127.0.0.1:9"), ExitStatus.NO_SERVER, "127.0.0.1:9"),
+        (("scene", "export", "nowhere", "--url", place.first), ExitStatus.NOT_FOUND, "no scene nowhere"),
+        (("project", "import", "missing.zip", "--url", place.first), ExitStatus.NOT_FOUND, "missing.zip"),
+        (("project", "validate", "none.zip"), ExitStatus.DOCUMENT_PROBLEMS, "none.zip"),
+        (("project", "validate", "half.zip"), ExitStatus.DOCUMENT_PROBLEMS, "no usable zip"),
+        (("project", "validate"), ExitStatus.USAGE, "give the files"),
+        (("scene", "list", "--ca", "none.zip", "--url", place.first), ExitStatus.CERTIFICATE_UNUSABLE, "none.zip"),
+        (("scene", "export", "bench", "-o", "no/where.zip", "--url", place.first), ExitStatus.FAILED, "written"),
+    ):
+        ran = cli(*words)
+        assert (ran.status, told in ran.err, ran.err.count("\n")) == (status, True, 1), ran.err
+
+
+def test_a_program_that_is_not_finished_is_sound_with_a_note(cli: Any, exported: Path) -> None:
+    repacked(exported, Path("unfinished.zip"), changed("data/project.json", lambda project: project["logic"].pop()))
+    checked = cli("project", "validate", "unfinished.zip")
+    assert checked.status == 0
+    assert "note: unfinished.zip: data/project.json: logic: It cannot be built yet: " in checked.out
+
+
+def test_a_token_is_needed_where_one_is_asked_for(
+    cli: Any, place: Place, exported: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data = place.directory / "guarded"
+    data.mkdir()
+    _, secret = TokenFile(data).add("reader", Role.OPERATOR)
+    server = ServerProcess(data)
+    place.loop.run(server.start())
+    try:
+        assert cli("scene", "list", at=server.url).status == ExitStatus.NOT_PERMITTED
+        assert cli("scene", "list", "--token", "wrong", at=server.url).status == ExitStatus.NOT_PERMITTED
+        assert cli("scene", "list", "--token", secret, at=server.url).status == 0
+        monkeypatch.setenv("ARCOR2_HW_TOKEN", secret)
+        monkeypatch.setenv("ARCOR2_HW_URL", server.url)
+        assert cli("scene", "list").status == 0
+        brought = cli("project", "import", str(exported))
+        assert (brought.status, "technician" in brought.err or "programmer" in brought.err) == (18, True)
+    finally:
+        place.loop.run(server.stop())
