@@ -235,15 +235,13 @@ class Requests(ABC):
         """Make a stream."""
 
     async def acknowledge_stop(
-        self, object_id: str, *, code: str | Unset = UNSET, arm_id: str | Unset = UNSET, timeout: float | None = None
+        self, object_id: str, *, code: str | Unset = UNSET, timeout: float | None = None
     ) -> None:
         """AcknowledgeStop: the stop or fault of a robot; with `code`, an alarm of any device.
 
         Needs the role operator.
         """
-        await self.call(
-            "AcknowledgeStop", AcknowledgeStopArgs(object_id=object_id, code=code, arm_id=arm_id), timeout=timeout
-        )
+        await self.call("AcknowledgeStop", AcknowledgeStopArgs(object_id=object_id, code=code), timeout=timeout)
 
     async def action_param_values(
         self, *, id: str, param_id: str, parent_params: Sequence[IdValue] = (), timeout: float | None = None
