@@ -398,9 +398,8 @@ class CollisionWorld:
     def ray(self, start: Position, end: Position, ignore: Iterable[str] = (), inflation: float = 0.0) -> RayHit | None:
         """Give what a straight line meets first, None when it is free. Robots stand as they are now.
 
-        `ignore`: ids of bodies and robots that are no obstacle; what such a robot holds still is one. `inflation`: sizes
-        count as larger by so much, m.
-        Raises InvalidData for numbers that are not finite.
+        `ignore`: ids of bodies and robots that are no obstacle; what such a robot holds still is one. `inflation`:
+        sizes count as larger by so much, m. Raises InvalidData for numbers that are not finite.
         """
         a, b = np.array([*start]), np.array([*end])
         if not (np.isfinite(a).all() and np.isfinite(b).all()):
