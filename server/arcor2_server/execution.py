@@ -1,7 +1,7 @@
 """The Execution service: packages, and the one program that runs (protocol, section 12)."""
 
 import asyncio
-from collections.abc import Collection, Coroutine
+from collections.abc import Coroutine
 from typing import IO, TYPE_CHECKING, Any, Final, TypeVar
 
 import msgspec
@@ -28,6 +28,7 @@ from arcor2_server.cell.devices import DeviceBoard, DeviceStatus, overlay_for
 from arcor2_server.cell.host import CellHost
 from arcor2_server.packages import Packages
 from arcor2_server.rpc.registry import RequestRefused, make_event
+from arcor2_server.runs import How
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services
@@ -42,18 +43,6 @@ SPARE_AFTER: Final = 1.0
 """Seconds after the first action when the next spare host is started: it must not slow down the one that begins."""
 RUN_STATES: Final = frozenset({S.RUNNING, S.PAUSING, S.PAUSED, S.RESUMING})
 _IDLE: Final = frozenset({S.UNDEFINED, S.STOPPED})
-
-
-class How(msgspec.Struct, frozen=True):
-    """How a package is run. by: a user's name. breakpoints: ids of its action points and actions.
-
-    shared_breakpoints: pause at those that users share on its project, too.
-    """
-
-    start_paused: bool = False
-    breakpoints: Collection[str] = ()
-    shared_breakpoints: bool = False
-    by: str = ""
 
 
 class Execution:
@@ -72,6 +61,7 @@ class Execution:
         self._host: CellHost | None = None
         self._info: bytes | None = None
         self._before: bytes | None = None
+        self._exception: ProjectExceptionData | None = None
         self._board = DeviceBoard(services.hub)
         self._run_number = 0
         self._stopped_by: str | None = None
@@ -188,7 +178,7 @@ class Execution:
         self._shared_of = project_id
         self._stopped_by = None
         self.last_error = None
-        self._info = self._before = None
+        self._info = self._before = self._exception = None
         self._board.clear()
         self._enter(S.STARTED)
         period = self._services.settings.streaming_period
@@ -329,10 +319,15 @@ class Execution:
                 self._before = message.encoded
             case "ActionStateAfter":
                 self._before = None
+            case "ProjectException":
+                self._exception = msgspec.json.decode(message.encoded, type=_ExceptionEvent).data
 
     def _program_changed(self, host: CellHost, message: m.ProgramChanged) -> None:
         if message.state == "stopped":
             self.last_error = message.error
+            if message.error is not None and self._exception is not None:  # as it was told: with the device
+                told = self._exception
+                self.last_error = msgspec.structs.replace(message.error, type=told.type, message=told.message)
             self._ended()
             self._spawn(host.gone(), "end of the program's host")
         elif self.state is not S.STOPPING:
@@ -395,3 +390,7 @@ class Execution:
 
 class _InfoEvent(msgspec.Struct):
     data: PackageInfoData
+
+
+class _ExceptionEvent(msgspec.Struct):
+    data: ProjectExceptionData

@@ -2,12 +2,13 @@
 
 import asyncio
 from collections import OrderedDict
+from collections.abc import Collection
 from datetime import UTC, datetime
 from itertools import islice
 from typing import Any, Final
 
 import structlog
-from msgspec import UNSET
+from msgspec import UNSET, Struct
 from msgspec.structs import replace
 
 from arcor2_hw.data.base import now
@@ -24,6 +25,18 @@ KEPT: Final = 1000
 """Runs that are kept."""
 KEPT_ACTIONS: Final = 1000
 """Actions of the last run that are kept."""
+
+
+class How(Struct, frozen=True):
+    """How a package is run. by: a user's name. breakpoints: ids of its action points and actions.
+
+    shared_breakpoints: pause at those that users share on its project, too.
+    """
+
+    start_paused: bool = False
+    breakpoints: Collection[str] = ()
+    shared_breakpoints: bool = False
+    by: str = ""
 
 
 class Runs:

@@ -13,9 +13,9 @@ from arcor2_hw.data.rpc import (
     UploadPackageArgs,
 )
 from arcor2_server.cell.actions import RunningAction, execute, prepare
-from arcor2_server.execution import How
 from arcor2_server.locks import ACTION
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
+from arcor2_server.runs import How
 
 
 # ------------------------------------------------------------------------------------------------ scene

@@ -11,9 +11,9 @@ from arcor2_hw.data.events import ChangeType, Event, MainScreen, OpenProjectData
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.rpc import TemporaryPackageArgs
 from arcor2_hw.exceptions import Arcor2Error
-from arcor2_server.execution import How
 from arcor2_server.rpc.execution import how
 from arcor2_server.rpc.registry import Context, RequestRefused, make_event, rpc
+from arcor2_server.runs import How
 from arcor2_server.services import Services
 from arcor2_server.session.checks import project_problems
 
