@@ -22,6 +22,7 @@ from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ObjectTypeS
 from arcor2_hw.data.robot import RobotMeta
 from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_hw.runtime.messages import TypeCode
+from arcor2_server.robot_packages import robot_packages
 from arcor2_server.storage import AssetStore, Storage
 
 log = structlog.get_logger(__name__)
@@ -87,6 +88,7 @@ class ObjectTypes:
         """Read built-in, installed and uploaded types."""
         async with self._reading:
             await asyncio.to_thread(self._read_installed)
+            await self._offer_models()
             await self._read_uploaded()
 
     @property
@@ -120,6 +122,17 @@ class ObjectTypes:
             self._installed[installed.name] = installed
             if installed.file is not None:
                 self._library.add(installed.file)
+
+    async def _offer_models(self) -> None:
+        """Offer the models of robots that lie with installed drivers as assets."""
+        for folder in sorted({each.folder for each in self._installed.values() if each.folder}):
+            try:
+                packages = await asyncio.to_thread(robot_packages, Path(folder))
+            except OSError as error:
+                log.warning("the models of a driver cannot be read", folder=folder, reason=error.strerror)
+                continue
+            for name, content in packages.items():
+                await self._assets.offer(name, content, "the model of an installed driver's robot")
 
     async def _read_uploaded(self) -> None:
         first = self._read_at is None

@@ -37,6 +37,7 @@ class DobotMagician(DobotArm):
     """Dobot Magician: four axes, 0.5 kg, 320 mm, with suction cup or gripper."""
 
     _ABSTRACT = False
+    urdf_package_name = "dobot_magician.zip"
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {
         "home": "stop",
         "move": "stop",

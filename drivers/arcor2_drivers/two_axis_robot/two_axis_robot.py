@@ -26,6 +26,7 @@ class TwoAxisRobot(TwoAxisControlled):
     """A planar arm of two Dynamixel servos for fine manipulation."""
 
     _ABSTRACT = False
+    urdf_package_name = "two_axis_robot.zip"
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"move": "stop", "move_to": "stop"}
 
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: TwoAxisRobotSettings) -> None:

@@ -13,6 +13,7 @@ class UR5e(UrTasks):
     """Universal Robots UR5e: six axes, 5 kg, 850 mm."""
 
     _ABSTRACT = False
+    urdf_package_name = "ur5e.zip"
 
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: UrSettings) -> None:
         super().__init__(obj_id, name, pose, settings)
@@ -22,6 +23,7 @@ class UR3e(UrTasks):
     """Universal Robots UR3e: six axes, 3 kg, 500 mm."""
 
     _ABSTRACT = False
+    urdf_package_name = "ur3e.zip"
     max_payload: ClassVar[float] = 3.0
     reach: ClassVar[float] = 0.5
     joint_limit: ClassVar[float] = 2.0 * math.pi
@@ -34,6 +36,7 @@ class UR10e(UrTasks):
     """Universal Robots UR10e: six axes, 12.5 kg, 1300 mm."""
 
     _ABSTRACT = False
+    urdf_package_name = "ur10e.zip"
     max_payload: ClassVar[float] = 12.5
     reach: ClassVar[float] = 1.3
 

@@ -61,6 +61,7 @@ class AssetStore:
         self._records = directory / "records"
         self._incoming = directory / "incoming"
         self._assets: dict[str, Asset] = {}
+        self._offered: dict[str, Asset] = {}
         self._changing = asyncio.Lock()
 
     @classmethod
@@ -92,19 +93,19 @@ class AssetStore:
 
     # ------------------------------------------------------------------------------------------------ look-ups
     def infos(self) -> list[Asset]:
-        """Give all assets, by id."""
+        """Give all assets that were put in, by id; those that are offered are not listed."""
         return [self._assets[key] for key in sorted(self._assets)]
 
     def exists(self, key: str) -> bool:
         """Tell whether there is such an asset."""
-        return key in self._assets
+        return key in self._assets or key in self._offered
 
     def info(self, key: str) -> Asset:
         """Give what is known of an asset; NotFound."""
-        try:
-            return self._assets[key]
-        except KeyError:
-            raise NotFound(f"There is no asset {key!r}.") from None
+        found = self._assets.get(key) or self._offered.get(key)
+        if found is None:
+            raise NotFound(f"There is no asset {key!r}.")
+        return found
 
     def file(self, key: str) -> Path:
         """Give the file of an asset's present content, which never changes, and goes with it; NotFound."""
@@ -159,10 +160,28 @@ class AssetStore:
                 os.unlink(name)  # noqa: PTH108 - at once, not on a thread that a cancelled task would not wait for
         return asset
 
+    async def offer(self, key: str, content: bytes, description: str | Unset = UNSET) -> None:
+        """Offer an asset of an installed distribution until the store is closed.
+
+        One that is put in under its id stands before it; it can be deleted only with its distribution.
+        """
+        key, digest = _checked(key), hashlib.sha256(content).hexdigest()
+        async with self._changing:
+            with self._told("write"):
+                await asyncio.to_thread(self._keep, content, digest)
+            stamp = now()
+            self._offered[key] = Asset(key, stamp, stamp, len(content), digest, key, description)
+            self.revision += 1
+
     async def delete(self, key: str) -> None:
-        """Delete; NotFound. What is being read at this moment is read to its end."""
+        """Delete; NotFound. What is being read at this moment is read to its end.
+
+        Conflict for one that is offered by an installed distribution.
+        """
         async with self._changing:
             asset = self.info(key)
+            if key not in self._assets:
+                raise Conflict(f"The asset {key!r} belongs to an installed driver and cannot be deleted.")
             with self._told("write"):
                 await asyncio.to_thread(self._record(key).unlink, missing_ok=True)
                 await asyncio.to_thread(_flush, self._records)
@@ -172,7 +191,7 @@ class AssetStore:
 
     # ------------------------------------------------------------------------------------------------ inside
     def _refuse_known(self, key: str, upsert: bool) -> None:
-        if key in self._assets and not upsert:
+        if self.exists(key) and not upsert:
             raise Conflict(f"There is an asset {key!r} already.")
 
     async def _receive(self, content: AsyncIterable[bytes], descriptor: int) -> tuple[int, str]:
@@ -202,8 +221,18 @@ class AssetStore:
         Path(name).replace(self._record(asset.id))
         _flush(self._records)
 
+    def _keep(self, content: bytes, digest: str) -> None:
+        place = self._path(digest)
+        if place.is_file() and place.stat().st_size == len(content):
+            return
+        place.parent.mkdir(exist_ok=True)
+        descriptor, name = tempfile.mkstemp(dir=self._incoming)
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(content)
+        Path(name).replace(place)
+
     async def _drop_unused(self, digest: str) -> None:
-        if all(asset.digest != digest for asset in self._assets.values()):
+        if all(asset.digest != digest for asset in [*self._assets.values(), *self._offered.values()]):
             with self._told("write"):
                 await asyncio.to_thread(self._path(digest).unlink, missing_ok=True)
 

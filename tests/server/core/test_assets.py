@@ -162,3 +162,26 @@ async def test_a_directory_that_cannot_be_used_is_named(tmp_path: Path) -> None:
     (tmp_path / "assets").write_text("a file")
     with pytest.raises(StorageError, match=str(tmp_path / "assets")):
         await AssetStore.open(tmp_path / "assets")
+
+
+async def test_what_a_driver_offers_is_read_but_not_listed_and_an_upload_stands_before_it(
+    store: AssetStore, tmp_path: Path
+) -> None:
+    await store.offer("arm.zip", b"the driver's", "of a driver")
+    assert store.exists("arm.zip")
+    assert store.infos() == []
+    assert await read(store, "arm.zip") == b"the driver's"
+    assert store.file("arm.zip").read_bytes() == b"the driver's"
+    with pytest.raises(Conflict, match=r"arm\.zip.*installed driver"):
+        await store.delete("arm.zip")
+    with pytest.raises(Conflict):
+        await store.put(chunks(b"mine"), "arm.zip")
+    await store.put(chunks(b"mine"), "arm.zip", upsert=True)
+    assert await read(store, "arm.zip") == b"mine"
+    await store.delete("arm.zip")
+    assert await read(store, "arm.zip") == b"the driver's"
+    # The same bytes, put in and deleted, leave what is offered.
+    await store.put(chunks(b"the driver's"), "copy")
+    await store.delete("copy")
+    assert await read(store, "arm.zip") == b"the driver's"
+    assert not (await AssetStore.open(tmp_path)).exists("arm.zip")

@@ -234,7 +234,8 @@ async def test_a_robots_description_is_named_only_while_it_is_there(types: Objec
     await assets.put(content(), "arm.zip")
     await types.refresh()
     assert types.robot_meta("Arm").urdf_package_filename == "arm.zip"
-    assert [robot.type for robot in types.robot_metas() if robot.urdf_package_filename is not UNSET] == ["Arm"]
+    with_model = [robot.type for robot in types.robot_metas() if robot.urdf_package_filename is not UNSET]
+    assert with_model == ["Arm", "DobotMagician", "TwoAxisRobot", "UR10e", "UR3e", "UR5e"]
     await assets.delete("arm.zip")
     await types.refresh()
     assert types.robot_meta("Arm").urdf_package_filename is UNSET
