@@ -1,6 +1,6 @@
 /** The view: orbit around a point, or fly. z is up. Tells when something has to be drawn. */
 
-import { Box3, PerspectiveCamera, Sphere, Vector3 } from "three";
+import { type Box3, PerspectiveCamera, Vector3 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 
 const START = new Vector3(1.5, -1.5, 1.25);
@@ -12,6 +12,9 @@ const KEYS: Record<string, [number, number, number]> = {
   KeyE: [0, 1, 0],
   KeyQ: [0, -1, 0],
 };
+/** Part of the view that what is shown fills, and the nearest that the camera goes for it, m. */
+const MARGIN = 0.88;
+const CLOSEST = 0.35;
 /** m/s. */
 const FLY_SPEED = 0.8;
 
@@ -66,16 +69,28 @@ export class View {
     return true;
   }
 
-  /** Show all of a box. */
+  /** Show all of a box, from the side from which it is seen now, as large as it can be. */
   fit(box: Box3): void {
     if (box.isEmpty()) return;
-    const ball = box.getBoundingSphere(new Sphere());
-    const direction = new Vector3().subVectors(this.camera.position, this.controls.target).normalize();
-    // The narrower of the two angles of view has to hold it.
-    const half = Math.min(this.camera.fov, this.camera.fov * this.camera.aspect) * (Math.PI / 360);
-    const distance = Math.max(0.35, ball.radius / Math.sin(half));
-    this.controls.target.copy(ball.center);
-    this.camera.position.copy(ball.center).addScaledVector(direction, distance);
+    const centre = box.getCenter(new Vector3());
+    const back = new Vector3().subVectors(this.camera.position, this.controls.target).normalize();
+    const right = new Vector3().crossVectors(this.camera.up, back).normalize();
+    const above = new Vector3().crossVectors(back, right);
+    const tall = Math.tan((this.camera.fov * Math.PI) / 360) * MARGIN;
+    const wide = tall * this.camera.aspect;
+    let distance = CLOSEST;
+    const corner = new Vector3();
+    for (const x of [box.min.x, box.max.x]) {
+      for (const y of [box.min.y, box.max.y]) {
+        for (const z of [box.min.z, box.max.z]) {
+          corner.set(x, y, z).sub(centre);
+          const sideways = Math.max(Math.abs(corner.dot(right)) / wide, Math.abs(corner.dot(above)) / tall);
+          distance = Math.max(distance, corner.dot(back) + sideways);
+        }
+      }
+    }
+    this.controls.target.copy(centre);
+    this.camera.position.copy(centre).addScaledVector(back, distance);
     this.controls.update();
     this.changed();
   }

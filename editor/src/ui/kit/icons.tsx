@@ -3,10 +3,10 @@
 const PATHS = {
   home: "M4 11l8-7 8 7v9h-5v-6H9v6H4z",
   save: "M5 4h11l3 3v13H5zM8 4v5h7V4M8 20v-6h8v6",
-  undo: "M9 7L4 12l5 5M4 12h10a6 6 0 0 1 0 12",
-  redo: "M15 7l5 5-5 5M20 12H10a6 6 0 0 0 0 12",
+  undo: "M9 14L4 9l5-5M4 9h10a5 5 0 0 1 0 11h-3",
+  redo: "M15 14l5-5-5-5M20 9H10a5 5 0 0 0 0 11h3",
   close: "M6 6l12 12M18 6L6 18",
-  more: "M5 12h.01M12 12h.01M19 12h.01",
+  more: "M5 11a1 1 0 1 0 0 2 1 1 0 1 0 0-2zM12 11a1 1 0 1 0 0 2 1 1 0 1 0 0-2zM19 11a1 1 0 1 0 0 2 1 1 0 1 0 0-2z",
   plus: "M12 5v14M5 12h14",
   tree: "M5 5h6M5 5v14h4M5 12h4M13 12h6M13 19h6",
   plug: "M9 3v5M15 3v5M6 8h12v3a6 6 0 0 1-12 0zM12 17v4",

@@ -6,7 +6,7 @@ import * as documents from "../../commands/documents";
 import { goOffline, goOnline } from "../../commands/operation";
 import { leave } from "../../session/session";
 import { isRunning } from "../../store/selectors";
-import { useEditor } from "../../store/store";
+import { tell, useEditor } from "../../store/store";
 import { Button, Confirm, More } from "../kit/kit";
 import { People } from "../people/People";
 import { Settings } from "../settings/Settings";
@@ -21,15 +21,18 @@ export function TopBar() {
   const [asking, setAsking] = useState(false);
   if (!doc) return null;
   const { unsaved } = doc;
-  const busy = running || live !== "stopped";
   return (
     <header className="bar topbar">
       <Button
         look="plain"
         icon="home"
         aria-label="Close, and go to the lists"
-        isDisabled={busy || cannotSave !== ""}
-        onPress={() => (unsaved ? setAsking(true) : void documents.close(false))}
+        onPress={() => {
+          const why = running ? "A program runs: stop it first." : live !== "stopped" ? "Go offline first: the devices would be left." : cannotSave;
+          if (why) tell("info", why);
+          else if (unsaved) setAsking(true);
+          else void documents.close(false);
+        }}
       />
       <div className="document">
         <h1>{doc.project?.name ?? doc.scene.name}</h1>

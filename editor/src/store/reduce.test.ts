@@ -1,0 +1,161 @@
+import { describe, expect, test } from "vitest";
+import type { Project, Scene, ServerEvent } from "../protocol/types";
+import { reduce } from "./reduce";
+import { initialState, type State } from "./state";
+
+const POSE = { position: { x: 0, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } };
+const SCENE: Scene = {
+  id: "scn",
+  name: "cell",
+  description: "",
+  modified: "2026-01-01T10:00:00+00:00",
+  objects: [{ id: "obj", name: "robot", type: "UR5e", pose: POSE, parameters: [] }],
+};
+const PROJECT: Project = {
+  id: "pro",
+  name: "sort",
+  scene_id: "scn",
+  description: "",
+  has_logic: true,
+  modified: "2026-01-01T10:00:00+00:00",
+  action_points: [
+    {
+      id: "acp",
+      name: "pick",
+      position: { x: 1, y: 0, z: 0 },
+      parent: "obj",
+      orientations: [{ id: "ori", name: "default", orientation: POSE.orientation }],
+      robot_joints: [],
+      actions: [{ id: "act", name: "move", type: "obj/move", parameters: [], flows: [] }],
+    },
+  ],
+  parameters: [],
+  functions: [],
+  logic: [{ id: "lit", start: "START", end: "act" }],
+  object_overrides: [],
+};
+
+function after(...events: ServerEvent[]): State {
+  let state = initialState();
+  state = { ...state, connection: { ...state.connection, user: "me" } };
+  for (const event of events) state = { ...state, ...reduce(state, event) };
+  return state;
+}
+const OPEN: ServerEvent = { event: "OpenProject", data: { scene: SCENE, project: PROJECT } };
+
+describe("the open document", () => {
+  test("is taken apart by ids", () => {
+    const { doc } = after(OPEN);
+    expect(doc?.points["acp"]).toMatchObject({ name: "pick", parent: "obj" });
+    expect(doc?.orientations["ori"]?.pointId).toBe("acp");
+    expect(doc?.actions["act"]?.pointId).toBe("acp");
+    expect(doc?.unsaved).toBe(false);
+  });
+
+  test("is not saved when it was changed after its last save, or never was", () => {
+    const changed = { ...PROJECT, int_modified: "2026-01-01T10:00:01+00:00" };
+    expect(after({ event: "OpenProject", data: { scene: SCENE, project: changed } }).doc?.unsaved).toBe(true);
+    expect(after({ event: "OpenScene", data: { scene: { ...SCENE, modified: undefined } } }).doc?.unsaved).toBe(true);
+  });
+
+  test("follows what is added, changed and removed on a point", () => {
+    const added = after(OPEN, {
+      event: "ActionChanged",
+      change_type: "add",
+      parent_id: "acp",
+      data: { id: "act2", name: "grip", type: "obj/grip", parameters: [], flows: [] } as never,
+    });
+    expect(added.doc?.actions["act2"]).toMatchObject({ pointId: "acp", type: "obj/grip" });
+    expect(added.doc?.unsaved).toBe(true);
+    // Other events than "add" do not say on which point it is.
+    const renamed = after(OPEN, { event: "ActionChanged", change_type: "update_base", data: { id: "act", name: "go", type: "obj/move" } });
+    expect(renamed.doc?.actions["act"]).toMatchObject({ pointId: "acp", name: "go", parameters: [] });
+    const gone = after(OPEN, { event: "ActionPointChanged", change_type: "remove", data: { id: "acp", name: "pick", position: POSE.position } });
+    expect(gone.doc?.points).toEqual({});
+    expect(gone.doc?.orientations).toEqual({});
+    expect(gone.doc?.actions).toEqual({});
+  });
+
+  test("a change of a point alone keeps what is on it, and its new parent is taken over", () => {
+    const moved = after(OPEN, { event: "ActionPointChanged", change_type: "update_base", data: { id: "acp", name: "pick", position: { x: 2, y: 0, z: 0 } } });
+    expect(moved.doc?.points["acp"]).toMatchObject({ position: { x: 2 } });
+    expect(moved.doc?.points["acp"]?.parent).toBeUndefined();
+    expect(Object.keys(moved.doc?.orientations ?? {})).toEqual(["ori"]);
+  });
+
+  test("saving and closing", () => {
+    const change: ServerEvent = { event: "LogicItemChanged", change_type: "remove", data: PROJECT.logic[0] as never };
+    expect(after(OPEN, change).doc).toMatchObject({ unsaved: true, logic: {} });
+    expect(after(OPEN, change, { event: "ProjectSaved", data: undefined }).doc?.unsaved).toBe(false);
+    expect(after(OPEN, { event: "ProjectClosed", data: undefined }).doc).toBeNull();
+  });
+
+  test("opened again, after the connection was lost, keeps the selection unless it is gone", () => {
+    const selected = (id: string): State => ({ ...after(OPEN), ui: { ...initialState().ui, selection: { kind: "action", id } } });
+    expect(reduce(selected("act"), OPEN).ui?.selection?.id).toBe("act");
+    expect(reduce(selected("other"), OPEN).ui?.selection).toBeNull();
+    const removed = reduce(selected("act"), { event: "ActionChanged", change_type: "remove", data: { id: "act", name: "move", type: "obj/move" } });
+    expect(removed.ui?.selection).toBeNull();
+  });
+});
+
+describe("what others do", () => {
+  test("locks are known by what they hold", () => {
+    const held = after({ event: "ObjectsLocked", data: { object_ids: ["a", "b"], owner: "Eva" } }, { event: "ObjectsUnlocked", data: { object_ids: ["a"], owner: "Eva" } });
+    expect(held.locks).toEqual({ b: "Eva" });
+  });
+
+  test("who left is gone, and a preview that is over, too", () => {
+    const presence = (online: boolean): ServerEvent => ({ event: "UserPresence", data: { user: "Eva", online, role: "operator" } });
+    expect(Object.keys(after(presence(true)).users)).toEqual(["Eva"]);
+    expect(after(presence(true), presence(false)).users).toEqual({});
+    const drag: ServerEvent = { event: "MovePreview", data: { id: "acp", user: "Eva", position: POSE.position } };
+    expect(after(drag).previews["acp"]?.position).toEqual(POSE.position);
+    expect(after(drag, { event: "MovePreview", data: { id: "acp", user: "Eva" } }).previews).toEqual({});
+  });
+
+  test("view state of others' documents and users is not ours", () => {
+    const change = (document: string, user: string): ServerEvent => ({ event: "ViewStateChanged", data: { scope: "user", document, user, values: { stars: [1], gone: null }, revision: 2 } });
+    expect(after(OPEN, change("pro", "me")).view.user).toEqual({ stars: [1] });
+    expect(after(OPEN, change("pro", "Eva")).view.user).toEqual({});
+    expect(after(OPEN, change("elsewhere", "me")).view.user).toEqual({});
+    expect(after(OPEN, change("", "me")).view.general).toEqual({ stars: [1] });
+  });
+});
+
+describe("operation", () => {
+  const online: ServerEvent = { event: "SceneState", data: { state: "started" } };
+  const lost: ServerEvent = { event: "ObjectState", data: { object_id: "obj", state: "lost", reason: "cable" } };
+
+  test("going offline forgets how devices were, and keeps why", () => {
+    expect(after(OPEN, online, lost).live.objects["obj"]?.reason).toBe("cable");
+    const off = after(OPEN, online, lost, { event: "SceneState", data: { state: "stopping", message: "no robot" } }, { event: "SceneState", data: { state: "stopped" } });
+    expect(off.live).toMatchObject({ state: "stopped", message: "no robot", objects: {} });
+  });
+
+  test("a motion that failed is told", () => {
+    const state = after({
+      event: "RobotMoveToPose",
+      data: { move_event_type: "failed", robot_id: "obj", end_effector_id: "e", target_pose: POSE, safe: true, linear: false, message: "too far" },
+    });
+    expect(state.live.moving).toEqual({});
+    expect(state.notices.map((each) => [each.level, each.text])).toEqual([["error", "too far"]]);
+  });
+
+  test("a program's actions run until they are told to have ended, and none after it stopped", () => {
+    const before = (id: string): ServerEvent => ({ event: "ActionStateBefore", data: { action_id: id } });
+    const state = after({ event: "PackageState", data: { state: "running" } }, before("a"), before("b"), { event: "ActionStateAfter", data: { action_id: "a" } });
+    expect(state.program.running).toEqual(["b"]);
+    expect({ ...state, ...reduce(state, { event: "PackageState", data: { state: "stopped" } }) }.program.running).toEqual([]);
+  });
+});
+
+test("a type that is gone takes its actions along", () => {
+  const type = { type: "UR5e" } as never;
+  let state = after({ event: "ChangedObjectTypes", change_type: "add", data: [type] });
+  state = { ...state, types: { ...state.types, actions: { UR5e: [] } } };
+  state = { ...state, ...reduce(state, { event: "ChangedObjectTypes", change_type: "update", data: [type] }) };
+  expect(state.types.actions).toEqual({}); // they are to be asked for anew
+  state = { ...state, ...reduce(state, { event: "ChangedObjectTypes", change_type: "remove", data: [type] }) };
+  expect(state.types.byName).toEqual({});
+});

@@ -1,0 +1,46 @@
+import { describe, expect, test } from "vitest";
+import { Telemetry } from "./telemetry";
+
+function at(): { telemetry: Telemetry; go: (seconds: number) => void } {
+  let time = 100;
+  return { telemetry: new Telemetry(() => time), go: (seconds) => (time += seconds) };
+}
+const joints = (value: number) => ({ robot_id: "r", joints: [{ name: "j", value }] });
+
+describe("joints", () => {
+  test("are drawn between the last two samples, and settle on the last", () => {
+    const { telemetry, go } = at();
+    telemetry.takeJoints(joints(0));
+    go(0.1);
+    telemetry.takeJoints(joints(1));
+    expect(telemetry.interpolated("r")).toEqual({ joints: new Map([["j", 0]]), settled: false });
+    go(0.05);
+    expect(telemetry.interpolated("r")?.joints.get("j")).toBeCloseTo(0.5);
+    go(0.06);
+    expect(telemetry.interpolated("r")).toEqual({ joints: new Map([["j", 1]]), settled: true });
+  });
+
+  test("after a pause are where they are, without a journey through the pause", () => {
+    const { telemetry, go } = at();
+    telemetry.takeJoints(joints(0));
+    go(5);
+    telemetry.takeJoints(joints(1));
+    expect(telemetry.interpolated("r")).toEqual({ joints: new Map([["j", 1]]), settled: true });
+  });
+
+  test("grow old, and are forgotten when the scene goes offline", () => {
+    const { telemetry, go } = at();
+    expect(telemetry.age("r")).toBe(Infinity);
+    telemetry.takeJoints(joints(0));
+    go(2);
+    expect(telemetry.age("r")).toBeCloseTo(2);
+    const told: string[] = [];
+    const end = telemetry.subscribe((id) => told.push(id));
+    telemetry.clear();
+    expect(told).toEqual(["r"]);
+    expect(telemetry.interpolated("r")).toBeUndefined();
+    end();
+    telemetry.takeJoints(joints(1));
+    expect(told).toEqual(["r"]);
+  });
+});
