@@ -1,0 +1,134 @@
+"""docs/examples/tower_light_client.py: a program of its own, between a real server and the fake block of a light."""
+
+import asyncio
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from arcor2_hw.client import Client
+from arcor2_hw.data.geometry import Position
+from arcor2_hw.data.project import ActionParameter, Flow
+from tests.client.test_client_on_server import Killed
+from tests.fakes.conftest import FakeProcess
+
+EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "tower_light_client.py"
+RED, AMBER, GREEN = range(3)
+WITHIN = 15.0
+BREAKS = '''"""Fails."""
+
+from arcor2_hw.actions import action
+from arcor2_hw.objects import Generic
+
+
+class Breaker(Generic):
+    """Fails when it is told to."""
+
+    _ABSTRACT = False
+
+    @action
+    def fail(self, *, an: str | None = None) -> None:
+        """Fail."""
+        raise ValueError("broken")
+'''
+
+
+@pytest.fixture
+def block() -> Iterator[FakeProcess]:
+    fake = FakeProcess("remote_io", "--control", "127.0.0.1:0")
+    yield fake
+    fake.end()
+
+
+class Watched:
+    """The lamps, as the block has them."""
+
+    def __init__(self, block: FakeProcess) -> None:
+        self.block = block
+
+    async def shows(self, lamp: int | None, blinking: bool = False) -> None:
+        """Wait until one lamp is lit, or blinks, and no other is."""
+        async with asyncio.timeout(WITHIN):
+            while not await asyncio.to_thread(self._shown, lamp, blinking):
+                await asyncio.sleep(0.05)
+
+    def _shown(self, lamp: int | None, blinking: bool) -> bool:
+        """Look at the changes of the last 1.1 s, in which a blinking lamp goes on and off."""
+        truth: dict[str, Any] = self.block.truth()
+        lit = {number for number in range(3) if truth["outputs"][number]}
+        changes = [entry for entry in truth["history"] if entry["output"] < 3][-3:]
+        if blinking:
+            # On, off, on: half a second apart, of one lamp.
+            alone = len(changes) == 3 and {entry["output"] for entry in changes} == {lamp}
+            return alone and lit <= {lamp} and changes[-1]["time"] - changes[0]["time"] < 2.5
+        return lit == (set() if lamp is None else {lamp})
+
+
+async def test_the_light_follows_the_server_and_says_when_nobody_drives_it(tmp_path: Path, block: FakeProcess) -> None:
+    lamps = Watched(block)
+    host, _, port = block.ready["modbus"].rpartition(":")
+    server = Killed(tmp_path / "data")
+    url = await server.start()
+    process = subprocess.Popen([sys.executable, str(EXAMPLE), host, "--port", port, "--url", url])
+    try:
+        async with Client(url, "ann") as client:
+            await client.rest.put_object_type("Breaker", BREAKS)
+            await client.new_scene("bench")
+            await client.add_object_to_scene(name="time", type="TimeActions")
+            await client.add_object_to_scene(name="breaker", type="Breaker")
+            await client.save_scene()
+            scene = await client.get_scene((await client.list_scenes())[0].id)
+            ids = {obj.name: obj.id for obj in scene.objects}
+            await client.start_scene()
+            await lamps.shows(GREEN, blinking=True)
+            await client.stop_scene()
+            await lamps.shows(None)
+            await client.new_project(scene_id=scene.id, name="wait and break")
+            await client.add_action_point(name="here", position=Position(0.0, 0.0, 0.0))
+            point = (await client.next_event("ActionPointChanged")).data.id
+            last = "START"
+            for name, of, parameters in (
+                ("wait", "time/sleep", [ActionParameter("seconds", "double", "3.0")]),
+                ("fail", "breaker/fail", []),
+            ):
+                thing, _, method = of.partition("/")
+                await client.add_action(
+                    action_point_id=point,
+                    name=name,
+                    type=f"{ids[thing]}/{method}",
+                    parameters=parameters,
+                    flows=[Flow()],
+                )
+                added = (await client.next_event("ActionChanged")).data.id
+                await client.add_logic_item(start=last, end=added)
+                last = added
+            await client.add_logic_item(start=last, end="END")
+            await client.save_project()
+            project = (await client.list_projects())[0].id
+            package = (await client.build_project(project_id=project, package_name="wait")).package_id
+            await client.close_project()
+            await client.run_package(package, start_paused=True)
+            await lamps.shows(AMBER)
+            await client.resume_package()
+            await lamps.shows(GREEN)
+            await lamps.shows(RED, blinking=True)
+            # It stays red after the program has ended, until another one starts.
+            await client.run_package(package, start_paused=True)
+            await lamps.shows(AMBER)
+            await client.stop_package()
+            await lamps.shows(None)
+        await server.end()
+        await lamps.shows(AMBER, blinking=True)
+        await server.start()
+        await lamps.shows(None)
+        # Killed, it cannot say anything any more: the block does, by its own watchdog.
+        process.kill()
+        await lamps.shows(RED)
+    finally:
+        process.kill()
+        process.wait(10)
+        await server.end(signal.SIGTERM)
