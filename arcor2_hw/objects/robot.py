@@ -10,8 +10,6 @@ from arcor2_hw.exceptions import Arcor2NotImplemented, DeviceError, KinematicsEr
 from arcor2_hw.objects.generic import GenericWithPose
 from arcor2_hw.objects.settings import Settings
 
-Frame = Literal["world", "base", "tool", "user"]
-
 
 class RobotException(DeviceError):
     """Something is wrong with a robot."""
@@ -135,7 +133,7 @@ class Robot(GenericWithPose):
         self,
         twist: tuple[float, float, float, float, float, float] | None = None,
         joint_velocities: list[float] | None = None,
-        frame: Frame = "world",
+        frame: Literal["world", "base", "tool", "user"] = "world",
         valid_for: float = 0.2,
         end_effector_id: str | None = None,
     ) -> None:
@@ -264,7 +262,7 @@ class MultiArmRobot(Robot):
         self,
         twist: tuple[float, float, float, float, float, float] | None = None,
         joint_velocities: list[float] | None = None,
-        frame: Frame = "world",
+        frame: Literal["world", "base", "tool", "user"] = "world",
         valid_for: float = 0.2,
         end_effector_id: str | None = None,
         arm_id: str | None = None,

@@ -133,3 +133,13 @@ def test_all_that_is_installed_is_sound() -> None:
         analysis = library.analyse(each.name)
         assert analysis.problem is None, analysis.problem
         assert not [(a.name, a.problem) for a in analysis.actions if a.disabled], each.name
+
+
+def test_what_can_be_jogged_and_acknowledged_is_known_of_the_robots_that_are_installed() -> None:
+    library = Library([found.file for found in installed_types() if found.file is not None])
+    features = {name: library.analyse(name).robot for name in ("UR5e", "YuMi")}
+    assert features["UR5e"] is not None
+    assert features["UR5e"].features.jog is True
+    assert features["UR5e"].features.acknowledge_stop is True
+    assert features["YuMi"] is not None
+    assert features["YuMi"].features.acknowledge_stop is True
