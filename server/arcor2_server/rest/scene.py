@@ -1,14 +1,16 @@
 """The Scene service: collision models, lines through them, where an object stands (protocol, section 14)."""
 
+from arcor2_hw.compute.kinematics_tasks import ReadMesh
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import Box, Cylinder, Mesh, Models, Sphere
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server import focus
-from arcor2_server.collisions import Placed, first_hit
+from arcor2_server.collisions import Placed
 from arcor2_server.rest.operations import operation
 from arcor2_server.rest.scenes import check_id
+from arcor2_server.scene_world import attach, detach, hit, kept_mesh
 from arcor2_server.services import Services
 
 SCENE = "Scene"
@@ -69,6 +71,13 @@ class LineCheckResult(Data, frozen=True):
     object_id: str | Unset = UNSET
 
 
+class HolderQuery(Data, frozen=True, rename="camel"):
+    """A robot of the scene that is online, and the link of its model that holds."""
+
+    robot_id: str
+    link: str
+
+
 def _put(services: Services, kind: type[Models], pose: Pose, key: str, *sizes: float | str) -> str:
     check_id(key, "collision model")
     try:
@@ -99,8 +108,15 @@ async def put_cylinder(services: Services, query: CylinderQuery, body: Pose) -> 
 
 @operation("PUT", "/collisions/mesh", SCENE, Role.TECHNICIAN)
 async def put_mesh(services: Services, query: MeshQuery, body: Pose) -> str:
-    """Put a mesh in the way; it is listed, but lines are not checked against it."""
-    return _put(services, Mesh, body, query.mesh_id, query.mesh_file_id)
+    """Put a mesh in the way, which is an asset; each axis may be scaled."""
+    check_id(query.mesh_id, "collision model")
+    scale = (query.mesh_scale_x, query.mesh_scale_y, query.mesh_scale_z)
+    if 0.0 in scale:
+        raise InvalidData("A mesh cannot be scaled to nothing.")
+    services.assets.info(query.mesh_file_id)
+    await services.compute.run(ReadMesh(kept_mesh(services, query.mesh_file_id), scale))
+    services.collisions.put(Placed(Mesh(query.mesh_id, query.mesh_file_id), body, scale))
+    return "ok"
 
 
 @operation("GET", "/collisions", SCENE, Role.OPERATOR)
@@ -141,7 +157,20 @@ async def find_by_focus(body: MeshFocusAction) -> Pose:
 
 @operation("PUT", "/utils/line-safe", SCENE, Role.OPERATOR, plain=True)
 async def check_line(services: Services, body: LineCheck) -> LineCheckResult:
-    """Tell whether a straight line is free of boxes, spheres and cylinders, each a little larger than stated."""
-    world = services.collisions
-    hit = first_hit(body.pt1, body.pt2, world.everything(services).items(), world.inflation)
-    return LineCheckResult(True) if hit is None else LineCheckResult(False, hit)
+    """Tell whether a straight line is free of all that stands in the way, each a little larger than stated."""
+    found = await hit(services, body.pt1, body.pt2)
+    return LineCheckResult(True) if found is None else LineCheckResult(False, found.id)
+
+
+@operation("PUT", "/collisions/{id}/attach", SCENE, Role.TECHNICIAN)
+async def attach_collision(services: Services, id: str, query: HolderQuery) -> None:  # noqa: A002 - as above
+    """Let a robot hold what was put in, from where it is now: it moves with a link of the robot's model."""
+    services.cell.require_online()
+    await attach(services, id, services.cell.robot(query.robot_id), query.link)
+
+
+@operation("PUT", "/collisions/{id}/detach", SCENE, Role.TECHNICIAN)
+async def detach_collision(services: Services, id: str) -> Pose:  # noqa: A002 - as above
+    """Let go of what a robot holds; it stays where it is now, which is the answer."""
+    services.cell.require_online()
+    return await detach(services, id)

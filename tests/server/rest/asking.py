@@ -7,6 +7,8 @@ from typing import Any
 import httpx
 
 from arcor2_hw.compute.calibration_tasks import FrameByPoints
+from arcor2_hw.compute.kinematics_tasks import ReadMesh
+from arcor2_hw.compute.world import KeptFile
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.app import create_app
 from arcor2_server.services import Services
@@ -24,6 +26,8 @@ async def start_workers(services: Services) -> None:
     """Let the compute workers come up before the tests, not within the one that happens to need them first."""
     with contextlib.suppress(InvalidData):
         await services.compute.run(FrameByPoints([], []))
+    with contextlib.suppress(InvalidData):
+        await services.compute.run(ReadMesh(KeptFile("/nonexistent", "none.stl")))
 
 
 def granted(answer: httpx.Response) -> Any:

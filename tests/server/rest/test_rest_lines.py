@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import Box, Cylinder, Mesh, Models, Sphere
-from arcor2_server.collisions import Placed, first_hit
+from arcor2_server.collisions import Hit, Placed, first_hit
 
 
 def inside(point: Position, placed: Placed, inflation: float) -> bool:
@@ -63,13 +63,13 @@ def test_the_size_is_increased_by_as_much_as_stated() -> None:
             assert (first_hit(Position(-2, y), Position(2, y), placed, 0.01) is None) is free, (model, y)
     top = [("x", Placed(Cylinder("x", 0.5, 1), Pose()))]
     assert first_hit(Position(0, 0, 0.506), Position(0.1, 0, 0.506), top, 0.01) is None
-    assert first_hit(Position(0, 0, 0.504), Position(0.1, 0, 0.504), top, 0.01) == "x"
+    assert first_hit(Position(0, 0, 0.504), Position(0.1, 0, 0.504), top, 0.01) == Hit("x", 0.0)
 
 
 def test_a_line_of_no_length_and_one_from_within() -> None:
     ball = [("x", Placed(Sphere("x", 1), Pose()))]
-    assert first_hit(Position(), Position(), ball, 0.0) == "x"
+    assert first_hit(Position(), Position(), ball, 0.0) == Hit("x", 0.0)
     assert first_hit(Position(2), Position(2), ball, 0.0) is None
-    assert first_hit(Position(), Position(5), ball, 0.0) == "x"
+    assert first_hit(Position(), Position(5), ball, 0.0) == Hit("x", 0.0)
     assert first_hit(Position(5), Position(9), ball, 0.0) is None, "behind the start there is no line"
     assert first_hit(Position(-2), Position(2), [("x", Placed(Mesh("x", "file"), Pose()))], 0.0) is None

@@ -5,6 +5,7 @@ from typing import Any
 
 import httpx
 import pytest
+import trimesh
 
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import Box, ObjectModel, ObjectTypeSource
@@ -27,7 +28,15 @@ def line(*points: tuple[float, float, float]) -> dict[str, Any]:
     return {f"pt{n}": dict(zip("xyz", point, strict=True)) for n, point in enumerate(points, 1)}
 
 
+def box_stl(x: float, y: float, z: float) -> bytes:
+    """Give an STL file of a box around its origin."""
+    made: bytes = trimesh.creation.box((x, y, z)).export(file_type="stl")
+    return made
+
+
 async def test_models_are_put_in_and_taken_out(http: httpx.AsyncClient) -> None:
+    chair = {"assetData": ("chair.stl", box_stl(0.5, 0.5, 0.5))}
+    granted(await http.post("/assets", params={"id": "chair.stl", "upsert": True}, files=chair))
     assert granted(await http.get("/collisions")) == []
     box: dict[str, Any] = {"boxId": "crate", "sizeX": 1, "sizeY": 1, "sizeZ": 1}
     assert granted(await http.put("/collisions/box", params=box, json=at(2))) == "ok"
@@ -40,7 +49,7 @@ async def test_models_are_put_in_and_taken_out(http: httpx.AsyncClient) -> None:
     through_all = line((0, 0, 0), (10, 0, 0))
     assert granted(await http.put("/utils/line-safe", json=through_all)) == {"safe": False, "object_id": "crate"}
     back = line((10, 0, 0), (0, 0, 0))
-    assert granted(await http.put("/utils/line-safe", json=back)) == {"safe": False, "object_id": "tube"}
+    assert granted(await http.put("/utils/line-safe", json=back)) == {"safe": False, "object_id": "chair"}
     granted(await http.delete("/collisions/crate"))
     refused(await http.delete("/collisions/crate"), 404, "NotFound", "crate")
     assert granted(await http.put("/utils/line-safe", json=through_all))["object_id"] == "ball"
@@ -55,6 +64,35 @@ async def test_models_are_put_in_and_taken_out(http: httpx.AsyncClient) -> None:
     assert granted(await http.get("/system/running")) is False
     assert granted(await http.get("/collisions")) == []
     assert granted(await http.put("/utils/line-safe", json=through_all)) == {"safe": True}
+
+
+async def test_meshes_are_in_the_way_as_they_are(http: httpx.AsyncClient) -> None:
+    through, above = line((0, 0, 0), (10, 0, 0)), line((0, 0, 0.4), (10, 0, 0.4))
+    table = {"assetData": ("table.stl", box_stl(1, 1, 0.5))}
+    granted(await http.post("/assets", params={"id": "table.stl"}, files=table))
+    mesh: dict[str, Any] = {"meshId": "table", "meshFileId": "table.stl"}
+    granted(await http.put("/collisions/mesh", params=mesh, json=at(5)))
+    assert granted(await http.put("/utils/line-safe", json=through)) == {"safe": False, "object_id": "table"}
+    assert granted(await http.put("/utils/line-safe", json=above)) == {"safe": True}
+    # What comes first is told, whatever of it is a mesh.
+    granted(await http.put("/collisions/sphere", params={"sphereId": "ball", "radius": 0.5}, json=at(3)))
+    assert granted(await http.put("/utils/line-safe", json=through))["object_id"] == "ball"
+    granted(await http.put("/collisions/sphere", params={"sphereId": "ball", "radius": 0.5}, json=at(8)))
+    assert granted(await http.put("/utils/line-safe", json=through))["object_id"] == "table"
+    # Put in again, larger: it reaches up to where the other line is.
+    granted(await http.put("/collisions/mesh", params=mesh | {"meshScaleZ": 2}, json=at(5)))
+    assert granted(await http.put("/utils/line-safe", json=above)) == {"safe": False, "object_id": "table"}
+
+    refused(await http.put("/collisions/mesh", params=mesh | {"meshScaleX": 0}, json=at(5)), 400, "Argument", "scale")
+    refused(await http.put("/collisions/mesh", params=mesh | {"meshFileId": "none.stl"}, json=at(5)), 404, "NotFound")
+    granted(await http.post("/assets", params={"id": "bad.stl"}, files={"assetData": ("bad.stl", b"no mesh at all")}))
+    answer = await http.put("/collisions/mesh", params=mesh | {"meshFileId": "bad.stl"}, json=at(5))
+    refused(answer, 400, "Argument", "bad.stl")
+    # One that goes while it is in use is named.
+    granted(await http.delete("/assets/table.stl"))
+    granted(await http.put("/collisions/sphere", params={"sphereId": "ball", "radius": 0.5}, json=at(8)))
+    refused(await http.put("/utils/line-safe", json=through), 400, "Argument", "table.stl")
+    granted(await http.put("/system/stop"))
 
 
 @pytest.mark.parametrize(
