@@ -173,6 +173,7 @@ class CollisionObject(GenericWithPose):
         super().__init__(obj_id, name, pose, settings)
         self.collision_model = collision_model
         self._enabled = True
+        self._told: Callable[[], None] = lambda: None
 
     @property
     def enabled(self) -> bool:
@@ -182,6 +183,11 @@ class CollisionObject(GenericWithPose):
     @enabled.setter
     def enabled(self, value: bool) -> None:
         self._enabled = value
+        self._told()
+
+    def tell_enabled(self, listener: Callable[[], None]) -> None:
+        """Have `listener` called, on whatever thread, when it comes to count in collision checks, or no longer does."""
+        self._told = listener
 
     @action
     def set_enabled(self, state: bool, *, an: str | None = None) -> None:

@@ -15,7 +15,7 @@ from arcor2_hw.exceptions import (
     InvalidData,
     NotConnected,
 )
-from arcor2_hw.objects import Axis, Generic, Robot
+from arcor2_hw.objects import Axis, CollisionObject, Generic, Robot
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.observing import Observing, listening
 from arcor2_hw.runtime.creation import Recipe
@@ -113,6 +113,8 @@ class Device:
         with listening(self._life_changed):
             instance = self.recipe.make()
             self.instance = instance
+            if isinstance(instance, CollisionObject):
+                instance.tell_enabled(lambda: self._changed(self))
             if self._find is not None:
                 instance.attach(self._find)
             instance.connect()

@@ -278,7 +278,10 @@ class ProgramChanged(ToServer, frozen=True):
 
 
 class DeviceChanged(ToServer, frozen=True):
-    """A device's connection, health, alarms or owner of control changed; `reason` why the connection is lost."""
+    """A device's connection, health, alarms or owner of control changed; `reason` why the connection is lost.
+
+    in_the_way: false for a collision object that is disabled for now.
+    """
 
     object_id: str
     connection: Connection
@@ -286,6 +289,7 @@ class DeviceChanged(ToServer, frozen=True):
     alarms: list[Alarm] = field(default_factory=list)
     control_owner: str | None = None
     reason: str = ""
+    in_the_way: bool = True
 
 
 class LogLine(ToServer, frozen=True):

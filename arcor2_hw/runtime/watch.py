@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from arcor2_hw.data.device import Alarm, Connection, Health
 from arcor2_hw.exceptions import DeviceTimeout
-from arcor2_hw.objects import Generic
+from arcor2_hw.objects import CollisionObject, Generic
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.device import Device, overrides
 from arcor2_hw.runtime.lane import Job
@@ -100,7 +100,8 @@ class Watch:
             was = Connection.OFFLINE if before is None else before.connection
             if before is not None and connection is was:
                 reason = before.reason  # that of the loss: what further attempts meet is no news
-            found = DeviceChanged(device.id, connection, *asked, reason)
+            in_the_way = _told(lambda: not isinstance(instance, CollisionObject) or instance.enabled, True)
+            found = DeviceChanged(device.id, connection, *asked, reason, in_the_way)
             if found == before:
                 return
             self._known[device.id] = found

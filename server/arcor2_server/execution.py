@@ -95,6 +95,10 @@ class Execution:
         """Give the health of the objects of the running program."""
         return self._board.healths() if self.busy else []
 
+    def not_in_the_way(self) -> frozenset[str]:
+        """Give the collision objects of the running program that do not count for now."""
+        return self._board.not_in_the_way()
+
     @property
     def action_in_progress(self) -> bytes | None:
         """Give the ActionStateBefore of the action that runs, or that the program is paused before, as it was sent."""

@@ -116,6 +116,10 @@ class DeviceBoard:
         """Give the connection of every object, in the order of the scene."""
         return [self._state(self._word(object_id)) for object_id in self._objects]
 
+    def not_in_the_way(self) -> frozenset[str]:
+        """Give the collision objects that do not count for now."""
+        return frozenset(said.object_id for said in self._said.values() if not said.in_the_way)
+
     def _word(self, object_id: str) -> DeviceChanged:
         return self._said.get(object_id) or DeviceChanged(object_id, Connection.OFFLINE, Health.NORMAL)
 

@@ -235,6 +235,19 @@ async def test_a_program_is_run_paused_stepped_and_stopped(server: ServerProcess
         info = await until_state(http, "Faulted")
         assert "acp_nowhere" in info["exceptionMessage"]
 
+        # Who ran what, and how it ended.
+        runs = granted(await http.get("/api/runs", params={"package_id": "pkg_r", "limit": 2}))
+        assert [(run["end"], run["start_paused"], run["project_id"]) for run in runs] == [
+            ("failed", False, "pro_c"),
+            ("stopped", True, "pro_c"),
+        ]
+        assert runs[0]["error"] == info["exceptionMessage"]
+        older = granted(await http.get("/api/runs", params={"before": runs[-1]["number"]}))
+        assert (older[0]["end"], older[0]["last_action"]["id"]) == ("stopped", "act_1")
+        assert older[0]["actions"] >= 1
+        assert granted(await http.get("/api/runs", params={"projectId": "pro_none"})) == []
+        refused(await http.get("/api/runs", params={"limit": 501}), 400, "Argument", "limit")
+
 
 async def test_an_upload_of_a_hundred_megabytes_does_not_stop_the_others(server: ServerProcess) -> None:
     mesh = bytes(100_000_000)

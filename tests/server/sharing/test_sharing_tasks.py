@@ -1,0 +1,136 @@
+"""Tasks as clients follow them, on a whole server without its socket; what is in the way while it is disabled."""
+
+import asyncio
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from arcor2_hw.data.editor import TaskKind
+from arcor2_hw.exceptions import StorageError
+from arcor2_server.hub import Hub
+from arcor2_server.tasks import Tasks
+from tests.server.protocol.stage import Actor, happens, open_stage, until
+from tests.server.protocol.test_protocol_temporary import project
+from tests.server.session.desk import Refused
+
+
+def tasks(person: Actor) -> list[dict[str, Any]]:
+    return [event["data"] for event in person.events() if event["event"] == "TaskState"]
+
+
+async def test_a_scene_is_started_and_stopped(tmp_path: Path) -> None:
+    async with open_stage(tmp_path, "Arm", "DumbArm") as stage:
+        alice, bob = await stage.person("alice"), await stage.person("bob")
+        await stage.place(alice, arm="Arm", second="DumbArm")
+        await bob.ask("SubscribeEvents", events=["TaskState"])
+        bob.take()
+        await alice.ask("StartScene")
+        begun = await happens(bob, "TaskState", kind="scene_start")
+        assert (begun["state"], begun["title"], begun["started_by"]) == ("running", "Starting the scene scene", "alice")
+        late = await stage.newcomer()
+        await late.ask("SubscribeEvents", events=["TaskState"])
+        under_way = [event["data"]["id"] for event in late.events() if event["event"] == "TaskState"]
+        ended = await happens(bob, "TaskState", state="finished")
+        assert ended["id"] == begun["id"]
+        assert ended["progress"] == 1
+        assert under_way == [begun["id"]]  # it takes two imports and two connections: it was not over yet
+        progress = [task["progress"] for task in tasks(bob) if "progress" in task]
+        assert progress == sorted(progress)
+        await happens(alice, "SceneState", state="started")
+        await bob.ask("StopScene")
+        ended = await happens(bob, "TaskState", state="finished", kind="scene_stop")
+        assert ended["started_by"] == "bob"
+        assert "TaskState" not in alice.names()
+        assert stage.services.tasks.under_way() == []
+
+
+async def test_a_scene_that_does_not_come_up(tmp_path: Path) -> None:
+    async with open_stage(tmp_path, "Eye", "BlindEye") as stage:
+        alice = await stage.person("alice")
+        await stage.place(alice, eye="BlindEye")
+        await alice.ask("SubscribeEvents", events=["TaskState"])
+
+        async def broken(*_: Any) -> str:
+            return "The camera is not there."
+
+        stage.services.cell._bring_up = broken  # type: ignore[method-assign, assignment]
+        await alice.ask("StartScene")
+        failed = await happens(alice, "TaskState", kind="scene_start", state="failed")
+        assert failed["message"] == "The camera is not there."
+        await happens(alice, "TaskState", kind="scene_stop", state="finished")
+        await happens(alice, "SceneState", state="stopped")
+
+
+async def test_building_and_what_goes_wrong(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    async with open_stage(tmp_path) as stage:
+        alice = await stage.person("alice")
+        await project(stage, alice)
+        key = stage.services.session.require_project().id
+        await alice.ask("SubscribeEvents", events=["TaskState"])
+        alice.take()
+        await alice.ask("BuildProject", project_id=key, package_name="first")
+        states = [(task["kind"], task["state"], task["title"], task["started_by"]) for task in tasks(alice)]
+        title = "Building the package first"
+        assert states == [("build", "running", title, "alice"), ("build", "finished", title, "alice")]
+
+        async def full(*_: Any) -> str:
+            raise StorageError("The disk is full.")
+
+        monkeypatch.setattr(stage.services.build, "build", full)
+        with pytest.raises(Refused, match="The disk is full"):
+            await alice.ask("BuildProject", project_id=key, package_name="second")
+        assert [(task["state"], task.get("message")) for task in tasks(alice)] == [
+            ("running", None),
+            ("failed", "The disk is full."),
+        ]
+        with pytest.raises(Refused):
+            await alice.ask("UploadPackage", id="pkg_x", data="no base64!")
+        assert [(task["kind"], task["state"]) for task in tasks(alice)] == [("upload", "running"), ("upload", "failed")]
+        assert stage.services.tasks.under_way() == []
+
+
+async def test_a_task_is_told_at_a_bounded_rate_and_its_end_always() -> None:
+    sent: list[bytes] = []
+    hub = Hub()
+    hub.stream_to_subscribers = lambda name, key, message, besides=None: sent.append(message)  # type: ignore[method-assign, assignment]
+    board = Tasks(hub)
+    task = board.begin(TaskKind.COMPUTATION, "Counting")
+    for number in range(500):
+        task.at(number / 499 * 2, f"step {number}")  # beyond 1 is 1
+        if number % 50 == 0:
+            await asyncio.sleep(0.001)
+    assert len(sent) < 50
+    task.finish("counted")
+    assert b'"progress":1.0' in sent[-1]
+    assert b"counted" in sent[-1]
+    before = len(sent)
+    task.at(0.5)
+    task.fail("too late")
+    with pytest.raises(asyncio.CancelledError), board.running(TaskKind.CALIBRATION, "Looking"):
+        raise asyncio.CancelledError
+    assert len(sent) == before + 2
+    assert b'"cancelled"' in sent[-1]
+    with pytest.raises(ZeroDivisionError), board.running(TaskKind.CALIBRATION, "Looking"):
+        1 / 0  # noqa: B018
+    assert b"inside the server" in sent[-1]
+    assert board.under_way() == []
+    board.close()
+
+
+async def test_a_disabled_object_is_not_in_the_way(tmp_path: Path) -> None:
+    async with open_stage(tmp_path, "Part", "Plain") as stage:
+        alice = await stage.person("alice")
+        await stage.place(alice, part="Part", plain="Plain")
+        await stage.start(alice)
+        world, services, part = stage.services.collisions, stage.services, stage.ids["part"]
+        assert set(world.everything(services)) == {part}  # the other one has no model
+        await services.cell.call(part, "set_enabled", {"state": False})
+        await until(lambda: world.everything(services) == {})
+        await services.cell.call(part, "set_enabled", {"state": True})
+        await until(lambda: set(world.everything(services)) == {part})
+        await services.cell.call(part, "set_enabled", {"state": False})
+        await stage.stop(alice)
+        await stage.start(alice)  # a new instance counts
+        assert set(world.everything(services)) == {part}
+        await stage.stop(alice)
