@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Final
 
 import msgspec
 
+from arcor2_hw.compute.world import Holder
 from arcor2_hw.data.base import Data, Unset
 from arcor2_hw.data.events import PackageInfoData
 from arcor2_hw.data.geometry import Pose, Position
-from arcor2_hw.data.object_type import Box, Cylinder, Models, Sphere
+from arcor2_hw.data.object_type import Box, Cylinder, Mesh, Models, Sphere
 from arcor2_hw.exceptions import NotFound
 
 if TYPE_CHECKING:
@@ -22,10 +23,17 @@ _TINY: Final = 1e-12
 
 
 class Placed(Data, frozen=True):
-    """A collision model, and its pose in the world."""
+    """A collision model, and its pose in the world, or in the frame of the link that holds it. scale: of a mesh."""
 
     model: Models
     pose: Pose
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    holder: Holder | None = None
+
+    @property
+    def simple(self) -> bool:
+        """Tell whether lines are checked against it here: it stands by itself, and is no mesh."""
+        return self.holder is None and not isinstance(self.model, Mesh)
 
 
 class CollisionWorld:
@@ -39,6 +47,12 @@ class CollisionWorld:
     def put(self, placed: Placed) -> None:
         """Put a model in, in place of one of its id."""
         self._put[placed.model.id] = placed
+
+    def given(self, key: str) -> Placed:
+        """Give a model that was put in; NotFound."""
+        if (placed := self._put.get(key)) is None:
+            raise NotFound(f"There is no collision model {key!r}.")
+        return placed
 
     def remove(self, key: str) -> None:
         """Take a model out; NotFound."""
@@ -87,20 +101,50 @@ class _InfoEvent(msgspec.Struct):
 
 
 # ------------------------------------------------------------------------------------------------ lines
-def first_hit(start: Position, end: Position, placed: Iterable[tuple[str, Placed]], inflation: float) -> str | None:
-    """Give the id of what a straight line from `start` to `end` meets first, None when it is free.
+class Hit(Data, frozen=True):
+    """What a line meets first, and at which share of it."""
+
+    id: str
+    share: float
+
+
+def first_hit(start: Position, end: Position, placed: Iterable[tuple[str, Placed]], inflation: float) -> Hit | None:
+    """Give what a straight line from `start` to `end` meets first, None when it is free.
 
     Boxes, spheres and cylinders (along their z) with sizes increased by `inflation`, m: edges of a box, radius and
-    height. Meshes are not looked at: their content is no business of this process.
+    height. Meshes, and what is held, are not looked at: that is no business of this process.
     """
     nearest, hit = math.inf, None
+    way = end - start
     for key, one in placed:
+        if not one.simple or not _near(one, start, way, 2 * inflation):
+            continue
         frame = one.pose.inverted()
         a, b = (frame.position + point.rotated(frame.orientation) for point in (start, end))
         at = _entry(a, b - a, one.model, inflation)
         if at is not None and at < nearest:
             nearest, hit = at, key
-    return hit
+    return None if hit is None else Hit(hit, nearest)
+
+
+def _near(placed: Placed, a: Position, d: Position, within: float) -> bool:
+    """Tell whether the ball around a body comes within so much of a line: most of many do not."""
+    model, at = placed.model, placed.pose.position
+    match model:
+        case Box():
+            radius = math.hypot(model.size_x, model.size_y, model.size_z) / 2
+        case Sphere():
+            radius = model.radius
+        case Cylinder():
+            radius = math.hypot(model.radius, model.height / 2)
+        case _:
+            return False
+    x, y, z, reach = at.x - a.x, at.y - a.y, at.z - a.z, radius + within
+    square = d.x * d.x + d.y * d.y + d.z * d.z
+    if square > 0.0:
+        share = min(max((x * d.x + y * d.y + z * d.z) / square, 0.0), 1.0)
+        x, y, z = x - share * d.x, y - share * d.y, z - share * d.z
+    return x * x + y * y + z * z <= reach * reach
 
 
 def _entry(a: Position, d: Position, model: Models, inflation: float) -> float | None:
