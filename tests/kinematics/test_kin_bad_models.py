@@ -1,0 +1,256 @@
+"""What is wrong with a description, a package or a mesh is refused, by kind and by name."""
+
+import io
+import struct
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from arcor2_hw.kinematics import meshes, source
+from arcor2_hw.kinematics.errors import BadMesh, JointLoop, MissingMesh, ModelError, UnsafeDescription, ZeroLength
+from arcor2_hw.kinematics.meshes import read_mesh
+from arcor2_hw.kinematics.model import RobotModel
+from arcor2_hw.kinematics.shapes import Hull, TriangleMesh
+from tests.kinematics.kin_robots import joint, links, urdf
+
+GOOD = links("base", "arm") + joint("j", "base", "arm", xyz="0 0 1")
+
+
+def with_shape(geometry: str) -> bytes:
+    shaped = f'<link name="arm"><collision><geometry>{geometry}</geometry></collision></link>'
+    return urdf(links("base") + shaped + joint("j", "base", "arm", xyz="0 0 1"))
+
+
+def packed(**files: bytes) -> bytes:
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        for name, data in files.items():
+            archive.writestr(name.replace("__", "/").replace("_dot_", "."), data)
+    return content.getvalue()
+
+
+def stl(vertices: list[list[float]]) -> bytes:
+    """Write a binary STL by hand, of triangles as they come."""
+    out = bytes(80) + struct.pack("<I", len(vertices) // 3)
+    for at in range(0, len(vertices), 3):
+        out += struct.pack("<12fH", 0, 0, 0, *vertices[at], *vertices[at + 1], *vertices[at + 2], 0)
+    return out
+
+
+CUBE = trimesh.creation.box((1.0, 2.0, 3.0))
+CUBE_STL: bytes = CUBE.export(file_type="stl")
+
+# ------------------------------------------------------------------------------------------------ descriptions
+REFUSED = {
+    "no XML": (b"<robot", ModelError, "no XML"),
+    "nothing": (b"", ModelError, "no XML"),
+    "another document": (b"<html/>", ModelError, "a html"),
+    "a xacro": (b'<robot xmlns:xacro="x"><xacro:arm/></robot>', ModelError, "xacro"),
+    "no links": (urdf(""), ModelError, "no links"),
+    "nothing moves": (urdf(links("base")), ModelError, "no joint that moves"),
+    "a link twice": (urdf(GOOD + links("arm")), ModelError, "link arm is there twice"),
+    "a joint twice": (urdf(GOOD + links("b") + joint("j", "arm", "b")), ModelError, "joint j is there twice"),
+    "a link that is not there": (urdf(GOOD + joint("k", "arm", "nose")), ModelError, "k names the link nose"),
+    "two roots": (urdf(GOOD + links("lost")), ModelError, "base, lost hang on nothing"),
+    "two parents": (urdf(GOOD + links("b") + joint("k", "base", "b") + joint("l", "arm", "b")), JointLoop, "k and l"),
+    "a ring": (
+        urdf(links("a", "b", "c") + joint("k", "a", "b") + joint("l", "b", "c") + joint("m", "c", "a")),
+        JointLoop,
+        "k, l, m close a loop",
+    ),
+    "a ring beside": (
+        urdf(GOOD + links("b", "c") + joint("k", "b", "c") + joint("l", "c", "b")),
+        JointLoop,
+        "k, l close a loop",
+    ),
+    "a joint to itself": (urdf(GOOD + links("b") + joint("k", "b", "b")), JointLoop, "k close a loop"),
+    "a kind that is not known": (
+        urdf(links("base", "arm") + joint("j", "base", "arm", kind="planar")),
+        ModelError,
+        "j is of type planar",
+    ),
+    "no limit": (urdf(links("base", "arm") + joint("j", "base", "arm", limit="")), ModelError, "j has no limit"),
+    "limits that cross": (
+        urdf(links("base", "arm") + joint("j", "base", "arm", limit='<limit lower="1" upper="-1"/>')),
+        ModelError,
+        "j: its lower limit 1 is above the upper, -1",
+    ),
+    "an axis without direction": (
+        urdf(links("base", "arm") + joint("j", "base", "arm", axis="0 0 0")),
+        ModelError,
+        "j has an axis without direction",
+    ),
+    "numbers that are none": (
+        urdf(links("base", "arm") + joint("j", "base", "arm", xyz="0 nan 0")),
+        ModelError,
+        "joint j: xyz of origin must be 3 numbers, not '0 nan 0'",
+    ),
+    "too few numbers": (
+        urdf(links("base", "arm") + joint("j", "base", "arm", rpy="0 0")),
+        ModelError,
+        "joint j: rpy of origin must be 3 numbers",
+    ),
+    "mimicking nobody": (
+        urdf(links("base", "arm") + joint("j", "base", "arm", more='<mimic joint="nobody"/>')),
+        ModelError,
+        "j mimics nobody",
+    ),
+    "an entity bomb": (
+        b'<!DOCTYPE r [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;">]><robot name="&b;"/>',
+        UnsafeDescription,
+        "entity",
+    ),
+    "a file fetched": (
+        b'<!DOCTYPE r [<!ENTITY a SYSTEM "file:///etc/passwd">]><robot name="&a;"/>',
+        UnsafeDescription,
+        "entity",
+    ),
+    "nested without end": (b"<robot>" + b"<a>" * 500, UnsafeDescription, "nested"),
+    "links without end": (urdf("".join(f'<link name="{n}"/>' for n in range(2001))), UnsafeDescription, "2001 links"),
+    "a cylinder of no length": (with_shape('<cylinder radius="0.1" length="0"/>'), ZeroLength, "arm.*length"),
+    "a flat box": (with_shape('<box size="1 0 1"/>'), ZeroLength, "link arm, collision: y of a box"),
+    "a ball turned inside out": (with_shape('<sphere radius="-1"/>'), ZeroLength, "radius of a sphere"),
+    "a shape that is not known": (with_shape('<torus radius="1"/>'), ModelError, "torus"),
+    "a missing mesh": (with_shape('<mesh filename="package://arm/arm.stl"/>'), MissingMesh, "package://arm/arm.stl"),
+    "a mesh elsewhere": (with_shape('<mesh filename="http://x/arm.stl"/>'), UnsafeDescription, "http://x/arm.stl"),
+    "a mesh above": (with_shape('<mesh filename="../../etc/passwd"/>'), UnsafeDescription, "leads out"),
+    "a mesh above, encoded": (
+        with_shape('<mesh filename="package://arm/%2e%2e/%2e%2e/etc/passwd"/>'),
+        UnsafeDescription,
+        "leads out",
+    ),
+    "a mesh at the root": (with_shape('<mesh filename="file:///etc/passwd"/>'), UnsafeDescription, "passwd"),
+    "an end effector that is no link": (
+        urdf(GOOD + '<arcor2_hw><end_effector link="nose"/></arcor2_hw>'),
+        ModelError,
+        "end effector nose",
+    ),
+    "a setting of nothing": (
+        urdf(GOOD + '<arcor2_hw><setting name="s" joint="k" component="x"/></arcor2_hw>'),
+        ModelError,
+        "no joint k",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_description_is_refused_by_kind_and_name(case: str) -> None:
+    content, kind, words = REFUSED[case]
+    with pytest.raises(ModelError, match=words) as refused:
+        RobotModel.load(content, name="robot.urdf")
+    assert type(refused.value) is kind
+    assert refused.value.code == kind.code
+
+
+def test_what_is_next_to_the_refused_ones_is_taken() -> None:
+    assert RobotModel.load(urdf(GOOD)).joint_names == ("j",)
+    assert RobotModel.load(with_shape('<box size="1 1 1"/>')).collision[0].link == "arm"
+
+
+# ------------------------------------------------------------------------------------------------ packages
+def test_packages_that_are_none_or_not_safe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(ModelError, match="no file .urdf"):
+        RobotModel.load(packed(readme_dot_txt=b""))
+    with pytest.raises(ModelError, match=r"2 descriptions: a\.urdf, b\.urdf"):
+        RobotModel.load(packed(a_dot_urdf=urdf(GOOD), b_dot_urdf=urdf(GOOD)))
+    nested = packed(a_dot_urdf=urdf(GOOD, "top"), deeper__b_dot_urdf=urdf(GOOD, "deep"))
+    assert RobotModel.load(nested).name == "top"
+    with pytest.raises(UnsafeDescription, match="outside"):
+        RobotModel.load(packed(**{"..__evil_dot_urdf": urdf(GOOD)}))
+    with pytest.raises(ModelError, match="no zip archive"):
+        RobotModel.load(b"PK\x03\x04" + bytes(100))
+    damaged = bytearray(packed(a_dot_urdf=urdf(GOOD)))
+    damaged[45] ^= 0xFF
+    with pytest.raises(ModelError, match="damaged"):
+        RobotModel.load(bytes(damaged))
+    with pytest.raises(ModelError, match="no robot description nowhere"):
+        RobotModel.load(tmp_path / "nowhere")
+    (tmp_path / "arm").mkdir()
+    (tmp_path / "secret").write_text("secret")
+    (tmp_path / "arm" / "arm.stl").symlink_to(tmp_path / "secret")
+    with pytest.raises(UnsafeDescription, match=r"arm\.stl is a link that leads out"):
+        RobotModel.load(tmp_path / "arm")
+    monkeypatch.setattr(source, "MAX_PACKAGE", 100)
+    with pytest.raises(UnsafeDescription, match="more than 100 bytes"):
+        RobotModel.load(packed(a_dot_urdf=urdf(GOOD)))
+
+
+def test_meshes_are_found_however_they_are_named() -> None:
+    for name in ("package://any/meshes/arm.STL", "meshes/arm.STL", "file:meshes/arm.STL", "package://meshes/arm.STL"):
+        content = packed(arm__arm_dot_urdf=with_shape(f'<mesh filename="{name}"/>'), arm__meshes__arm_dot_STL=CUBE_STL)
+        (shape,) = RobotModel.load(content).collision
+        assert isinstance(shape.shape, Hull)
+        assert len(shape.shape.vertices) == 8
+        (exact,) = RobotModel.load(content, mesh_use="exact").collision
+        assert isinstance(exact.shape, TriangleMesh)
+
+
+# ------------------------------------------------------------------------------------------------ meshes
+@pytest.mark.parametrize("kind", ["stl", "obj", "ply", "off", "dae"])
+def test_a_cube_is_read_from_every_kind_and_scaled(kind: str) -> None:
+    exported = CUBE.export(file_type=kind)
+    content = exported if isinstance(exported, bytes) else exported.encode()
+    mesh = read_mesh(content, f"cube.{kind}", (0.001, 0.001, 0.001))
+    assert np.allclose(mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0), (0.001, 0.002, 0.003), atol=1e-9)
+    assert len(mesh.triangles) == 12
+    mirrored = read_mesh(content, f"cube.{kind}", (1.0, 1.0, -1.0))
+    volume = trimesh.Trimesh(mirrored.vertices, mirrored.triangles, process=False).volume
+    assert volume == pytest.approx(6.0)
+
+
+TRIANGLE = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
+
+
+@pytest.mark.parametrize(
+    ("content", "name", "words"),
+    [
+        (b"not a mesh", "m.stl", "m.stl is damaged|m.stl has no triangles"),
+        (b"", "m.stl", "m.stl"),
+        (CUBE_STL[:200], "m.stl", "m.stl"),
+        (stl([[0.0, 0.0, float("nan")], *TRIANGLE[1:]]), "m.stl", "m.stl has vertices that are not finite"),
+        (stl([[0.0, 0.0, float("inf")], *TRIANGLE[1:]]), "m.stl", "m.stl has vertices that are not finite"),
+        (stl([[0.0, 0.0, 1e9], *TRIANGLE[1:]]), "m.stl", "farther than 10000 m"),
+        (b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "m.obj", "m.obj"),
+        (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "m.obj", "m.obj"),
+        (b"x", "m.exe", "no kind that is known"),
+        (b'<!DOCTYPE C [<!ENTITY a "a">]><COLLADA/>', "m.dae", "document type"),
+        ('<?xml version="1.0"?><!DOCTYPE C><COLLADA/>'.encode("utf-16"), "m.dae", "UTF-8"),
+    ],
+)
+def test_a_bad_mesh_is_refused_by_name(content: bytes, name: str, words: str) -> None:
+    with pytest.raises(BadMesh, match=words):
+        read_mesh(content, name)
+
+
+def test_a_mesh_without_end_is_refused_before_it_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "arm.urdf").write_bytes(with_shape('<mesh filename="arm.stl"/>'))
+    with (tmp_path / "arm.stl").open("wb") as file:
+        file.truncate(2 * 1024**3)  # 2 GB that take no room on the disk
+    with pytest.raises(UnsafeDescription, match=r"arm\.stl has more than"):
+        RobotModel.load(tmp_path)
+    monkeypatch.setattr(meshes, "MAX_TRIANGLES", 11)
+    with pytest.raises(BadMesh, match="12 triangles; at most 11"):
+        read_mesh(CUBE_STL, "cube.stl")
+
+
+def test_an_archive_that_lies_of_its_sizes_is_read_no_further_than_allowed() -> None:
+    content = bytearray(packed(a_dot_urdf=b" " * 3_000_000))
+    honest = struct.pack("<I", 3_000_000)
+    assert content.count(honest) == 4  # compressed and not, in the header and the directory
+    package = source.Package.open(bytes(content))
+    with pytest.raises(UnsafeDescription, match="more than 1000 bytes"):
+        package.read("a.urdf", 1000)
+    lying = source.Package.open(bytes(content.replace(honest, struct.pack("<I", 500))))
+    with pytest.raises(ModelError, match="damaged|more than"):
+        lying.read("a.urdf", 1000)
+
+
+def test_a_flat_mesh_has_no_hull() -> None:
+    content = packed(arm_dot_urdf=with_shape('<mesh filename="f.stl"/>'), f_dot_stl=stl(TRIANGLE + TRIANGLE))
+    with pytest.raises(BadMesh, match=r"arm, collision: the mesh f\.stl is flat"):
+        RobotModel.load(content)
+    with pytest.raises(ZeroLength, match="scaled to nothing"):
+        RobotModel.load(packed(a_dot_urdf=with_shape('<mesh filename="f.stl" scale="1 0 1"/>'), f_dot_stl=CUBE_STL))
