@@ -72,9 +72,13 @@ def on_table(x: float, y: float, turn: float) -> Array:
     return pose
 
 
-def camera_over(random: np.random.Generator) -> Array:
-    """Give world_from_camera of a camera 0.5 to 1.6 m away, tilted by 0 to 60°, turned at will."""
-    distance, tilt, azimuth = random.uniform(0.5, 1.6), math.radians(random.uniform(0, 60)), random.uniform(0, math.tau)
+def camera_over(random: np.random.Generator, near: float = 0.5, far: float = 1.6) -> Array:
+    """Give world_from_camera of a camera so far away (m), tilted by 0 to 60°, turned at will."""
+    distance, tilt, azimuth = (
+        random.uniform(near, far),
+        math.radians(random.uniform(0, 60)),
+        random.uniform(0, math.tau),
+    )
     eye = distance * np.array([math.sin(tilt) * math.cos(azimuth), math.sin(tilt) * math.sin(azimuth), math.cos(tilt)])
     target = np.append(random.uniform(-0.03, 0.03, 2), 0.0)
     return rendering.looking_at(eye, target, random.uniform(0, math.tau))
@@ -108,11 +112,11 @@ def markers_view(random: np.random.Generator, count: int, background: Plate) -> 
 
 
 def board_view(random: np.random.Generator, background: Plate) -> View:
-    """Give a view of a ChArUco board of 7 × 5 squares of 30 mm."""
+    """Give a view of a ChArUco board of 7 × 5 squares of 30 mm, 0.4 to 1 m away."""
     cell = 0.03 / 8
     while True:
         camera, place = (
-            camera_over(random),
+            camera_over(random, 0.4, 1.0),
             on_table(random.uniform(-0.05, 0.05), random.uniform(-0.05, 0.05), random.uniform(0, math.tau)),
         )
         plate = rendering.charuco(7, 5, cell, place)

@@ -1,9 +1,9 @@
 """Pictures of markers and boards as a camera takes them, ray by ray: the truth for calibrations.
 
-Every pixel is 16 rays. A pixel's rays come from the lens's own formula, inverted by Newton's method; where they meet
-the printed plates is computed in the plates' frames. Nothing is projected, and nothing of the solver, or of OpenCV's
-geometry, is used: the dictionaries' bits are all that is taken from there. A picture then gets light that falls off to
-one side, blur of lens and defocus, the camera's tone curve, noise and 8 bits.
+Every pixel is 16 rays, or as many as are asked for. They come from the lens's own formula, inverted by Newton's method;
+where they meet the printed plates is computed in the plates' frames. Nothing is projected, and nothing of the solver, or
+of OpenCV's geometry, is used: the dictionaries' bits are all that is taken from there. A picture then gets light that
+falls off to one side, blur of lens and defocus, the camera's tone curve, noise and 8 bits.
 
 Not modelled: depth (plates are painted in the order given), shadows, reflections, rolling shutter, colour filters.
 """
@@ -202,20 +202,32 @@ def _paint(picture: Array, plate: Plate, world_from_camera: Array, lens: Lens, s
 
 def _printed(plate: Plate, x: Array, y: Array, fine: int) -> Array:
     """Give what is printed at points, with edges that are a `fine`th of a cell wide."""
-    count_y, count_x = plate.cells.shape
+    rows, columns = plate.cells.shape
+    right, down = x / plate.cell + columns / 2, rows / 2 - y / plate.cell
+    column = np.clip(right.astype(np.int32), 0, columns - 1)
+    row = np.clip(down.astype(np.int32), 0, rows - 1)
+    values: Array = plate.cells[row, column]
+    part_x, part_y = right - column, down - row
+    edge = 0.5 / fine
+    near = np.nonzero((np.abs(part_x - 0.5) > 0.5 - edge) | (np.abs(part_y - 0.5) > 0.5 - edge))[0]
+    left, part_x = _between(right[near], columns, fine)
+    upper, part_y = _between(down[near], rows, fine)
+    after, lower = np.minimum(left + 1, columns - 1), np.minimum(upper + 1, rows - 1)
+    above = plate.cells[upper, left] * (1 - part_x) + plate.cells[upper, after] * part_x
+    below = plate.cells[lower, left] * (1 - part_x) + plate.cells[lower, after] * part_x
+    values[near] = above * (1 - part_y) + below * part_y
+    return values
 
-    def index(at: Array, count: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Array]:
-        texel = np.clip(at * fine - 0.5, 0, count * fine - 1)
-        low = np.floor(texel)
-        high = np.minimum(low + 1, count * fine - 1)
-        return (low // fine).astype(np.intp), (high // fine).astype(np.intp), texel - low
 
-    left, right, part_x = index(x / plate.cell + count_x / 2, count_x)
-    top, bottom, part_y = index(count_y / 2 - y / plate.cell, count_y)
-    cells = plate.cells
-    upper = cells[top, left] * (1 - part_x) + cells[top, right] * part_x
-    lower = cells[bottom, left] * (1 - part_x) + cells[bottom, right] * part_x
-    return np.asarray(upper * (1 - part_y) + lower * part_y)
+def _between(at: Array, count: int, fine: int) -> tuple[npt.NDArray[np.int32], Array]:
+    """Give the cell before the edge that is nearest, and how far the value has gone over to the next cell's: 0..1."""
+    edge = np.rint(at)
+    part = np.clip((at - edge) * fine + 0.5, 0.0, 1.0)
+    before = (edge - 1).astype(np.int32)
+    # At the rim of the plate there is no edge.
+    part = np.where(before < 0, 1.0, part)
+    part = np.where(before >= count - 1, 0.0, part)
+    return np.clip(before, 0, count - 1), part
 
 
 # ------------------------------------------------------------------------------------------------ pictures
@@ -225,11 +237,15 @@ def render(
     plates: Sequence[Plate],
     random: np.random.Generator,
     exposure: Exposure = Exposure(),
+    subpixels: int = SUBPIXELS,
 ) -> npt.NDArray[np.uint8]:
-    """Take a picture: grey values, rows × columns. The first plate is the background, and gets one ray per pixel."""
+    """Take a picture: grey values, rows × columns. The first plate is the background, and gets one ray per pixel.
+
+    subpixels: rows and columns of rays in every other pixel.
+    """
     reflectance = np.full((lens.height, lens.width), TABLE)
     for index, plate in enumerate(plates):
-        _paint(reflectance, plate, world_from_camera, lens, SUBPIXELS if index else 1)
+        _paint(reflectance, plate, world_from_camera, lens, subpixels if index else 1)
     side = np.linspace(1.0 - exposure.falloff, 1.0, lens.width)
     light = reflectance * side[None, :] * exposure.light
     if exposure.blur > 0:

@@ -13,7 +13,7 @@ from arcor2_hw.calibration.camera_results import CameraPose, MarkerError, PoseOp
 from arcor2_hw.calibration.drawing import GOOD, Canvas, error_picture
 from arcor2_hw.calibration.layout import Layout
 from arcor2_hw.calibration.lens import Array, Lens
-from arcor2_hw.calibration.pictures import Picture, grey_of, same_size
+from arcor2_hw.calibration.pictures import Picture, grey_of, one_by_one
 from arcor2_hw.calibration.pose_problem import Hints, Seen
 from arcor2_hw.calibration.pose_search import Found, search
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
@@ -53,9 +53,8 @@ def find_camera_pose(
     hints = _hints(options)
     if not 1 <= len(pictures) <= MOST_PICTURES:
         raise InvalidData(f"one to {MOST_PICTURES} pictures are needed, not {len(pictures)}")
-    several = len(pictures) > 1
-    greys = [grey_of(each, f"picture {i}" if several else "the picture") for i, each in enumerate(pictures)]
-    lens = Lens(parameters, *same_size(greys))
+    greys = list(one_by_one(pictures)) if len(pictures) > 1 else [grey_of(pictures[0])]
+    lens = Lens(parameters, greys[0].shape[1], greys[0].shape[0])
     sighting = sight_of(greys, lens, layout, options.blur_threshold, options.largest_blur)
     _check_still(sighting.seen)
     if options.method == "averaged":

@@ -1,10 +1,47 @@
 """Where a camera sits on a robot's flange (eye in hand), or beside the robot (eye to hand)."""
 
+import math
 from collections.abc import Callable, Sequence
+from typing import Final
 
-from arcor2_hw.calibration.camera_results import HandEye, HandEyeOptions, HandEyeSample, Mounting
+import numpy as np
+
+from arcor2_hw.calibration.boards import check_pose
+from arcor2_hw.calibration.camera_results import (
+    HandEye,
+    HandEyeError,
+    HandEyeMethod,
+    HandEyeOptions,
+    HandEyeSample,
+    Mounting,
+    PoseOptions,
+)
+from arcor2_hw.calibration.drawing import error_picture
+from arcor2_hw.calibration.hand_eye_methods import METHODS
+from arcor2_hw.calibration.hand_eye_problem import Mount, Station, refined
 from arcor2_hw.calibration.layout import Layout
+from arcor2_hw.calibration.lens import Array, Lens
+from arcor2_hw.calibration.pictures import one_by_one
+from arcor2_hw.calibration.pose_problem import Hints
+from arcor2_hw.calibration.pose_search import search
+from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
+from arcor2_hw.calibration.results import Grade
+from arcor2_hw.calibration.rigid import crossed, inverted, mean_rotation, motion, rotation_vector
+from arcor2_hw.calibration.sight import sight_of
 from arcor2_hw.data.camera import CameraParameters
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.exceptions import InvalidData
+
+FEWEST: Final = 3
+MOST_SAMPLES: Final = 300
+_TARGET_DEVIATION: Final = 0.03
+"""m, standard deviation of one picture's pose from which on the picture is left out."""
+_OUTLIER: Final = 4.0
+"""How many times the median of all samples' errors a sample's may be."""
+_LEAST_OUTLIER: Final = 1.0
+"""px, that a sample's error may be in any case."""
+_GOOD: Final = 0.001
+"""m, standard deviation up to which a result is good."""
 
 
 def find_hand_eye(
@@ -28,6 +65,194 @@ def find_hand_eye(
     Raises:
         InvalidPicture, InvalidData: as find_camera_pose; fewer than three samples; a flange's pose that is not finite.
         CalibrationRefused: no marker (in too many pictures); degenerate (all rotations about one axis, or hardly any);
-            implausible (the flange's poses do not belong to the pictures).
+            implausible (the flange's poses do not belong to the pictures); unobservable (known too badly).
     """
-    raise NotImplementedError
+    options = options or HandEyeOptions()
+    if not FEWEST <= len(samples) <= MOST_SAMPLES:
+        raise InvalidData(f"{FEWEST} to {MOST_SAMPLES} samples are needed, not {len(samples)}")
+    for index, each in enumerate(samples):
+        check_pose(each.flange, f"the flange's pose of sample {index}")
+    problems: dict[int, str] = {}
+    stations: list[Station] = []
+    eyes: list[Array] = []
+    lens: Lens | None = None
+    for index, grey in enumerate(one_by_one(each.picture for each in samples)):
+        lens = lens or Lens(parameters, grey.shape[1], grey.shape[0])
+        flange = samples[index].flange.matrix()
+        hand = flange if mounting == "eye_in_hand" else inverted(flange)
+        try:
+            seen = sight_of([grey], lens, target, options.blur_threshold, options.largest_blur).seen
+            found = search(lens, seen, Hints(), PoseOptions(largest_deviation=_TARGET_DEVIATION))
+        except CalibrationRefused as error:
+            problems[index] = str(error)
+        else:
+            if found.covariance[0, 0] + found.covariance[1, 1] + found.covariance[2, 2] < 3 * _TARGET_DEVIATION**2:
+                stations.append(Station(index, hand, seen))
+                eyes.append(found.pose)
+            else:
+                problems[index] = "the target is too far away, or seen from the front"
+        if progress is not None:
+            progress(index + 1, len(samples))
+    assert lens is not None
+    _check_enough(stations, problems)
+    _check_turns([each.hand for each in stations], options)
+    best, methods = _solve(lens, stations, eyes, options)
+    while (worst := _outlier(best)) is not None and len(stations) > max(FEWEST, len(samples) // 2):
+        problems[stations[worst].index] = (
+            f"it contradicts the others by {_root_mean_square(best.errors[worst]):.1f} px: did the arm still move?"
+        )
+        stations = [each for i, each in enumerate(stations) if i != worst]
+        eyes = [each for i, each in enumerate(eyes) if i != worst]
+        _check_turns([each.hand for each in stations], options)
+        best, methods = _solve(lens, stations, eyes, options)
+    return _result(best, methods, stations, problems, mounting, options, lens)
+
+
+def _check_enough(stations: list[Station], problems: dict[int, str]) -> None:
+    """Raise CalibrationRefused for too few pictures of the target."""
+    if len(stations) < FEWEST:
+        first = next((f"sample {index}: {problem}" for index, problem in problems.items()), "")
+        raise CalibrationRefused(
+            f"The target is seen well in {len(stations)} pictures only; {FEWEST} are the least, ten are good.",
+            first,
+            Reason.TOO_FEW_POINTS if stations else Reason.NO_MARKER,
+        )
+
+
+def _check_turns(hands: list[Array], options: HandEyeOptions) -> None:
+    """Raise CalibrationRefused unless the hand is turned about two axes."""
+    turns = [rotation_vector(a[:3, :3].T @ b[:3, :3]) for index, a in enumerate(hands) for b in hands[index + 1 :]]
+    large = [turn / np.linalg.norm(turn) for turn in turns if np.linalg.norm(turn) >= options.smallest_turn]
+    if not large:
+        raise CalibrationRefused(
+            "The flange was hardly turned from picture to picture: turn it by 30° and more, about different axes.",
+            f"largest rotation {math.degrees(max(float(np.linalg.norm(turn)) for turn in turns)):.1f}°",
+            Reason.DEGENERATE,
+        )
+    axes = np.stack(large)
+    spread = float(np.arccos(np.clip(np.abs(axes @ axes.T), 0.0, 1.0).min()))
+    if spread < options.smallest_spread:
+        raise CalibrationRefused(
+            "The flange was turned about one axis only, which leaves the camera's place along it open: turn it about "
+            "another one, too.",
+            f"axes within {math.degrees(spread):.1f}°, at least {math.degrees(options.smallest_spread):.1f}°",
+            Reason.DEGENERATE,
+        )
+
+
+def _solve(
+    lens: Lens, stations: list[Station], eyes: list[Array], options: HandEyeOptions
+) -> tuple[Mount, list[HandEyeMethod]]:
+    """Give the mount that explains the pictures best, and what the closed forms gave."""
+    hands = [each.hand for each in stations]
+    methods: list[HandEyeMethod] = []
+    found: list[Mount] = []
+    for name, method in METHODS.items():
+        rotation, position = method(
+            [each[:3, :3] for each in hands],
+            [each[:3, 3] for each in hands],
+            [each[:3, :3] for each in eyes],
+            [each[:3, 3] for each in eyes],
+            options.smallest_turn,
+        )
+        mount = motion(rotation, position)
+        if not np.all(np.isfinite(mount)):
+            continue
+        target, turn, shift = _scatter([hand @ mount @ eye for hand, eye in zip(hands, eyes, strict=True)])
+        methods.append(HandEyeMethod(name, Pose.from_matrix(mount), turn, shift))
+        solution = refined(lens, stations, mount, target)
+        if solution is not None:
+            found.append(solution)
+    if not found:
+        raise CalibrationRefused(
+            "The flange's poses do not belong to the pictures: no place of the camera explains both. Are they in the "
+            "same order, of the flange, in the base frame, and is the mounting the right one?",
+            reason=Reason.IMPLAUSIBLE,
+        )
+    return min(found, key=lambda each: _root_mean_square(np.concatenate(each.errors))), methods
+
+
+def _scatter(targets: list[Array]) -> tuple[Array, float, float]:
+    """Give the mean of poses and how far they scatter about it (r.m.s.): rad, m."""
+    stacked = np.stack(targets)
+    middle = motion(mean_rotation(stacked[:, :3, :3], np.ones(len(targets))), stacked[:, :3, 3].mean(axis=0))
+    turns = [float(np.linalg.norm(rotation_vector(middle[:3, :3].T @ each[:3, :3]))) for each in targets]
+    shifts = np.linalg.norm(stacked[:, :3, 3] - middle[:3, 3], axis=1)
+    return middle, float(np.sqrt(np.mean(np.square(turns)))), float(np.sqrt(np.mean(shifts**2)))
+
+
+def _root_mean_square(errors: Array) -> float:
+    return float(np.sqrt(np.mean(np.sum(errors**2, axis=1))))
+
+
+def _outlier(mount: Mount) -> int | None:
+    """Give the sample that fits far worse than the others."""
+    residuals = [_root_mean_square(each) for each in mount.errors]
+    worst = int(np.argmax(residuals))
+    return worst if residuals[worst] > max(_OUTLIER * float(np.median(residuals)), _LEAST_OUTLIER) else None
+
+
+def _result(
+    best: Mount,
+    methods: list[HandEyeMethod],
+    stations: list[Station],
+    problems: dict[int, str],
+    mounting: Mounting,
+    options: HandEyeOptions,
+    lens: Lens,
+) -> HandEye:
+    """Give what was found with its errors in words, or refuse it."""
+    residual = _root_mean_square(np.concatenate(best.errors))
+    if residual > options.largest_residual:
+        raise CalibrationRefused(
+            f"The flange's poses do not belong to the pictures: the corners are off by {residual:.1f} px. Are they "
+            "in the same order, of the flange, in the base frame, and is the mounting the right one?",
+            f"at most {options.largest_residual} px",
+            Reason.IMPLAUSIBLE,
+        )
+    # As everywhere outside the solvers: position before rotation, the displacement being that of the camera itself.
+    turn = np.zeros((6, 6))
+    turn[:3, :3] = -crossed(best.mount[:3, 3])
+    turn[:3, 3:] = turn[3:, :3] = np.eye(3)
+    covariance = turn @ best.covariance @ turn.T
+    position = float(np.sqrt(np.linalg.eigvalsh(covariance[:3, :3])[-1]))
+    orientation = float(np.sqrt(np.linalg.eigvalsh(covariance[3:, 3:])[-1]))
+    if not position <= options.largest_deviation:
+        raise CalibrationRefused(
+            f"The camera's place would be known to {position * 1000:.0f} mm only: more pictures are needed, with the "
+            "flange turned more, to all sides.",
+            f"standard deviation {position * 1000:.1f} mm, at most {options.largest_deviation * 1000:.1f} mm",
+            Reason.UNOBSERVABLE,
+        )
+    errors = [
+        HandEyeError(s.index, len(e), _root_mean_square(e), float(np.linalg.norm(e, axis=1).max()))
+        for s, e in zip(stations, best.errors, strict=True)
+    ]
+    errors += [HandEyeError(index, 0, 0.0, 0.0, used=False, problem=problem) for index, problem in problems.items()]
+    errors.sort(key=lambda each: each.sample)
+    where = "on the flange" if mounting == "eye_in_hand" else "beside the robot"
+    count = len(stations)
+    verdict = (
+        f"The camera's place {where} is known to {position * 1000:.1f} mm and its direction to "
+        f"{math.degrees(orientation):.2f}° (standard deviations; {count} pictures, residual {residual:.2f} px)."
+    )
+    grade = Grade.GOOD if position <= _GOOD and count >= 8 else Grade.USABLE
+    if count < 8:
+        verdict += " Ten pictures or more would make it better."
+    if problems:
+        verdict += f" {len(problems)} of {count + len(problems)} pictures could not be used."
+    views = [(f"sample {s.index}", s.pixels, e, True) for s, e in zip(stations, best.errors, strict=True)]
+    return HandEye(
+        mounting=mounting,
+        pose=Pose.from_matrix(best.mount),
+        target=Pose.from_matrix(best.target),
+        residual=residual,
+        samples=errors,
+        methods=methods,
+        covariance=[[float(value) for value in row] for row in covariance],
+        position_deviation=position,
+        orientation_deviation=orientation,
+        grade=grade,
+        verdict=verdict,
+        picture=error_picture((lens.width, lens.height), views, verdict.split(" (")[0] + "."),
+    )

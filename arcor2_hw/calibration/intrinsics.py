@@ -1,10 +1,57 @@
 """A camera's intrinsics and distortion, from pictures of a ChArUco board."""
 
+import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
 
-from arcor2_hw.calibration.camera_results import Intrinsics, IntrinsicsOptions
+import cv2
+import numpy as np
+
+from arcor2_hw.calibration.boards import board_of, seen_of_board
+from arcor2_hw.calibration.camera_results import Intrinsics, IntrinsicsOptions, ViewError
+from arcor2_hw.calibration.drawing import error_picture
 from arcor2_hw.calibration.layout import CharucoBoard
-from arcor2_hw.calibration.pictures import Picture
+from arcor2_hw.calibration.lens import Array
+from arcor2_hw.calibration.markers import detect
+from arcor2_hw.calibration.pictures import Grey, Picture, one_by_one, sharpness_of
+from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
+from arcor2_hw.calibration.results import Grade
+from arcor2_hw.data.camera import CameraParameters
+from arcor2_hw.exceptions import InvalidData
+
+MOST_PICTURES: Final = 300
+_FLAGS: Final = {
+    4: cv2.CALIB_FIX_K3,
+    5: 0,
+    8: cv2.CALIB_RATIONAL_MODEL,
+    12: cv2.CALIB_RATIONAL_MODEL | cv2.CALIB_THIN_PRISM_MODEL,
+}
+_FIELDS: Final = (8, 6)
+"""Columns and rows of the fields in which corners are counted."""
+_OUTLIER: Final = 3.0
+"""How many times the median of all views' errors a view's may be."""
+_LEAST_OUTLIER: Final = 0.5
+"""px, that a view's error may be in any case."""
+_GOOD: Final = 0.0007
+"""Deviation of the focal length, as a part of it, up to which a calibration is good."""
+
+
+@dataclass(frozen=True, eq=False)
+class _View:
+    index: int
+    points: Array
+    pixels: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    matrix: Array
+    coefficients: Array
+    deviations: Array
+    errors: list[Array]
+    normals: Array
+    """Directions of the board's normal in the camera's frame, n × 3."""
 
 
 def find_intrinsics(
@@ -23,8 +70,199 @@ def find_intrinsics(
 
     Raises:
         InvalidPicture: as find_camera_pose; pictures of different sizes.
-        InvalidData: a board that cannot be.
+        InvalidData: a board that cannot be; no pictures, or more than MOST_PICTURES.
         CalibrationRefused: too few points (in too few pictures, or in too little of the picture); degenerate (the
             board is seen from one direction only); implausible (the errors are large: another board, a bent one).
     """
-    raise NotImplementedError
+    options = options or IntrinsicsOptions()
+    if not 1 <= len(pictures) <= MOST_PICTURES:
+        raise InvalidData(f"one to {MOST_PICTURES} pictures are needed, not {len(pictures)}")
+    made = board_of(board)
+    size = (0, 0)
+    views: list[_View] = []
+    problems: dict[int, str] = {}
+    for index, grey in enumerate(one_by_one(pictures)):
+        size = grey.shape[1], grey.shape[0]
+        points, pixels = seen_of_board(grey, board, made, detect(grey, board.dictionary))
+        if len(points):
+            views.append(_View(index, points, pixels))
+        else:
+            problems[index] = _why_not(grey, options)
+        if progress is not None:
+            progress(index + 1, len(pictures))
+    _check_enough(views, problems, size, options)
+    solved = _solve(views, size, options)
+    while (outlier := _outlier(solved)) is not None and len(views) > options.fewest_views:
+        residual = _root_mean_square(solved.errors[outlier])
+        problems[views[outlier].index] = f"its corners are off by {residual:.1f} px: moved, bent or blurred"
+        views = [view for i, view in enumerate(views) if i != outlier]
+        solved = _solve(views, size, options)
+    _check_enough(views, problems, size, options)
+    return _result(views, solved, problems, size, options, len(pictures))
+
+
+def _why_not(grey: Grey, options: IntrinsicsOptions) -> str:
+    if sharpness_of(grey) < options.blur_threshold:
+        return "the board is not in sight, or the picture is blurred"
+    return "the board is not in sight, or too little of it, or too small"
+
+
+def _check_enough(
+    views: list[_View], problems: dict[int, str], size: tuple[int, int], options: IntrinsicsOptions
+) -> None:
+    """Raise CalibrationRefused for too few views, or too little of the picture."""
+    if len(views) < options.fewest_views:
+        if not views:
+            reason, text = Reason.NO_MARKER, "The board is in none of the pictures: is it the one that was described?"
+        else:
+            reason = Reason.TOO_FEW_POINTS
+            text = f"The board is seen well in {len(views)} pictures only; {options.fewest_views} are the least."
+        first = next((f"picture {index}: {problem}" for index, problem in problems.items()), "")
+        raise CalibrationRefused(text, first, reason)
+    covered = coverage_of([view.pixels for view in views], size)
+    if covered < options.smallest_coverage:
+        raise CalibrationRefused(
+            f"The board was in {covered:.0%} of the picture only; {options.smallest_coverage:.0%} are the least. "
+            "Hold it into the corners, too.",
+            reason=Reason.TOO_FEW_POINTS,
+        )
+
+
+def coverage_of(pixels: Sequence[Array], size: tuple[int, int]) -> float:
+    """Give the part of a picture's fields in which there is a corner."""
+    columns, rows = _FIELDS
+    together = np.concatenate(pixels) / size * _FIELDS
+    fields = {(int(x), int(y)) for x, y in together if 0 <= x < columns and 0 <= y < rows}
+    return len(fields) / (columns * rows)
+
+
+def _solve(views: list[_View], size: tuple[int, int], options: IntrinsicsOptions) -> _Solved:
+    """Find the intrinsics that explain the views best."""
+    points: Any = [view.points.astype(np.float32).reshape(-1, 1, 3) for view in views]
+    pixels: Any = [view.pixels.astype(np.float32).reshape(-1, 1, 2) for view in views]
+    start: Any = np.eye(3)
+    try:
+        _, matrix, coefficients, turns, places, deviations, _, _ = cv2.calibrateCameraExtended(
+            points, pixels, size, start, np.zeros(5), flags=_FLAGS[options.coefficients]
+        )
+    except cv2.error as error:
+        raise CalibrationRefused(
+            "The pictures determine no lens: are they all of the board, and from different directions?",
+            str(error).strip(),
+            Reason.DEGENERATE,
+        ) from error
+    numbers = np.ravel(coefficients)[: options.coefficients].astype(np.float64)
+    if not (np.all(np.isfinite(matrix)) and np.all(np.isfinite(numbers))):
+        raise CalibrationRefused("The search for the lens did not converge.", reason=Reason.NOT_CONVERGED)
+    errors, normals = [], []
+    for view, turn, place in zip(views, turns, places, strict=True):
+        expected: Any = cv2.projectPoints(view.points, turn, place, matrix, numbers)[0]
+        errors.append(np.asarray(expected, dtype=np.float64).reshape(-1, 2) - view.pixels)
+        normals.append(np.asarray(cv2.Rodrigues(turn)[0], dtype=np.float64)[:, 2])
+    return _Solved(
+        np.asarray(matrix, dtype=np.float64),
+        numbers,
+        np.ravel(deviations)[:4].astype(np.float64),
+        errors,
+        np.stack(normals),
+    )
+
+
+def _outlier(solved: _Solved) -> int | None:
+    """Give the view that fits far worse than the others."""
+    residuals = [_root_mean_square(each) for each in solved.errors]
+    worst = int(np.argmax(residuals))
+    return worst if residuals[worst] > max(_OUTLIER * float(np.median(residuals)), _LEAST_OUTLIER) else None
+
+
+def _root_mean_square(errors: Array) -> float:
+    return float(np.sqrt(np.mean(np.sum(errors**2, axis=1))))
+
+
+def _tilt_between(normals: Array) -> float:
+    """Give the largest angle between two directions from which the board was seen, rad."""
+    return float(np.arccos(np.clip(normals @ normals.T, -1.0, 1.0).min()))
+
+
+def _result(
+    views: list[_View],
+    solved: _Solved,
+    problems: dict[int, str],
+    size: tuple[int, int],
+    options: IntrinsicsOptions,
+    pictures: int,
+) -> Intrinsics:
+    """Give what was found with its errors in words, or refuse it."""
+    tilt = _tilt_between(solved.normals)
+    if tilt < options.smallest_tilt:
+        raise CalibrationRefused(
+            f"The board is seen from one direction only, within {math.degrees(tilt):.0f}°: the focal length and the "
+            "distance cannot be told apart. Tilt it, by 30° and more, to all sides.",
+            f"at least {math.degrees(options.smallest_tilt):.0f}°",
+            Reason.DEGENERATE,
+        )
+    residual = _root_mean_square(np.concatenate(solved.errors))
+    if residual > options.largest_residual:
+        raise CalibrationRefused(
+            f"The corners are off by {residual:.1f} px: is it another board, is it bent, or does the lens need a model "
+            "with more coefficients?",
+            f"residual {residual:.2f} px, at most {options.largest_residual}",
+            Reason.IMPLAUSIBLE,
+        )
+    fx, fy, cx, cy = (float(solved.matrix[at]) for at in ((0, 0), (1, 1), (0, 2), (1, 2)))
+    width, height = size
+    if not (0.25 < cx / width < 0.75 and 0.25 < cy / height < 0.75 and fx > 0 and 0.5 < fx / fy < 2.0):
+        raise CalibrationRefused(
+            "The lens that fits the pictures cannot be: its axis is far from their middle. More pictures, tilted to "
+            "all sides, are needed.",
+            f"fx {fx:.1f}, fy {fy:.1f}, cx {cx:.1f}, cy {cy:.1f}",
+            Reason.IMPLAUSIBLE,
+        )
+    focal = float(max(solved.deviations[0] / fx, solved.deviations[1] / fy))
+    centre = float(max(solved.deviations[2:4]))
+    covered = coverage_of([view.pixels for view in views], size)
+    errors = [
+        ViewError(view.index, len(left), _root_mean_square(left), float(np.linalg.norm(left, axis=1).max()))
+        for view, left in zip(views, solved.errors, strict=True)
+    ]
+    errors += [ViewError(index, 0, 0.0, 0.0, used=False, problem=problem) for index, problem in problems.items()]
+    errors.sort(key=lambda each: each.view)
+    grade, verdict = _verdict(len(views), pictures, residual, focal * fx, focal, centre, covered)
+    return Intrinsics(
+        parameters=CameraParameters(fx, fy, cx, cy, [float(k) for k in solved.coefficients]),
+        width=width,
+        height=height,
+        residual=residual,
+        deviations=[float(value) for value in solved.deviations],
+        focal_deviation=focal,
+        centre_deviation=centre,
+        coverage=covered,
+        views=errors,
+        grade=grade,
+        verdict=verdict,
+        picture=error_picture(
+            size,
+            [(f"picture {v.index}", v.pixels, e, True) for v, e in zip(views, solved.errors, strict=True)],
+            f"{len(views)} pictures, r.m.s. {residual:.2f} px, corners in {covered:.0%} of the picture",
+        ),
+    )
+
+
+def _verdict(
+    used: int, pictures: int, residual: float, focal_px: float, focal: float, centre: float, covered: float
+) -> tuple[Grade, str]:
+    """Say how good intrinsics are, and what would make them better."""
+    text = (
+        f"The focal length is known to {focal_px:.1f} px and the middle of the picture to {centre:.1f} px (standard "
+        f"deviations, {used} of {pictures} pictures, residual {residual:.2f} px, corners in {covered:.0%} of it)."
+    )
+    grade = Grade.GOOD
+    if focal > _GOOD:
+        text += " More pictures of a tilted board would make it better."
+        grade = Grade.USABLE
+    if covered < 0.7:
+        text += " Some of the picture's edge was never covered; there the lens is guessed."
+        grade = Grade.USABLE
+    if used < pictures:
+        text += f" {pictures - used} {'pictures were' if pictures - used > 1 else 'picture was'} left out."
+    return grade, text

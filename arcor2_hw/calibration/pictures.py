@@ -2,6 +2,7 @@
 
 import io
 import warnings
+from collections.abc import Iterable, Iterator
 from typing import Final
 
 import cv2
@@ -72,16 +73,18 @@ def grey_of(picture: Picture, name: str = "the picture") -> Grey:
     return np.asarray(grey, dtype=np.uint8)
 
 
-def same_size(pictures: list[Grey]) -> tuple[int, int]:
-    """Give width and height of pictures. Raises InvalidPicture when they differ."""
-    height, width = pictures[0].shape
+def one_by_one(pictures: Iterable[Picture]) -> Iterator[Grey]:
+    """Give the grey values of pictures, all of one size. Raises InvalidPicture, naming the picture."""
+    first: tuple[int, ...] = ()
     for index, each in enumerate(pictures):
-        if each.shape != (height, width):
+        grey = grey_of(each, f"picture {index}")
+        first = first or grey.shape
+        if grey.shape != first:
             raise InvalidPicture(
-                f"picture {index} is {each.shape[1]} × {each.shape[0]}, the first one {width} × {height}: "
+                f"picture {index} is {grey.shape[1]} × {grey.shape[0]}, the first one {first[1]} × {first[0]}: "
                 "the pictures have to be of one camera in one mode"
             )
-    return width, height
+        yield grey
 
 
 def sharpness_of(grey: Grey) -> float:

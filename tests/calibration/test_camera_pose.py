@@ -166,7 +166,7 @@ def test_a_board_gives_the_pose() -> None:
     board = CharucoBoard(7, 5, 0.04, 0.03, pose=Pose.from_matrix(flat(0.02, 0.01, 0.3)))
     camera = rendering.looking_at(np.array([0.1, -0.25, 0.35]), ORIGIN, 0.2)
     plate = rendering.charuco(7, 5, 0.005, flat(0.02, 0.01, 0.3))
-    grey = rendering.render(LENS, camera, [background(), plate], np.random.default_rng(3))
+    grey = rendering.render(LENS, camera, [background(), plate], np.random.default_rng(3), subpixels=2)
     found = find_camera_pose([grey], GIVEN, Layout(boards=[board]))
     assert off(found, camera)[0] < 1.0
     assert found.markers[0].name == "board 0"
