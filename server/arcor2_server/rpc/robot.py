@@ -37,6 +37,8 @@ from arcor2_hw.data.rpc import (
     StepWhat,
     StopRobotArgs,
 )
+from arcor2_hw.data.scene import SceneObject
+from arcor2_server import solving
 from arcor2_server.cell.motion import (
     Told,
     move,
@@ -46,6 +48,7 @@ from arcor2_server.cell.motion import (
     require_speed,
 )
 from arcor2_server.cell.online import OnlineCell
+from arcor2_server.robot_models import model_of_type
 from arcor2_server.rpc.editing import optional
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
 
@@ -130,9 +133,24 @@ async def register_for_robot_event(context: Context, args: RegisterForRobotEvent
 
 @rpc("InverseKinematics")
 async def inverse_kinematics(context: Context, args: InverseKinematicsArgs) -> list[Joint]:
-    """Give joints that reach a pose."""
-    async with _reading(context, args.robot_id):
-        return await solve_inverse(context, args)
+    """Give joints that reach a pose: as the robot computes them, else by its model, for which nothing need run."""
+    async with _modelled(context, args.robot_id, args.arm_id) as robot:
+        if solving.solves(context.services, robot, "inverse_kinematics"):
+            return await solve_inverse(context, args)
+        return await solving.inverse(context.services, robot, args)
+
+
+@asynccontextmanager
+async def _modelled(context: Context, robot_id: str, arm_id: str | Unset) -> AsyncIterator[SceneObject]:
+    """Hold the robot's read lock meanwhile; it is a robot, and has a model where it cannot be asked itself."""
+    services = context.services
+    services.session.require_scene_open()
+    async with services.locks.read(context.user, robot_id):
+        robot = services.cell.robot(robot_id)
+        if model_of_type(services, robot.type) is None:
+            services.cell.require_online()
+        services.cell.arm(robot_id, optional(arm_id))
+        yield robot
 
 
 async def solve_inverse(context: Context, args: InverseKinematicsArgs) -> list[Joint]:
@@ -153,10 +171,13 @@ async def solve_inverse(context: Context, args: InverseKinematicsArgs) -> list[J
 
 @rpc("ForwardKinematics")
 async def forward_kinematics(context: Context, args: ForwardKinematicsArgs) -> Pose:
-    """Give the pose that joints lead to."""
-    async with _reading(context, args.robot_id) as cell:
+    """Give the pose that joints lead to: as the robot computes it, else by its model, for which nothing need run."""
+    async with _modelled(context, args.robot_id, args.arm_id) as robot:
+        services = context.services
+        if not solving.solves(services, robot, "forward_kinematics"):
+            return await solving.forward(services, robot, args)
+        cell = services.cell
         arguments: dict[str, Any] = cell.arm(args.robot_id, optional(args.arm_id))
-        require_feature(context.services, args.robot_id, "forward_kinematics")
         arguments |= {"end_effector_id": args.end_effector_id, "joints": args.joints}
         pose: Pose = await cell.ask(Pose, args.robot_id, "forward_kinematics", arguments)
         return pose

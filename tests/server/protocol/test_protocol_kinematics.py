@@ -1,0 +1,121 @@
+"""Inverse and forward kinematics from a robot's model: offline, and where the robot computes none itself."""
+
+import math
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+import pytest_asyncio
+
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.object_type import Box, ObjectModel, ObjectTypeSource
+from tests.server.protocol.devices import PART
+from tests.server.protocol.stage import Actor, Stage, open_stage, refused
+
+pytestmark = pytest.mark.asyncio(loop_scope="module")
+
+BASE = Pose(Position(0.1, 0.2, 0.3), Orientation(0, 0, math.sin(0.3), math.cos(0.3)))
+TARGET = BASE * Pose(Position(0.4, 0.2, 0.3), Orientation(1, 0, 0, 0))
+CRATE = PART.replace("class Part", "class Crate")
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def stage(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Stage]:
+    directory: Path = tmp_path_factory.mktemp("kinematics")
+    async with open_stage(directory, "Arm", "DumbArm", "TwoArms") as opened:
+        crate = ObjectModel.of(Box("Crate", 0.3, 0.3, 0.3))
+        await opened.services.types.add(ObjectTypeSource("Crate", CRATE.lstrip(), model=crate))
+        alice = await opened.person("alice")
+        await opened.place(alice, arm="Arm", dumb="DumbArm", two="TwoArms")
+        await add(alice, opened, "ur", "UR5e", BASE, host="127.0.0.99")
+        await solve(alice, opened.ids["ur"])  # the worker comes up
+        opened.alice = alice  # type: ignore[attr-defined]
+        yield opened
+
+
+@pytest.fixture
+def alice(stage: Stage) -> Actor:
+    actor: Actor = stage.alice  # type: ignore[attr-defined]
+    return actor
+
+
+async def add(person: Actor, stage: Stage, name: str, kind: str, pose: Pose, **settings: Any) -> str:
+    parameters = [
+        {
+            "name": key,
+            "type": "string" if isinstance(value, str) else "double",
+            "value": msgspec.json.encode(value).decode(),
+        }
+        for key, value in settings.items()
+    ]
+    await person.ask("AddObjectToScene", name=name, type=kind, pose=msgspec.to_builtins(pose), parameters=parameters)
+    stage.ids |= {obj.name: obj.id for obj in stage.services.session.require_scene().objects}
+    return stage.ids[name]
+
+
+async def solve(alice: Actor, robot: str, pose: Pose = TARGET, **more: Any) -> list[dict[str, Any]]:
+    args = {"robot_id": robot, "end_effector_id": "tcp", "pose": msgspec.to_builtins(pose)} | more
+    found: list[dict[str, Any]] = await alice.ask("InverseKinematics", **args)
+    return found
+
+
+async def forward(alice: Actor, robot: str, joints: Any) -> Pose:
+    found = await alice.ask("ForwardKinematics", robot_id=robot, end_effector_id="tcp", joints=joints)
+    return msgspec.convert(found, Pose)
+
+
+async def test_offline_joints_come_from_the_model(stage: Stage, alice: Actor) -> None:
+    robot = stage.ids["ur"]
+    assert not stage.services.cell.online
+    joints = await solve(alice, robot)
+    there = await forward(alice, robot, joints)
+    assert there.position.distance_to(TARGET.position) < 1e-6
+    assert there.orientation.angle_to(TARGET.orientation) < 1e-4
+    start = [joint | {"value": joint["value"] - 0.02} for joint in joints]
+    near = await solve(alice, robot, start_joints=start)
+    assert [joint["value"] for joint in near] == pytest.approx([joint["value"] for joint in joints], abs=1e-4)
+
+
+async def test_what_stands_in_the_scene_is_in_the_way(stage: Stage, alice: Actor) -> None:
+    robot = stage.ids["ur"]
+    crate = await add(alice, stage, "crate", "Crate", Pose(TARGET.position))
+    args = {"robot_id": robot, "end_effector_id": "tcp", "pose": msgspec.to_builtins(TARGET)}
+    text = await refused(alice, "InverseKinematics", **args)
+    assert "only in collision" in text
+    assert crate in text
+    joints = await solve(alice, robot, avoid_collisions=False)
+    await alice.ask("RemoveFromScene", id=crate)
+    assert await solve(alice, robot) == joints
+
+
+async def test_what_cannot_be_is_refused(stage: Stage, alice: Actor) -> None:
+    robot = stage.ids["ur"]
+    pose = msgspec.to_builtins(TARGET)
+    far = msgspec.to_builtins(Pose(Position(5, 0, 0)))
+    assert "cannot reach" in await refused(alice, "InverseKinematics", robot_id=robot, end_effector_id="tcp", pose=far)
+    assert "one arm" in await refused(
+        alice, "InverseKinematics", robot_id=robot, end_effector_id="tcp", pose=pose, arm_id="left"
+    )
+    joints = [{"name": "elbow", "value": 1.0}]
+    text = await refused(alice, "ForwardKinematics", robot_id=robot, end_effector_id="tcp", joints=joints)
+    assert "missing" in text
+    for name in ("two", "dumb"):
+        # Without a model the device is needed.
+        args = {"robot_id": stage.ids[name], "end_effector_id": "tip", "pose": pose}
+        assert "offline" in await refused(alice, "InverseKinematics", **args)
+    # An asset that is no model of a robot says so.
+    args = {"robot_id": stage.ids["arm"], "end_effector_id": "tip", "pose": pose}
+    assert "arm.zip" in await refused(alice, "InverseKinematics", **args)
+    stranger = await stage.person()
+    assert "not logged in" in await refused(stranger, "InverseKinematics", **args)
+
+
+async def test_settings_of_the_object_shape_its_model(stage: Stage, alice: Actor) -> None:
+    short = await forward(alice, stage.ids["ur"], await solve(alice, stage.ids["ur"]))
+    joints = await solve(alice, stage.ids["ur"])
+    longer = await add(alice, stage, "longer", "UR5e", BASE, host="127.0.0.98", tcp_z=0.1)
+    there = await forward(alice, longer, joints)
+    assert there.position.distance_to(short.position) == pytest.approx(0.1, abs=1e-6)
+    await alice.ask("RemoveFromScene", id=longer)
