@@ -1,6 +1,7 @@
 """`arcor2-hw package`: list packages, and run one while following what it does."""
 
 import sys
+from datetime import datetime
 from typing import Annotated
 
 from cyclopts import App, Parameter
@@ -8,13 +9,14 @@ from rich.console import Console
 from rich.table import Table
 
 from arcor2_hw.client import RequestFailed
-from arcor2_hw.data.base import Unset
+from arcor2_hw.data.base import UNSET, Unset
+from arcor2_hw.data.editor import Run
 from arcor2_hw.data.package import PackageStateEnum, PackageSummary
 from arcor2_hw.exceptions import ConnectionLost, NotFound
 from arcor2_server.cli.reaching import HERE, Failed, Server, run
 from arcor2_server.cli.status import ExitStatus
 
-app = App(name="package", help="List the packages of a running server, or run one.")
+app = App(name="package", help="List the packages of a running server, run one, or show what was run.")
 
 
 @app.command(name="list")
@@ -40,6 +42,47 @@ def _show(summaries: list[PackageSummary]) -> None:
             "never" if isinstance(meta.executed, Unset) else meta.executed,
         )
     Console().print(table if summaries else "There are no packages: build one from a project first.")
+
+
+@app.command(name="runs")
+def list_runs(
+    package: Annotated[str, Parameter(help="Id of a package: only its runs.")] = "",
+    *,
+    limit: Annotated[int, Parameter(help="How many, the newest ones.")] = 20,
+    server: Server = HERE,
+) -> int:
+    """Show who ran what, and how it ended."""
+
+    async def work() -> None:
+        async with server.client() as client:
+            told = await client.list_runs(limit=limit, package_id=package or UNSET)
+            _show_runs(told.runs)
+
+    return run("package runs", work)
+
+
+def _show_runs(runs: list[Run]) -> None:
+    table = Table("run", "package", "started", "by", "end", "after", "last action", "error", box=None, pad_edge=False)
+    for one in runs:
+        ended, by, last, error = one.ended, one.started_by, one.last_action, one.error
+        by = "" if isinstance(by, Unset) else by
+        stopped = "" if isinstance(one.stopped_by, Unset) else f" by {one.stopped_by}"
+        seconds = "" if isinstance(ended, Unset) else f"{_seconds(one.started, ended):.1f} s"
+        table.add_row(
+            str(one.number),
+            one.package_name,
+            one.started,
+            by,
+            f"{one.end}{stopped}",
+            seconds,
+            "" if isinstance(last, Unset) else last.name or last.id,
+            "" if isinstance(error, Unset) else error,
+        )
+    Console().print(table if runs else "Nothing was run yet.")
+
+
+def _seconds(start: str, end: str) -> float:
+    return (datetime.fromisoformat(end) - datetime.fromisoformat(start)).total_seconds()
 
 
 @app.command(name="run")

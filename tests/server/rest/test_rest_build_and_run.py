@@ -2,6 +2,7 @@
 
 import asyncio
 import io
+import os
 import time
 import zipfile
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.server.core.serving import ServerProcess, Talker, running, talking
+from tests.server.core.serving import COMMAND, ServerProcess, Talker, running, talking
 from tests.server.rest.asking import granted, refused
 
 COUNT = """
@@ -247,6 +248,24 @@ async def test_a_program_is_run_paused_stepped_and_stopped(server: ServerProcess
         assert older[0]["actions"] >= 1
         assert granted(await http.get("/api/runs", params={"projectId": "pro_none"})) == []
         refused(await http.get("/api/runs", params={"limit": 501}), 400, "Argument", "limit")
+    newest, older, *_ = (await package_command(server, "runs", "pkg_r"))[1:]
+    assert "failed" in newest
+    assert "acp_nowhere" in newest
+    assert "stopped" in older
+    assert await package_command(server, "runs", "pkg_none") == ["Nothing was run yet."]
+
+
+async def package_command(server: ServerProcess, *arguments: str) -> list[str]:
+    """Give what `arcor2-hw package` prints, in a window that is wide enough."""
+    process = await asyncio.create_subprocess_exec(
+        *(*COMMAND, "package", *arguments, "--url", server.url),
+        stdout=asyncio.subprocess.PIPE,
+        env=os.environ | {"COLUMNS": "400"},
+    )
+    async with asyncio.timeout(30):
+        output, _ = await process.communicate()
+    assert process.returncode == 0
+    return output.decode().splitlines()
 
 
 async def test_an_upload_of_a_hundred_megabytes_does_not_stop_the_others(server: ServerProcess) -> None:
