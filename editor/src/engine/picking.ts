@@ -16,6 +16,7 @@ export interface Hit {
 const AROUND: [number, number][] = [0, 1, 2, 3, 4, 5, 6, 7].map((n) => [Math.cos((n * Math.PI) / 4), Math.sin((n * Math.PI) / 4)]);
 
 const caster = new Raycaster();
+caster.params.Line.threshold = 0.002; // m; outlines and axes would be hit a metre beside them
 const place = new Vector2();
 
 export interface Size {

@@ -73,10 +73,12 @@ export class RobotThing extends Thing<RobotItem> {
     this.placeTips();
     const drawn = this.context.telemetry.interpolated(this.item.id);
     if (!drawn || !this.robot) return false;
+    const first = this.shown.size === 0;
     for (const [name, value] of drawn.joints) {
       this.shown.set(name, value);
       this.robot.joints[name]?.setJointValue(value);
     }
+    if (first) this.paint();
     return !drawn.settled;
   }
 
@@ -108,8 +110,10 @@ export class RobotThing extends Thing<RobotItem> {
     const { palette } = this.context;
     const { selected, trouble, faint } = this.item;
     this.material.color.copy(selected ? palette.selected : trouble ? palette.trouble : this.stale ? palette.locked : palette.robot);
-    this.material.transparent = faint > 0 || this.stale;
-    this.material.opacity = (1 - faint) * (this.stale ? 0.55 : 1);
+    // Where its joints are is not known: what is shown is only where it stands.
+    const vague = this.stale || (this.robot !== null && this.shown.size === 0);
+    this.material.transparent = faint > 0 || vague;
+    this.material.opacity = (1 - faint) * (vague ? 0.5 : 1);
   }
 
   private placeTips(): void {
@@ -158,6 +162,7 @@ export class RobotThing extends Thing<RobotItem> {
     this.shown.clear();
     this.body.add(robot ?? this.standIn());
     ownedBy(this.body, this.item.id);
+    this.paint();
     this.context.invalidate();
   }
 

@@ -4,10 +4,9 @@ import { useState } from "react";
 import { Input, Label, SearchField, Tab, TabList, TabPanel, Tabs } from "react-aria-components";
 import * as documents from "../../commands/documents";
 import { barred } from "../../commands/asking";
-import { leave } from "../../session/session";
 import { type State } from "../../store/state";
 import { useEditor } from "../../store/store";
-import { AskName, Button, More, Waiting } from "../kit/kit";
+import { AskName, Button, Waiting } from "../kit/kit";
 import { People } from "../people/People";
 import { Settings } from "../settings/Settings";
 import { Notices } from "../notices/Notices";
@@ -39,7 +38,6 @@ export function Home() {
         <h1>Workplace</h1>
         <People />
         <Settings />
-        <More label="More" choices={[{ id: "leave", label: "Leave", icon: "close", act: leave }]} />
       </header>
       <main>
         <Tabs selectedKey={tab} onSelectionChange={(key) => setTab(key as TabName)}>

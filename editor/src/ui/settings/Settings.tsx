@@ -1,9 +1,10 @@
-/** How the screen looks: on this device only. */
+/** How the screen looks, on this device only; and the way out. */
 
 import { useEffect } from "react";
 import { remember, remembered } from "../../session/memory";
 import type { Ui } from "../../store/state";
 import { setUi, useEditor } from "../../store/store";
+import { leave } from "../../session/session";
 import { type Choice, More } from "../kit/kit";
 
 const THEMES: Record<Ui["theme"], string> = { system: "Colours as the device has them", light: "Light", dark: "Dark" };
@@ -33,6 +34,7 @@ export function useScreenSettings(): void {
 
 export function Settings() {
   const { theme, leftHanded } = useEditor((state) => state.ui);
+  const user = useEditor((state) => state.connection.user);
   const choices: Choice[] = [
     ...(Object.keys(THEMES) as Ui["theme"][]).map((each) => ({
       id: each,
@@ -51,6 +53,7 @@ export function Settings() {
         remember("hand", leftHanded ? "" : "left");
       },
     },
+    { id: "leave", label: `Leave (you are ${user})`, icon: "close", act: leave },
   ];
-  return <More label="Screen settings" icon="settings" choices={choices} />;
+  return <More label="Settings" icon="settings" choices={choices} />;
 }

@@ -4,10 +4,9 @@ import { useState } from "react";
 import { barred } from "../../commands/asking";
 import * as documents from "../../commands/documents";
 import { goOffline, goOnline } from "../../commands/operation";
-import { leave } from "../../session/session";
 import { isRunning } from "../../store/selectors";
 import { tell, useEditor } from "../../store/store";
-import { Button, Confirm, More } from "../kit/kit";
+import { Button, Confirm } from "../kit/kit";
 import { People } from "../people/People";
 import { Settings } from "../settings/Settings";
 
@@ -49,7 +48,6 @@ export function TopBar() {
       <LiveSwitch />
       <People />
       <Settings />
-      <More label="More" choices={[{ id: "leave", label: "Leave", icon: "close", act: leave }]} />
       {asking && (
         <Confirm title="Close without saving?" yes="Throw the changes away" onClose={() => setAsking(false)} onYes={() => void documents.close(true)}>
           <p>What was changed since it was saved would be lost, also what others have changed.</p>

@@ -1,0 +1,201 @@
+"""Somebody joins, opens the project, sees the robot move, stops it, selects things: in Chromium, on fakes."""
+
+import asyncio
+import math
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+import pytest_asyncio
+from playwright.async_api import Browser
+
+from arcor2_hw.client import Client
+from arcor2_hw.data import rpc
+from arcor2_hw.data.events import SceneStateEnum
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.project import Project
+from arcor2_hw.data.scene import Scene
+from tests.e2e.harness import Cell, scene_state, until
+from tests.editor.screen import VIEWPORTS, Screen, screen_of
+
+pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(180)]
+
+SLOW = 0.05
+"""Fraction of the robot's speed at which a motion of 0.3 m lasts long enough to be stopped."""
+
+
+@dataclass
+class Place:
+    cell: Cell
+    client: Client
+    scene: Scene
+    project: Project
+    robot: str
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def place(cell: Cell) -> AsyncIterator[Place]:
+    """The project, saved and closed, and a second person who moves things from elsewhere."""
+    client = await cell.client("colleague")
+    scene, project = await cell.open(client)
+    await client.call("CloseProject")
+    robot = next(each.id for each in scene.objects if each.name == "robot")
+    yield Place(cell, client, scene, project, robot)
+
+
+@pytest_asyncio.fixture(loop_scope="module")
+async def closed(place: Place) -> AsyncIterator[Place]:
+    """Nothing is open, before and after."""
+    yield place
+    client = place.client
+    await client.call("StopScene") if await _is_online(client) else None
+    with_force = rpc.CloseProjectArgs(force=True)
+    await until(lambda: _granted(client, "CloseProject", with_force), "the project is closed")
+
+
+async def _is_online(client: Client) -> bool:
+    return await _granted(client, "StopScene", dry_run=True)
+
+
+async def _granted(client: Client, request: str, args: Any = None, **options: Any) -> bool:
+    try:
+        await client.call(request, args, **options)
+    except Exception:
+        return False
+    return True
+
+
+def apart(a: dict[str, Any], b: dict[str, Any]) -> float:
+    return math.dist(a["position"].values(), b["position"].values())
+
+
+async def tcp(screen: Screen, robot: str) -> dict[str, Any]:
+    await screen.until("id => window.__engine?.item(id)?.endEffectors.length > 0", robot)
+    pose: dict[str, Any] = (await screen.item(robot))["endEffectors"][0]
+    return pose
+
+
+async def goal(client: Client, robot: str, down: float) -> rpc.MoveToPoseArgs:
+    (tool,) = await client.call("GetEndEffectors", rpc.GetEndEffectorsArgs(robot))
+    now: Pose = await client.call("GetEndEffectorPose", rpc.GetEndEffectorPoseArgs(robot, tool))
+    now.position.z -= down
+    return rpc.MoveToPoseArgs(robot, tool, 1.0, now.position, now.orientation, safe=False)
+
+
+async def opened_and_online(screen: Screen, place: Place) -> None:
+    await screen.join("Eva")
+    await screen.press(f"Open {place.project.name}")
+    await screen.item(place.robot)
+    await screen.press("Go online")
+    await screen.page.get_by_role("button", name="Stop motion").wait_for()
+
+
+async def test_joins_opens_the_project_and_sees_the_robot_move(closed: Place, browser: Browser) -> None:
+    place, client = closed, closed.client
+    async with screen_of(browser, place.cell.url) as screen:
+        await screen.join("Eva")
+        await screen.sees("on PCB testing")
+        await screen.press(f"Open {place.project.name}")
+        shown = await screen.item(place.robot)
+        assert (shown["kind"], shown["name"], shown["endEffectors"]) == ("robot", "robot", [])
+        actions = [action for point in place.project.action_points for action in point.actions]
+        ids = set(await screen.page.evaluate("window.__engine.ids()"))
+        assert {action.id for action in actions} | {item.id for item in place.project.logic} <= ids
+        # A point is drawn where it is: relative to its parent, where it has one.
+        point = place.project.action_points[0]
+        drawn = (await screen.item(point.id))["pose"]["position"]
+        parent = next((each for each in place.scene.objects if each.id == point.parent), None)
+        expected = point.position if parent is None else (parent.pose * Pose(point.position)).position  # type: ignore[operator]
+        assert math.dist(drawn.values(), tuple(expected)) < 1e-6
+
+        await screen.press("Go online")
+        await screen.page.get_by_role("button", name="Stop motion").wait_for()
+        before = await tcp(screen, place.robot)
+        await client.call("MoveToPose", await goal(client, place.robot, 0.1))
+        await screen.until(
+            "([id, z]) => Math.abs(window.__engine.item(id).endEffectors[0].position.z - (z - 0.1)) < 0.001",
+            [place.robot, before["position"]["z"]],
+        )
+        moved = await tcp(screen, place.robot)
+        assert apart(before, moved) == pytest.approx(0.1, abs=0.002)
+
+        # Nothing moves any more: nothing is drawn.
+        await asyncio.sleep(0.5)
+        frames = await screen.frames()
+        await asyncio.sleep(1.5)
+        assert await screen.frames() == frames
+
+
+async def test_stop_motion_ends_a_motion_of_somebody_else(closed: Place, browser: Browser) -> None:
+    place, client = closed, closed.client
+    async with screen_of(browser, place.cell.url) as screen:
+        await opened_and_online(screen, place)
+        start = await tcp(screen, place.robot)
+        arguments = await goal(client, place.robot, 0.2)
+        await client.call("MoveToPose", rpc.MoveToPoseArgs(*_slowly(arguments), safe=False))
+        await screen.until(
+            "([id, z]) => window.__engine.item(id).endEffectors[0].position.z < z - 0.005",
+            [place.robot, start["position"]["z"]],
+        )
+        await screen.page.get_by_role("button", name="Stop motion").click()
+        ended = await client.next_event("RobotMoveToPose", timeout=10)
+        while ended.data.move_event_type.value == "start":
+            ended = await client.next_event("RobotMoveToPose", timeout=10)
+        rest = await client.call(
+            "GetEndEffectorPose", rpc.GetEndEffectorPoseArgs(place.robot, arguments.end_effector_id)
+        )
+        assert rest.position.z > start["position"]["z"] - 0.15, "it went on to the end"
+
+
+def _slowly(arguments: rpc.MoveToPoseArgs) -> tuple[Any, ...]:
+    return arguments.robot_id, arguments.end_effector_id, SLOW, arguments.position, arguments.orientation
+
+
+async def test_an_edit_of_somebody_else_is_seen_and_a_tap_selects(closed: Place, browser: Browser) -> None:
+    place, client = closed, closed.client
+    async with screen_of(browser, place.cell.url) as screen:
+        await screen.join("Eva")
+        await screen.press(f"Open {place.project.name}")
+        await screen.item(place.robot)
+        await client.call("AddActionPoint", rpc.AddActionPointArgs("lonely", Pose().position))
+        added = await client.next_event("ActionPointChanged", timeout=10)
+        new = added.data.id
+        assert (await screen.item(new))["pose"]["position"] == {"x": 0, "y": 0, "z": 0}
+        await screen.sees("not saved")
+        await client.call("WriteLock", rpc.WriteLockArgs(new))
+        await screen.until("id => window.__engine.item(id).badge === 'locked by colleague'", new)
+        lock = place.project.action_points[0].id
+        await screen.page.evaluate("id => window.__engine.focus(id)", lock)
+        await screen.tap(lock)
+        panel = screen.page.get_by_role("complementary")
+        await panel.get_by_role("heading", name=place.project.action_points[0].name).wait_for()
+        await client.call("WriteUnlock", rpc.WriteUnlockArgs(new))
+        await screen.until("id => window.__engine.item(id).badge === ''", new)
+
+
+@pytest.mark.parametrize("viewport", VIEWPORTS)
+async def test_nothing_is_too_small_covered_or_off_the_screen(closed: Place, browser: Browser, viewport: str) -> None:
+    dark = viewport in ("small tablet", "phone")
+    async with screen_of(browser, closed.cell.url, viewport, dark=dark, touch=viewport != "desktop") as screen:
+        await screen.page.goto(f"{screen.url}/?q=low")
+        await screen.page.get_by_label("Your name").wait_for()
+        assert await screen.faults() == []
+        await screen.picture(f"{viewport} join")
+        await screen.join("Eva")
+        await screen.sees("on PCB testing")
+        assert await screen.faults() == []
+        await screen.picture(f"{viewport} home")
+        await screen.press(f"Open {closed.project.name}")
+        await screen.item(closed.robot)
+        assert await screen.faults() == []
+        await screen.picture(f"{viewport} workplace")
+        for tool in ("Things", "Devices"):
+            await screen.page.get_by_role("navigation").get_by_role("button", name=tool).click()
+            assert await screen.faults() == []
+            await screen.picture(f"{viewport} {tool.lower()}")
+        await screen.press("Go online")
+        await screen.page.get_by_role("button", name="Stop motion").wait_for()
+        await scene_state(closed.client, SceneStateEnum.STARTED)
+        assert await screen.faults() == []
+        await screen.picture(f"{viewport} online")
