@@ -13,7 +13,7 @@ import msgspec
 
 from arcor2_hw.client.errors import AnswerLate, AnswerUnknown, EventsMissed, NotAdmitted, RequestFailed, refusal
 from arcor2_hw.client.requests import Requests
-from arcor2_hw.client.rest import Rest
+from arcor2_hw.client.rest import TOKEN_VARIABLE, Rest
 from arcor2_hw.client.stream import EventStream
 from arcor2_hw.client.wire import Message, Unanswered, Unsent, Wire
 from arcor2_hw.data.base import Unset
@@ -31,7 +31,6 @@ __all__ = ["Client", "RequestFailed"]
 
 ANSWER_TIMEOUT: Final = 30.0
 """Seconds to wait for an answer: what existing clients wait."""
-TOKEN_VARIABLE: Final = "ARCOR2_HW_TOKEN"  # noqa: S105 - the name of a variable, not a token
 FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
 """Seconds between attempts to connect again: doubled each time, and spread so that many clients don't come at once."""
 READING: Final = frozenset(

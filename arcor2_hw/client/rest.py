@@ -1,5 +1,6 @@
 """What a server offers over HTTP: saved documents, assets and packages, typed."""
 
+import os
 import re
 import ssl
 from functools import lru_cache
@@ -20,6 +21,7 @@ from arcor2_hw.data.scene import Scene, SceneObjectOverride
 from arcor2_hw.exceptions import ConnectionLost, DeviceTimeout, InvalidData
 
 T = TypeVar("T")
+TOKEN_VARIABLE: Final = "ARCOR2_HW_TOKEN"  # noqa: S105 - the name of a variable, not a token
 _HUMP: Final = re.compile(r"(?<=[a-z0-9])([A-Z])")
 _MODELS: Final = {kind.__name__.lower(): kind for kind in Models.__args__}
 
@@ -94,6 +96,8 @@ def _part(key: str) -> str:
 class Rest:
     """Requests over HTTP. Use it as `async with Rest(url) as rest`, or take `client.rest`.
 
+    url, token, tls, timeout: as of Client.
+
     Each raises RequestFailed (a class of its own for each kind of reason), ConnectionLost, DeviceTimeout, InvalidData
     for an answer of a wrong form. Nothing is repeated by itself.
     """
@@ -101,11 +105,13 @@ class Rest:
     def __init__(
         self, url: str, *, token: str | None = None, tls: ssl.SSLContext | None = None, timeout: float = 30.0
     ) -> None:
+        token = token or os.environ.get(TOKEN_VARIABLE) or None
         self._url = url.replace("ws://", "http://", 1).replace("wss://", "https://", 1).rstrip("/")
         self._http = httpx.AsyncClient(
             base_url=self._url,
             headers={} if token is None else {"Authorization": f"Bearer {token}"},
-            verify=True if tls is None else tls,
+            # Certificates take 30 ms to load, and are of no use on http.
+            verify=self._url.startswith("https:") if tls is None else tls,
             timeout=timeout,
         )
 

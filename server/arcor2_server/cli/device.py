@@ -1,18 +1,15 @@
 """`arcor2-hw device`: which devices can be used here, how those in operation are; and the integrator's commands."""
 
-import http.client
 import sys
-import urllib.error
-import urllib.request
-from typing import Annotated, Any, Final
+from typing import Any
 
-import msgspec
-from cyclopts import App, Parameter
+from cyclopts import App
 from rich.table import Table
 
 from arcor2_hw.analysis import Library, installed_types
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectTypeMeta
+from arcor2_server.cli.reaching import HERE, Server, run
 from arcor2_server.cli.status import ExitStatus
 from arcor2_server.cli.tables import console
 
@@ -22,9 +19,6 @@ app.command("arcor2_server.cli.device_new:new", name="new")
 app.command("arcor2_server.cli.device_scan:scan", name="scan")
 app.command("arcor2_server.cli.device_cell:export", name="export")
 app.command("arcor2_server.cli.device_cell:check", name="check")
-DEFAULT_URL: Final = "http://127.0.0.1:6789"
-TIMEOUT: Final = 5.0
-"""Seconds in which a server answers."""
 
 
 @app.command(name="list")
@@ -59,30 +53,25 @@ def _described(meta: ObjectTypeMeta) -> str:
 
 
 @app.command
-def status(*, url: Annotated[str, Parameter(help="Where the server listens.")] = DEFAULT_URL) -> int:
+def status(*, server: Server = HERE) -> int:
     """Show connection, health and alarms of the devices that a running server has in operation."""
-    try:
-        devices = _devices(url.replace("ws://", "http://", 1).rstrip("/"))
-    except (OSError, ValueError, http.client.HTTPException, msgspec.DecodeError) as error:
-        reason = getattr(error, "reason", None) or error
-        sys.stderr.write(f"arcor2-hw device status: {url}: {reason}\n")
-        return ExitStatus.NO_SERVER
+
+    async def work() -> None:
+        async with server.rest() as rest:
+            _show(await rest.request("GET", "/api/devices", list[dict[str, Any]]))
+
+    return run("device status", work)
+
+
+def _show(devices: list[dict[str, Any]]) -> None:
     if not devices:
         sys.stdout.write("No device is in operation: start a scene or run a package first.\n")
-        return ExitStatus.OK
+        return
     columns = sorted({key for device in devices for key in device})
     table = Table(*columns, box=None, pad_edge=False)
     for device in devices:
         table.add_row(*(_shown(device.get(column)) for column in columns))
     console().print(table)
-    return ExitStatus.OK
-
-
-def _devices(url: str) -> list[dict[str, Any]]:
-    if not url.startswith("http://"):
-        raise ValueError("this is no address of a server; it looks like http://127.0.0.1:6789")
-    with urllib.request.urlopen(f"{url}/api/devices", timeout=TIMEOUT) as answer:  # noqa: S310 - checked above
-        return msgspec.json.decode(answer.read(), type=list[dict[str, Any]])
 
 
 def _shown(value: Any) -> str:

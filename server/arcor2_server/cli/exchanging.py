@@ -55,8 +55,8 @@ def installed() -> list[SourceFile]:
     return [one.file for one in installed_types() if one.file is not None]
 
 
-def show_list(entries: list[Listed], what: str, as_json: bool) -> None:
-    """Show a list of documents."""
+def show_list(entries: list[Listed], nothing: str, as_json: bool) -> None:
+    """Show a list of documents; `nothing` says that there are none."""
     if as_json:
         print_json(entries)
         return
@@ -64,7 +64,7 @@ def show_list(entries: list[Listed], what: str, as_json: bool) -> None:
     for entry in sorted(entries, key=lambda one: one.name):
         about = "" if isinstance(entry.description, Unset) else escape(entry.description)
         table.add_row(escape(entry.name), entry.modified, entry.id, about)
-    out().print(table if entries else f"There are no {what}.")
+    out().print(table if entries else nothing)
 
 
 # ------------------------------------------------------------------------------------------------ files

@@ -83,10 +83,10 @@ def add(
             source = _read(file)
             chosen = _class_in(source, file, name)
             given[chosen] = SourceFile(chosen, module_name(chosen), source, str(file))
-        async with server.client() as client:
-            for one in await _in_order(given, client.rest):
+        async with server.rest() as rest:
+            for one in await _in_order(given, rest):
                 source = one.source if isinstance(one.source, str) else one.source.decode()
-                await client.rest.put_object_type(one.name, source)
+                await rest.put_object_type(one.name, source)
                 x.out().print(f"{one.name} added")
 
     return run("object-type add", work)
@@ -97,19 +97,19 @@ def list_types(*, as_json: x.Json = False, server: Server = HERE) -> int:
     """Show the object types that were brought into a server."""
 
     async def work() -> None:
-        async with server.client() as client:
-            x.show_list(await client.rest.object_types(), "object types that were brought in", as_json)
+        async with server.rest() as rest:
+            x.show_list(await rest.object_types(), "No object types were brought in.", as_json)
 
     return run("object-type list", work)
 
 
 @app.command
-def remove(name: str, *, server: Server = HERE) -> int:
+def remove(name: str, /, *, server: Server = HERE) -> int:
     """Take an object type out of a server."""
 
     async def work() -> None:
-        async with server.client() as client:
-            await client.rest.delete_object_type(name)
+        async with server.rest() as rest:
+            await rest.delete_object_type(name)
         x.out().print(f"{name} removed")
 
     return run("object-type remove", work)
@@ -138,6 +138,7 @@ def export(
 @app.command(name="import")
 def import_types(
     file: Annotated[Path, Parameter(help="What `arcor2-hw object-type export` wrote.")],
+    /,
     *,
     overwrite: x.Overwrite = None,
     dry_run: x.DryRun = False,
@@ -165,6 +166,7 @@ async def _one(source: Source, name: str) -> Archive:
 def diff(
     old: Annotated[str, Parameter(help="An export file, or the name of an object type of the server.")],
     new: Annotated[str, Parameter(help="Likewise: what it is compared with.")],
+    /,
     *,
     as_json: x.Json = False,
     server: Server = HERE,

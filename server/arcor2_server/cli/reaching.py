@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final
 
 from cyclopts import Parameter
 
-from arcor2_hw.client import Client, Forbidden, NotAdmitted
+from arcor2_hw.client import Client, Forbidden, NotAdmitted, Rest
 from arcor2_hw.exceptions import (
     Arcor2Error,
     Conflict,
@@ -48,13 +48,19 @@ class Server:
 
     def client(self) -> Client:
         """Make a client that gives up at the first loss. Raises Failed when the certificate cannot be used."""
-        tls = None
-        if self.ca is not None:
-            try:
-                tls = ssl.create_default_context(cafile=self.ca)
-            except OSError as error:  # ssl.SSLError is one
-                raise Failed(ExitStatus.CERTIFICATE_UNUSABLE, f"{self.ca} cannot be used: {error}") from error
-        return Client(self.url, token=self.token, tls=tls, reconnect=False)
+        return Client(self.url, token=self.token, tls=self._tls(), reconnect=False)
+
+    def rest(self) -> Rest:
+        """Make a client for HTTP alone. Raises Failed when the certificate cannot be used."""
+        return Rest(self.url, token=self.token, tls=self._tls())
+
+    def _tls(self) -> ssl.SSLContext | None:
+        if self.ca is None:
+            return None
+        try:
+            return ssl.create_default_context(cafile=self.ca)
+        except OSError as error:  # ssl.SSLError is one
+            raise Failed(ExitStatus.CERTIFICATE_UNUSABLE, f"{self.ca} cannot be used: {error}") from error
 
 
 HERE: Final = Server()

@@ -17,8 +17,8 @@ def list_scenes(*, as_json: x.Json = False, server: Server = HERE) -> int:
     """Show the saved scenes of a server."""
 
     async def work() -> None:
-        async with server.client() as client:
-            x.show_list(await client.rest.scenes(), "scenes", as_json)
+        async with server.rest() as rest:
+            x.show_list(await rest.scenes(), "There are no scenes.", as_json)
 
     return run("scene list", work)
 
@@ -26,6 +26,7 @@ def list_scenes(*, as_json: x.Json = False, server: Server = HERE) -> int:
 @app.command
 def export(
     name: Annotated[str, Parameter(help="Name of the scene, or its id.")],
+    /,
     *,
     output: x.Output = None,
     force: x.Force = False,
@@ -43,6 +44,7 @@ def export(
 @app.command(name="import")
 def import_scene(
     file: Annotated[Path, Parameter(help="What `arcor2-hw scene export` wrote.")],
+    /,
     *,
     overwrite: x.Overwrite = None,
     name: Annotated[str | None, Parameter(help="Bring it in as a copy under this name.")] = None,
@@ -67,6 +69,7 @@ def validate(*files: Annotated[Path, Parameter(help="Export files.")], as_json: 
 def diff(
     old: Annotated[str, Parameter(help="An export file, or the name or id of a scene of the server.")],
     new: Annotated[str, Parameter(help="Likewise: what it is compared with.")],
+    /,
     *,
     as_json: x.Json = False,
     server: Server = HERE,
