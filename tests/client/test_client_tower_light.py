@@ -92,7 +92,7 @@ async def test_the_light_follows_the_server_and_says_when_nobody_drives_it(tmp_p
             point = (await client.next_event("ActionPointChanged")).data.id
             last = "START"
             for name, of, parameters in (
-                ("wait", "time/sleep", [ActionParameter("seconds", "double", "3.0")]),
+                ("wait", "time/sleep", [ActionParameter("seconds", "double", "2.0")]),
                 ("fail", "breaker/fail", []),
             ):
                 thing, _, method = of.partition("/")

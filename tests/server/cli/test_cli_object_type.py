@@ -1,28 +1,61 @@
 """`arcor2-hw object-type`: object types written for ARCOR2, and their bases and mixins, into a running server."""
 
-import subprocess
-import sys
+import asyncio
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
 from arcor2_hw.analysis import module_name
+from arcor2_hw.client import Client
+from arcor2_server.cli.main import app
 from arcor2_server.cli.status import ExitStatus
 from tests.runtime.older_sources import SOURCES
-from tests.server.core.serving import ServerProcess, running, talking
+from tests.server.core.serving import ServerProcess
 
 pytestmark = pytest.mark.timeout(90)
 
 
-def object_type(server: ServerProcess | None, *arguments: str | Path) -> "subprocess.CompletedProcess[str]":
-    url = "ws://127.0.0.1:9" if server is None else server.url
-    return subprocess.run(
-        [sys.executable, "-m", "arcor2_server.cli.main", "object-type", *map(str, arguments), "--url", url],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
+class Ran(NamedTuple):
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+Cli = Callable[..., Ran]
+
+
+@pytest.fixture
+def object_type(capsys: pytest.CaptureFixture[str]) -> Cli:
+    """Run the command line in this process."""
+
+    def run(server: ServerProcess | None, *arguments: str | Path) -> Ran:
+        url = "ws://127.0.0.1:9" if server is None else server.url
+        capsys.readouterr()
+        status = app(["object-type", *map(str, arguments), "--url", url])
+        return Ran(status, *capsys.readouterr())
+
+    return run
+
+
+@pytest.fixture
+def loop() -> Iterator[asyncio.Runner]:
+    with asyncio.Runner() as runner:
+        yield runner
+
+
+@pytest.fixture
+def server(loop: asyncio.Runner, tmp_path: Path) -> Iterator[ServerProcess]:
+    process = ServerProcess(tmp_path / "data")
+    loop.run(process.start())
+    yield process
+    loop.run(process.stop())
+
+
+async def types(url: str) -> dict[str, tuple[bool, str]]:
+    async with Client(url) as client:
+        return {meta.type: (meta.disabled, meta.base) for meta in await client.get_object_types()}
 
 
 @pytest.fixture
@@ -32,31 +65,30 @@ def sources(tmp_path: Path) -> Path:
     return tmp_path
 
 
-async def test_a_family_of_types_is_brought_in_together_and_one_by_one(sources: Path, tmp_path: Path) -> None:
-    async with running(tmp_path / "data") as server:
-        arm, base, mixin = (sources / f"{name}.py" for name in ("arm_m1", "abstract_arm", "kinematics_mixin"))
-        lonely = object_type(server, "add", arm)
-        assert lonely.returncode == ExitStatus.ANALYSIS_PROBLEMS
-        assert "arm_m1.py:3: the module abstract_arm that it imports does not exist" in lonely.stderr
-        together = object_type(server, "add", arm, base, mixin)
-        assert (together.returncode, together.stderr) == (0, "")
-        assert together.stdout.split() == ["AbstractArm", "added", "KinematicsMixin", "added", "ArmM1", "added"]
-        async with talking(server.url) as client:
-            metas = {meta["type"]: meta for meta in await client.granted("GetObjectTypes")}
-        assert (metas["ArmM1"]["disabled"], metas["ArmM1"]["base"]) == (False, "AbstractArm")
-        # What it needs is there already.
-        arm.write_text(arm.read_text().replace("arm-m1.zip", "arm-m2.zip"))
-        assert object_type(server, "add", arm).returncode == 0
-        listed = object_type(server, "list").stdout
-        assert all(name in listed for name in ("AbstractArm", "ArmM1", "KinematicsMixin"))
-        assert object_type(server, "remove", "KinematicsMixin").returncode == 0
-        assert object_type(server, "remove", "KinematicsMixin").returncode == ExitStatus.NOT_FOUND
-        again = object_type(server, "add", arm)
-        assert again.returncode == ExitStatus.ANALYSIS_PROBLEMS
-        assert "kinematics_mixin" in again.stderr
+def test_a_family_of_types_is_brought_in_together_and_one_by_one(
+    sources: Path, server: ServerProcess, loop: asyncio.Runner, object_type: Cli
+) -> None:
+    arm, base, mixin = (sources / f"{name}.py" for name in ("arm_m1", "abstract_arm", "kinematics_mixin"))
+    lonely = object_type(server, "add", arm)
+    assert lonely.returncode == ExitStatus.ANALYSIS_PROBLEMS
+    assert "arm_m1.py:3: the module abstract_arm that it imports does not exist" in lonely.stderr
+    together = object_type(server, "add", arm, base, mixin)
+    assert (together.returncode, together.stderr) == (0, "")
+    assert together.stdout.split() == ["AbstractArm", "added", "KinematicsMixin", "added", "ArmM1", "added"]
+    assert loop.run(types(server.url))["ArmM1"] == (False, "AbstractArm")
+    # What it needs is there already.
+    arm.write_text(arm.read_text().replace("arm-m1.zip", "arm-m2.zip"))
+    assert object_type(server, "add", arm).returncode == 0
+    listed = object_type(server, "list").stdout
+    assert all(name in listed for name in ("AbstractArm", "ArmM1", "KinematicsMixin"))
+    assert object_type(server, "remove", "KinematicsMixin").returncode == 0
+    assert object_type(server, "remove", "KinematicsMixin").returncode == ExitStatus.NOT_FOUND
+    again = object_type(server, "add", arm)
+    assert again.returncode == ExitStatus.ANALYSIS_PROBLEMS
+    assert "kinematics_mixin" in again.stderr
 
 
-def test_what_makes_no_sense_is_refused(sources: Path) -> None:
+def test_what_makes_no_sense_is_refused(sources: Path, object_type: Cli) -> None:
     two = sources / "two.py"
     two.write_text(
         "from arcor2_hw.objects import Generic\n\n\n"
