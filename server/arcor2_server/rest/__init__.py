@@ -6,6 +6,7 @@ from litestar.handlers import HTTPRouteHandler
 
 # Imported for their operations.
 from arcor2_server.rest import (  # noqa: F401
+    api_page,
     assets,
     build,
     calibration,

@@ -1,11 +1,15 @@
 """The OpenAPI document is one, valid, and says what the documents of the original say."""
 
 import asyncio
+import base64
+import hashlib
 import json
+import re
 import sys
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 import schemathesis
 
@@ -137,3 +141,21 @@ async def test_it_is_printed(tmp_path: Path) -> None:
     assert (process.returncode, err) == (0, b"")
     assert json.loads(out) == document()
     assert list(tmp_path.iterdir()) == [], "nothing was set up for it"
+
+
+async def test_the_page_for_people_needs_nothing_from_elsewhere(http: httpx.AsyncClient) -> None:
+    answer = await http.get("/swagger")
+    assert answer.status_code == 200
+    assert answer.headers["content-type"].startswith("text/html")
+    text = answer.text
+    assert not re.findall(r"(?:src|href)\s*=", text)
+    policy = re.findall(r'Content-Security-Policy" content="([^"]*)"', text)[0]
+    assert policy.startswith("default-src 'none'; connect-src 'self';")
+    for kind in ("style", "script"):
+        (content,) = re.findall(rf"<{kind}>(.*?)</{kind}>", text, re.DOTALL)
+        digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
+        assert f"{kind}-src 'sha256-{digest}'" in policy
+        assert "http" not in content
+    assert "innerHTML" not in text
+    # What it reads is there.
+    assert (await http.get("/swagger/api/swagger.json")).json()["paths"]["/swagger"]

@@ -1,0 +1,31 @@
+"""A page to read and try the REST operations, made from their OpenAPI document; it loads nothing from elsewhere."""
+
+import base64
+import functools
+import hashlib
+import re
+from pathlib import Path
+from typing import Final
+
+from arcor2_hw.data.role import Role
+from arcor2_server.rest.general import SERVER
+from arcor2_server.rest.operations import operation
+
+PAGE: Final = Path(__file__).with_name("api_page.html")
+
+
+@functools.cache
+def page() -> str:
+    """Give the page; its policy allows its own style and script by their digests, and nothing else."""
+    text = PAGE.read_text(encoding="utf-8")
+    for kind, place in (("style", "STYLE"), ("script", "SCRIPT")):
+        (content,) = re.findall(rf"<{kind}>(.*?)</{kind}>", text, re.DOTALL)
+        digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
+        text = text.replace(f"sha256-{place}", f"sha256-{digest}")
+    return text
+
+
+@operation("GET", "/swagger", SERVER, Role.OPERATOR, open=True, media_type="text/html")
+async def swagger_page() -> str:
+    """Answer with a page on which all operations can be read and tried."""
+    return page()
