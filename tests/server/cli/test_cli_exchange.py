@@ -528,22 +528,27 @@ def test_a_program_that_is_not_finished_is_sound_with_a_note(cli: Any, exported:
     assert "note: unfinished.zip: data/project.json: logic: It cannot be built yet: " in checked.out
 
 
-def test_a_token_is_needed_where_one_is_asked_for(
+def test_a_token_is_needed_where_one_is_asked_for_and_a_certificate_trusted(
     cli: Any, place: Place, exported: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     data = place.directory / "guarded"
     data.mkdir()
     _, secret = TokenFile(data).add("reader", Role.OPERATOR)
-    server = ServerProcess(data)
+    server = ServerProcess(data, "--self-signed")
     place.loop.run(server.start())
     try:
-        assert cli("scene", "list", at=server.url).status == ExitStatus.NOT_PERMITTED
-        assert cli("scene", "list", "--token", "wrong", at=server.url).status == ExitStatus.NOT_PERMITTED
-        assert cli("scene", "list", "--token", secret, at=server.url).status == 0
+        strange = cli("scene", "list", at=server.url)
+        assert (strange.status, "certificate verify failed" in strange.err) == (ExitStatus.NO_SERVER, True)
+        ca = ("--ca", str(data / "certificate.pem"))
+        assert cli("scene", "list", *ca, at=server.url).status == ExitStatus.NOT_PERMITTED
+        assert cli("scene", "list", *ca, "--token", "wrong", at=server.url).status == ExitStatus.NOT_PERMITTED
+        assert cli("package", "list", *ca, "--token", "wrong", at=server.url).status == ExitStatus.NOT_PERMITTED
+        assert cli("scene", "list", *ca, "--token", secret, at=server.url).status == 0
         monkeypatch.setenv("ARCOR2_HW_TOKEN", secret)
         monkeypatch.setenv("ARCOR2_HW_URL", server.url)
-        assert cli("scene", "list").status == 0
-        brought = cli("project", "import", str(exported))
+        assert cli("scene", "list", *ca).status == 0
+        assert cli("package", "list", *ca).status == 0
+        brought = cli("project", "import", str(exported), *ca)
         assert (brought.status, "technician" in brought.err or "programmer" in brought.err) == (18, True)
     finally:
         place.loop.run(server.stop())
