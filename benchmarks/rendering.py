@@ -1,9 +1,9 @@
 """Pictures of markers and boards as a camera takes them, ray by ray: the truth for calibrations.
 
 Every pixel is 16 rays, or as many as are asked for. They come from the lens's own formula, inverted by Newton's method;
-where they meet the printed plates is computed in the plates' frames. Nothing is projected, and nothing of the solver, or
-of OpenCV's geometry, is used: the dictionaries' bits are all that is taken from there. A picture then gets light that
-falls off to one side, blur of lens and defocus, the camera's tone curve, noise and 8 bits.
+where they meet the printed plates is computed in the plates' frames. Nothing is projected, and nothing of the solver,
+or of OpenCV's geometry, is used: the dictionaries' bits are all that is taken from there. A picture then gets light
+that falls off to one side, blur of lens and defocus, the camera's tone curve, noise and 8 bits.
 
 Not modelled: depth (plates are painted in the order given), shadows, reflections, rolling shutter, colour filters.
 """

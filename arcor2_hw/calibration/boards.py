@@ -6,15 +6,18 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
+from arcor2_hw.calibration.edges import ALONG, Chart, Measured, measure
 from arcor2_hw.calibration.layout import CharucoBoard, Layout
-from arcor2_hw.calibration.lens import Array
-from arcor2_hw.calibration.markers import dictionary_number, dictionary_size
+from arcor2_hw.calibration.lens import Array, Lens
+from arcor2_hw.calibration.markers import TONES, dictionary_number, dictionary_size
 from arcor2_hw.calibration.pictures import Grey
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.exceptions import Conflict, InvalidData
 
 CORNER_DEVIATION: Final = 0.05
 """px, of a corner between squares as it is measured."""
+_MARGIN: Final = 8
+"""px around a board that are looked at."""
 LARGEST_BOARD: Final = 64
 """Columns and rows."""
 FEWEST_CORNERS: Final = 6
@@ -71,6 +74,73 @@ def seen_of_board(
     if np.linalg.svd(points[:, :2] - points[:, :2].mean(axis=0), compute_uv=False)[1] < 0.5 * board.square:
         return nothing
     return points, np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+
+
+def measured_board(
+    grey: Grey, lens: Lens, board: CharucoBoard, made: cv2.aruco.CharucoBoard, found: list[tuple[int, Array]]
+) -> tuple[Measured, Array] | None:
+    """Measure a board by the edges of its squares, as if it were one large marker.
+
+    Gives its outermost corners between squares, and where they are in its frame (4 × 3, m); None when too few of its
+    markers were found, or its edges are not where they should be.
+    """
+    last = board.first_id + board.columns * board.rows // 2 - 1
+    own = [(number, corners) for number, corners in found if board.first_id <= number <= last]
+    if len(own) < 2:
+        return None
+    half = np.array([board.columns, board.rows]) * board.square / 2
+    placed = np.asarray(made.getObjPoints(), dtype=np.float64)[:, :, :2]
+    unit = (board.square - board.marker) / 2
+    model = np.concatenate([placed[number - board.first_id] for number, _ in own])
+    model = np.column_stack((model[:, 0] - half[0], half[1] - model[:, 1])) / unit
+    rays = lens.rays(np.concatenate([corners for _, corners in own]))
+    matrix, _ = cv2.findHomography(model, rays, cv2.LMEDS)
+    if matrix is None:
+        return None
+    chart = _chart(board, placed.mean(axis=1))
+    outer = np.column_stack((chart.corners, np.ones(4))) @ np.asarray(matrix, dtype=np.float64).T
+    if outer[:, 2].min() <= 0:
+        return None
+    start = lens.pixels(outer[:, :2] / outer[:, 2:])
+    if not (np.all(np.isfinite(start)) and np.abs(start).max() < 4 * lens.width):
+        return None
+    (left, top), (right, bottom) = start.min(axis=0) - _MARGIN, start.max(axis=0) + _MARGIN
+    left, top = max(int(left), 0), max(int(top), 0)
+    light = cv2.LUT(grey[top : max(int(bottom), top + 1), left : max(int(right), left + 1)], TONES[0])
+    result = measure(np.asarray(light, dtype=np.float32), (left, top), lens, chart, board.first_id, start)
+    return None if result is None else (result, np.column_stack((chart.corners * unit, np.zeros(4))))
+
+
+def _chart(board: CharucoBoard, white: Array) -> Chart:
+    """Give the edges between squares, in widths of the margin around its markers, from its middle (x right, y up).
+
+    white: middles of the squares with markers, m, from the upper left corner (x right, y down).
+    """
+    side = 2 * board.square / (board.square - board.marker)
+    light = np.zeros((board.rows, board.columns), dtype=bool)
+    light[(white[:, 1] / board.square).astype(int), (white[:, 0] / board.square).astype(int)] = True
+    fractions = (np.arange(ALONG) + 0.5) / ALONG
+    points, across, towards = [], [], []
+    for row in range(board.rows):
+        for column in range(board.columns):
+            if column:
+                points.append(np.column_stack((np.full(ALONG, column), row + fractions)))
+                across.append(0)
+                towards.append(1.0 if light[row, column] else -1.0)
+            if row:
+                points.append(np.column_stack((column + fractions, np.full(ALONG, row))))
+                across.append(1)
+                towards.append(-1.0 if light[row, column] else 1.0)
+    flat = np.concatenate(points)
+    half = np.array([board.columns, board.rows]) / 2
+    x, y = half - 1
+    return Chart(
+        np.column_stack((flat[:, 0] - half[0], half[1] - flat[:, 1])) * side,
+        np.repeat(np.array(across, dtype=np.intp), ALONG),
+        np.repeat(np.array(towards), ALONG),
+        np.tile(np.minimum(fractions, 1 - fractions), len(points)) * side,
+        np.array([[-x, y], [x, y], [x, -y], [-x, -y]]) * side,
+    )
 
 
 def check_layout(layout: Layout) -> None:

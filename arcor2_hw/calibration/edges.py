@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from arcor2_hw.calibration.lens import Array, Lens
 
-_ALONG: Final = 6
+ALONG: Final = 6
 """Places on each edge of a cell."""
 _UNIT: Final = np.linspace(-1.0, 1.0, 17)
 """Samples across an edge."""
@@ -40,7 +40,7 @@ _CORNER_FLOOR: Final = 0.01
 class Chart:
     """The edges inside and around a marker, in cells from its middle (x right, y up).
 
-    points: n × 2, _ALONG on the edge of each cell. across: n, 0 where the edge is crossed along x, 1 along y.
+    points: n × 2, ALONG on each edge. across: n, 0 where the edge is crossed along x, 1 along y.
     towards: n, 1 or -1, where it is light. free: n, distance to where the edge ends or turns. corners: 4 × 2, upper
     left first, clockwise.
     """
@@ -76,7 +76,7 @@ def chart_of(dictionary: int, number: int) -> Chart:
     side = known.markerSize + 2
     light = np.pad(cv2.aruco.generateImageMarker(known, number, side) > 127, 1, constant_values=True)
     half = side / 2
-    fractions = (np.arange(_ALONG) + 0.5) / _ALONG
+    fractions = (np.arange(ALONG) + 0.5) / ALONG
     points: list[tuple[float, float]] = []
     across: list[int] = []
     towards: list[float] = []
@@ -94,8 +94,8 @@ def chart_of(dictionary: int, number: int) -> Chart:
                 at = (column - half, half - (along - 1)) if axis == 0 else (along - 1 - half, half - column)
                 points.append((float(at[0]), float(at[1])))
                 free.append(float(min(along - first, last + 1 - along)))
-            across += [axis] * _ALONG
-            towards += [float(line[row]) * (1.0 if axis == 0 else -1.0)] * _ALONG
+            across += [axis] * ALONG
+            towards += [float(line[row]) * (1.0 if axis == 0 else -1.0)] * ALONG
     return Chart(
         np.array(points),
         np.array(across, dtype=np.intp),
@@ -240,10 +240,10 @@ def _crossings(
     if np.count_nonzero(valid) < 24:
         return None
     values = cv2.remap(picture, map_x, map_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(np.float64)
-    ends = np.where(valid[:, None], values, np.nan).reshape(-1, _ALONG, _UNIT.size)
-    count = np.repeat(np.maximum(valid.reshape(-1, _ALONG).sum(axis=1), 1), _ALONG)
-    dark = np.repeat(np.nansum(ends[:, :, :2], axis=(1, 2)) / 2, _ALONG) / count
-    light = np.repeat(np.nansum(ends[:, :, -2:], axis=(1, 2)) / 2, _ALONG) / count
+    ends = np.where(valid[:, None], values, np.nan).reshape(-1, ALONG, _UNIT.size)
+    count = np.repeat(np.maximum(valid.reshape(-1, ALONG).sum(axis=1), 1), ALONG)
+    dark = np.repeat(np.nansum(ends[:, :, :2], axis=(1, 2)) / 2, ALONG) / count
+    light = np.repeat(np.nansum(ends[:, :, -2:], axis=(1, 2)) / 2, ALONG) / count
     difference = light - dark
     contrast = float(np.median(difference[valid]))
     if contrast <= _LEAST_CONTRAST:

@@ -25,7 +25,7 @@ _STRAIGHT: Final = 0.1
 """px, shift of edges up to which a tone curve is the right one."""
 _LEVELS: Final = np.arange(256) / 255.0
 _SRGB: Final = np.where(_LEVELS <= 0.04045, _LEVELS / 12.92, ((_LEVELS + 0.055) / 1.055) ** 2.4)
-_TONES: Final = (_SRGB.astype(np.float32), _LEVELS.astype(np.float32))
+TONES: Final = (_SRGB.astype(np.float32), _LEVELS.astype(np.float32))
 """Light by grey value (IEC 61966-2-1, and a straight line)."""
 
 
@@ -76,15 +76,15 @@ def measured(grey: Grey, lens: Lens, dictionary: MarkerDictionary, found: list[t
     """
     family = dictionary_number(dictionary)
     result: dict[int, Measured] = {}
-    tone = _TONES[0]
+    tone = TONES[0]
     for index in sorted(range(len(found)), key=lambda i: -float(np.linalg.norm(np.ptp(found[i][1], axis=0)))):
         number, corners = found[index]
         chart = chart_of(family, number)
         fine = _measured(grey, tone, lens, chart, number, corners)
         if not result and (fine is None or abs(fine.shift) > _STRAIGHT):
-            other = _measured(grey, _TONES[1], lens, chart, number, corners)
+            other = _measured(grey, TONES[1], lens, chart, number, corners)
             if other is not None and (fine is None or abs(other.shift) < abs(fine.shift)):
-                fine, tone = other, _TONES[1]
+                fine, tone = other, TONES[1]
         result[index] = fine or Measured(number, corners, np.eye(8) / _COARSE**2, float("nan"), 0.0, 0.0, 0.0)
     return [result[index] for index in range(len(found))]
 

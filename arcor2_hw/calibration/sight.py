@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from arcor2_hw.calibration.boards import CORNER_DEVIATION, board_of, check_layout, seen_of_board
+from arcor2_hw.calibration.boards import CORNER_DEVIATION, board_of, check_layout, measured_board, seen_of_board
 from arcor2_hw.calibration.edges import Measured
 from arcor2_hw.calibration.layout import Layout, MarkerDictionary
 from arcor2_hw.calibration.lens import Array, Lens
@@ -96,7 +96,12 @@ def _in_picture(
     used = set(numbers)
     for index, board in enumerate(layout.boards):
         made = board_of(board)
-        points, pixels = seen_of_board(grey, board, made, found[board.dictionary])
+        fine = measured_board(grey, lens, board, made, found[board.dictionary])
+        if fine is not None:
+            pixels, points, root = fine[0].corners, fine[1], root_of(fine[0])
+        else:
+            points, pixels = seen_of_board(grey, board, made, found[board.dictionary])
+            root = np.eye(2 * len(points)) / CORNER_DEVIATION
         used |= set(range(board.first_id, board.first_id + board.columns * board.rows // 2))
         if len(points):
             origin_from_board = board.pose.matrix()
@@ -107,12 +112,17 @@ def _in_picture(
                     picture,
                     points @ origin_from_board[:3, :3].T + origin_from_board[:3, 3],
                     pixels,
-                    np.eye(2 * len(points)) / CORNER_DEVIATION,
+                    root,
                     origin_from_board[:3, 2],
                     origin_from_board[:3, 3],
                 )
             )
     return seen, widths, {number for each in found.values() for number, _ in each} - used
+
+
+def root_of(each: Measured) -> Array:
+    """Give the square root of the information of a measured marker."""
+    return np.asarray(np.linalg.cholesky(each.information).T, dtype=np.float64)
 
 
 def seen_marker(each: Measured, origin_from_marker: Array, size: float, picture: int) -> Seen:
@@ -125,7 +135,7 @@ def seen_marker(each: Measured, origin_from_marker: Array, size: float, picture:
         picture,
         corners @ origin_from_marker[:3, :3].T + origin_from_marker[:3, 3],
         each.corners,
-        np.asarray(np.linalg.cholesky(each.information).T, dtype=np.float64),
+        root_of(each),
         origin_from_marker[:3, 2],
         origin_from_marker[:3, 3],
         origin_from_marker,

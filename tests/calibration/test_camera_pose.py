@@ -170,7 +170,7 @@ def test_a_board_gives_the_pose() -> None:
     found = find_camera_pose([grey], GIVEN, Layout(boards=[board]))
     assert off(found, camera)[0] < 1.0
     assert found.markers[0].name == "board 0"
-    assert found.markers[0].corners == 24
+    assert found.position_deviation < 0.001
     drawn = draw_camera_pose(grey, GIVEN, Layout(boards=[board]), found)
     assert cv2.imdecode(np.frombuffer(drawn, np.uint8), cv2.IMREAD_COLOR).shape[1] > 640
 
