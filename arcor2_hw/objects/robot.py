@@ -143,9 +143,17 @@ class Robot(GenericWithPose):
         is neither a move in progress nor refused as one beside itself. `joint_velocities` are in the order of
         `robot_joints()`. `twist` is that of the end effector (None: the robot's only one), in the axes of `frame`;
         `user` is for drivers whose controller has such a frame. Who calls keeps the speed of the end effector at or
-        below 0.25 m/s, by `forward_kinematics` where joints are given: a type without it keeps that itself.
+        below 0.25 m/s; where joints are given, by `tcp_speed`, or else by `forward_kinematics`. A type that has neither
+        keeps it itself.
         """
         raise Arcor2NotImplemented("jog")
+
+    def tcp_speed(self, joint_velocities: list[float], end_effector_id: str | None = None) -> float:
+        """Give the speed of an end effector, m/s, that joint rates would give it now, at once and while it is jogged.
+
+        For types that can be jogged and whose `forward_kinematics` asks the controller, which takes time.
+        """
+        raise Arcor2NotImplemented("tcp_speed")
 
     def joint_limits(self) -> dict[str, tuple[float, float]]:
         """Give lower and upper limit of each joint, rad."""
@@ -269,6 +277,12 @@ class MultiArmRobot(Robot):
     ) -> None:
         """Move one arm with a velocity that runs out by itself."""
         raise Arcor2NotImplemented("jog")
+
+    def tcp_speed(
+        self, joint_velocities: list[float], end_effector_id: str | None = None, arm_id: str | None = None
+    ) -> float:
+        """Give the speed of an end effector, m/s, that joint rates of its arm would give it now."""
+        raise Arcor2NotImplemented("tcp_speed")
 
     def move_synchronously(self, targets: dict[str, Pose | list[Joint]], speed: float = 0.25) -> dict[str, MoveResult]:
         """Move several arms so that they start and arrive together; keys are arm ids."""

@@ -1,5 +1,6 @@
 """A jog as the driver is told of it: never faster than a person may be near, nor into the limit of a joint."""
 
+import contextlib
 import math
 import time
 from typing import Any, Final, NamedTuple
@@ -68,12 +69,16 @@ class Jog:
         """
         joints = self._robot.robot_joints(**self._arm)
         self._check_end_effector(lease.end_effector_id)
-        valid_for = lease.until - time.monotonic()
-        if valid_for < LEAST_VALID:
-            raise Refused(f"{self._robot.name}: the lease had run out when the robot was ready for it")
         if lease.joints is not None:
-            return self._drive_joints(lease, lease.joints, joints, valid_for)
-        return self._drive_twist(lease, lease.twist or NO_TWIST, joints, valid_for)
+            return self._drive_joints(lease, lease.joints, joints)
+        return self._drive_twist(lease, lease.twist or NO_TWIST, joints)
+
+    def _left(self, lease: Lease) -> float:
+        """Give the seconds left of a lease at this moment; Refused when there are too few."""
+        left = lease.until - time.monotonic()
+        if left < LEAST_VALID:
+            raise Refused(f"{self._robot.name}: the lease had run out when the robot was ready for it")
+        return left
 
     def _check_end_effector(self, named: str | None) -> None:
         have = ", ".join(sorted(self._end_effectors))
@@ -82,7 +87,8 @@ class Jog:
         if named is None and len(self._end_effectors) > 1:
             raise InvalidData(f"{self._robot.name} has several end effectors: name one of {have}")
 
-    def _drive_joints(self, lease: Lease, asked: list[Joint], joints: list[Joint], valid_for: float) -> float:
+    def _drive_joints(self, lease: Lease, asked: list[Joint], joints: list[Joint]) -> float:
+        valid_for = self._left(lease)
         wanted = {joint.name: joint.value for joint in asked}
         names = [joint.name for joint in joints]
         if unknown := wanted.keys() - set(names):
@@ -95,10 +101,11 @@ class Jog:
         if speed * scale > LEVERS_CHANGE * MOST_TCP_SPEED:
             scale = LEVERS_CHANGE * MOST_TCP_SPEED / speed
         told = [scale * velocity for velocity in velocities]
-        self._robot.jog(joint_velocities=told, valid_for=valid_for, **self._names(lease))
+        self._robot.jog(joint_velocities=told, valid_for=self._left(lease), **self._names(lease))
         return scale
 
-    def _drive_twist(self, lease: Lease, twist: Twist, joints: list[Joint], valid_for: float) -> float:
+    def _drive_twist(self, lease: Lease, twist: Twist, joints: list[Joint]) -> float:
+        valid_for = self._left(lease)
         speed = math.hypot(*twist[:3])
         scale = 1.0 if speed <= MOST_TCP_SPEED else MOST_TCP_SPEED / speed
         now, before = time.monotonic(), self._before
@@ -108,7 +115,7 @@ class Jog:
             scale = min(scale, self._room_of_twist(twist, joints, valid_for, scale))
             self._before = _Before(now, [joint.value for joint in joints], twist, scale)
         x, y, z, a, b, c = (scale * part for part in twist)
-        self._robot.jog(twist=(x, y, z, a, b, c), frame=lease.frame, valid_for=valid_for, **self._names(lease))
+        self._robot.jog(twist=(x, y, z, a, b, c), frame=lease.frame, valid_for=self._left(lease), **self._names(lease))
         return scale
 
     def _names(self, lease: Lease) -> dict[str, Any]:
@@ -159,6 +166,8 @@ class Jog:
         if not any(velocities):
             return 0.0
         end_effector = lease.end_effector_id or min(self._end_effectors, default="")
+        with contextlib.suppress(Arcor2NotImplemented):
+            return self._robot.tcp_speed(velocities, end_effector, **self._arm)
         there = [
             Joint(joint.name, joint.value + LOOK_AHEAD * rate) for joint, rate in zip(joints, velocities, strict=True)
         ]

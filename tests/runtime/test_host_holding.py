@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
+import psutil
 import pytest
 
 from arcor2_hw.data.operation import HoldKind
@@ -152,6 +153,8 @@ def test_a_lease_that_comes_late_is_thrown_away(holder: Holder) -> None:
     """The host hangs for longer than the leases last that wait for it, and with them a new press."""
     pid = holder.host.process.pid
     os.kill(pid, signal.SIGSTOP)
+    while psutil.Process(pid).status() != psutil.STATUS_STOPPED:
+        time.sleep(0.001)
     late = [holder.lease(0.1, new=True)] + [holder.lease(0.1) for _ in range(4)]
     time.sleep(0.3)
     os.kill(pid, signal.SIGCONT)

@@ -5,6 +5,7 @@ from typing import ClassVar
 
 from arcor2_hw.data.geometry import Pose
 
+from .geometry import UR3E, UR10E, Dimensions
 from .settings import UrSettings
 from .ur_tasks import UrTasks
 
@@ -26,6 +27,7 @@ class UR3e(UrTasks):
     urdf_package_name = "ur3e.zip"
     max_payload: ClassVar[float] = 3.0
     reach: ClassVar[float] = 0.5
+    dimensions: ClassVar[Dimensions] = UR3E
     joint_limit: ClassVar[float] = 2.0 * math.pi
 
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: UrSettings) -> None:
@@ -39,6 +41,7 @@ class UR10e(UrTasks):
     urdf_package_name = "ur10e.zip"
     max_payload: ClassVar[float] = 12.5
     reach: ClassVar[float] = 1.3
+    dimensions: ClassVar[Dimensions] = UR10E
 
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: UrSettings) -> None:
         super().__init__(obj_id, name, pose, settings)

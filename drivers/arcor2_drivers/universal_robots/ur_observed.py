@@ -15,6 +15,7 @@ from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from . import dashboard as answers
 from .dashboard import Dashboard
 from .frames import from_vector, world_from_base
+from .geometry import UR5E, Dimensions
 from .observer import Observer, Sample
 from .settings import UrSettings
 from .states import MAY_MOVE, MODE_NAMES, MODE_RUNNING, REMEDIES, Runtime, power_of, program_plays, safety_of
@@ -44,6 +45,7 @@ class UrObserved(Robot):
     robot_type = RobotType.ARTICULATED
     max_payload: ClassVar[float] = 5.0
     reach: ClassVar[float] = 0.85
+    dimensions: ClassVar[Dimensions] = UR5E
     joint_limit: ClassVar[float] = 6.283185307179586
 
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: UrSettings) -> None:

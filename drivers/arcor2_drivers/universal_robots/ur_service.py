@@ -11,6 +11,7 @@ from arcor2_hw.data.robot import Control, Safety
 from arcor2_hw.exceptions import DeviceTimeout, InvalidData, NotFound, NotInControl, OutOfRange, Refused
 
 from .frames import turned, world_from_base
+from .geometry import tcp_speed
 from .observer import Sample
 from .program import Tool
 from .settings import within
@@ -115,6 +116,12 @@ class UrServiced(UrArm):
                 ramp = self._ur.tcp_acceleration
                 command, velocities = "speedL", [*linear, *angular]
             session.speed(command, velocities, ramp, valid_for, lambda: self._stops == stops)
+
+    def tcp_speed(self, joint_velocities: list[float], end_effector_id: str | None = None) -> float:
+        """Give the speed of the TCP, m/s, that joint rates (rad/s) give now, by the arm's nominal geometry."""
+        if end_effector_id is not None:
+            self._check_end_effector(end_effector_id)
+        return tcp_speed(self.dimensions, list(self._observer.sample().q), joint_velocities, self._tool.tcp)
 
     def _turned_twist(
         self, twist: tuple[float, float, float, float, float, float], frame: str

@@ -159,6 +159,15 @@ class UR5eBench(Bench):
             self.fake.control.wait_until(lambda truth: truth["q"][5] > before + 0.02)
             device.stop()
 
+        def measured() -> None:
+            rates = [0.1, 0.2, -0.1, 0.3, -0.2, 0.5]
+            joints, after = device.robot_joints(), device.robot_joints()
+            for joint, rate in zip(after, rates, strict=True):
+                joint.value += 0.001 * rate
+            begin, end = (device.forward_kinematics("tcp", one).position for one in (joints, after))
+            speed = begin.distance_to(end) / 0.001
+            assert abs(device.tcp_speed(rates) - speed) < 0.02 * speed
+
         def touched() -> None:
             x, y, z = self.fake.truth()["tcp_pose"][:3]
             self.fake.do("obstacle", point=[x, y, z - 0.04], normal=[0.0, 0.0, 1.0], stiffness=5000.0)
@@ -210,6 +219,7 @@ class UR5eBench(Bench):
             "move_path": lambda: device.move_path([near(0.02), near(0.05)], 0.005),
             "move_until_contact": touched,
             "jog": jogged,
+            "tcp_speed": measured,
             "stop": device.stop,
             "inverse_kinematics": lambda: device.inverse_kinematics("tcp", near(0.02)),
             "forward_kinematics": lambda: device.forward_kinematics("tcp", device.robot_joints()),
