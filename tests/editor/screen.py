@@ -97,6 +97,10 @@ class Screen:
         assert box is not None
         await self.page.mouse.click(box["x"] + at["x"], box["y"] + at["y"])
 
+    async def settle(self) -> None:
+        """Let the page lay itself out and draw."""
+        await self.page.evaluate("() => new Promise((done) => setTimeout(() => requestAnimationFrame(done), 60))")
+
     async def frames(self) -> int:
         return int(await self.page.evaluate("window.__engine.frames"))
 
