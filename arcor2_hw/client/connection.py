@@ -1,7 +1,6 @@
 """The client: one server, joined again after a loss, with a method for every request and streams of its events."""
 
 import asyncio
-import contextlib
 import os
 import random
 import ssl
@@ -142,8 +141,7 @@ class Client(Requests):
         self._finish(None, ConnectionLost(f"The connection to {self._url} is closed."))
         if self._keeper is not None:
             self._keeper.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._keeper
+            await asyncio.gather(self._keeper, return_exceptions=True)
             self._keeper = None
         if self._wire is not None:
             await self._wire.close()
@@ -210,6 +208,14 @@ class Client(Requests):
             raise refusal(name, message.messages, reason=message.code)
 
     async def _keep(self) -> None:
+        """Keep the client connected; what nobody foresaw is told to all who wait, and ends it."""
+        try:
+            await self._stay_joined()
+        except Exception as error:
+            self._finish(error, error)
+            raise
+
+    async def _stay_joined(self) -> None:
         """Join again whenever the connection is lost, until the client is closed or not let in any more."""
         while self._wire is not None:
             wire = self._wire
@@ -255,7 +261,8 @@ class Client(Requests):
                 await wire.closed.wait()
             except Unanswered:
                 await wire.closed.wait()
-                if not self._reconnect or not (name in READING or (dry_run and RPCS[name].dry_run)):
+                harmless = name in READING or (dry_run and name in RPCS and RPCS[name].dry_run)
+                if not (self._reconnect and harmless):
                     raise AnswerUnknown(name, self._url) from None
             except AnswerLate:
                 raise AnswerLate(name, limit) from None
@@ -267,7 +274,8 @@ class Client(Requests):
         return data
 
     async def _connection(self, name: str, deadline: float, limit: float) -> Wire:
-        while True:
+        """Give the connection, at once when there is one."""
+        while self._wire is None or self._wire.closed.is_set() or not self.connected:
             try:
                 async with asyncio.timeout(max(deadline - time.monotonic(), 0.0)):
                     if self._end is None:
@@ -278,10 +286,8 @@ class Client(Requests):
                 ) from None
             if self._end is not None:
                 raise self._end.with_traceback(None)
-            wire = self._wire
-            if wire is not None and not wire.closed.is_set():
-                return wire
             await asyncio.sleep(0.001)  # lost this moment: the keeper is about to notice
+        return self._wire
 
     def _data(self, name: str, message: Message) -> Any:
         if isinstance(message.data, Unset):

@@ -250,3 +250,18 @@ async def test_followers_come_and_go() -> None:
                 await anext(narrow)
             assert missed.value.dropped == 1
         assert len(client._streams) == 1
+
+
+async def test_what_nobody_foresaw_is_told_to_all_who_wait(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def broken(*args: Any) -> Any:
+        raise ZeroDivisionError("a bug")
+
+    async with scripted() as server, Client(server.url) as client:
+        await client.next_event()
+        monkeypatch.setattr("arcor2_hw.client.wire.Wire.open", broken)
+        waiting = asyncio.create_task(client.next_event(timeout=5.0))
+        await lose(server, client)
+        with pytest.raises(ZeroDivisionError):
+            await waiting
+        with pytest.raises(ZeroDivisionError):
+            await client.save_scene()
