@@ -23,6 +23,7 @@ from benchmarks import (
     recovery,
     requests,
     robot,
+    running,
     stops,
 )
 from benchmarks.figures import Report
@@ -33,6 +34,7 @@ ROOMS: Final[dict[str, Callable[[Report, Path], Awaitable[None]]]] = {
     "documents": documents.run,
     "listeners": listeners.run,
     "operation": operation.run,
+    "running": running.run,
     "building": lambda report, _: building.build(report),
     "analysing": lambda report, _: analysing.analyse(report),
     "robot": robot.run,
