@@ -21,6 +21,9 @@ RANGE: Final = (0.15, 8.0)
 JUMP: Final = 0.02
 """Of the distance: depths of neighbours that differ by more are an edge, where sensors give what is neither side."""
 LEAST_POINTS: Final = 500
+SAMPLE: Final = 2_000
+TRIALS: Final = 150
+"""Of planes through three points each."""
 _IHDR: Final = 8 + 4 + 4
 _PNG: Final = b"\x89PNG\r\n\x1a\n"
 
@@ -139,3 +142,37 @@ def _without_edges(z: Floats) -> Floats:
     near = cv2.erode(np.where(z > 0, z, 1e3), kernel)
     edge = (far - near > JUMP * z).astype(np.uint8)
     return np.where(cv2.dilate(edge, kernel) > 0, 0.0, z)
+
+
+def planes(points: Floats, random: np.random.Generator, most: int = 3) -> list[tuple[Floats, float]]:
+    """Find large planes in a cloud (n, 3): of each its unit normal and offset, so that normal · point = offset.
+
+    Source: M. Fischler and R. Bolles, "Random sample consensus" (1981). A plane has at least a tenth of the points.
+    """
+    rest = points[random.permutation(len(points))[:SAMPLE]]
+    least = max(len(rest) // 10, 50)
+    found: list[tuple[Floats, float]] = []
+    while len(found) < most and len(rest) >= least:
+        corners = rest[random.integers(0, len(rest), (TRIALS, 3))]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        lengths = np.linalg.norm(normals, axis=1)
+        normals = normals[lengths > 1e-9] / lengths[lengths > 1e-9][:, None]
+        offsets = np.einsum("ij,ij->i", normals, corners[lengths > 1e-9][:, 0])
+        if not len(normals):
+            break
+        thickness = plane_thickness(rest)
+        counts = (np.abs(normals @ rest.T - offsets[:, None]) < thickness).sum(axis=1)
+        best = int(np.argmax(counts))
+        if counts[best] < least:
+            break
+        on = np.abs(rest @ normals[best] - offsets[best]) < thickness
+        middle = rest[on].mean(axis=0)
+        normal = np.linalg.svd(rest[on] - middle, full_matrices=False)[2][2]
+        found.append((normal, float(normal @ middle)))
+        rest = rest[np.abs(rest @ normal - normal @ middle) >= 1.5 * thickness]
+    return found
+
+
+def plane_thickness(points: Floats) -> Floats:
+    """Give how far from a plane points (n, 3, in the camera's frame) may be and still belong to it, m."""
+    return np.asarray(0.006 + 0.005 * points[:, 2] ** 2)

@@ -14,9 +14,9 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from arcor2_hw.calibration.depth import LEAST_POINTS, DepthPictures, DepthView, look
+from arcor2_hw.calibration.depth import LEAST_POINTS, DepthPictures, DepthView, look, plane_thickness, planes
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
-from arcor2_hw.calibration.registration import Fit, Model, Stage, approach, refine, rotation
+from arcor2_hw.calibration.registration import GRAZING, Fit, Model, Stage, approach, refine, rotation
 from arcor2_hw.calibration.results import Grade, RobotPose
 from arcor2_hw.calibration.surface import RobotSurface
 from arcor2_hw.data.camera import CameraParameters
@@ -25,7 +25,7 @@ from arcor2_hw.exceptions import InvalidData
 
 Floats = npt.NDArray[np.float64]
 
-FAR: Final = (Stage(0.10, 10), Stage(0.05, 8), Stage(0.025, 6))
+FAR: Final = (Stage(0.06, 8), Stage(0.03, 7), Stage(0.015, 7))
 NEAR: Final = (Stage(0.02, 8), Stage(0.01, 12))
 FITTING: Final = 3.0
 """Of the distances' standard deviation: what lies farther off is not the robot. Within these bounds, m:"""
@@ -46,6 +46,10 @@ APART: Final = (0.004, 0.012)
 """m and rad beyond which two ends of the search are different ones."""
 ALIKE: Final = 0.93
 """Of the best end's score that makes another one as good."""
+FEW_IN_TILE: Final = 8
+"""Rays of a tile below which its mean says nothing."""
+UNEVEN: Final = (0.0025, 0.012)
+"""m of unevenness up to which a result is good, and from which on it is none."""
 LEAST_KNOWN: Final = 0.05
 """Of a motion in the worst direction that distances have to show."""
 LEAST_AGREED: Final = 2
@@ -70,7 +74,7 @@ class RobotPoseOptions:
     within: float = 0.08
     angle_within: float = 0.14
     least_fitness: float = 0.5
-    most_contradicted: float = 0.15
+    most_contradicted: float = 0.1
     most_deviation: float = 0.005
     most_angle_deviation: float = 0.015
 
@@ -87,6 +91,8 @@ class _Compared(NamedTuple):
     occluded: float
     contradicted: float
     rays: int
+    uneven: float = 0.0
+    """m: rms over tiles of the picture of how far the model's surface is from what is seen there on the average."""
 
     @property
     def score(self) -> float:
@@ -125,6 +131,7 @@ def find_robot_pose(
     best = search.last(ends[0].fit)
     compared = search.compare(best.base_from_camera, MANY_RAYS)
     _refuse_disagreement(surface, compared, best, limits)
+    _refuse_unsettled(surface, best, start, limits)
     covariance = best.covariance(search.tiles) + np.diag([FLOOR[0] ** 2] * 3 + [FLOOR[1] ** 2] * 3)
     deviations = tuple(
         float(np.sqrt(np.linalg.eigvalsh(part)[-1])) for part in (covariance[:3, :3], covariance[3:, 3:])
@@ -141,7 +148,12 @@ def find_robot_pose(
     moved, turned = pose.position.distance_to(assumed.position), pose.orientation.angle_to(assumed.orientation)
     _refuse_ambiguous(surface, ends)
     agreed = ends[0].starts
-    good = deviations[0] <= GOOD[0] and deviations[1] <= GOOD[1] and compared.confirmed >= 0.75
+    good = (
+        deviations[0] <= GOOD[0]
+        and deviations[1] <= GOOD[1]
+        and compared.uneven <= UNEVEN[0]
+        and compared.contradicted <= limits.most_contradicted / 2.0
+    )
     return RobotPose(
         pose=pose,
         grade=Grade.GOOD if good else Grade.USABLE,
@@ -182,7 +194,11 @@ class _Search:
         margin = limits.within + limits.angle_within * float(np.linalg.norm(np.maximum(-low, high)))
         based = cloud @ start[:3, :3].T + start[:3, 3]
         chosen = np.flatnonzero(((based > low - margin) & (based < high + margin)).all(axis=1))
-        chosen = chosen[self._within(based[chosen], limits)]
+        near = np.zeros(len(cloud), dtype=np.bool_)
+        near[chosen[self._within(based[chosen], limits)]] = True
+        for normal, offset in planes(cloud[~near], self._random):  # a table, a wall: robots stand on them
+            near &= np.abs(cloud @ normal - offset) > plane_thickness(cloud)
+        chosen = np.flatnonzero(near)
         if len(chosen) < LEAST_POINTS:
             raise CalibrationRefused(
                 f"The camera sees hardly anything where {surface.name} is taken to stand. Does it look there, and are"
@@ -193,8 +209,8 @@ class _Search:
         if len(chosen) > MOST_POINTS:
             chosen = self._random.choice(chosen, MOST_POINTS, replace=False)
         self._cloud = cloud[chosen]
-        tile = max(1, view.depth.shape[1] // TILES)
-        self.tiles = (rows[chosen] // tile) * (TILES + 2) + columns[chosen] // tile
+        self._tile = max(1, view.depth.shape[1] // TILES)
+        self.tiles = (rows[chosen] // self._tile) * (TILES + 2) + columns[chosen] // self._tile
         self.starts = 0
 
     def _within(self, points: Floats, limits: RobotPoseOptions) -> npt.NDArray[np.bool_]:
@@ -238,44 +254,33 @@ class _Search:
             else:
                 ends[same] = ends[same]._replace(starts=ends[same].starts + count)
         if not ends:
-            raise CalibrationRefused(
-                f"What the camera sees near the assumed place of {self._surface.name} does not look like it.",
-                f"none of {self.starts} starts came to an end",
-                Reason.NO_OVERLAP,
-            )
+            raise self._unlike(f"none of {self.starts} starts came to an end")
         return sorted(ends, key=lambda end: -end.compared.score)
 
     def last(self, fit: Fit) -> Fit:
-        """Give the result from all points. Raises CalibrationRefused: it does not settle, or leaves where it may be."""
+        """Give the result from all points. Raises CalibrationRefused: nothing is near."""
         best = refine(self._model, self._cloud, fit.base_from_camera, (Stage(REACH[1], 12),))
         if best is not None:
             sigma = 1.4826 * float(np.median(np.abs(best.errors)))
             reach = float(np.clip(FITTING * sigma, *REACH))
             best = refine(self._model, self._cloud, best.base_from_camera, (Stage(reach, 25),))
-        if best is None or best.moved > SETTLED:
-            raise CalibrationRefused(
-                f"The search for {self._surface.name} did not settle.",
-                "" if best is None else f"the last step was {best.moved * 1e3:.2f} mm",
-                Reason.NOT_CONVERGED,
-            )
-        off = np.linalg.inv(self._start) @ best.base_from_camera
-        moved = float(np.linalg.norm((best.base_from_camera @ np.linalg.inv(self._start))[:3, 3]))
-        turned = _angle(off[:3, :3])
-        if moved > 1.5 * self._limits.within or turned > 1.5 * self._limits.angle_within:
-            raise CalibrationRefused(
-                f"{self._surface.name} was found {moved * 1e3:.0f} mm and {math.degrees(turned):.1f}° from where it was"
-                " taken to stand, farther than was searched: put it nearer in the scene, and calibrate again.",
-                f"searched: {self._limits.within * 1e3:.0f} mm and {math.degrees(self._limits.angle_within):.1f}°",
-                Reason.NOT_CONVERGED,
-            )
+        if best is None:
+            raise self._unlike("nothing near enough was left in the end")
         return best
+
+    def _unlike(self, detail: str) -> CalibrationRefused:
+        return CalibrationRefused(
+            f"What the camera sees near the assumed place of {self._surface.name} does not look like it.",
+            detail,
+            Reason.NO_OVERLAP,
+        )
 
     def compare(self, base_from_camera: Floats, most_rays: int) -> _Compared:
         """Compare model and picture."""
         stride = self._stride(most_rays)
         rays = self._view.rays[::stride, ::stride].reshape(-1, 3)
         seen = self._view.seen[::stride, ::stride].reshape(-1)
-        expected = self._model.render(base_from_camera, rays).depth
+        expected, normals = self._model.render(base_from_camera, rays)
         both = np.isfinite(expected) & (seen > 0)
         count = int(np.count_nonzero(both))
         if not count:
@@ -283,7 +288,12 @@ class _Search:
         farther = seen[both] - expected[both]
         allowed = TOLERANCE[0] + TOLERANCE[1] * expected[both] ** 2
         nearer, beyond = float(np.mean(farther < -allowed)), float(np.mean(farther > allowed))
-        return _Compared(1.0 - nearer - beyond, nearer, beyond, count)
+        slope = np.abs(np.einsum("ij,ij->i", normals[both], rays[both] @ base_from_camera[:3, :3].T))
+        confirmed = (np.abs(farther) <= allowed) & (slope > 2.0 * GRAZING)
+        rows, columns = np.divmod(np.flatnonzero(both)[confirmed], self._view.seen[::stride, ::stride].shape[1])
+        tile = max(1, self._tile // stride)
+        uneven = _uneven((farther * slope)[confirmed], (rows // tile) * (TILES + 2) + columns // tile)
+        return _Compared(1.0 - nearer - beyond, nearer, beyond, count, uneven)
 
     def _stride(self, most_rays: int) -> int:
         return max(1, math.ceil(math.sqrt(self._view.depth.size / most_rays)))
@@ -303,6 +313,15 @@ class _Search:
         return offsets
 
 
+def _uneven(distances: Floats, tiles: npt.NDArray[np.intp]) -> float:
+    _, where, counts = np.unique(tiles, return_inverse=True, return_counts=True)
+    if not len(counts):
+        return 0.0
+    means = np.bincount(where, distances) / counts
+    many = counts >= FEW_IN_TILE
+    return float(np.sqrt(np.average(means[many] ** 2, weights=counts[many]))) if many.any() else 0.0
+
+
 def _near(one: Fit, other: Fit, times: float) -> bool:
     between = one.base_from_camera @ np.linalg.inv(other.base_from_camera)
     at_middle = between[:3, :3] @ one.centre + between[:3, 3] - one.centre
@@ -317,7 +336,7 @@ def _angle(matrix: Floats) -> float:
 def _refuse_disagreement(surface: RobotSurface, found: _Compared, fit: Fit, limits: RobotPoseOptions) -> None:
     figures = (
         f"confirmed {found.confirmed:.0%}, hidden {found.occluded:.0%}, contradicted {found.contradicted:.0%} of"
-        f" {found.rays} rays; residual {fit.residual * 1e3:.1f} mm"
+        f" {found.rays} rays; residual {fit.residual * 1e3:.1f} mm, uneven by {found.uneven * 1e3:.1f} mm"
     )
     if found.contradicted > limits.most_contradicted:
         raise CalibrationRefused(
@@ -331,6 +350,24 @@ def _refuse_disagreement(surface: RobotSurface, found: _Compared, fit: Fit, limi
             f"Too little of {surface.name} was recognised: something stands before it, it stands elsewhere, or the"
             " model is of another robot.",
             figures,
+            Reason.NOT_CONVERGED,
+        )
+
+
+def _refuse_unsettled(surface: RobotSurface, best: Fit, start: Floats, limits: RobotPoseOptions) -> None:
+    if best.moved > SETTLED:
+        raise CalibrationRefused(
+            f"The search for {surface.name} did not settle.",
+            f"the last step was {best.moved * 1e3:.2f} mm",
+            Reason.NOT_CONVERGED,
+        )
+    off = best.base_from_camera @ np.linalg.inv(start)
+    moved, turned = float(np.linalg.norm(off[:3, 3])), _angle(off[:3, :3])
+    if moved > 1.5 * limits.within or turned > 1.5 * limits.angle_within:
+        raise CalibrationRefused(
+            f"{surface.name} was found {moved * 1e3:.0f} mm and {math.degrees(turned):.1f}° from where it was taken to"
+            " stand, farther than was searched: put it nearer in the scene, and calibrate again.",
+            f"searched: {limits.within * 1e3:.0f} mm and {math.degrees(limits.angle_within):.1f}°",
             Reason.NOT_CONVERGED,
         )
 
