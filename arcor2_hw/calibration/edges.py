@@ -8,6 +8,7 @@ ways, that shift is found together with the homography.
 """
 
 import functools
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -30,6 +31,8 @@ _WIDEST: Final = 4.0
 """px to each side of an edge, along its normal; more in a blurred picture."""
 _NARROWEST: Final = 1.5
 _ROUNDS: Final = 4
+_AS_BEFORE: Final = 0.3
+"""px; after a smaller step edges are crossed in the same directions as before."""
 _SHIFT_DEVIATION: Final = 0.3
 """px, what a shift of edges is known before."""
 _CORNER_FLOOR: Final = 0.01
@@ -121,10 +124,13 @@ def measure(
     model = np.ascontiguousarray(chart.corners, dtype=np.float32)
     rays = np.ascontiguousarray(lens.rays(corners), dtype=np.float32)
     h = np.asarray(cv2.getPerspectiveTransform(model, rays), dtype=np.float64).ravel()[:8]
-    shift, blur = 0.0, 1.0
+    shift, blur, moved = 0.0, 1.0, math.inf
     for index in range(_ROUNDS):
-        at, slopes = lens.pixels_and_slopes(_mapped(h, chart.points))
-        sight = _sight(h, chart, slopes)
+        if moved > _AS_BEFORE:
+            at, slopes = lens.pixels_and_slopes(_mapped(h, chart.points))
+            sight = _sight(h, chart, slopes)
+        else:
+            at = lens.pixels(_mapped(h, chart.points))
         step = _crossings(picture, at - first, sight, blur)
         if step is None:
             return None
@@ -149,9 +155,9 @@ def measure(
         h = h + change[:8]
         shift += float(change[8])
         moved = float(np.abs(sight.by_h @ change[:8]).max())
-        if not np.isfinite(moved) or moved > 6.0:
+        if not math.isfinite(moved) or moved > 6.0:
             return None
-        if index and moved < 0.003:
+        if index and moved < 0.01:
             break
     used = int(np.count_nonzero(weights > 0.1))
     if used < max(24, 0.5 * np.count_nonzero(valid)) or abs(shift) > 1.5:
@@ -164,7 +170,7 @@ def measure(
     pixels, corner_slopes = lens.pixels_and_slopes(corner_rays)
     by_corner = np.einsum("nij,njk->nik", corner_slopes, _by_h(h, chart.corners, corner_rays)).reshape(8, 8)
     covariance = by_corner @ covariance_h @ by_corner.T + _CORNER_FLOOR**2 * np.eye(8)
-    return Measured(number, pixels, np.linalg.inv(covariance), blur, float(np.median(sight.cell)), shift, contrast)
+    return Measured(number, pixels, np.linalg.inv(covariance), blur, _median(sight.cell), shift, contrast)
 
 
 def _mapped(h: Array, points: Array) -> Array:
@@ -234,33 +240,41 @@ def _crossings(
     across = reach[:, None] * _UNIT
     map_x = (at[:, 0:1] + sight.ways[:, 0:1] * across).astype(np.float32)
     map_y = (at[:, 1:2] + sight.ways[:, 1:2] * across).astype(np.float32)
-    valid = (map_x.min(axis=1) >= 0) & (map_y.min(axis=1) >= 0) & (sight.slant > 0.3)
-    valid &= (map_x.max(axis=1) <= picture.shape[1] - 1) & (map_y.max(axis=1) <= picture.shape[0] - 1)
-    valid &= sight.room > min(_CLEAR * blur, 4.0)
+    valid = (sight.slant > 0.3) & (sight.room > min(_CLEAR * blur, 4.0))
+    for ends, last in ((map_x[:, ::16], picture.shape[1] - 1), (map_y[:, ::16], picture.shape[0] - 1)):
+        valid &= ((ends >= 0) & (ends <= last)).all(axis=1)
     if np.count_nonzero(valid) < 24:
         return None
     values = cv2.remap(picture, map_x, map_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(np.float64)
-    ends = np.where(valid[:, None], values, np.nan).reshape(-1, ALONG, _UNIT.size)
-    count = np.repeat(np.maximum(valid.reshape(-1, ALONG).sum(axis=1), 1), ALONG)
-    dark = np.repeat(np.nansum(ends[:, :, :2], axis=(1, 2)) / 2, ALONG) / count
-    light = np.repeat(np.nansum(ends[:, :, -2:], axis=(1, 2)) / 2, ALONG) / count
+    # Dark and light are taken of the whole edge, so that noise does not move single places.
+    counts = np.maximum(valid.reshape(-1, ALONG).sum(axis=1), 1) * 2.0
+    dark, light = (
+        np.repeat(((values[:, a] + values[:, b]) * valid).reshape(-1, ALONG).sum(axis=1) / counts, ALONG)
+        for a, b in ((0, 1), (-2, -1))
+    )
     difference = light - dark
-    contrast = float(np.median(difference[valid]))
+    contrast = _median(difference[valid])
     if contrast <= _LEAST_CONTRAST:
         return None
     valid &= difference > 0.35 * contrast
     parts = (values - dark[:, None]) / np.where(valid, difference, 1.0)[:, None]
     offsets = reach * (1.0 - parts @ _WEIGHTS) * sight.slant
-    slopes = (parts[:, 2:] - parts[:, :-2]) / ((_UNIT[2] - _UNIT[0]) * reach * sight.slant)[:, None]
-    steepest = float(np.max(slopes[valid].mean(axis=0)))
-    return offsets, valid, 1.0 / (max(steepest, 1e-3) * np.sqrt(2 * np.pi)), contrast
+    share = valid / np.maximum(reach * sight.slant, 0.1)
+    mean = share @ parts
+    steepest = float(np.max(mean[2:] - mean[:-2])) / ((_UNIT[2] - _UNIT[0]) * max(np.count_nonzero(valid), 1))
+    return offsets, valid, 1.0 / (max(steepest, 1e-3) * math.sqrt(math.tau)), contrast
 
 
 def _tukey(residual: Array, valid: npt.NDArray[np.bool_]) -> Array:
     """Give weights that leave out what lies far off."""
     if not valid.any():
         return np.zeros(len(residual))
-    middle = np.median(residual[valid])
-    scale = max(1.4826 * float(np.median(np.abs(residual[valid] - middle))), 0.02)
+    middle = _median(residual[valid])
+    scale = max(1.4826 * _median(np.abs(residual[valid] - middle)), 0.02)
     part = (residual - middle) / (4.685 * scale)
     return np.where(valid & (np.abs(part) < 1), (1 - part**2) ** 2, 0.0)
+
+
+def _median(values: Array) -> float:
+    """Give the (upper) median."""
+    return float(np.partition(values, len(values) // 2)[len(values) // 2])

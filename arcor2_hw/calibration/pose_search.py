@@ -75,17 +75,19 @@ def solve(problem: PoseProblem, options: PoseOptions) -> Solution:
 
     One that contradicts what is seen is given all the same: which of several is best does not matter then.
     """
-    starts = [start for start in problem.starts() if np.isfinite(problem.typical(start))]
+    typical = [(problem.typical(start), start) for start in problem.starts()]
+    starts = [start for errors, start in typical if np.isfinite(errors)]
     if not starts:
         raise CalibrationRefused("No pose of the camera explains the picture.", reason=Reason.NOT_CONVERGED)
-    problem.scale = max(1.0, min(problem.typical(start) for start in starts))
+    problem.scale = max(1.0, min(errors for errors, _ in typical))
     found = _minima(problem, starts)
     for _ in range(_SCALINGS):
         scale = max(1.0, problem.typical(found[0].pose, found[0].change)) if found else problem.scale
         if abs(scale / problem.scale - 1) < 0.1:
             break
         problem.scale = scale
-        again = [problem.refined(each.pose, each.change) for each in found]
+        least = min(problem.cost(each.pose, each.change) for each in found)
+        again = [problem.refined(each.pose, each.change, enough=least) for each in found]
         found = sorted((each for each in again if each), key=lambda each: each.cost)
     allowed = [each for each in found if _allowed(each.pose, options)]
     if not allowed:
