@@ -18,29 +18,38 @@ MODELS: Final = 16
 
 
 class Desk:
-    """Kept from one computation to the next. progress(share, message): tells how far the present one is."""
+    """Kept from one computation to the next. progress(share, message): tells how far the present one is.
+
+    place: the name of the world of the present computation.
+    """
 
     def __init__(self, progress: Callable[[float, str], None]) -> None:
         self.progress = progress
         self._models: OrderedDict[bytes, model.RobotModel] = OrderedDict()
-        self._changes: list[tuple[Sequence[Thing], Sequence[str]]] = []
-        self._world: StandingWorld | None = None
+        self._changes: dict[str, list[tuple[Sequence[Thing], Sequence[str]]]] = {}
+        self._worlds: dict[str, StandingWorld] = {}
+        self.place = ""
 
-    def change(self, put: Sequence[Thing], remove: Sequence[str]) -> None:
-        """Change the world; nothing is read of it before a computation needs it."""
-        self._changes.append((put, remove))
+    def change(self, place: str, put: Sequence[Thing], remove: Sequence[str]) -> None:
+        """Change a world; nothing is read of it before a computation needs it."""
+        self._changes.setdefault(place, []).append((put, remove))
+
+    def forget(self, place: str) -> None:
+        """Drop a world."""
+        self._changes.pop(place, None)
+        self._worlds.pop(place, None)
 
     def world(self) -> "StandingWorld":
-        """Give the world as it is now. Raises ModelError, BadMesh ... for what of it cannot be used."""
+        """Give the world of this place as it is now. Raises ModelError, BadMesh ... for what of it cannot be used."""
         from arcor2_hw.compute.standing_world import StandingWorld
 
-        if self._world is None:
-            self._world = StandingWorld(self.robot)
-        changes, self._changes = self._changes, []
-        for put, remove in changes:
-            self._world.change(put, remove)
-        self._world.settle()
-        return self._world
+        world = self._worlds.get(self.place)
+        if world is None:
+            world = self._worlds[self.place] = StandingWorld(self.robot)
+        for put, remove in self._changes.pop(self.place, []):
+            world.change(put, remove)
+        world.settle()
+        return world
 
     def robot(self, wanted: RobotModel) -> "model.RobotModel":
         """Give a robot's model as it stands in itself, read once. Raises ModelError and its kinds."""

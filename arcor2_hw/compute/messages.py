@@ -18,22 +18,36 @@ MAX_MESSAGE: Final = 512 * 1024 * 1024
 
 
 class Work(Struct, frozen=True, tag=True):
-    """Compute something. within: seconds, after which the worker ends itself. Answer: Done or Failed."""
+    """Compute something. within: seconds, after which the worker ends itself. Answer: Done or Failed.
+
+    place: the name of the world in which it is asked, where it needs one.
+    """
 
     task: AnyTask
     within: float
+    place: str = ""
 
 
 class ChangeWorld(Struct, frozen=True, tag=True):
     """Take things out, and put others in, in place of those of the same ids. One that cannot be used fails the Works
     that need the world, until it goes.
+
+    place: the name of the world. What is kept of a world is worth keeping while the same things stand in it, so
+    questions about different things have worlds of their own.
     """
 
+    place: str
     put: list[Thing]
     remove: list[str]
 
 
-ToWorker = Work | ChangeWorld
+class ForgetWorld(Struct, frozen=True, tag=True):
+    """Drop a world, and what is kept of it."""
+
+    place: str
+
+
+ToWorker = Work | ChangeWorld | ForgetWorld
 
 
 class Done(Struct, frozen=True, tag=True):

@@ -54,10 +54,14 @@ def serve(sock: socket.socket) -> None:
     desk = Desk(lambda share, text: say(m.Progress(share, text)))
     with contextlib.suppress(OSError):
         for message in _messages(sock):
-            if isinstance(message, m.ChangeWorld):
-                desk.change(message.put, message.remove)
-            else:
-                say(_answer(message, desk))
+            match message:
+                case m.ChangeWorld():
+                    desk.change(message.place, message.put, message.remove)
+                case m.ForgetWorld():
+                    desk.forget(message.place)
+                case m.Work():
+                    desk.place = message.place
+                    say(_answer(message, desk))
 
 
 def _answer(work: m.Work, desk: Desk) -> m.Done | m.Failed:

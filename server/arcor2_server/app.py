@@ -47,6 +47,7 @@ from arcor2_server.rpc import (  # noqa: F401
     parameters,
     perpendicular,
     project,
+    reachability,
     robot,
     runs,
     scene,

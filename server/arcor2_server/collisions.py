@@ -2,7 +2,7 @@
 
 import functools
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, Final
 
 import msgspec
@@ -43,10 +43,13 @@ class CollisionWorld:
         self.started = False
         self.inflation = inflation
         self._put: dict[str, Placed] = {}
+        self.on_change: list[Callable[[], None]] = []
+        """Called when what was put in changed."""
 
     def put(self, placed: Placed) -> None:
         """Put a model in, in place of one of its id."""
         self._put[placed.model.id] = placed
+        self._changed()
 
     def given(self, key: str) -> Placed:
         """Give a model that was put in; NotFound."""
@@ -58,11 +61,17 @@ class CollisionWorld:
         """Take a model out; NotFound."""
         if self._put.pop(key, None) is None:
             raise NotFound(f"There is no collision model {key!r}.")
+        self._changed()
 
     def stop(self) -> None:
         """Stop, and take all models out that were put in."""
         self.started = False
         self._put.clear()
+        self._changed()
+
+    def _changed(self) -> None:
+        for tell in self.on_change:
+            tell()
 
     def everything(self, services: "Services") -> dict[str, Placed]:
         """Give all models by id: those put in, and those of the objects of the scene in operation."""

@@ -24,6 +24,7 @@ class _Question:
     within: float
     world: World | None
     told: Told | None
+    place: str = ""
     answer: asyncio.Future[Any] = field(default_factory=lambda: asyncio.get_running_loop().create_future())
 
 
@@ -90,7 +91,7 @@ class _Worker:
     async def _answer(self, question: _Question) -> None:
         try:
             process = await self._ready()
-            value = await process.ask(question.task, question.within, question.world, question.told)
+            value = await process.ask(question.task, question.within, question.world, question.told, question.place)
         except asyncio.CancelledError:
             _settle(question, ComputeStopped("The server is ending."))
             raise
@@ -132,19 +133,21 @@ class Compute:
         *,
         within: float | None = None,
         world: World | None = None,
+        place: str = "",
         told: Told | None = None,
         background: bool = False,
     ) -> R:
         """Give the answer to a task.
 
         within: seconds, where not as the task has it. world: what stands in the way, by id, where the task asks for
-        it. told: called with the progress. background: wait for everything else. Raises what the computation raises;
+        it. place: the name of that world; what is kept of it is worth keeping while the same things stand in it. told:
+        called with the progress. background: wait for everything else. Raises what the computation raises;
         ComputeStopped, ComputeTimeout, ComputeBusy, NotInstalled. Who is cancelled leaves a computation that runs to
         its end.
         """
         if self._closed:
             raise ComputeStopped("The server is ending.")
-        question = _Question(task, task.within if within is None else within, world, told)
+        question = _Question(task, task.within if within is None else within, world, told, place)
         self._workers[task.room].put(question, background=background)
         answer: R = await question.answer
         return answer

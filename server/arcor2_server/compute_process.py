@@ -35,6 +35,8 @@ GOES_WITHIN: Final = 3.0
 COMMAND: Final = ("-P", "-m", "arcor2_hw.compute")
 PIECE: Final = 256 * 1024
 """Bytes that are handed to the socket at once."""
+WORLDS: Final = 16
+"""Worlds that a process keeps."""
 LONGEST_LINE: Final = 4096
 LINES: Final = 30
 """Lines of output that tell why a process ended."""
@@ -49,8 +51,8 @@ class ComputeProcess:
         self.process = process
         self._reader = reader
         self._writer = writer
-        self._told: dict[str, Thing] = {}
-        """The world as this process knows it."""
+        self._told: dict[str, dict[str, Thing]] = {}
+        """The worlds as this process knows them, the one that was asked of last at the end."""
         self._lines: deque[str] = deque(maxlen=LINES)
         self._output = asyncio.create_task(self._read_output(), name=f"output of compute worker {process.pid}")
 
@@ -87,13 +89,13 @@ class ComputeProcess:
         """Tell whether the process can be asked."""
         return self.process.returncode is None and not self._reader.at_eof() and not self._writer.is_closing()
 
-    async def ask(self, task: Task[Any], within: float, world: World | None, told: Told | None) -> Any:
+    async def ask(self, task: Task[Any], within: float, world: World | None, told: Told | None, place: str = "") -> Any:
         """Give the answer. Raises what the computation raises; ComputeStopped, ComputeTimeout when there is none."""
         try:
             async with asyncio.timeout(within + START_WITHIN):
                 if world is not None:
-                    await self._send_world(world)
-                await self._send(m.Work(task, within))  # type: ignore[arg-type]
+                    await self._send_world(world, place)
+                await self._send(m.Work(task, within, place))  # type: ignore[arg-type]
                 while isinstance(message := await self._read(), m.Progress):
                     if told is not None:
                         told(message.share, message.message)
@@ -106,14 +108,18 @@ class ComputeProcess:
             raise error_of(message)
         return msgspec.msgpack.decode(message.value, type=task.gives)
 
-    async def _send_world(self, world: World) -> None:
+    async def _send_world(self, world: World, place: str) -> None:
         """Tell the process what changed since it was told last."""
-        known = self._told
+        known = self._told.pop(place, {})
         put = [body for key, body in world.items() if (old := known.get(key)) is not body and old != body]
         remove = [key for key in known if key not in world]
         if put or remove:
-            await self._send(m.ChangeWorld(put, remove))
-        self._told = dict(world)
+            await self._send(m.ChangeWorld(place, put, remove))
+        self._told[place] = dict(world)
+        while len(self._told) > WORLDS:
+            oldest = next(iter(self._told))
+            del self._told[oldest]
+            await self._send(m.ForgetWorld(oldest))
 
     async def _send(self, message: m.ToWorker) -> None:
         data = memoryview(m.encode(message))

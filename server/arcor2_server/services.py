@@ -13,6 +13,7 @@ from arcor2_server.kept import KeptAnswers
 from arcor2_server.markers import Markers
 from arcor2_server.presence import PresenceBoard
 from arcor2_server.previews import Previews
+from arcor2_server.reachability import ReachabilityBoard
 from arcor2_server.runs import Runs
 from arcor2_server.storage.calibrations import Calibrations
 from arcor2_server.storage.shared import SharedData
@@ -48,6 +49,7 @@ class Services:
     collisions: what is in the way. type_news: object types that clients have to be told of. kept: encoded answers.
     runs: their history. tasks: work under way. previews: what is dragged. views: what clients show, by user and shared.
     breakpoints: the shared ones. presence: who looks at what. edit_news: what follows from edits.
+    reachability: what robots reach of the open project.
     """
 
     settings: "ServerSettings"
@@ -78,6 +80,7 @@ class Services:
     breakpoints: SharedBreakpoints = field(init=False)
     presence: PresenceBoard = field(init=False)
     edit_news: EditNews = field(init=False)
+    reachability: ReachabilityBoard = field(init=False)
 
     def __post_init__(self) -> None:
         """Make what needs no more than these."""
@@ -97,10 +100,12 @@ class Services:
         await self.runs.open(SharedData(self.storage))
         self.presence = PresenceBoard(self.hub, self.users)
         self.edit_news = EditNews(self)
+        self.reachability = ReachabilityBoard(self)
         self.storage.on_deleted += [self.views.forget, self.breakpoints.forget]
 
     async def close_shared(self) -> None:
         """End what `share` brought up."""
+        await self.reachability.close()
         self.edit_news.close()
         self.presence.close()
         self.previews.close()

@@ -113,5 +113,7 @@ async def subscribe_events(context: Context, args: SubscribeEventsArgs) -> None:
         tell += services.presence.everybody()
     if "TaskState" in args.events:
         tell += services.tasks.under_way()
+    if "ReachabilityChanged" in args.events:
+        services.reachability.look()
     if "HistoryChanged" in args.events:
         tell.append(services.edit_news.history_of(client))

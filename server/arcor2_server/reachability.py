@@ -1,0 +1,285 @@
+"""Which orientations and joints of the open project each robot reaches: worked out beside, told by events."""
+
+import asyncio
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final
+
+import structlog
+
+from arcor2_hw.compute.kinematics_tasks import DescribeRobot, Judged, JudgeJoints, JudgePoses
+from arcor2_hw.compute.task import ComputeStopped
+from arcor2_hw.compute.world import RobotModel, Thing
+from arcor2_hw.data.base import UNSET, Unset
+from arcor2_hw.data.editor import Reach, ReachabilityData, ReachOfItem
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.project import ProjectRobotJoints
+from arcor2_hw.data.project_index import global_pose
+from arcor2_hw.data.robot import Joint
+from arcor2_hw.data.scene import SceneObject
+from arcor2_hw.exceptions import Arcor2Error, NotFound
+from arcor2_server.robot_models import model_of
+from arcor2_server.rpc.registry import make_event
+from arcor2_server.scene_world import robot_model, robots, things
+
+if TYPE_CHECKING:
+    from arcor2_hw.data.rpc.editor import ReachabilityArgs
+    from arcor2_server.services import Services
+
+log = structlog.get_logger(__name__)
+
+NAME: Final = "ReachabilityChanged"
+DELAY: Final = 0.05
+"""Seconds after an edit: edits in a row are looked at once."""
+AT_LATEST: Final = 0.3
+"""Seconds after which it is looked at although edits still come."""
+ANSWER_WITHIN: Final = 1.0
+"""Seconds that a request waits for what is being worked out."""
+PIECE: Final = 100
+"""Poses of one question to the worker, between which others get their turn."""
+
+Target = Pose | list[Joint]
+
+
+@dataclass(slots=True)
+class _Row:
+    """What is known of one end effector. targets: for which `judged` holds, in `world`."""
+
+    robot: str
+    end_effector: str
+    arm: str | Unset = UNSET
+    targets: dict[str, Target] = field(default_factory=dict)
+    world: Mapping[str, Thing] = field(default_factory=dict)
+    judged: dict[str, ReachOfItem] = field(default_factory=dict)
+
+
+class ReachabilityBoard:
+    """Works only while somebody subscribed to the event, or asked since the project was opened."""
+
+    def __init__(self, services: "Services") -> None:
+        self._services = services
+        self._rows: dict[tuple[str, str], _Row] = {}
+        self._effectors: dict[bytes, list[str]] = {}
+        self._asked = False
+        self._wake = asyncio.Event()
+        self._idle = asyncio.Event()
+        self._idle.set()
+        self._working: asyncio.Task[None] | None = None
+        services.session.on_change.append(lambda edit: self.look() if edit is not None else self._begin_anew())
+        services.collisions.on_change.append(self.look)
+
+    # -------------------------------------------------------------------------------- asked
+    async def ask(self, args: "ReachabilityArgs") -> list[ReachabilityData]:
+        """Give what is known, having waited a moment for it. RequestRefused, NotFound for what cannot be asked of."""
+        services = self._services
+        services.session.require_project_open()
+        project = services.session.require_project()
+        chosen = self._chosen(args)
+        known = {key for point in project.action_points for key in _items(point)}
+        wanted = known if isinstance(args.ids, Unset) else args.ids
+        if strange := sorted(wanted - known):
+            raise NotFound(f"The project has no orientation or joints {strange[0]!r}.")
+        self._asked = True
+        self.look()
+        try:
+            async with asyncio.timeout(ANSWER_WITHIN):
+                await self._idle.wait()
+        except TimeoutError:
+            log.debug("reachability is being worked out still")
+        rows = [row for row in self._rows.values() if row.robot in chosen and _is_asked(row, args)]
+        return [self._told(row, self._of_interest(row, wanted)) for row in rows]
+
+    def _chosen(self, args: "ReachabilityArgs") -> set[str]:
+        services = self._services
+        if isinstance(args.robot_id, Unset):
+            return {robot.id for robot in robots(services)}
+        robot = services.cell.robot(args.robot_id)
+        model_of(services, robot, "by which its reach could be told")
+        return {robot.id}
+
+    def _of_interest(self, row: _Row, wanted: set[str]) -> list[ReachOfItem]:
+        """Give items in the order of their ids; joints of other robots are none of this row's."""
+        project = self._services.session.require_project()
+        own = {orientation.id for point in project.action_points for orientation in point.orientations}
+        own |= {each.id for point in project.action_points for each in point.robot_joints if _is_of(each, row)}
+        return [row.judged.get(key, ReachOfItem(key, Reach.UNKNOWN)) for key in sorted(wanted & own)]
+
+    def _told(self, row: _Row, items: list[ReachOfItem]) -> ReachabilityData:
+        return ReachabilityData(row.robot, row.end_effector, self._services.session.revision, items, row.arm)
+
+    # -------------------------------------------------------------------------------- when
+    def look(self) -> None:
+        """Look, a moment later, whether something changed."""
+        services = self._services
+        wanted = self._asked or bool(services.hub.subscribers(NAME))
+        if not wanted or services.session.project is None:
+            return
+        self._idle.clear()
+        self._wake.set()
+        if self._working is None:
+            self._working = asyncio.create_task(self._work(), name="reachability")
+
+    def _begin_anew(self) -> None:
+        """Forget all: another document is open, or none."""
+        self._asked = False
+        self._stop()
+        self.look()
+
+    def _stop(self) -> None:
+        if self._working is not None:
+            self._working.cancel()
+            self._working = None
+        self._rows.clear()
+        self._effectors.clear()
+        self._wake.clear()
+        self._idle.set()
+
+    async def close(self) -> None:
+        """End with the server."""
+        working = self._working
+        self._stop()
+        if working is not None:
+            await asyncio.gather(working, return_exceptions=True)
+
+    async def _work(self) -> None:
+        loop = asyncio.get_running_loop()
+        while True:
+            await self._wake.wait()
+            since = loop.time()
+            while self._wake.is_set() and loop.time() < since + AT_LATEST:
+                self._wake.clear()
+                await asyncio.sleep(DELAY)
+            self._wake.clear()
+            try:
+                await self._round()
+            except Exception:
+                log.exception("reachability failed")
+            if not self._wake.is_set():
+                self._idle.set()
+
+    # -------------------------------------------------------------------------------- one round
+    async def _round(self) -> None:
+        services = self._services
+        standing = robots(services)
+        names = {robot.id for robot in standing}
+        for key in [key for key in self._rows if key[0] not in names]:
+            del self._rows[key]
+        poses = await self._poses()
+        for robot in standing:
+            model = robot_model(services, robot)
+            if model is None:
+                continue
+            problem = ""
+            try:
+                await self._rows_of(robot, model)
+            except Arcor2Error as error:
+                problem = str(error)
+                if not any(row.robot == robot.id for row in self._rows.values()):
+                    self._rows[robot.id, ""] = _Row(robot.id, "")
+            for row in [row for row in self._rows.values() if row.robot == robot.id]:
+                await self._judge(row, robot, poses | self._joints(row), problem)
+            if self._wake.is_set():
+                return  # something changed meanwhile: what is known of the old state is of no use
+
+    async def _rows_of(self, robot: SceneObject, model: RobotModel) -> None:
+        """Bring the rows of a robot up to date with the end effectors of its model."""
+        services = self._services
+        key = repr((model.urdf, sorted(model.settings.items(), key=str))).encode()
+        if key not in self._effectors:
+            found = await services.compute.run(DescribeRobot(model), background=True)
+            self._effectors[key] = found.end_effectors
+        several = services.types.robot_meta(robot.type).multi_arm
+        wanted: dict[tuple[str, str], _Row] = {}
+        for link in self._effectors[key]:
+            arm, _, name = link.partition("_") if several else ("", "", link)
+            wanted[robot.id, link] = _Row(robot.id, name or link, arm if name and several else UNSET)
+        for gone in [key for key in self._rows if key[0] == robot.id and key not in wanted]:
+            del self._rows[gone]
+        self._rows = {**wanted, **self._rows}
+
+    async def _poses(self) -> dict[str, Target]:
+        """Give the orientations of the project as poses in the world; others get their turn between many."""
+        session = self._services.session
+        project = session.project
+        found: dict[str, Target] = {}
+        for point in project.action_points if project is not None else ():
+            for orientation in point.orientations:
+                try:
+                    bare, named = session.orientation(orientation.id)
+                    found[orientation.id] = global_pose(session, bare, named.orientation)
+                except NotFound:
+                    continue  # it went meanwhile
+                if len(found) % PIECE == 0:
+                    await asyncio.sleep(0)
+        return found
+
+    def _joints(self, row: _Row) -> dict[str, Target]:
+        """Give the joints of the project that are meant for an end effector."""
+        project = self._services.session.project
+        points = project.action_points if project is not None else ()
+        return {each.id: each.joints for point in points for each in point.robot_joints if _is_of(each, row)}
+
+    async def _judge(self, row: _Row, robot: SceneObject, targets: dict[str, Target], problem: str) -> None:
+        """Judge what is new, or may have changed."""
+        services = self._services
+        for gone in row.judged.keys() - targets.keys():
+            del row.judged[gone]
+            row.targets.pop(gone, None)
+        world = things(services, [robot])
+        if world != row.world:
+            row.targets.clear()
+            row.world = world
+        new = {key: target for key, target in targets.items() if row.targets.get(key) != target}
+        if problem:
+            self._note(row, {key: Judged(Reach.UNKNOWN, problem) for key in new}, targets)
+            return
+        for kind in (list, Pose):
+            of_kind = [key for key, target in new.items() if isinstance(target, kind)]
+            for start in range(0, len(of_kind), PIECE):
+                piece = of_kind[start : start + PIECE]
+                try:
+                    judged = await self._asked_of_worker(row, [new[key] for key in piece])
+                except Arcor2Error as error:
+                    judged = [Judged(Reach.UNKNOWN, str(error))] * len(piece)
+                self._note(row, dict(zip(piece, judged, strict=True)), targets)
+                if self._wake.is_set():
+                    return
+
+    async def _asked_of_worker(self, row: _Row, targets: list[Any]) -> list[Judged]:
+        effector = row.end_effector if isinstance(row.arm, Unset) else f"{row.arm}_{row.end_effector}"
+        joints = isinstance(targets[0], list)
+        task = JudgeJoints(row.robot, targets) if joints else JudgePoses(row.robot, effector, targets)
+        run, place = self._services.compute.run, f"reach of {row.robot}"
+        try:
+            return await run(task, world=row.world, place=place, background=True)
+        except ComputeStopped:
+            # Whoever else's question it was that ended the worker: once more.
+            return await run(task, world=row.world, place=place, background=True)
+
+    def _note(self, row: _Row, judged: dict[str, Judged], targets: dict[str, Target]) -> None:
+        """Keep what was judged, and tell what is another than before."""
+        changed = []
+        for key, one in judged.items():
+            item = ReachOfItem(key, one.reach, one.reason or UNSET)
+            row.targets[key] = targets[key]
+            if row.judged.get(key) != item:
+                row.judged[key] = item
+                changed.append(item)
+        if changed:
+            self._services.hub.broadcast(make_event(NAME, self._told(row, changed)))
+
+
+def _items(point: Any) -> set[str]:
+    return {each.id for each in (*point.orientations, *point.robot_joints)}
+
+
+def _is_of(joints: ProjectRobotJoints, row: _Row) -> bool:
+    """Tell whether joints are meant for an end effector: of its robot, and of its arm where that is said."""
+    if joints.robot_id != row.robot:
+        return False
+    return isinstance(joints.arm_id, Unset) or isinstance(row.arm, Unset) or joints.arm_id == row.arm
+
+
+def _is_asked(row: _Row, args: "ReachabilityArgs") -> bool:
+    arm = isinstance(args.arm_id, Unset) or args.arm_id == row.arm
+    return arm and (isinstance(args.end_effector_id, Unset) or args.end_effector_id == row.end_effector)

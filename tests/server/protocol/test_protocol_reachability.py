@@ -1,0 +1,178 @@
+"""Reachability of the open project: asked, told of by events, worked out anew for what changed."""
+
+import os
+import signal
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from arcor2_hw.compute.kinematics_tasks import DescribeRobot
+from arcor2_hw.compute.task import Room
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.object_type import Box, ObjectModel, ObjectTypeSource
+from arcor2_hw.data.project import ProjectRobotJoints
+from arcor2_hw.data.robot import Joint
+from arcor2_server.collisions import Placed
+from arcor2_server.robot_models import model_of
+from arcor2_server.session.changes import Kind
+from tests.server.protocol.devices import PART
+from tests.server.protocol.stage import Actor, Stage, open_stage, refused, until
+
+DOWN = {"x": 1, "y": 0, "z": 0, "w": 0}
+CRATE = PART.replace("class Part", "class Crate")
+
+
+async def add(person: Actor, stage: Stage, name: str, kind: str, pose: Pose, **settings: str) -> str:
+    parameters = [
+        {"name": key, "type": "string", "value": msgspec.json.encode(value).decode()} for key, value in settings.items()
+    ]
+    await person.ask("AddObjectToScene", name=name, type=kind, pose=msgspec.to_builtins(pose), parameters=parameters)
+    stage.ids |= {obj.name: obj.id for obj in stage.services.session.require_scene().objects}
+    return stage.ids[name]
+
+
+async def point(person: Actor, stage: Stage, name: str, x: float, y: float, z: float) -> tuple[str, str]:
+    """Add an action point with an orientation that points down; gives both ids."""
+    await person.ask("AddActionPoint", name=name, position={"x": x, "y": y, "z": z})
+    (added,) = [each for each in stage.services.session.require_project().action_points if each.name == name]
+    await person.lock(added.id)
+    await person.ask("AddActionPointOrientation", action_point_id=added.id, orientation=DOWN)
+    await person.ask("WriteUnlock", object_id=added.id)
+    (with_it,) = [each for each in stage.services.session.require_project().action_points if each.name == name]
+    return added.id, with_it.orientations[0].id
+
+
+async def move(person: Actor, point_id: str, x: float, y: float, z: float) -> None:
+    await person.lock(point_id, tree=True)
+    await person.ask("UpdateActionPointPosition", action_point_id=point_id, new_position={"x": x, "y": y, "z": z})
+    await person.ask("WriteUnlock", object_id=point_id)
+
+
+def told(person: Actor) -> dict[str, str]:
+    """Give what the events so far say: the newest of each item."""
+    found: dict[str, str] = {}
+    for message in person.waiting:
+        if message.get("event") == "ReachabilityChanged":
+            found |= {item["id"]: item["reach"] for item in message["data"]["items"]}
+    return found
+
+
+async def prepared(stage: Stage, alice: Actor) -> str:
+    crate = ObjectModel.of(Box("Crate", 0.2, 0.2, 0.2))
+    await stage.services.types.add(ObjectTypeSource("Crate", CRATE.lstrip(), model=crate))
+    await alice.ask("NewScene", name="scene")
+    robot = await add(alice, stage, "ur", "UR5e", Pose(), host="127.0.0.99")
+    await add(alice, stage, "crate", "Crate", Pose(Position(0, 5, 0)))
+    await alice.ask("SaveScene")
+    await alice.ask("NewProject", scene_id=stage.services.session.require_scene().id, name="project")
+    return robot
+
+
+async def test_reachability_is_told_and_follows_edits(tmp_path: Path) -> None:
+    async with open_stage(tmp_path) as stage:
+        alice, bob, carol = await stage.person("alice"), await stage.person("bob"), await stage.person()
+        assert "is open" in await refused(alice, "Reachability")
+        robot = await prepared(stage, alice)
+        near_point, near = await point(alice, stage, "near", 0.4, 0.2, 0.3)
+        _, far = await point(alice, stage, "far", 3, 0, 0)
+        await bob.ask("SubscribeEvents", events=["ReachabilityChanged"])
+        await until(lambda: told(bob) == {near: "reachable", far: "out_of_reach"})
+        (event, *_) = [m["data"] for m in bob.waiting if m.get("event") == "ReachabilityChanged"]
+        assert (event["robot_id"], event["end_effector_id"]) == (robot, "tcp")
+        assert "arm_id" not in event
+        assert not any(m.get("event") == "ReachabilityChanged" for m in [*alice.waiting, *carol.waiting])
+
+        (answer,) = await carol.ask("Reachability")
+        assert answer["revision"] == stage.services.session.revision
+        items = {item["id"]: item for item in answer["items"]}
+        assert items[near] == {"id": near, "reach": "reachable"}
+        assert "reaches" in items[far]["reason"]
+        (answer,) = await carol.ask("Reachability", robot_id=robot, end_effector_id="tcp", ids=[far])
+        assert [item["id"] for item in answer["items"]] == [far]
+        assert await carol.ask("Reachability", end_effector_id="other") == []
+
+        # Only what changed is told.
+        bob.take()
+        await move(alice, near_point, 2.5, 0, 0)
+        await until(lambda: told(bob) == {near: "out_of_reach"})
+        bob.take()
+        await move(alice, near_point, 0.4, 0.2, 0.3)
+        await until(lambda: told(bob) == {near: "reachable"})
+        bob.take()
+        # Something is put in the way, and taken out again.
+        stage.services.collisions.put(Placed(Box("box", 0.2, 0.2, 0.2), Pose(Position(0.4, 0.2, 0.3))))
+        await until(lambda: told(bob) == {near: "in_collision"})
+        (answer,) = await carol.ask("Reachability", ids=[near])
+        assert "box" in answer["items"][0]["reason"]
+        bob.take()
+        stage.services.collisions.remove("box")
+        await until(lambda: told(bob) == {near: "reachable"})
+        # Joints that are kept count too, for their robot.
+        names = [joint.name for joint in (await _joints(stage))]
+        bob.take()
+        beyond = [Joint(name, value) for name, value in zip(names, (0, -1.2, 1, -1.4, -1.57, 9), strict=True)]
+        key = await _add_joints(stage, near_point, robot, beyond)
+        await until(lambda: told(bob) == {key: "out_of_reach"})
+
+        for args, words in (
+            ({"robot_id": stage.ids["crate"]}, "not a robot"),
+            ({"robot_id": "nobody"}, "nobody"),
+            ({"ids": ["ori_none"]}, "ori_none"),
+        ):
+            assert words in await refused(carol, "Reachability", **args)
+
+
+async def _joints(stage: Stage) -> list[Any]:
+    model = model_of(stage.services, stage.services.session.scene_object(stage.ids["ur"]), "")
+    return (await stage.services.compute.run(DescribeRobot(model))).joints
+
+
+async def _add_joints(stage: Stage, point_id: str, robot: str, joints: list[Joint]) -> str:
+    """Keep joints at a point, past the robot that is not there."""
+    session = stage.services.session
+    value = ProjectRobotJoints("kept", robot, joints, True, id="jnt_kept")
+    await session.commit("alice", [session.document.add(Kind.JOINTS, "jnt_kept", value, parent=point_id)])
+    return "jnt_kept"
+
+
+async def test_it_ends_with_the_document_and_survives_the_worker(tmp_path: Path) -> None:
+    async with open_stage(tmp_path) as stage:
+        alice, bob = await stage.person("alice"), await stage.person("bob")
+        await prepared(stage, alice)
+        near_point, near = await point(alice, stage, "near", 0.4, 0.2, 0.3)
+        await bob.ask("SubscribeEvents", events=["ReachabilityChanged"])
+        await until(lambda: told(bob) == {near: "reachable"})
+        compute, board = stage.services.compute, stage.services.reachability
+        pid = compute.pid(Room.KINEMATICS)
+        assert pid is not None
+        bob.take()
+        os.kill(pid, signal.SIGSTOP)
+        await move(alice, near_point, 2.5, 0, 0)
+        await until(lambda: compute._workers[Room.KINEMATICS].process is not None and not board._idle.is_set())
+        os.kill(pid, signal.SIGKILL)
+        await until(lambda: told(bob) == {near: "out_of_reach"})
+
+        pid = compute.pid(Room.KINEMATICS)
+        assert pid is not None
+        os.kill(pid, signal.SIGSTOP)
+        await move(alice, near_point, 0.4, 0.2, 0.3)
+        bob.take()
+        await alice.ask("CloseProject", force=True)
+        assert board._working is None, "nothing is worked out for a project that is closed"
+        os.kill(pid, signal.SIGCONT)
+        assert "is open" in await refused(alice, "Reachability")
+        assert told(bob) == {}
+
+
+async def test_a_robot_whose_model_is_damaged_says_so(tmp_path: Path) -> None:
+    async with open_stage(tmp_path, "Arm") as stage:
+        alice = await stage.person("alice")
+        await alice.ask("NewScene", name="scene")
+        await add(alice, stage, "arm", "Arm", Pose())
+        await alice.ask("SaveScene")
+        await alice.ask("NewProject", scene_id=stage.services.session.require_scene().id, name="project")
+        await point(alice, stage, "near", 0.4, 0.2, 0.3)
+        (answer,) = await alice.ask("Reachability")
+        assert [item["reach"] for item in answer["items"]] == ["unknown"]
+        assert "arm.zip" in answer["items"][0]["reason"]
