@@ -17,7 +17,7 @@ from arcor2_hw.analysis import SourceFile, installed_types
 from arcor2_hw.client.rest import Listed
 from arcor2_hw.data.base import Unset
 from arcor2_hw.exceptions import InvalidPackage
-from arcor2_server.cli.reaching import Failed, Server
+from arcor2_server.cli.reaching import Failed, Server, printable
 from arcor2_server.cli.status import ExitStatus
 from arcor2_server.cli.tables import console
 from arcor2_server.exchange import archive as archives
@@ -45,6 +45,11 @@ def out() -> Console:
     return console()
 
 
+def say(text: str) -> None:
+    """Print one line."""
+    out().print(escape(printable(text)), soft_wrap=True)
+
+
 def print_json(value: Any) -> None:
     """Print JSON that people can read, too."""
     sys.stdout.write(msgspec.json.format(msgspec.json.encode(value), indent=2).decode() + "\n")
@@ -62,8 +67,8 @@ def show_list(entries: list[Listed], nothing: str, as_json: bool) -> None:
         return
     table = Table("name", "modified", "id", "description", box=None, pad_edge=False)
     for entry in sorted(entries, key=lambda one: one.name):
-        about = "" if isinstance(entry.description, Unset) else escape(entry.description)
-        table.add_row(escape(entry.name), entry.modified, entry.id, about)
+        about = "" if isinstance(entry.description, Unset) else entry.description
+        table.add_row(*(escape(printable(text)) for text in (entry.name, entry.modified, entry.id, about)))
     out().print(table if entries else nothing)
 
 
@@ -95,10 +100,10 @@ def write(archive: Archive, output: Path | None, force: bool) -> None:
     ):
         if count:
             parts.append(f"{count} {one if count == 1 else many}")
-    out().print(escape(f"{path}: {', '.join(parts)}"), soft_wrap=True)
+    say(f"{path}: {', '.join(parts)}")
     ours = {one.name for one in installed_types() if one.distribution == "arcor2-hw"}
     if foreign := [name for name in archive.installed if name not in ours]:
-        out().print(f"The other server must have installed: {', '.join(foreign)}", soft_wrap=True)
+        say(f"The other server must have installed: {', '.join(foreign)}")
 
 
 # ------------------------------------------------------------------------------------------------ commands
@@ -119,7 +124,7 @@ async def bring_in(
             await target.carry_out()
     words = {"new": "would be new", "replaced": "would be replaced", "same": "is the same"} if dry_run else {}
     for step in steps:
-        out().print(escape(f"{step.kind} {step.name}: {words.get(step.verb, step.verb)}"), soft_wrap=True)
+        say(f"{step.kind} {step.name}: {words.get(step.verb, step.verb)}")
 
 
 async def validate(paths: list[Path], kind: Kind, as_json: bool) -> ExitStatus:
@@ -141,16 +146,16 @@ async def validate(paths: list[Path], kind: Kind, as_json: bool) -> ExitStatus:
             continue
         reported += [{"file": str(path), **msgspec.to_builtins(finding)} for finding in findings]
         if not as_json and not any(finding.level == "error" for finding in findings):
-            out().print(escape(f"{path}: {archive.kind} {archive.name} is sound"), soft_wrap=True)
+            say(f"{path}: {archive.kind} {archive.name} is sound")
     if as_json:
         print_json(reported)
     for one in reported:
         line = ": ".join(part for part in (one["file"], one["entry"], one["text"]) if part)
         if one["level"] == "error":
             worst = ExitStatus.DOCUMENT_PROBLEMS
-            sys.stderr.write(f"arcor2-hw {kind} validate: {line}\n")
+            sys.stderr.write(f"arcor2-hw {kind} validate: {printable(line)}\n")
         elif not as_json:
-            out().print(escape(f"note: {line}"), soft_wrap=True)
+            say(f"note: {line}")
     return worst
 
 
@@ -180,7 +185,7 @@ async def compare(
             _show(one, names)
     if not found:
         if not as_json:
-            out().print("There is no difference.")
+            say("There is no difference.")
         return ExitStatus.OK
     sys.stderr.write(f"arcor2-hw {kind} diff: {old} and {new} differ in {len(found)} places\n")
     return ExitStatus.DIFFERENT
@@ -195,7 +200,13 @@ def _show(one: Difference, names: dict[str, str]) -> None:
         values = f": {old} → {new}"
     elif old or new:
         values = f" ({old or new})"
-    out().print(f"{_MARKS[one.change]} {escape(' › '.join(one.path))}{escape(values)}", soft_wrap=True)
+    entry = escape(printable(" › ".join(one.path) + values))
+    out().print(f"{_MARKS[one.change]} {entry}", soft_wrap=True)
     for line in [] if isinstance(one.text, Unset) else one.text:
-        style = _LINES.get(line[:1], "")
-        out().print(f"    [{style}]{escape(line)}[/]" if style else f"    {escape(line)}", soft_wrap=True)
+        style, shown = _LINES.get(line[:1], ""), escape(_indented(line))
+        out().print(f"    [{style}]{shown}[/]" if style else f"    {shown}", soft_wrap=True)
+
+
+def _indented(line: str) -> str:
+    """Give a line of source as it can be shown: its spaces stay."""
+    return "".join(each if each.isprintable() else "�" for each in line.expandtabs(4))

@@ -87,7 +87,7 @@ def add(
             for one in await _in_order(given, rest):
                 source = one.source if isinstance(one.source, str) else one.source.decode()
                 await rest.put_object_type(one.name, source)
-                x.out().print(f"{one.name} added")
+                x.say(f"{one.name} added")
 
     return run("object-type add", work)
 
@@ -110,7 +110,7 @@ def remove(name: str, /, *, server: Server = HERE) -> int:
     async def work() -> None:
         async with server.rest() as rest:
             await rest.delete_object_type(name)
-        x.out().print(f"{name} removed")
+        x.say(f"{name} removed")
 
     return run("object-type remove", work)
 

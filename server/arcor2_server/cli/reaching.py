@@ -79,12 +79,16 @@ def status_of(error: Arcor2Error) -> ExitStatus:
     return next((status for kinds, status in _STATUSES if isinstance(error, kinds)), ExitStatus.FAILED)
 
 
+def printable(text: str) -> str:
+    """Give a text on one line without what would command a terminal: it may come out of somebody else's file."""
+    return "".join(each if each.isprintable() else "�" for each in " ".join(text.split()))
+
+
 def run(command: str, work: Callable[[], Awaitable[Any]]) -> int:
     """Run a command to its end: what it returns as a status, else OK; for an error its status and one line."""
 
     def fail(error: Exception, status: ExitStatus) -> ExitStatus:
-        text = " ".join(str(error).split())
-        sys.stderr.write(f"arcor2-hw {command}: {text}\n")
+        sys.stderr.write(f"arcor2-hw {command}: {printable(str(error))}\n")
         return status
 
     async def working() -> Any:

@@ -145,7 +145,12 @@ def _wanted(path: PurePosixPath) -> bool:
 
 def _document(files: Mapping[str, bytes], path: str, kind: type[T]) -> T:
     try:
-        return msgspec.json.decode(files[path], type=kind)
+        found = msgspec.json.decode(files[path], type=kind)
+        if b"\\u" in files[path]:
+            msgspec.json.encode(found)  # half a surrogate pair can be read, but neither be written nor shown
+        return found
+    except UnicodeError as error:
+        raise InvalidPackage(f"{path}: it has a character that is none: {error}") from error
     except KeyError:
         raise InvalidPackage(f"{path}: it is missing.") from None
     except (msgspec.MsgspecError, RecursionError) as error:

@@ -503,6 +503,24 @@ def test_a_file_from_outside_is_not_trusted(
     assert {path.name for path in Path().iterdir()} == {"evil.zip"}
 
 
+def test_a_file_from_outside_does_not_command_the_terminal(cli: Any, exported: Path) -> None:
+    evil = "\x1b]0;owned\x07 [red]lid[/] \x9b2J"
+
+    def spoil(files: dict[str, bytes]) -> None:
+        changed("data/scene.json", lambda scene: scene.update(name=evil, description=evil))(files)
+        changed("data/project.json", lambda project: project["action_points"][0].update(name=evil))(files)
+        files["object_types/crate.py"] += f"\n# {evil}\n".encode()
+
+    repacked(exported, Path("evil.zip"), spoil)
+    for ran in (cli("project", "validate", "evil.zip"), cli("project", "diff", str(exported), "evil.zip")):
+        assert ran.status != 0
+        assert not {"\x1b", "\x07", "\x9b"} & {*ran.out, *ran.err}
+        assert "[red]lid[/]" in ran.out + ran.err
+    repacked(exported, Path("half.zip"), changed("data/scene.json", lambda scene: scene.update(name="\ud800")))
+    half = cli("project", "validate", "half.zip")
+    assert (half.status, "data/scene.json: " in half.err) == (ExitStatus.DOCUMENT_PROBLEMS, True)
+
+
 def test_what_cannot_be_done_is_said_with_a_status(cli: Any, place: Place, exported: Path, tmp_path: Path) -> None:
     Path("none.zip").write_text("no zip")
     half = Path("half.zip")
