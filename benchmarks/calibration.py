@@ -31,8 +31,10 @@ LONG: Final = 2000
 LENS: Final = Lens(870.0, 868.0, 645.0, 355.0, (0.08, -0.16, 0.0006, -0.0004, 0.05))
 SIZE: Final = 0.1
 FOCAL, CENTRE, DISTORTION = 0.0005, 0.5, 0.02
-TELLS: Final = 4.0
-"""A result that is off by more than that many of its own standard deviations has a wrong verdict."""
+TELLS: Final = 3.0
+"""A result that is off by more than that many of its own standard deviations (of the position) has a wrong verdict."""
+CALLS: Final = 3
+"""How often each picture is solved; the shortest time counts, so that what else the machine does is left out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,27 +168,41 @@ def measure(
         done, data = cv2.imencode(".jpg", picture_of(view, random), [cv2.IMWRITE_JPEG_QUALITY, 95])
         assert done
         file, parameters = data.tobytes(), intrinsics_off(random, factor)
-        began = time.perf_counter()
-        try:
-            result: CameraPose | None = find_camera_pose([file], parameters, view.layout, options)
-        except CalibrationRefused as refused:
-            result = None
-            tally.refused.append(refused.reason.value)
-        tally.seconds.append(time.perf_counter() - began)
-        if result is not None:
-            position, orientation = errors_of(result.pose, view.world_from_camera)
-            tally.position.append(position)
-            tally.orientation.append(orientation)
-            tally.wrong += position > limit or position > TELLS * 1e3 * result.position_deviation * math.sqrt(3)
+        seconds, result = _timed(file, parameters, view.layout, options)
+        tally.seconds.append(seconds)
+        if isinstance(result, CalibrationRefused):
+            tally.refused.append(result.reason.value)
+            continue
+        position, orientation = errors_of(result.pose, view.world_from_camera)
+        tally.position.append(position)
+        tally.orientation.append(orientation)
+        known = 1e3 * math.sqrt(sum(result.covariance[axis][axis] for axis in range(3)))
+        tally.wrong += position > limit or position > TELLS * known
     return tally
 
 
-def run(report: Report, *, long: bool = False) -> None:
-    """Measure the poses of a camera."""
+def _timed(
+    file: bytes, parameters: CameraParameters, layout: Layout, options: PoseOptions
+) -> tuple[float, CameraPose | CalibrationRefused]:
+    """Solve a picture some times; give the shortest time, s, and what came of it."""
+    best = math.inf
+    result: CameraPose | CalibrationRefused | None = None
+    for _ in range(CALLS):
+        began = time.perf_counter()
+        try:
+            result = find_camera_pose([file], parameters, layout, options)
+        except CalibrationRefused as refused:
+            result = refused
+        best = min(best, time.perf_counter() - began)
+    assert result is not None
+    return best, result
+
+
+async def run(report: Report, long: bool) -> None:
+    """Measure the poses of a camera, on 200 pictures of each kind, or on 2,000."""
     pictures = LONG if long else PICTURES
     sys.stderr.write(f"calibration: seed {SEED}, {pictures} pictures of each kind\n")
-    cv2.setNumThreads(1)
-    options = PoseOptions(focal_deviation=FOCAL, centre_deviation=CENTRE)
+    options = PoseOptions(focal_deviation=FOCAL, centre_deviation=CENTRE, distortion_deviation=DISTORTION)
     three = measure(lambda random, table: markers_view(random, 3, table), pictures, 3.0, options, 1.0)
     one = measure(lambda random, table: markers_view(random, 1, table), pictures, 10.0, options, 1.0)
     board = measure(board_view, pictures, 3.0, options, 1.0)
