@@ -1,4 +1,4 @@
-"""The robot on its wire: how late a stop arrives, and what 500 Hz of state cost and lose."""
+"""The robot on its wire: how late a stop arrives, what 500 Hz of state cost and lose, how soon a jog ends."""
 
 import asyncio
 import contextlib
@@ -17,7 +17,7 @@ from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.robot import Joint
 from arcor2_server.demo.fakes import free_loopback_address
 from arcor2_server.demo.processes import Child, python_module
-from benchmarks import serving
+from benchmarks import held, serving
 from benchmarks.figures import Figure, Report, median, percentile
 from benchmarks.operation import scene_state
 
@@ -119,5 +119,6 @@ async def run(report: Report, directory: Path) -> None:
         addresses = await fake.start_json()
         await stop_latency(report, directory, host, addresses["control"])
         await stream(report, host)
+        await held.held(report, directory, host, addresses["control"])
     finally:
         await fake.stop()

@@ -1,0 +1,134 @@
+"""Held motion: from the last renewal of a jog to the arm at rest, and what a renewal costs."""
+
+import asyncio
+import time
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+
+from arcor2_hw.client import Client
+from arcor2_hw.data import rpc
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.parameter import Parameter
+from benchmarks import serving
+from benchmarks.figures import Figure, Report, median, percentile
+from benchmarks.operation import scene_state
+
+HOLDS: Final = 100
+VALID_MS: Final = 300
+"""The longest lease that there is."""
+PERIOD: Final = 0.1
+HELD: Final = 5
+"""Renewals of each hold, after control was taken."""
+SPEED: Final = 0.25
+RESTS: Final = 1e-3
+"""rad/s below which every joint counts as standing."""
+MOST: Final = 3.0
+"""Seconds."""
+
+
+class Fake:
+    """The fake's control channel, kept open: it is asked every few milliseconds."""
+
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._reader, self._writer = reader, writer
+
+    @classmethod
+    async def open(cls, control: str) -> "Fake":
+        """Connect to the channel."""
+        host, _, port = control.rpartition(":")
+        return cls(*await asyncio.open_connection(host, int(port), limit=1 << 24))
+
+    def close(self) -> None:
+        """Disconnect."""
+        self._writer.close()
+
+    async def moving(self) -> bool:
+        """Tell whether any joint moves."""
+        self._writer.write(msgspec.json.encode({"id": 1, "do": "truth"}) + b"\n")
+        answer: dict[str, Any] = msgspec.json.decode(await self._reader.readline())
+        return bool(max(map(abs, answer["data"]["qd"])) > RESTS)
+
+
+class Holder:
+    """Presses, renews, and freezes."""
+
+    def __init__(self, client: Client, robot: str) -> None:
+        self._client, self._robot = client, robot
+        self._hold = 0
+        self.renewals: list[float] = []
+        self._under_way: list[asyncio.Task[None]] = []
+
+    async def _lease(self, up: float, valid_ms: int) -> None:
+        began = time.monotonic()
+        await self._client.jog_robot(
+            robot_id=self._robot,
+            hold=self._hold,
+            sent_ms=began * 1e3,
+            valid_ms=valid_ms,
+            linear=Position(0.0, 0.0, up),
+        )
+        self.renewals.append(time.monotonic() - began)
+
+    async def hold(self, up: float, renewals: int) -> float:
+        """Move up (or down) at full speed; gives when the last renewal was sent."""
+        self._hold += 1
+        for number in range(renewals):
+            if number:
+                await asyncio.sleep(PERIOD)
+            sent = time.monotonic()
+            self._under_way.append(asyncio.create_task(self._lease(up, VALID_MS)))
+        return sent
+
+    async def settle(self) -> int:
+        """Take what was answered; gives how many renewals were refused, as late ones of a busy machine are."""
+        outcomes = await asyncio.gather(*self._under_way, return_exceptions=True)
+        self._under_way.clear()
+        return sum(isinstance(outcome, BaseException) for outcome in outcomes)
+
+
+async def held(report: Report, directory: Path, host: str, control: str) -> None:
+    """Measure holds that are not renewed any more, half of them upwards."""
+    fake = await Fake.open(control)
+    async with serving.server(directory / "held") as (url, _), Client(url, "bench") as client:
+        await client.call("NewScene", rpc.NewSceneArgs("robot"))
+        settings = [Parameter("host", "string", f'"{host}"'), Parameter("payload_mass", "double", "0.5")]
+        await client.call("AddObjectToScene", rpc.AddObjectToSceneArgs("robot", "UR5e", Pose(), settings))
+        robot = (await client.next_event("SceneObjectChanged")).data.id
+        await client.call("StartScene")
+        await scene_state(client, "started")
+        await client.call("WriteLock", rpc.WriteLockArgs(robot))
+        holder = Holder(client, robot)
+        await holder.hold(SPEED / 10.0, 20)  # takes control
+        await holder.settle()
+        samples: list[float] = []
+        refused = skipped = 0
+        holder.renewals.clear()
+        while len(samples) < HOLDS:
+            await asyncio.sleep(VALID_MS / 1e3 + 0.2)
+            sent = await holder.hold(SPEED if (len(samples) + skipped) % 2 == 0 else -SPEED, HELD)
+            await asyncio.sleep(0.05)
+            if not await fake.moving():
+                skipped += 1
+                refused += await holder.settle()
+                if skipped > HOLDS:
+                    raise RuntimeError("the arm does not move")
+                continue
+            while await fake.moving():
+                if time.monotonic() - sent > MOST:
+                    raise RuntimeError("the arm does not come to rest")
+                await asyncio.sleep(0.001)
+            samples.append(time.monotonic() - sent)
+            refused += await holder.settle()
+        await client.call("StopScene")
+        await scene_state(client, "stopped")
+    fake.close()
+    ms = [sample * 1e3 for sample in samples]
+    note = f"median {median(ms):.0f} ms, worst {max(ms):.0f} ms, of which {VALID_MS} ms are the lease"
+    if skipped:
+        note += f"; {skipped} holds ended before by themselves, {refused} renewals late: the machine was busy"
+    report.add(Figure("jog_missed_to_rest_p99_ms", percentile(ms, 99), len(ms), note))
+    renewals = [renewal * 1e3 for renewal in holder.renewals]
+    note = f"99th percentile {percentile(renewals, 99):.1f} ms"
+    report.add(Figure("jog_renewal_ms", median(renewals), len(renewals), note))
