@@ -26,9 +26,39 @@ function compressed(): Plugin {
   };
 }
 
+/** Shaders of materials that the engine does not use: physical, toon, matcap and points, and backgrounds that are pictures. */
+const UNUSED =
+  /\/three\/src\/renderers\/shaders\/Shader(Lib\/(meshphysical|meshtoon|meshmatcap|meshphong|points|background|backgroundCube|cube|equirect)|Chunk\/(lights_physical_\w+|lights_toon_\w+|lights_phong_\w+|transmission_\w+|iridescence_\w+|clearcoat_\w+|cube_uv_reflection_fragment|envmap_physical_pars_fragment|bsdfs_physical))\.glsl\.js$/;
+
+/**
+ * Leaves out what libraries carry along and nobody needs here: unused shaders and what prepares their light, comments in
+ * the others, words in other languages than the editor's own.
+ */
+function lean(): Plugin {
+  return {
+    name: "lean",
+    apply: "build",
+    enforce: "pre",
+    transform(code, id) {
+      if (UNUSED.test(id)) return "export default '';";
+      if (id.endsWith("/three/src/extras/PMREMGenerator.js")) return "export class PMREMGenerator {}";
+      if (id.endsWith("/three/src/renderers/shaders/DFGLUTData.js")) return "export const getDFGLUT = () => null;";
+      if (/\/three\/src\/renderers\/shaders\/.*\.js$/.test(id)) {
+        return code
+          .replace(/\/\*(?! glsl)[\s\S]*?\*\//g, "")
+          .replace(/^[ \t]*\/\/.*$/gm, "")
+          .replace(/^[ \t]+/gm, "")
+          .replace(/\n{2,}/g, "\n");
+      }
+      if (/\/intl\/.*\/[a-z]{2}-[A-Z]{2}\.m?js$/.test(id) && !id.includes("en-US")) return "export default {};";
+      return null;
+    },
+  };
+}
+
 export default defineConfig({
   base: "/editor/",
-  plugins: [react(), compressed()],
+  plugins: [react(), lean(), compressed()],
   // From its sources, so that what is not used of it is left out.
   resolve: { alias: [{ find: /^three$/, replacement: "three/src/Three.js" }] },
   build: {

@@ -20,3 +20,10 @@ if (root) {
     </StrictMode>,
   );
 }
+
+// What a first tap opens is there when it comes, without having delayed the first picture.
+setTimeout(() => {
+  void import("./ui/kit/menu");
+  void import("./ui/kit/dialogs");
+  void import("./ui/workplace/tools/ThingsPanel");
+}, 1500);

@@ -10,7 +10,7 @@ import {
   LineBasicMaterial,
   LineSegments,
   Mesh,
-  MeshStandardMaterial,
+  MeshLambertMaterial,
   OctahedronGeometry,
   SphereGeometry,
   Vector3,
@@ -23,7 +23,7 @@ export class ObjectThing extends Thing<ObjectItem> {
   readonly root = new Group();
   item: ObjectItem;
   private shape = "";
-  private readonly material = new MeshStandardMaterial({ roughness: 0.75, metalness: 0.05 });
+  private readonly material = new MeshLambertMaterial();
   private readonly edges = new LineBasicMaterial({ transparent: true, opacity: 0.35 });
   /** Counts shapes, so that a mesh that comes late does not replace a newer one. */
   private loading = 0;

@@ -1,6 +1,6 @@
 /** An orientation of a point: an arrow the way the tool points; where reachability is known, its colour and shape tell. */
 
-import { type BufferGeometry, ConeGeometry, CylinderGeometry, Matrix4, MeshStandardMaterial, Object3D, OctahedronGeometry, TorusGeometry, Vector3 } from "three";
+import { type BufferGeometry, ConeGeometry, CylinderGeometry, Matrix4, MeshLambertMaterial, Object3D, OctahedronGeometry, TorusGeometry, Vector3 } from "three";
 import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 import type { Batch, Instance } from "../batches";
 import type { OrientationItem } from "../items";
@@ -50,7 +50,7 @@ export class OrientationThing extends Thing<OrientationItem> {
     const known = item.reach in HEADS ? item.reach : "reachable";
     const batch = this.context.batches.of(`orientation ${known}`, () => [
       (HEADS[known] as () => BufferGeometry)(),
-      new MeshStandardMaterial({ roughness: 0.6 }),
+      new MeshLambertMaterial(),
     ]);
     if (batch !== this.batch) {
       this.batch?.remove(this.instance);

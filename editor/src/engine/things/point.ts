@@ -1,6 +1,6 @@
 /** An action point: a ball, drawn with all others at once. */
 
-import { Matrix4, MeshStandardMaterial, Object3D, SphereGeometry, Vector3 } from "three";
+import { Matrix4, MeshLambertMaterial, Object3D, SphereGeometry, Vector3 } from "three";
 import type { Batch, Instance } from "../batches";
 import type { PointItem } from "../items";
 import { setPosition } from "../poses";
@@ -19,7 +19,7 @@ export class PointThing extends Thing<PointItem> {
     this.item = item;
     this.batch = context.batches.of("point", () => [
       new SphereGeometry(RADIUS, 14, 10),
-      new MeshStandardMaterial({ roughness: 0.5 }),
+      new MeshLambertMaterial(),
     ]);
     this.instance = { id: item.id, frame: this.root, offset: new Matrix4(), color: context.palette.point };
     this.batch.add(this.instance);

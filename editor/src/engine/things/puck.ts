@@ -1,6 +1,6 @@
 /** An action: a disc above its point, stacked when there are several. START and END stand where people put them. */
 
-import { CylinderGeometry, Matrix4, MeshStandardMaterial, Object3D, Vector3 } from "three";
+import { CylinderGeometry, Matrix4, MeshLambertMaterial, Object3D, Vector3 } from "three";
 import type { Batch, Instance } from "../batches";
 import type { PuckItem } from "../items";
 import { Thing, type Context } from "../thing";
@@ -22,7 +22,7 @@ export class PuckThing extends Thing<PuckItem> {
     const edge = item.role === "action";
     this.batch = context.batches.of(edge ? "puck" : "start and end", () => [
       (edge ? new CylinderGeometry(0.018, 0.018, 0.01, 24) : new CylinderGeometry(0.03, 0.03, 0.014, 6)).rotateX(Math.PI / 2),
-      new MeshStandardMaterial({ roughness: 0.45 }),
+      new MeshLambertMaterial(),
     ]);
     this.instance = { id: item.id, frame: this.root, offset: new Matrix4(), color: context.palette.point };
     this.batch.add(this.instance);

@@ -6,7 +6,7 @@ import {
   Group,
   Matrix4,
   Mesh,
-  MeshStandardMaterial,
+  MeshLambertMaterial,
   type Object3D,
   SphereGeometry,
   Vector3,
@@ -30,7 +30,7 @@ export class RobotThing extends Thing<RobotItem> {
   private readonly body = new Group();
   private readonly tips = new Map<string, Object3D>();
   private readonly shown = new Map<string, number>();
-  private readonly material = new MeshStandardMaterial({ roughness: 0.55, metalness: 0.1 });
+  private readonly material = new MeshLambertMaterial();
   private urdf: string | null = null;
   private stale = false;
 

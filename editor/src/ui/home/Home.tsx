@@ -1,7 +1,7 @@
 /** What there is to open: scenes, projects, packages, kept up to date by the server's events. */
 
 import { useState } from "react";
-import { Input, Label, SearchField, Tab, TabList, TabPanel, Tabs } from "react-aria-components";
+import { Input, Label, SearchField, ToggleButton, ToggleButtonGroup } from "react-aria-components";
 import * as documents from "../../commands/documents";
 import { barred } from "../../commands/asking";
 import { type State } from "../../store/state";
@@ -40,36 +40,44 @@ export function Home() {
         <Settings />
       </header>
       <main>
-        <Tabs selectedKey={tab} onSelectionChange={(key) => setTab(key as TabName)}>
-          <div className="home-tools">
-            <TabList className="tabs" aria-label="What there is">
-              {TABS.map((each) => (
-                <Tab key={each} id={each} className="tab">
-                  {TITLES[each]} <span className="tag">{entries[each]?.length ?? "…"}</span>
-                </Tab>
-              ))}
-            </TabList>
-            <SearchField className="field search" value={search} onChange={setSearch}>
-              <Label className="hidden-but-read">Search</Label>
-              <Input placeholder="Search by name or description" />
-            </SearchField>
-            {tab === "scenes" && (
-              <Button look="primary" icon="plus" isDisabled={noScene !== ""} onPress={() => setAsking("scene")}>
-                New scene
-              </Button>
-            )}
-            {tab === "projects" && (
-              <Button look="primary" icon="plus" isDisabled={noProject !== "" || !lists.scenes?.length} onPress={() => setAsking("project")}>
-                New project
-              </Button>
-            )}
-          </div>
-          {TABS.map((each) => (
-            <TabPanel key={each} id={each} className="cards-panel">
-              <Cards entries={entries[each]} search={search} empty={EMPTY[each]} highlight={lists.highlight} />
-            </TabPanel>
-          ))}
-        </Tabs>
+        <div className="home-tools">
+          <ToggleButtonGroup
+            className="tabs"
+            aria-label="What is listed"
+            selectionMode="single"
+            disallowEmptySelection
+            selectedKeys={[tab]}
+            onSelectionChange={(keys) => setTab([...keys][0] as TabName)}
+          >
+            {TABS.map((each) => (
+              <ToggleButton key={each} id={each} className="tab">
+                {TITLES[each]} <span className="tag">{entries[each]?.length ?? "…"}</span>
+              </ToggleButton>
+            ))}
+          </ToggleButtonGroup>
+          <SearchField className="field search" value={search} onChange={setSearch}>
+            <Label className="hidden-but-read">Search</Label>
+            <Input placeholder="Search by name or description" />
+          </SearchField>
+          {tab === "scenes" && (
+            <Button look="primary" icon="plus" isDisabled={noScene !== ""} onPress={() => setAsking("scene")}>
+              New scene
+            </Button>
+          )}
+          {tab === "projects" && (
+            <Button
+              look="primary"
+              icon="plus"
+              isDisabled={noProject !== "" || !lists.scenes?.length}
+              onPress={() => setAsking("project")}
+            >
+              New project
+            </Button>
+          )}
+        </div>
+        <section aria-label={TITLES[tab]}>
+          <Cards entries={entries[tab]} search={search} empty={EMPTY[tab]} highlight={lists.highlight} />
+        </section>
       </main>
       <Notices />
       {asking === "scene" && (

@@ -1,8 +1,8 @@
 /** The right side: the open tool, or the selected thing in sections. On a narrow screen it is a sheet from below. */
 
-import { useState } from "react";
+import { Suspense, useState } from "react";
 import { select, setUi, useEditor } from "../../store/store";
-import { Button } from "../kit/kit";
+import { Button, Waiting } from "../kit/kit";
 import { nameOf } from "../names";
 import { SECTIONS } from "./sections";
 import { TOOLS } from "./tools";
@@ -23,7 +23,9 @@ export function Panel() {
         <h2>{tool?.label ?? title}</h2>
         <Button look="plain" icon="close" aria-label="Close the panel" onPress={close} />
       </header>
-      <div className="panel-body">{tool ? <tool.Panel /> : selection && <Sections />}</div>
+      <div className="panel-body">
+        <Suspense fallback={<Waiting>Loading…</Waiting>}>{tool ? <tool.Panel /> : selection && <Sections />}</Suspense>
+      </div>
     </aside>
   );
 }

@@ -4,13 +4,10 @@ import { useMemo, useState } from "react";
 import { Input, Label, ListBox, ListBoxItem, SearchField } from "react-aria-components";
 import { heldBy } from "../../../store/selectors";
 import type { Kind, OpenDocument } from "../../../store/state";
-import { select, useEditor } from "../../../store/store";
 import { theEngine } from "../../../session/engine";
+import { now, select, setUi, useEditor } from "../../../store/store";
 import { Icon, type IconName } from "../../kit/icons";
 import { KINDS, selectionOf } from "../../names";
-import { now } from "../../../store/store";
-import { setUi } from "../../../store/store";
-import type { Tool } from "../tools";
 
 interface Row {
   id: string;
@@ -50,7 +47,7 @@ export function rowsOf(doc: OpenDocument): Row[] {
   return rows;
 }
 
-function Panel() {
+export default function ThingsPanel() {
   const doc = useEditor((state) => state.doc);
   const locks = useEditor((state) => state.locks);
   const [search, setSearch] = useState("");
@@ -87,5 +84,3 @@ function Panel() {
     </>
   );
 }
-
-export const things: Tool = { id: "things", label: "Things", icon: "tree", Panel };

@@ -1,0 +1,99 @@
+/** Windows over all others; a chunk of its own. `kit.tsx` has what most need of them. */
+
+import { type FormEvent, type ReactNode, useState } from "react";
+import { Dialog, Heading, Modal, ModalOverlay } from "react-aria-components";
+import { Button, Field } from "./kit";
+
+interface WindowProps {
+  title: string;
+  onClose: () => void;
+  children: ReactNode;
+  role?: "dialog" | "alertdialog";
+}
+
+export interface ConfirmProps {
+  title: string;
+  children: ReactNode;
+  /** What the button says that does it. */
+  yes: string;
+  onYes: () => void;
+  onClose: () => void;
+}
+
+export interface AskNameProps {
+  title: string;
+  label?: string;
+  initial?: string;
+  yes: string;
+  /** Names that there are already. */
+  taken?: string[];
+  children?: ReactNode;
+  onYes: (name: string) => void;
+  onClose: () => void;
+}
+
+/** A window over all others. `onClose` is called by Escape and by a tap beside it, too. */
+export function Window({ title, onClose, children, role = "dialog" }: WindowProps) {
+  return (
+    <ModalOverlay isOpen isDismissable onOpenChange={(open) => open || onClose()} className="overlay">
+      <Modal className="dialog">
+        <Dialog role={role}>
+          <Heading slot="title" level={2}>
+            {title}
+          </Heading>
+          {children}
+        </Dialog>
+      </Modal>
+    </ModalOverlay>
+  );
+}
+
+/** Asks before something that cannot be taken back. */
+export function Confirm({ title, children, yes, onYes, onClose }: ConfirmProps) {
+  return (
+    <Window title={title} onClose={onClose} role="alertdialog">
+      <div>{children}</div>
+      <div className="actions">
+        <Button onPress={onClose} autoFocus>
+          Cancel
+        </Button>
+        <Button
+          look="danger"
+          onPress={() => {
+            onClose();
+            onYes();
+          }}
+        >
+          {yes}
+        </Button>
+      </div>
+    </Window>
+  );
+}
+
+/** Asks for a name. */
+export function AskName({ title, label = "Name", initial = "", yes, taken = [], children, onYes, onClose }: AskNameProps) {
+  const [name, setName] = useState(initial);
+  const clean = name.trim();
+  const problem = clean !== initial && taken.includes(clean) ? "There is one of that name." : "";
+  const submit = (event: FormEvent) => {
+    event.preventDefault();
+    if (!clean || problem) return;
+    onClose();
+    onYes(clean);
+  };
+  return (
+    <Window title={title} onClose={onClose}>
+      <form onSubmit={submit} className="ask-name">
+        <Field label={label} value={name} onChange={setName} autoFocus isInvalid={problem !== ""} hint={problem} autoComplete="off" />
+        {children}
+        <div className="actions">
+          <Button onPress={onClose}>Cancel</Button>
+          <Button look="primary" type="submit" isDisabled={!clean || problem !== ""}>
+            {yes}
+          </Button>
+        </div>
+      </form>
+    </Window>
+  );
+}

@@ -1,0 +1,52 @@
+/** The list that `More` of kit.tsx opens; a chunk of its own. */
+
+import type { ReactNode } from "react";
+import { Menu, MenuItem, MenuTrigger, Popover } from "react-aria-components";
+import { Icon, type IconName } from "./icons";
+import { Button, type Look } from "./kit";
+
+export interface Choice {
+  id: string;
+  label: string;
+  icon?: IconName;
+  /** Why it cannot be chosen now. */
+  not?: string;
+  act: () => void;
+}
+
+export interface MoreProps {
+  label: string;
+  choices: Choice[];
+  icon?: IconName;
+  children?: ReactNode;
+  look?: Look;
+}
+
+export default function MoreMenu({ label, choices, icon = "more", children, look = "plain" }: MoreProps) {
+  const barred = choices.filter((each) => each.not).map((each) => each.id);
+  return (
+    <MenuTrigger>
+      <Button look={look} icon={icon} aria-label={label}>
+        {children}
+      </Button>
+      <Popover className="popover">
+        <Menu
+          className="menu"
+          aria-label={label}
+          onAction={(key) => choices.find((each) => each.id === key)?.act()}
+          disabledKeys={barred}
+        >
+          {choices.map((each) => (
+            <MenuItem key={each.id} id={each.id} className="menu-item" textValue={each.label}>
+              {each.icon && <Icon name={each.icon} />}
+              <span>
+                {each.label}
+                {each.not && <span className="quiet small"> – {each.not}</span>}
+              </span>
+            </MenuItem>
+          ))}
+        </Menu>
+      </Popover>
+    </MenuTrigger>
+  );
+}
