@@ -19,10 +19,12 @@ class RobotPose(Data, frozen=True):
     """Where a robot stands, found from a depth picture.
 
     pose: world_from_base. fitness: part of the robot's visible surface that the picture confirms, 0..1; occluded: part
-    of it that something else hides. residual: rms distance of the points used from the model's surface, m; points: how
-    many were used. covariance: 6 × 6, of a small motion of the base in its own frame: position (m), then rotation
-    vector (rad), as rows; position_deviation (m) and orientation_deviation (rad): standard deviation in the direction
-    that is known worst. moved (m) and turned (rad): by how much the result differs from the pose that was assumed.
+    of it that something else hides. uneven: rms over parts of the picture of how far the model is from what is seen
+    there on the average, m: large when joints or model are not the robot's. residual: rms distance of the points used
+    from the model's surface, m; points: how many were used. covariance: 6 × 6, of a small motion of the base in its own
+    frame: position (m), then rotation vector (rad), as rows; position_deviation (m) and orientation_deviation (rad):
+    standard deviation in the direction that is known worst. moved (m) and turned (rad): by how much the result differs
+    from the pose that was assumed.
     starts: number of starts of the search; agreed: how many of them ended at this pose. seconds: time it took.
     """
 
@@ -31,6 +33,7 @@ class RobotPose(Data, frozen=True):
     verdict: str
     fitness: float
     occluded: float
+    uneven: float
     residual: float
     points: int
     covariance: list[list[float]]

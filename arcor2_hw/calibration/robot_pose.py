@@ -160,6 +160,7 @@ def find_robot_pose(
         verdict=_verdict(surface.name, compared, deviations, moved, turned),
         fitness=compared.confirmed,
         occluded=compared.occluded,
+        uneven=compared.uneven,
         residual=best.residual,
         points=int(np.count_nonzero(best.weights)),
         covariance=covariance.tolist(),
@@ -338,7 +339,7 @@ def _refuse_disagreement(surface: RobotSurface, found: _Compared, fit: Fit, limi
         f"confirmed {found.confirmed:.0%}, hidden {found.occluded:.0%}, contradicted {found.contradicted:.0%} of"
         f" {found.rays} rays; residual {fit.residual * 1e3:.1f} mm, uneven by {found.uneven * 1e3:.1f} mm"
     )
-    if found.contradicted > limits.most_contradicted:
+    if found.contradicted > limits.most_contradicted or found.uneven > UNEVEN[1]:
         raise CalibrationRefused(
             f"The camera sees through where {surface.name} would be: it stands elsewhere, its joints are others than"
             " told, or the model is of another robot.",
@@ -393,6 +394,8 @@ def _verdict(name: str, found: _Compared, deviations: tuple[float, ...], moved: 
         f" to {deviations[0] * 1e3:.1f} mm and {math.degrees(deviations[1]):.2f}°."
         f" The picture confirms {found.confirmed:.0%} of what should be seen."
     )
+    if found.uneven > UNEVEN[0]:
+        sentence += f" Parts of it are {found.uneven * 1e3:.0f} mm off: are the joints and the model the robot's?"
     if found.occluded > 0.2:
         sentence += f" {found.occluded:.0%} is hidden by something else."
     return sentence

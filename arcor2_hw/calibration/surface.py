@@ -2,16 +2,23 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
+from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import InvalidData
+from arcor2_hw.kinematics.shapes import Capsule, Cylinder, Shape, Sphere, TriangleMesh, triangles_of
+
+if TYPE_CHECKING:
+    from arcor2_hw.kinematics.model import RobotModel
 
 Floats = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
 
-MOST_TRIANGLES = 2_000_000
+MOST_TRIANGLES: Final = 2_000_000
+_SIDES: Final = 96
 
 
 @dataclass(frozen=True)
@@ -57,3 +64,36 @@ class RobotSurface:
     def size(self) -> float:
         """Give the length of the diagonal of the box around it, m."""
         return float(np.linalg.norm(self.vertices.max(axis=0) - self.vertices.min(axis=0)))
+
+
+def surface_of(model: "RobotModel", joints: Iterable[Joint]) -> RobotSurface:
+    """Give the outside of a robot in a joint state: its visual shapes, or those for collision where a link has none.
+
+    Raises ModelError naming the joints that are missing or given twice, InvalidData when nothing of it can be seen.
+    """
+    poses = model.link_poses(model.values(joints))
+    seen = {shape.link for shape in model.visual}
+    shapes = [*model.visual, *(shape for shape in model.collision if shape.link not in seen)]
+    links = []
+    for each in shapes:
+        mesh = finely_of(each.shape)
+        links.append((mesh.vertices, mesh.triangles, poses[each.link] @ each.origin))
+    return RobotSurface.of_links(links, model.name)
+
+
+def finely_of(shape: Shape) -> TriangleMesh:
+    """Give a shape as triangles that leave a round one by less than 0.1 % of its radius."""
+    import trimesh
+
+    made: Any
+    match shape:
+        case Cylinder():
+            made = trimesh.creation.cylinder(shape.radius, shape.length, sections=_SIDES)
+        case Capsule():
+            made = trimesh.creation.capsule(shape.length, shape.radius, count=(_SIDES // 2, _SIDES))
+            made.apply_translation(-np.mean(made.bounds, axis=0))
+        case Sphere():
+            made = trimesh.creation.icosphere(4, shape.radius)
+        case _:
+            return triangles_of(shape)
+    return TriangleMesh(np.asarray(made.vertices, dtype=np.float64), np.asarray(made.faces, dtype=np.int64))
