@@ -17,7 +17,7 @@ from arcor2_hw.kinematics.shapes import Array
 NEARLY: Final = 0.02
 """How far the axes may be off, rad and m: calibrations are off by less."""
 _TINY: Final = 1e-9
-_SINGULAR: Final = 1e-6
+_SINGULAR: Final = 1e-10
 _BEYOND: Final = 0.02
 """By how much a cosine may be beyond 1 and still count as 1, for what is then refined."""
 
@@ -84,15 +84,38 @@ class ThreeParallel:
                 turn5 = _about(h5, q5)
                 v = _turned(_transposed(turn5), h2)
                 w = _turned(back, _turned(_transposed(unturn1), h2))
-                q6 = -_between(h6, v, w, -q6_if_free)
-                turn56 = _product(turn5, _about(h6, q6))
-                turn14 = _product(_product(unturn1, turn), _transposed(turn56))
-                q14 = _between(h2, self._h5, _turned(turn14, self._h5), 0.0)
-                rest = _sub(_sub(shoulder, self._p12), _turned(_about(h2, q14), self._p45))
-                for q3 in _folded(h2, self._p34, self._p23, rest):
-                    bent = _sum(self._p23, _turned(_about(h2, q3), self._p34))
-                    q2 = _between(h2, bent, rest, 0.0)
-                    yield q1, q2, q3, math.remainder(q14 - q2 - q3, math.tau), q5, q6
+                for q6 in self._last(v, w, q6_if_free, _product(unturn1, turn), turn5, shoulder):
+                    turn56 = _product(turn5, _about(h6, q6))
+                    turn14 = _product(_product(unturn1, turn), _transposed(turn56))
+                    q14 = _between(h2, h5, _turned(turn14, h5), 0.0)
+                    rest = _sub(_sub(shoulder, self._p12), _turned(_about(h2, q14), self._p45))
+                    for q3 in _folded(h2, self._p34, self._p23, rest):
+                        bent = _sum(self._p23, _turned(_about(h2, q3), self._p34))
+                        q2 = _between(h2, bent, rest, 0.0)
+                        yield q1, q2, q3, math.remainder(q14 - q2 - q3, math.tau), q5, q6
+
+    def _last(self, v: Vector, w: Vector, if_free: float, whole: Rows, turn5: Rows, shoulder: Vector) -> list[float]:
+        """Give the angles of joint 6. Where it turns about the axis of joints 2 to 4 it is free, as far as these reach.
+
+        Then it is `if_free`, and also what lets the links just reach, since they may not with the former.
+        """
+        h2, h6 = self._h2, self._h6
+        across = _cross(h6, v)
+        if math.hypot(_dot(across, w), _dot(_cross(across, h6), w)) >= _SINGULAR:
+            return [-_between(h6, v, w, 0.0)]
+        turn14 = _product(whole, _transposed(_product(turn5, _about(h6, if_free))))
+        q14 = _between(h2, self._h5, _turned(turn14, self._h5), 0.0)
+        to, tail = (_sub(each, _scaled(h2, _dot(h2, each))) for each in (_sub(shoulder, self._p12), self._p45))
+        far, short = math.hypot(*to), math.hypot(*tail)
+        longest = math.hypot(*self._p23) + math.hypot(*self._p34)
+        found = [if_free]
+        if min(far, short) > _TINY:
+            share = (far * far + short * short - longest * longest) / (2.0 * far * short)
+            middle, half = _between(h2, tail, to, 0.0), math.acos(max(-1.0, min(1.0, share)))
+            sign = math.copysign(1.0, _dot(h2, _turned(turn5, h6)))
+            # Joints 2 to 4 together, and joint 6, make one turn.
+            found += [math.remainder(if_free + sign * (q14 - middle - part * half), math.tau) for part in (-1, 0, 1)]
+        return found
 
 
 # ------------------------------------------------------------------------------------------------ subproblems

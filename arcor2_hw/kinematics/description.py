@@ -96,8 +96,8 @@ class EndEffector:
 
     link: str
     free: frozenset[str] = frozenset()
-    position_tolerance: float = 1e-5
-    orientation_tolerance: float = 1e-4
+    position_tolerance: float = 1e-6
+    orientation_tolerance: float = 1e-5
 
 
 @dataclass(frozen=True)

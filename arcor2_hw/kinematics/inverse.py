@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from arcor2_hw.kinematics.arm import Arm
-from arcor2_hw.kinematics.closed_form import ThreeParallel
+from arcor2_hw.kinematics.closed_form import NEARLY, ThreeParallel
 from arcor2_hw.kinematics.errors import OnlyInCollision, OutOfReach
 from arcor2_hw.kinematics.shapes import Array
 
@@ -29,7 +29,11 @@ EXACT: Final = 1e-8
 """m and rad at which a solution counts as exact; what is less exact has to keep the end effector's tolerances."""
 SAME: Final = 1e-3
 """rad or m by which some joint of two distinct solutions differs at least."""
-_LEAST_DAMPING: Final = 1e-9
+_FEW: Final = 6
+_MOST_DAMPING: Final = 1e-4
+_LEAST_DAMPING: Final = 1e-14
+_SLACK: Final = 1e-6
+"""rad or m by which rounding may put a joint beyond its limit; it is put back there."""
 _PATIENCE: Final = 8
 _PROGRESS: Final = 0.8
 """Rounds after which at most this share of the error has to be left."""
@@ -125,26 +129,32 @@ class InverseKinematics:
         if float(np.linalg.norm(target[:3, 3] - self.arm.centre)) > self.arm.reach + self._tolerance[0]:
             return
         if self._form is not None:
-            yield from self._computed(target, seed)
+            raw = np.array(self._form.solve(target, float(seed[0]), float(seed[5]))).reshape(-1, 6)
+            near = self._near(raw, seed, NEARLY)  # calibrated, it may keep the limits yet
+            some = False
+            for q in self._computed(pin.SE3(target), near, seed):
+                some = True
+                yield q
+            if some or not len(near):
+                return
+            # At the edge of reach, and where axes meet, what was computed may be too far off to be refined.
+            yield from self._searched(target, seed, everything, _FEW)
         else:
-            yield from self._searched(target, seed, everything)
+            yield from self._searched(target, seed, everything, STARTS)
 
-    def _computed(self, target: Array, seed: Array) -> Iterator[Array]:
-        assert self._form is not None
-        form, goal = self._form, pin.SE3(target)
-        near = self._near(np.array(form.solve(target, float(seed[0]), float(seed[5]))).reshape(-1, 6), seed)
+    def _computed(self, goal: Any, near: Array, seed: Array) -> Iterator[Array]:
         given: list[Array] = []
         for i in np.argsort(((near - seed) ** 2).sum(axis=1)):
             q = self._refined(goal, near[i], rounds=12, clamp=False)
             if q is None:
                 continue
-            if q is not near[i]:
-                q = self._near(q, seed)
-            if self.arm.within(q) and not self._known(q, given):
+            q = self._near(q, seed)
+            if self.arm.within(q, _SLACK) and not self._known(q, given):
+                q = np.clip(q, self.arm.lower, self.arm.upper)
                 given.append(q)
                 yield q
 
-    def _searched(self, target: Array, seed: Array, everything: bool) -> Iterator[Array]:
+    def _searched(self, target: Array, seed: Array, everything: bool, starts: int) -> Iterator[Array]:
         """Give what is found from the seed, then what is found from elsewhere, in the order of its distance."""
         goal = pin.SE3(target)
         first = self._refined(goal, np.clip(seed, self.arm.lower, self.arm.upper))
@@ -154,7 +164,7 @@ class InverseKinematics:
             yield given[0]
         found: list[Array] = []
         idle = 0
-        for start in self._starts:
+        for start in self._starts[:starts]:
             q = self._refined(goal, start)
             idle += 1
             if q is None:
@@ -176,10 +186,9 @@ class InverseKinematics:
         return False
 
     # -------------------------------------------------------------------------------- turns
-    def _near(self, q: Array, seed: Array) -> Array:
+    def _near(self, q: Array, seed: Array, slack: float = _SLACK) -> Array:
         """Give joints, (n) or (m, n), the same place by whole turns, as near to the seed as the limits allow."""
         turned = q + np.where(self._turning, 2.0 * np.pi * np.round((seed - q) / (2.0 * np.pi)), 0.0)
-        slack = 1e-9
         over, under = turned > self.arm.upper + slack, turned < self.arm.lower - slack
         if over.any() or under.any():
             back = np.where(over, np.ceil((turned - self.arm.upper - slack) / (2.0 * np.pi)), 0.0)
@@ -202,7 +211,7 @@ class InverseKinematics:
         """Give joints near `q` that meet the goal, None when these steps lead to none."""
         arm = self.arm
         error, size = self._error(goal, q)
-        damping = 1e-4
+        damping = min(max(size * size, _LEAST_DAMPING), _MOST_DAMPING)
         jacobian: Array | None = None
         before = np.inf
         for number in range(rounds):
@@ -226,7 +235,7 @@ class InverseKinematics:
                 if size - smaller < 1e-6 * size and damping <= _LEAST_DAMPING:
                     break
                 q, error, size, jacobian = trial, after, smaller, None
-                damping = max(damping * 0.1, _LEAST_DAMPING)
+                damping = min(max(damping * 0.1, _LEAST_DAMPING), max(size * size, _LEAST_DAMPING))
             else:
                 damping *= 10.0
                 if damping > 1e2:

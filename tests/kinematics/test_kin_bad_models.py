@@ -152,7 +152,7 @@ def test_what_is_next_to_the_refused_ones_is_taken() -> None:
 
 # ------------------------------------------------------------------------------------------------ packages
 def test_packages_that_are_none_or_not_safe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(ModelError, match="no file .urdf"):
+    with pytest.raises(ModelError, match=r"no file \.urdf"):
         RobotModel.load(packed(readme_dot_txt=b""))
     with pytest.raises(ModelError, match=r"2 descriptions: a\.urdf, b\.urdf"):
         RobotModel.load(packed(a_dot_urdf=urdf(GOOD), b_dot_urdf=urdf(GOOD)))
@@ -244,7 +244,7 @@ def test_an_archive_that_lies_of_its_sizes_is_read_no_further_than_allowed() -> 
     with pytest.raises(UnsafeDescription, match="more than 1000 bytes"):
         package.read("a.urdf", 1000)
     lying = source.Package.open(bytes(content.replace(honest, struct.pack("<I", 500))))
-    with pytest.raises(ModelError, match="damaged|more than"):
+    with pytest.raises(ModelError, match=r"damaged|more than"):
         lying.read("a.urdf", 1000)
 
 

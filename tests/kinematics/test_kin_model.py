@@ -85,7 +85,9 @@ def test_settings_change_limits_speeds_tools_and_the_boxes_of_links() -> None:
     assert boxes[0].origin[0, 3] == pytest.approx(0.15)
     tcp = Pose(Position(0.01, 0.02, 0.1), Orientation.from_rotation_vector(0.1, -0.7, 0.4))
     vector = tcp.orientation.rotation_vector()
-    given_tcp = {f"tcp_{k}": v for k, v in zip(("x", "y", "z", "rx", "ry", "rz"), (*tcp.position, *vector), strict=True)}
+    given_tcp = {
+        f"tcp_{k}": v for k, v in zip(("x", "y", "z", "rx", "ry", "rz"), (*tcp.position, *vector), strict=True)
+    }
     q = np.array((0.1, -1.0, 1.2, -0.4, 0.9, 0.3))
     plain = ur().arm("tcp").forward(q)
     assert np.allclose(RobotModel.load(UR / "ur5e", given_tcp).arm("tcp").forward(q), plain @ tcp.matrix())
@@ -161,7 +163,9 @@ def test_several_end_effectors_are_chains_of_their_own() -> None:
     assert right.whole(np.array((0.1, 0.5))).tolist() == [0.1, 0.0, 0.0, 0.5]
     q = np.array((0.1, 0.7, -0.2, 0.5))
     assert np.allclose(model.link_poses(q)["right_hand"], right.forward(right.of(q)))
-    assert np.allclose(right.forward(np.array((0.1, 0.5)))[:3, 3], (0.3 * math.cos(0.5), -0.2, 0.1 - 0.3 * math.sin(0.5)))
+    assert np.allclose(
+        right.forward(np.array((0.1, 0.5)))[:3, 3], (0.3 * math.cos(0.5), -0.2, 0.1 - 0.3 * math.sin(0.5))
+    )
     assert np.allclose(right.forward(np.array((0.1, 0.5)))[:3, 0], (math.cos(1.0), 0.0, -math.sin(1.0)))
     # Both joints that the mimicked one moves count: the hand turns twice as fast as it.
     assert right.jacobian(np.array((0.1, 0.5)))[4, 1] == pytest.approx(2.0)

@@ -1,0 +1,294 @@
+"""Joints for poses: forward after inverse is the pose again, nearest first, within limits, all of them."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from arcor2_drivers.dobot_magician import kinematics as dobot_kinematics
+from arcor2_drivers.two_axis_robot import kinematics as two_axis_kinematics
+from arcor2_fakes.ur.kinematics import Chain
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.kinematics.arm import Arm
+from arcor2_hw.kinematics.dh import DhRow, calibrated
+from arcor2_hw.kinematics.errors import OnlyInCollision, OutOfReach
+from arcor2_hw.kinematics.inverse import InverseKinematics, blocked_in
+from arcor2_hw.kinematics.model import RobotModel
+from arcor2_hw.kinematics.shapes import Array, Sphere
+from arcor2_hw.kinematics.world import CollisionWorld
+from tests.kinematics.kin_robots import DOBOT, TWO_AXIS, joint, links, six_axes, ur, urdf
+from tests.kinematics.test_kin_model import rows_of
+
+TURN = st.floats(-2.0 * math.pi, 2.0 * math.pi)
+SIX = st.tuples(TURN, TURN, TURN, TURN, TURN, TURN)
+
+
+def assert_there(arm: Arm, q: Array, target: Array, within: float = 2e-5) -> None:
+    assert arm.within(q)
+    assert np.allclose(arm.forward(q), target, atol=within)
+
+
+def wrapped(q: Array) -> Array:
+    return np.remainder(q + np.pi, 2.0 * np.pi) - np.pi
+
+
+def is_among(q: Array, found: list[Array], within: float = 1e-4) -> bool:
+    return any(np.abs(wrapped(other - q)).max() < within for other in found)
+
+
+# ------------------------------------------------------------------------------------------------ the UR's kind
+@pytest.mark.parametrize("name", ["ur3e", "ur5e", "ur10e"])
+@given(values=SIX, seed=SIX)
+def test_forward_after_inverse_is_the_pose(name: str, values: tuple[float, ...], seed: tuple[float, ...]) -> None:
+    arm = ur(name).arm("tcp", Pose(Position(0.01, -0.03, 0.12)).matrix())
+    assume(arm.smallest(np.array(values)) > 1e-4)
+    target = arm.forward(np.array(values))
+    inverse = InverseKinematics(arm)
+    assert inverse.has_closed_form
+    assert_there(arm, inverse.solve(target, np.array(seed)), target)
+
+
+@given(SIX)
+def test_the_seed_itself_comes_back_where_it_is_a_solution(values: tuple[float, ...]) -> None:
+    arm = ur().arm("tcp")
+    q = np.array(values)
+    assume(not arm.dexterity(q).near_singularity)
+    assert np.allclose(InverseKinematics(arm).solve(arm.forward(q), q), q, atol=1e-6)
+
+
+@given(SIX)
+def test_all_configurations_are_those_of_an_independent_solver(values: tuple[float, ...]) -> None:
+    arm, q = ur().arm("tcp"), np.array(values)
+    assume(not arm.dexterity(q).near_singularity)
+    chain = Chain("ur5e")
+    expected = [np.array(each) for each in chain.solutions(chain.forward(values))]
+    # Where the other configurations are near singular both lose digits.
+    assume(not any(arm.dexterity(each).near_singularity for each in expected))
+    found = InverseKinematics(arm).solutions(arm.forward(q))
+    assert len(found) == len(expected)
+    assert all(is_among(each, expected) for each in found)
+    assert is_among(q, found)
+
+
+def test_poses_in_and_right_beside_singularities_are_reached() -> None:
+    arm = ur().arm("tcp", Pose(Position(0.01, -0.03, 0.12)).matrix())
+    inverse = InverseKinematics(arm)
+    chance = np.random.default_rng(3)
+    quarter = np.arange(-4, 5) * math.pi / 2.0
+    for _ in range(300):
+        q = chance.choice(quarter, 6) + chance.choice((0.0, 1e-3, -1e-5, 1e-7, 1e-9, 0.5, -1.3), 6)
+        q = np.clip(q, arm.lower, arm.upper)
+        target = arm.forward(q)
+        assert_there(arm, inverse.solve(target, chance.uniform(-6.0, 6.0, 6)), target)
+
+
+def test_singular_poses_are_reached_with_the_free_joint_as_in_the_seed() -> None:
+    arm = ur().arm("tcp")
+    inverse = InverseKinematics(arm)
+    for q in (
+        (0.3, -1.2, 1.4, -0.4, 0.0, 0.7),
+        (0.3, -1.2, 0.0, -0.4, 1.3, 0.7),
+        (0.0, -math.pi / 2, 0.0, 0.0, 0.0, 0.0),
+    ):
+        target = arm.forward(np.array(q))
+        assert_there(arm, inverse.solve(target, np.array(q)), target)
+    free = np.array((0.3, -1.2, 1.4, -0.4, 0.0, 0.7))
+    assert np.allclose(inverse.solve(arm.forward(free), free), free, atol=1e-6)
+
+
+def test_all_turns_are_given_on_request_and_the_nearest_otherwise() -> None:
+    arm = ur().arm("tcp")
+    q = np.array((0.5, -1.2, 1.4, -0.4, 1.3, 0.7))
+    inverse = InverseKinematics(arm)
+    plain, all_of_them = (inverse.solutions(arm.forward(q), q, turns=turns) for turns in (False, True))
+    assert len(plain) == 8
+    assert len(all_of_them) == 8 * 2**6  # each joint has two turns within +-360 degrees
+    assert np.allclose(all_of_them[0], q, atol=1e-6)
+    assert all(arm.within(each) for each in all_of_them)
+    distances = [float(np.sum((each - q) ** 2)) for each in all_of_them]
+    assert distances == sorted(distances)
+    far = q + (2.0 * math.pi) * np.array((-1, 0, -1, 1, 0, 0))
+    assert np.allclose(inverse.solve(arm.forward(q), far), far, atol=1e-6)
+    # Beyond the limit there is no turn, however near the seed is.
+    beyond = q + 2.0 * math.pi * np.array((2, 0, 0, 0, 0, 0))
+    found = inverse.solutions(arm.forward(q), beyond)
+    assert len(found) == 8
+    assert all(arm.within(each) for each in found)
+    assert is_among(q, found)
+
+
+def test_limits_take_configurations_away() -> None:
+    arm = ur().arm("tcp")
+    q = np.array((0.5, -1.2, 1.4, -0.4, 1.3, 0.7))
+    arm.lower[2], arm.upper[2] = -3.0, 0.0  # an elbow that bends one way only
+    found = InverseKinematics(arm).solutions(arm.forward(q), q)
+    assert len(found) == 4
+    assert all(each[2] <= 0.0 for each in found)
+    arm.lower[2], arm.upper[2] = -0.1, 0.1
+    with pytest.raises(OutOfReach):
+        InverseKinematics(arm).solve(arm.forward(q), q)
+
+
+@settings(max_examples=50)
+@given(SIX, st.lists(st.tuples(*[st.floats(-2e-3, 2e-3)] * 4), min_size=6, max_size=6))
+def test_a_calibrated_arm_has_its_own_configurations(
+    values: tuple[float, ...], deltas: list[tuple[float, ...]]
+) -> None:
+    rows = [row.plus(DhRow(*delta)) for row, delta in zip(rows_of("ur5e"), deltas, strict=True)]
+    arm, q = calibrated(ur(), "tcp", rows).arm("tcp"), np.array(values)
+    assume(not arm.dexterity(q).near_singularity)
+    inverse = InverseKinematics(arm)
+    assert inverse.has_closed_form
+    target = arm.forward(q)
+    assert np.allclose(inverse.solve(target, q), q, atol=1e-5)
+    for each in inverse.solutions(target, q):
+        assert_there(arm, each, target)
+
+
+# ------------------------------------------------------------------------------------------------ others
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_an_arm_without_closed_form_is_searched(number: int) -> None:
+    arm = six_axes().arm("tool")
+    chance = np.random.default_rng(number)
+    lower, upper = np.maximum(arm.lower, -math.pi), np.minimum(arm.upper, math.pi)
+    q, seed = chance.uniform(lower, upper), chance.uniform(lower, upper)
+    target = arm.forward(q)
+    inverse = InverseKinematics(arm)
+    assert not inverse.has_closed_form
+    assert_there(arm, inverse.solve(target, seed), target)
+    again = InverseKinematics(arm).solve(target, seed)
+    assert np.array_equal(again, inverse.solve(target, seed))  # the same question, the same answer
+    near = q + chance.uniform(-0.02, 0.02, 6)
+    if not arm.dexterity(q).near_singularity:
+        assert np.abs(inverse.solve(target, np.clip(near, lower, upper)) - q).max() < 0.1
+
+
+def test_the_search_finds_all_configurations_of_an_industrial_arm() -> None:
+    arm = six_axes().arm("tool")
+    q = np.array((0.4, 0.5, -0.6, 0.8, 0.9, -0.3))
+    found = InverseKinematics(arm).solutions(arm.forward(q), q)
+    assert np.allclose(found[0], q, atol=1e-5)
+    for one, other in itertools.combinations(found, 2):
+        assert np.abs(wrapped(one - other)).max() > 1e-3
+    assert len(found) >= 2
+    flipped = q + np.array((0, 0, 0, -math.pi, 0, math.pi))
+    flipped[4] = -q[4]
+    assert is_among(flipped, found)
+
+
+@given(st.tuples(*(st.floats(low, high) for low, high in dobot_kinematics.LIMITS)))
+def test_a_dobot_has_the_joints_that_its_driver_computes(q: tuple[float, float, float, float]) -> None:
+    arm = RobotModel.load(DOBOT).arm("tcp")
+    target = arm.forward(np.array(q))
+    tool = dobot_kinematics.tool_of(Pose.from_matrix(target))
+    try:
+        expected = dobot_kinematics.inverse(tool, 0.0597, 0.0)
+    except dobot_kinematics.Unreachable:
+        assume(False)
+    out = math.hypot(tool.x, tool.y)
+    assume(out > 0.08)  # over its foot the arm may as well look backwards
+    assert np.allclose(InverseKinematics(arm).solve(target, np.array(q)), expected, atol=1e-4)
+
+
+def test_a_dobot_cannot_tilt_its_tool() -> None:
+    arm = RobotModel.load(DOBOT).arm("tcp")
+    target = arm.forward(np.array((0.2, 0.5, 0.4, 0.1)))
+    tilted = target.copy()
+    tilted[:3, :3] = target[:3, :3] @ np.array(
+        ((1, 0, 0), (0, math.cos(0.1), -math.sin(0.1)), (0, math.sin(0.1), math.cos(0.1)))
+    )
+    with pytest.raises(OutOfReach):
+        InverseKinematics(arm).solve(tilted)
+    slightly = target.copy()
+    slightly[:3, :3] = target[:3, :3] @ np.array(
+        ((1, 0, 0), (0, math.cos(0.01), -math.sin(0.01)), (0, math.sin(0.01), math.cos(0.01)))
+    )
+    q = InverseKinematics(arm).solve(slightly)
+    assert np.allclose(arm.forward(q)[:3, 3], target[:3, 3], atol=1e-5)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.tuples(st.floats(-2.6, 2.6), st.floats(-2.6, 2.6)), st.floats(-3.0, 3.0))
+def test_two_joints_reach_a_position_whatever_its_heading(q: tuple[float, float], heading: float) -> None:
+    assume(abs(q[1]) > 0.05)
+    arm = RobotModel.load(TWO_AXIS).arm("tcp")
+    target = arm.forward(np.array(q))
+    target[:3, :3] = Pose().matrix()[:3, :3]
+    c, s = math.cos(heading), math.sin(heading)
+    target[:2, :2] = (c, -s), (s, c)
+    found = InverseKinematics(arm).solutions(target, np.array(q))
+    assert np.allclose(found[0], q, atol=1e-3)
+    expected = [
+        each
+        for each in two_axis_kinematics.inverse((0.15, 0.1), float(target[0, 3]), float(target[1, 3]))
+        if all(abs(value) <= 2.6 for value in each)
+    ]
+    assert all(
+        any(np.allclose(wrapped(each - np.array(other)), 0.0, atol=0.02) for other in expected) for each in found
+    )
+    upside_down = target.copy()
+    upside_down[:3, 1:3] *= -1.0
+    with pytest.raises(OutOfReach):
+        InverseKinematics(arm).solve(upside_down)
+
+
+def test_joints_that_slide_and_turn_are_mixed() -> None:
+    text = links("base", "x", "y", "z", "tool")
+    text += joint("x", "base", "x", kind="prismatic", axis="1 0 0", limit='<limit lower="0" upper="2"/>')
+    text += joint("y", "x", "y", kind="prismatic", axis="0 1 0", limit='<limit lower="-1" upper="1"/>')
+    text += joint("z", "y", "z", kind="prismatic", axis="0 0 -1", limit='<limit lower="0" upper="1"/>')
+    text += joint("turn", "z", "tool", kind="continuous", limit="")
+    arm = RobotModel.load(urdf(text)).arm("tool")
+    q = np.array((1.9, -0.9, 0.3, 40.0))
+    found = InverseKinematics(arm).solutions(arm.forward(q), q)
+    assert len(found) == 1
+    assert np.allclose(found[0], q, atol=1e-6)
+    arm.upper[0] = 1.8
+    with pytest.raises(OutOfReach):
+        InverseKinematics(arm).solve(arm.forward(q), q)
+
+
+# ------------------------------------------------------------------------------------------------ refusals
+def test_what_cannot_be_reached_is_refused_with_the_place() -> None:
+    inverse = InverseKinematics(ur().arm("tcp"))
+    for position in ((1.5, 0.0, 0.3), (1.05, 0.0, 0.3), (0.0, 0.0, 0.2)):
+        with pytest.raises(OutOfReach, match="ur5e cannot reach") as refused:
+            inverse.solve(Pose(Position(*position)).matrix())
+        assert f"{position[0]:.3f}" in refused.value.detail
+        assert refused.value.code == "out_of_reach"
+        assert inverse.solutions(Pose(Position(*position)).matrix()) == []
+    broken = Pose().matrix()
+    broken[0, 3] = math.nan
+    with pytest.raises(OutOfReach, match="not finite"):
+        inverse.solve(broken)
+    with pytest.raises(OutOfReach, match="6 finite joint values"):
+        inverse.solve(Pose().matrix(), np.zeros(5))
+
+
+def test_collisions_are_avoided_by_another_configuration_and_named_when_they_cannot_be() -> None:
+    arm = ur().arm("tcp")
+    q = np.array((0.5, -1.2, 1.4, -1.8, -1.5, 0.7))
+    target = arm.forward(q)
+    world = CollisionWorld()
+    world.add_robot("arm", ur(), Pose())
+    inverse, blocked = InverseKinematics(arm), blocked_in(world, "arm", arm)
+    assert blocked(q) == ""
+    assert np.allclose(inverse.solve(target, q, blocked), q, atol=1e-6)
+    elbow = ur().link_poses(q)["forearm_link"]
+    world.put("lamp", Sphere(0.03), Pose.from_matrix(elbow @ Pose(Position(0.0, 0.0, 0.03)).matrix()))
+    assert blocked(q) in ("arm/forearm_link and lamp", "arm/upper_arm_link and lamp")
+    other = inverse.solve(target, q, blocked)
+    assert np.abs(wrapped(other - q)).max() > 0.1
+    assert_there(arm, other, target)
+    assert world.is_free("arm", other)
+    free = inverse.solutions(target, q, blocked)
+    assert 0 < len(free) < len(inverse.solutions(target, q))
+    world.put("wall", Sphere(0.03), Pose.from_matrix(target))
+    world.put("part", Sphere(0.05), Pose.from_matrix(target @ Pose(Position(0.0, 0.0, -0.02)).matrix()))
+    with pytest.raises(OnlyInCollision, match=r"arm/.*(part|wall|lamp)") as refused:
+        inverse.solve(target, q, blocked)
+    assert refused.value.code == "in_collision"
