@@ -34,6 +34,7 @@ def rotation_vector(rotation: Array) -> Array:
         return skew / 2
     outer = (rotation + np.eye(3)) / 2
     axis = outer[:, int(np.argmax(np.diag(outer)))]
+    axis = axis if skew @ axis >= 0 else -axis
     return np.asarray(axis / np.linalg.norm(axis) * angle)
 
 
