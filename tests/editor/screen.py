@@ -142,7 +142,7 @@ async def screen_of(
             scaled = f"document.documentElement.style.fontSize = '{100 * text_scale}%'"
             await screen.page.add_init_script(f"document.addEventListener('DOMContentLoaded', () => {{ {scaled} }})")
         yield screen
-        assert screen.unexpected() == []
+        assert not (told := screen.unexpected()), f"the page told errors: {told}"
     finally:
         with contextlib.suppress(Error):  # the browser is gone, which the test has told
             await context.close()

@@ -1,6 +1,6 @@
 /** Controls of all screens: react-aria's behaviour in our clothes. */
 
-import { lazy, type ReactNode, Suspense } from "react";
+import { type ReactNode, Suspense } from "react";
 import {
   Button as AriaButton,
   type ButtonProps,
@@ -11,14 +11,15 @@ import {
   type TextFieldProps,
 } from "react-aria-components";
 import { Icon, type IconName } from "./icons";
+import { lazily } from "./lazily";
 import type { AskNameProps, ConfirmProps } from "./dialogs";
 import type { MoreProps } from "./menu";
 
 export type { Choice } from "./menu";
 
-const ConfirmDialog = lazy(() => import("./dialogs").then((module) => ({ default: module.Confirm })));
-const AskNameDialog = lazy(() => import("./dialogs").then((module) => ({ default: module.AskName })));
-const MoreMenu = lazy(() => import("./menu"));
+const ConfirmDialog = lazily(() => import("./dialogs").then((module) => ({ default: module.Confirm })));
+const AskNameDialog = lazily(() => import("./dialogs").then((module) => ({ default: module.AskName })));
+const MoreMenu = lazily(() => import("./menu"));
 
 export type Look = "" | "primary" | "plain" | "danger";
 

@@ -8,6 +8,7 @@ import { now, select, setUi, store, useEditor } from "../../store/store";
 import { telemetry } from "../../store/telemetry";
 import { ItemMaker } from "../../viewmodel/items";
 import { Button, Waiting } from "../kit/kit";
+import { persistently } from "../kit/lazily";
 import { selectionOf } from "../names";
 import { useTheme } from "../settings/Settings";
 
@@ -26,7 +27,7 @@ export function View3D() {
     const maker = new ItemMaker();
     let stop = () => {};
     const begin = async () => {
-      const { Engine } = await import("../../engine/engine");
+      const { Engine } = await persistently(() => import("../../engine/engine"));
       if (ended || !canvas.current || !labels.current) return;
       made = new Engine({ canvas: canvas.current, labels: labels.current, telemetry, asset: readAsset, quality: chosen(quality), dark: themeAtStart.current === "dark" });
       const shown = made;

@@ -1,6 +1,6 @@
 /** The list of all that is in the workplace. */
 
-import { lazy } from "react";
+import { lazily } from "../../kit/lazily";
 import type { Tool } from "../tools";
 
-export const things: Tool = { id: "things", label: "Things", icon: "tree", Panel: lazy(() => import("./ThingsPanel")) };
+export const things: Tool = { id: "things", label: "Things", icon: "tree", Panel: lazily(() => import("./ThingsPanel")) };

@@ -1,0 +1,22 @@
+/** Parts of the page that are loaded when they are needed, also when the server is away just then. */
+
+import { type ComponentType, lazy, type LazyExoticComponent } from "react";
+
+/** Pauses in s before each further attempt; the last one again and again. */
+const PAUSES = [0.5, 1, 2, 4];
+
+/** Load until it succeeds: a lazy component that failed once would fail for good. */
+export async function persistently<T>(load: () => Promise<T>): Promise<T> {
+  for (let attempt = 0; ; attempt++) {
+    try {
+      return await load();
+    } catch {
+      const pause = PAUSES[Math.min(attempt, PAUSES.length - 1)] ?? 1;
+      await new Promise((resolve) => setTimeout(resolve, pause * 1000));
+    }
+  }
+}
+
+export function lazily<C extends ComponentType<any>>(load: () => Promise<{ default: C }>): LazyExoticComponent<C> {
+  return lazy(() => persistently(load));
+}
