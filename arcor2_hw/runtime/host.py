@@ -43,6 +43,8 @@ NUDGE_PERIOD: Final = 0.1
 """Seconds between two interruptions of a script that does not end although it is stopped."""
 LOST_WITHIN: Final = 5.0
 """Seconds that a script gets to end when it is stopped because a device is lost, as when somebody stops it."""
+ROOM_WITHIN: Final = 1.0
+"""Seconds that an event of the program waits for a server that does not keep up."""
 FLUSH: Final = 0.3
 """Seconds for the last messages."""
 
@@ -217,17 +219,18 @@ class Host:
         )
 
     # -------------------------------------------------------------------------------- channel of the program
-    def event(self, name: str, encoded: bytes) -> None:
-        """Pass on an encoded event of the program."""
-        self.link.post(m.ProgramEvent(name, encoded))
+    def event(self, name: str, encoded: bytes, number: int = 0, action: str = "", time: float = 0.0) -> None:
+        """Pass on an encoded event of the program, which waits a little for a server that does not keep up."""
+        self.link.wait_for_room(ROOM_WITHIN)
+        self.link.post(m.ProgramEvent(name, encoded, number, action, time))
 
     def changed(self, state: str) -> None:
         """Tell that the program is running or paused now."""
         self.link.post(m.ProgramChanged(state))
 
-    def action(self, told: m.ActionBegan | m.ActionEnded) -> None:
-        """Tell that an action was let begin, or has ended."""
-        self.link.post(told)
+    def action_over(self, number: int, duration: float, error: str) -> None:
+        """Tell that an action has ended where no event says so."""
+        self.link.post(m.ActionFailed(number, duration, error))
 
     # -------------------------------------------------------------------------------- reader thread
     def _read(self) -> None:

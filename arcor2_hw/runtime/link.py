@@ -4,6 +4,7 @@ import select
 import signal
 import socket
 import threading
+import time
 from collections.abc import Iterator
 from queue import Empty, SimpleQueue
 from typing import Any, Final
@@ -20,7 +21,11 @@ from arcor2_hw.runtime.messages import (
 
 STREAM_BACKLOG: Final = 1000
 """Messages waiting for a server that does not read, beyond which streamed values are left out."""
+BACKLOG: Final = 4096
+"""Messages waiting for a server that does not keep up, beyond which a program waits before its next event."""
 _CHUNK: Final = 1 << 18
+_LOOK: Final = 0.002
+"""Seconds between two looks at how many messages still wait."""
 
 
 class Link:
@@ -30,6 +35,7 @@ class Link:
         self._socket = sock
         self._socket.setblocking(True)
         self._outbox: SimpleQueue[ToServer | None] = SimpleQueue()
+        self._sent = 0
         self._writer = threading.Thread(target=self._write, name="to server", daemon=True)
         self._writer.start()
 
@@ -43,10 +49,21 @@ class Link:
         if self._outbox.qsize() < STREAM_BACKLOG:
             self._outbox.put(message)
 
+    def wait_for_room(self, timeout: float) -> None:
+        """Wait while too much waits to be sent, but no longer than `timeout` s: a server that hangs stops nobody."""
+        if self._outbox.qsize() < BACKLOG:
+            return
+        deadline = time.monotonic() + timeout
+        while self._outbox.qsize() >= BACKLOG and time.monotonic() < deadline:
+            time.sleep(_LOOK)
+
     def close(self, timeout: float) -> None:
-        """Send what waits, within `timeout` s."""
+        """Send what waits; given up when the server takes nothing for `timeout` s."""
         self._outbox.put(None)
-        self._writer.join(timeout)
+        sent = -1
+        while self._writer.is_alive() and sent != self._sent:
+            sent = self._sent
+            self._writer.join(timeout)
 
     def _write(self) -> None:
         alive = True
@@ -65,6 +82,7 @@ class Link:
             if alive:
                 try:
                     self._socket.sendall(b"".join(batch))
+                    self._sent += len(batch)
                 except OSError:
                     alive = False  # the reader learns of it too; what follows has no address
             if last:

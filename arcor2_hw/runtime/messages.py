@@ -237,32 +237,27 @@ class HoldEnded(ToServer, frozen=True):
 
 
 class ProgramEvent(ToServer, frozen=True):
-    """PackageInfo, ActionStateBefore, ActionStateAfter, ProjectException: the whole encoded event."""
+    """PackageInfo, ActionStateBefore, ActionStateAfter, ProjectException: the whole encoded event.
+
+    Of actions, `number` counts their calls from 1; `name` is the action's, else what is called. `time`: with
+    ActionStateBefore when it was told, s since the epoch; with ActionStateAfter how long the action took, s.
+    """
 
     event: str
     encoded: bytes
+    number: int = 0
+    name: str = ""
+    time: float = 0.0
 
 
-class ActionBegan(ToServer, frozen=True):
-    """An action of the program was let begin. `number` counts them from 1; `started`: seconds since the epoch.
+class ActionFailed(ToServer, frozen=True):
+    """An action has ended after `duration` s in a way for which the protocol has no event: by an error.
 
-    action_id is empty in a program whose project knows no actions; `name` is the action's, else what is called.
+    Without an error it is one of a program whose project knows no actions. `number`: as in ProgramEvent.
     """
 
     number: int
-    action_id: str
-    name: str
-    started: float
-    parameters: list[str] = field(default_factory=list)
-    thread_id: int | None = None
-
-
-class ActionEnded(ToServer, frozen=True):
-    """An action has ended after `duration` s, with its results or an error."""
-
-    number: int
     duration: float
-    results: list[str] = field(default_factory=list)
     error: str = ""
 
 
@@ -327,8 +322,7 @@ ServerBound = (
     | StreamEvent
     | HoldEnded
     | ProgramEvent
-    | ActionBegan
-    | ActionEnded
+    | ActionFailed
     | ProgramChanged
     | DeviceChanged
     | LogLine

@@ -23,7 +23,6 @@ from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, InvalidData, NotFo
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.device import STOP_DEADLINE, Device, describe
 from arcor2_hw.runtime.lane import Job
-from arcor2_hw.runtime.messages import ActionBegan, ActionEnded
 from arcor2_hw.runtime.pacing import Gate
 from arcor2_hw.runtime.values import encode_shown, results
 
@@ -38,14 +37,14 @@ _encode = msgspec.json.Encoder().encode
 class Channel(Protocol):
     """Where a program tells of itself."""
 
-    def event(self, name: str, encoded: bytes) -> None:
-        """Pass on an encoded event."""
+    def event(self, name: str, encoded: bytes, number: int = 0, action: str = "", time: float = 0.0) -> None:
+        """Pass on an encoded event; of an action with the number of its call, its name, and a time (ProgramEvent)."""
 
     def changed(self, state: str) -> None:
         """Tell that the program is running or paused now."""
 
-    def action(self, told: ActionBegan | ActionEnded) -> None:
-        """Tell that an action was let begin, or has ended."""
+    def action_over(self, number: int, duration: float, error: str) -> None:
+        """Tell that an action has ended where no event says so: by an error, or in a project without actions."""
 
 
 class Action:
@@ -155,35 +154,35 @@ class Program:
                 raise InvalidData(f"{what}: the project has no action named {name!r}")
         points = self.points_of(arguments)
         thread = None if self.in_main_thread else threading.get_ident()
-        parameters = [encode_shown(argument) for argument in arguments]
         data = ActionStateBeforeData(
             msgspec.UNSET if action_id is None else action_id,
-            parameters or msgspec.UNSET,
+            [encode_shown(argument) for argument in arguments] if arguments else msgspec.UNSET,
             points or msgspec.UNSET,
             msgspec.UNSET if thread is None else thread,
         )
-        self.channel.event("ActionStateBefore", _encode(Event("ActionStateBefore", data=data)))
-        self.gate.before(points if action_id is None else points | {action_id})
         action = Action(next(self._numbers), action_id)
-        self.channel.action(ActionBegan(action.number, action_id or "", name or what, time.time(), parameters, thread))
+        encoded = _encode(Event("ActionStateBefore", data=data))
+        self.channel.event("ActionStateBefore", encoded, action.number, name or what, time.time())
+        self.gate.before(points if action_id is None else points | {action_id})
         action.began = time.monotonic()
         return action
 
     def action_ended(self, action: Action, value: Any) -> None:
         """Tell that an action has ended with a result, and wait for leave to go on. Raises ProgramStopped."""
         duration = time.monotonic() - action.began
-        given = results(value)
-        self.channel.action(ActionEnded(action.number, duration, given))
-        if action.id is not None:
-            data = ActionStateAfterData(action.id, given or msgspec.UNSET)
-            self.channel.event("ActionStateAfter", _encode(Event("ActionStateAfter", data=data)))
+        if action.id is None:
+            self.channel.action_over(action.number, duration, "")
+        else:
+            data = ActionStateAfterData(action.id, results(value) or msgspec.UNSET)
+            encoded = _encode(Event("ActionStateAfter", data=data))
+            self.channel.event("ActionStateAfter", encoded, action.number, time=duration)
         self.gate.after()
 
     def action_failed(self, action: Action, error: BaseException) -> None:
         """Say that an action is over without a result. Raises ProgramStopped."""
-        duration = time.monotonic() - action.began
         self._failed = error, action
-        self.channel.action(ActionEnded(action.number, duration, error=str(error) or type(error).__name__))
+        duration = time.monotonic() - action.began
+        self.channel.action_over(action.number, duration, str(error) or type(error).__name__)
         self.gate.after()
 
     def blame(self, device: Device, error: BaseException) -> None:

@@ -14,7 +14,6 @@ import msgspec
 from arcor2_hw.data.events import Event, PackageStateData
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.exceptions import ProgramStopped
-from arcor2_hw.runtime.messages import ActionBegan, ActionEnded
 from arcor2_hw.runtime.program import Program
 from arcor2_hw.runtime.streaming import Streams
 
@@ -27,12 +26,12 @@ class _Lines:
     def __init__(self) -> None:
         self._lock = threading.Lock()
 
-    def event(self, name: str, encoded: bytes) -> None:  # noqa: ARG002 - the name stands in the event
+    def event(self, name: str, encoded: bytes, *_: object, **__: object) -> None:  # noqa: ARG002 - it is in the event
         with self._lock:
             sys.stdout.write(encoded.decode() + "\n")
             sys.stdout.flush()
 
-    def action(self, told: ActionBegan | ActionEnded) -> None:
+    def action_over(self, number: int, duration: float, error: str) -> None:
         pass  # the protocol's lines do not tell it
 
     def changed(self, state: str) -> None:

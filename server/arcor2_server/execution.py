@@ -300,9 +300,7 @@ class Execution:
             case m.ProgramEvent():
                 self._remember(message)
                 hub.broadcast_encoded(message.event, message.encoded)
-            case m.ActionBegan():
-                self._services.runs.began(message)
-            case m.ActionEnded():
+            case m.ActionFailed():
                 self._services.runs.ended(message)
             case m.ProgramChanged():
                 self._program_changed(host, message)
@@ -312,6 +310,8 @@ class Execution:
                 log.info("program", level=message.level, text=message.text, object=message.object_id)
 
     def _remember(self, message: m.ProgramEvent) -> None:
+        if message.number:
+            self._services.runs.told(message)
         match message.event:
             case "PackageInfo":
                 self._info = message.encoded

@@ -7,12 +7,14 @@ from datetime import UTC, datetime
 from itertools import islice
 from typing import Any, Final
 
+import msgspec
 import structlog
 from msgspec import UNSET, Struct
 from msgspec.structs import replace
 
-from arcor2_hw.data.base import now
+from arcor2_hw.data.base import Unset, now
 from arcor2_hw.data.editor import ActionOfRun, Run, RunEnd, TraceEntry
+from arcor2_hw.data.events import ActionStateAfterData, ActionStateBeforeData
 from arcor2_hw.exceptions import StorageError
 from arcor2_hw.runtime import messages as m
 from arcor2_server.hub import Hub
@@ -23,8 +25,47 @@ log = structlog.get_logger(__name__)
 
 KEPT: Final = 1000
 """Runs that are kept."""
+TRACE: Final = "ExecutionTrace"
 KEPT_ACTIONS: Final = 1000
 """Actions of the last run that are kept."""
+
+
+class _Before(Struct):
+    data: ActionStateBeforeData
+
+
+class _After(Struct):
+    data: ActionStateAfterData
+
+
+class _Call:
+    """One call of an action, as it was told; it is read only when somebody asks."""
+
+    __slots__ = ("before", "end")
+
+    def __init__(self, before: m.ProgramEvent) -> None:
+        self.before = before
+        self.end: m.ProgramEvent | m.ActionFailed | None = None
+
+    def entry(self, run: int) -> TraceEntry:
+        told, end = self.before, self.end
+        before = msgspec.json.decode(told.encoded, type=_Before).data
+        entry = TraceEntry(
+            run,
+            told.number,
+            "" if isinstance(before.action_id, Unset) else before.action_id,
+            datetime.fromtimestamp(told.time, UTC).isoformat(timespec="microseconds"),
+            told.name,
+            parameters=before.parameters,
+            thread_id=before.thread_id,
+        )
+        match end:
+            case m.ProgramEvent():
+                after = msgspec.json.decode(end.encoded, type=_After).data
+                return replace(entry, duration=end.time, results=after.results)
+            case m.ActionFailed():
+                return replace(entry, duration=end.duration, error=end.error or UNSET)
+        return entry
 
 
 class How(Struct, frozen=True):
@@ -48,7 +89,7 @@ class Runs:
         self._data: SharedData | None = None
         self._writing: asyncio.Task[None] | None = None
         self._unwritten: dict[int, Run] = {}
-        self._trace: OrderedDict[int, TraceEntry] = OrderedDict()
+        self._trace: OrderedDict[int, _Call] = OrderedDict()
         self._trace_of = 0
 
     async def open(self, data: SharedData) -> None:
@@ -95,7 +136,7 @@ class Runs:
             return
         last: ActionOfRun | Any = UNSET
         if self._trace_of == number and self._trace:
-            entry = next(reversed(self._trace.values()))
+            entry = next(reversed(self._trace.values())).entry(number)
             last = ActionOfRun(entry.action_id, entry.name)
             run = replace(run, actions=entry.number)
         self._put(
@@ -110,30 +151,25 @@ class Runs:
             )
         )
 
-    def began(self, action: m.ActionBegan) -> None:
-        """Note that an action of the present run was let begin."""
-        entry = TraceEntry(
-            self._trace_of,
-            action.number,
-            action.action_id,
-            datetime.fromtimestamp(action.started, UTC).isoformat(timespec="microseconds"),
-            action.name,
-            parameters=action.parameters or UNSET,
-            thread_id=UNSET if action.thread_id is None else action.thread_id,
-        )
-        self._trace[action.number] = entry
+    def told(self, told: m.ProgramEvent) -> None:
+        """Note that an action of the present run was announced (ActionStateBefore), or has ended (ActionStateAfter)."""
+        if told.event != "ActionStateBefore":
+            self.ended(told)
+            return
+        call = self._trace[told.number] = _Call(told)
         if len(self._trace) > KEPT_ACTIONS:
             self._trace.popitem(last=False)
-        self._hub.broadcast(make_event("ExecutionTrace", entry))
+        self._tell(call)
 
-    def ended(self, action: m.ActionEnded) -> None:
-        """Note that an action of the present run has ended."""
-        if (entry := self._trace.get(action.number)) is None:
-            return
-        entry = self._trace[action.number] = replace(
-            entry, duration=action.duration, results=action.results or UNSET, error=action.error or UNSET
-        )
-        self._hub.broadcast(make_event("ExecutionTrace", entry))
+    def ended(self, told: m.ProgramEvent | m.ActionFailed) -> None:
+        """Note that an action of the present run has ended (ActionStateAfter), or failed."""
+        if (call := self._trace.get(told.number)) is not None:
+            call.end = told
+            self._tell(call)
+
+    def _tell(self, call: "_Call") -> None:
+        if self._hub.subscribers(TRACE):
+            self._hub.broadcast(make_event(TRACE, call.entry(self._trace_of)))
 
     # -------------------------------------------------------------------------------- what is asked
     def newest(
@@ -151,8 +187,8 @@ class Runs:
 
     def trace(self, limit: int, before: int | None = None) -> tuple[int, list[TraceEntry]]:
         """Give the run whose actions are kept (0: there was none), and actions of it, newest first."""
-        entries = (e for e in reversed(self._trace.values()) if before is None or e.number < before)
-        return self._trace_of, [*islice(entries, limit)]
+        calls = (call for number, call in reversed(self._trace.items()) if before is None or number < before)
+        return self._trace_of, [call.entry(self._trace_of) for call in islice(calls, limit)]
 
     # -------------------------------------------------------------------------------- inside
     def _counted(self, run: Run) -> Run:

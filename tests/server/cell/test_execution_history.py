@@ -20,6 +20,8 @@ from tests.server.cell.conftest import Recorder, Server, serving
 from tests.server.cell.test_execution import LAMP, PROJECT, until_stopped, write
 
 EVENTS = {"RunChanged", "ExecutionTrace"}
+BEFORE = b'{"event": "ActionStateBefore", "data": {"action_id": "act", "thread_id": 7}}'
+AFTER = b'{"event": "ActionStateAfter", "data": {"action_id": "act", "results": ["1"]}}'
 
 
 def subscribe(server: Server, *names: str) -> None:
@@ -182,16 +184,16 @@ async def test_the_newest_runs_and_actions_are_kept(tmp_path: Any, monkeypatch: 
         for _ in range(8):
             number = kept.begin("pkg", by="", temporary=False, start_paused=False)
             for action in range(1, 6):
-                kept.began(m.ActionBegan(action, "act", "a", time.time()))
-                kept.ended(m.ActionEnded(action, 0.1))
+                kept.told(m.ProgramEvent("ActionStateBefore", BEFORE, action, "a", time.time()))
+                kept.told(m.ProgramEvent("ActionStateAfter", AFTER, action, time=0.1))
             if number != 8:
                 kept.end(number, RunEnd.FINISHED)
         assert [run.number for run in kept.newest(100)] == [8, 7, 6, 5, 4]
         assert kept.newest(1)[0].actions == 5
         _, entries = kept.trace(100)
         assert [entry.number for entry in entries] == [5, 4, 3]
-        assert isinstance(entries[0], TraceEntry)
-        kept.ended(m.ActionEnded(1, 0.1))  # not kept any more
+        assert entries[0] == TraceEntry(8, 5, "act", entries[0].started, "a", duration=0.1, results=["1"], thread_id=7)
+        kept.ended(m.ActionFailed(1, 0.1))  # not kept any more
         await kept.close()
         again = Runs(Hub())
         await again.open(SharedData(storage))
