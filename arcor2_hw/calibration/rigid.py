@@ -32,7 +32,7 @@ def rotation_vector(rotation: Array) -> Array:
         return np.asarray(skew / (2 * sine) * angle)
     if cosine > 0:
         return skew / 2
-    outer = (rotation + np.eye(3)) / 2
+    outer = (rotation + rotation.T) / 4 + np.eye(3) / 2
     axis = outer[:, int(np.argmax(np.diag(outer)))]
     axis = axis if skew @ axis >= 0 else -axis
     return np.asarray(axis / np.linalg.norm(axis) * angle)
