@@ -9,6 +9,7 @@ from typing import Annotated, Any, Final
 
 import msgspec
 from cyclopts import Parameter
+from msgspec.structs import replace
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -79,10 +80,14 @@ def read(path: Path, kind: Kind | None = None) -> Archive:
         archive = archives.read(path)
     except InvalidPackage as error:
         raise InvalidPackage(f"{path}: {error}") from error
-    if kind is not None and archive.kind != kind:
-        article = "an" if archive.kind[0] == "o" else "a"
-        raise Failed(ExitStatus.USAGE, f"{path} holds {article} {archive.kind}: use arcor2-hw {archive.kind}")
-    return archive
+    if kind is None or archive.kind == kind:
+        return archive
+    if kind == "scene" and archive.kind == "project":
+        # A project's file holds its scene, too.
+        kept = Archive("scene", archive.scene, types=archive.types, installed=archive.installed, assets=archive.assets)
+        return replace(kept, from_package=archive.from_package)
+    article = "an" if archive.kind[0] == "o" else "a"
+    raise Failed(ExitStatus.USAGE, f"{path} holds {article} {archive.kind}: use arcor2-hw {archive.kind}")
 
 
 def write(archive: Archive, output: Path | None, force: bool) -> None:

@@ -43,7 +43,7 @@ def export(
 
 @app.command(name="import")
 def import_scene(
-    file: Annotated[Path, Parameter(help="What `arcor2-hw scene export` wrote.")],
+    file: Annotated[Path, Parameter(help="What `arcor2-hw scene export` wrote, or `project export`.")],
     /,
     *,
     overwrite: x.Overwrite = None,

@@ -305,6 +305,9 @@ def test_a_copy_gets_a_name_and_an_id_of_its_own(cli: Any, place: Place) -> None
     cli("scene", "import", "bench.zip", "--overwrite", "all", at=place.second)
     assert cli("scene", "import", "bench.zip", "--name", "bench two", at=place.second).status == 0
     listed = {one["name"]: one["id"] for one in json.loads(cli("scene", "list", "--json", at=place.second).out)}
+    # A project's file holds its scene, too.
+    cli("project", "export", "open it", at=place.first)
+    assert cli("scene", "diff", "open_it.zip", "bench.zip") == (0, "There is no difference.\n", "")
     assert listed.keys() >= {"bench", "bench two"}
     assert listed["bench"] != listed["bench two"]
     taken = cli("scene", "import", "bench.zip", "--name", "bench two", at=place.second)
