@@ -38,7 +38,7 @@ class Body:
 
 
 class Contents:
-    """Bodies by id and robots by id; `margin`, m, is how far apart things have to be to count as free.
+    """Bodies by id and robots by id; `margin`, m, is how far from its surroundings a robot has to be to be free.
 
     revision: grows with every change. changes: the newest of them.
     """

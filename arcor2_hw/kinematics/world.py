@@ -76,7 +76,7 @@ class CollisionWorld(Contents):
         found = [
             Contact(_name(mine, mine.parts[one]), _name(mine, mine.parts[two]), depth)
             for one, two in mine.pairs
-            if (depth := self._depth(mine.parts[one].object, mine.parts[two].object)) is not None
+            if (depth := _depth(mine.parts[one].object, mine.parts[two].object, 0.0)) is not None
         ]
         found += self._contacts_around(mine, self._bodies.values())
         return list({(each.first, each.second): each for each in found}.values())
@@ -92,7 +92,7 @@ class CollisionWorld(Contents):
                 body = every[index]
                 if self._may_touch(part, mine.name, (body.name,)):
                     continue
-                if (depth := self._depth(part.object, body.object)) is not None:
+                if (depth := _depth(part.object, body.object, self.margin)) is not None:
                     yield Contact(_name(mine, part), body.name, depth)
         for other in self.robots.values():
             if other is not mine:
@@ -109,7 +109,7 @@ class CollisionWorld(Contents):
                 names = (their.name,) if their.held is not None else (other.name, f"{other.name}/{their.link}")
                 if self._may_touch(part, mine.name, names):
                     continue
-                if (depth := self._depth(part.object, their.object)) is not None:
+                if (depth := _depth(part.object, their.object, self.margin)) is not None:
                     yield Contact(_name(mine, part), _name(other, their), depth)
 
     def _collides(self, one: Any, other: Any) -> bool:
@@ -118,13 +118,6 @@ class CollisionWorld(Contents):
         callback.data.request.security_margin = self.margin
         one.collide(other, callback)
         return bool(callback.data.result.isCollision())
-
-    def _depth(self, one: Any, other: Any) -> float | None:
-        request, result = coal.CollisionRequest(), coal.CollisionResult()
-        request.security_margin = self.margin
-        if not coal.collide(one, other, request, result):
-            return None
-        return max(0.0, -float(result.getContact(0).penetration_depth))
 
     # -------------------------------------------------------------------------------- distances and lines
     def clearance(self, robot: str, q: Array, within: float = np.inf) -> Clearance | None:
@@ -225,3 +218,12 @@ def _gap(one: Part, two: Part) -> float:
 
 def _name(robot: StandingRobot, part: Part) -> str:
     return part.name if part.held is not None else f"{robot.name}/{part.link}"
+
+
+def _depth(one: Any, other: Any, margin: float) -> float | None:
+    """Give how deep two things are in each other, zero when they are only too near; None when they are free."""
+    request, result = coal.CollisionRequest(), coal.CollisionResult()
+    request.security_margin = margin
+    if not coal.collide(one, other, request, result):
+        return None
+    return max(0.0, -float(result.getContact(0).penetration_depth))
