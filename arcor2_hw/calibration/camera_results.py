@@ -77,9 +77,9 @@ class CameraPose(Data, frozen=True):
     markers and boards. residual: px, root mean square. covariance: 6 × 6, of a small displacement (x, y, z in m) and
     rotation (rotation vector in rad, turned after the pose), both in the origin's frame. position_deviation: m,
     standard deviation along its worst axis. orientation_deviation: rad, likewise. blur: px, standard deviation of the
-    markers' edges. parameters: the intrinsics with which the pose explains the picture; they differ from the given ones
-    by as much as the picture shows them to be off, within what is known of them. verdict: one sentence or two for the
-    operator.
+    edges, 0 where it could not be measured. parameters: the intrinsics with which the pose explains the picture; they
+    differ from the given ones by as much as the picture shows them to be off, within what is known of them. verdict:
+    one sentence or two for the operator.
     """
 
     pose: Pose

@@ -1,14 +1,14 @@
 """What pictures show of a layout: from files to corners of known place, or a refusal that says what is missing."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 
 from arcor2_hw.calibration.boards import CORNER_DEVIATION, board_of, check_layout, measured_board, seen_of_board
 from arcor2_hw.calibration.edges import Measured
-from arcor2_hw.calibration.layout import Layout, MarkerDictionary
+from arcor2_hw.calibration.layout import CharucoBoard, Layout, MarkerDictionary
 from arcor2_hw.calibration.lens import Array, Lens
 from arcor2_hw.calibration.markers import detect, measured
 from arcor2_hw.calibration.pictures import Grey, sharpness_of
@@ -23,10 +23,25 @@ _SHARP: Final = 1.4
 
 @dataclass(frozen=True)
 class Sighting:
-    """What is seen, and how sharp it is. blur: px, standard deviation of the markers' edges, NaN without markers."""
+    """What is seen, and the blur: px, standard deviation of the edges, 0 where it could not be measured."""
 
     seen: list[Seen]
     blur: float
+
+
+@dataclass
+class _Look:
+    """What one picture shows.
+
+    widths: px, of the markers' edges and cells. blurs: px, of all edges that were measured. pieces: whether there are
+    markers of boards. strangers: numbers of markers that are not listed.
+    """
+
+    seen: list[Seen] = field(default_factory=list)
+    widths: list[tuple[float, float]] = field(default_factory=list)
+    blurs: list[float] = field(default_factory=list)
+    pieces: bool = False
+    strangers: set[int] = field(default_factory=set)
 
 
 def sight_of(greys: Sequence[Grey], lens: Lens, layout: Layout, blur_threshold: float, largest_blur: float) -> Sighting:
@@ -38,39 +53,45 @@ def sight_of(greys: Sequence[Grey], lens: Lens, layout: Layout, blur_threshold: 
     check_layout(layout)
     if not layout.markers and not layout.boards:
         raise CalibrationRefused("No marker is configured: say which ones stand where.", reason=Reason.NO_MARKER)
-    seen: list[Seen] = []
-    blurs: list[float] = []
-    others: set[int] = set()
+    looks = []
     for picture, grey in enumerate(greys):
         name = "The picture" if len(greys) == 1 else f"Picture {picture}"
-        here, widths, strangers = _in_picture(grey, picture, lens, layout, name)
-        others |= strangers
-        typical = float(np.median([blur for blur, _ in widths])) if widths else float("nan")
-        if np.median([blur / min(largest_blur, max(_RESOLVED * cell, _SHARP)) for blur, cell in widths] or [0.0]) > 1.0:
-            raise CalibrationRefused(
-                f"{name} is blurred: the markers' edges are {typical:.1f} px wide. Is the camera in focus, and did it "
-                "stand still?",
-                f"at most {largest_blur:.1f} px, and a quarter of a cell",
-                Reason.BLURRED,
-            )
-        measured_at_all = bool(widths) or any(each.square is None for each in here)
-        if not measured_at_all and not strangers and (sharpness := sharpness_of(grey)) < blur_threshold:
-            raise CalibrationRefused(
-                f"{name} is blurred, or shows nothing at all. Is the camera in focus, the lens clean and the light on?",
-                f"variance of the Laplacian {sharpness:.0f}, at least {blur_threshold:.0f}",
-                Reason.BLURRED,
-            )
-        seen += here
-        blurs += [blur for blur, _ in widths]
+        look = _in_picture(grey, picture, lens, layout, name)
+        _check_sharp(grey, look, name, blur_threshold, largest_blur)
+        looks.append(look)
+    seen = [each for look in looks for each in look.seen]
     if not seen:
-        raise CalibrationRefused(_missing(layout, others), reason=Reason.NO_MARKER)
-    return Sighting(seen, float(np.median(blurs)) if blurs else float("nan"))
+        strangers = set().union(*(look.strangers for look in looks))
+        raise CalibrationRefused(
+            _missing(layout, strangers, any(look.pieces for look in looks)), reason=Reason.NO_MARKER
+        )
+    blurs = [blur for look in looks for blur in look.blurs]
+    return Sighting(seen, float(np.median(blurs)) if blurs else 0.0)
 
 
-def _in_picture(
-    grey: Grey, picture: int, lens: Lens, layout: Layout, name: str
-) -> tuple[list[Seen], list[tuple[float, float]], set[int]]:
-    """Give what is seen in one picture, widths of markers' edges and cells, and numbers of markers not listed."""
+def _check_sharp(grey: Grey, look: _Look, name: str, blur_threshold: float, largest_blur: float) -> None:
+    """Raise CalibrationRefused for a picture that is blurred."""
+    relative = [blur / min(largest_blur, max(_RESOLVED * cell, _SHARP)) for blur, cell in look.widths]
+    if relative and np.median(relative) > 1.0:
+        raise CalibrationRefused(
+            f"{name} is blurred: the markers' edges are {np.median([blur for blur, _ in look.widths]):.1f} px wide. Is "
+            "the camera in focus, and did it stand still?",
+            f"at most {largest_blur:.1f} px, and a quarter of a cell",
+            Reason.BLURRED,
+        )
+    # Sharp edges were measured, or something was at least recognised: what is missing then is not sharpness.
+    if look.blurs or ((look.strangers or look.pieces) and not look.seen):
+        return
+    if (sharpness := sharpness_of(grey)) < blur_threshold:
+        raise CalibrationRefused(
+            f"{name} is blurred, or shows nothing at all. Is the camera in focus, the lens clean and the light on?",
+            f"variance of the Laplacian {sharpness:.0f}, at least {blur_threshold:.0f}",
+            Reason.BLURRED,
+        )
+
+
+def _in_picture(grey: Grey, picture: int, lens: Lens, layout: Layout, name: str) -> _Look:
+    """Find and measure what one picture shows."""
     found: dict[MarkerDictionary, list[tuple[int, Array]]] = {}
     for dictionary in {layout.dictionary} | {board.dictionary for board in layout.boards}:
         own_boards = [board for board in layout.boards if board.dictionary == dictionary]
@@ -85,47 +106,55 @@ def _in_picture(
                 f"{name} shows marker {number} {numbers.count(number)} times: remove or cover the others.",
                 reason=Reason.IMPLAUSIBLE,
             )
-    seen: list[Seen] = []
-    widths: list[tuple[float, float]] = []
+    look = _Look()
     for each in measured(grey, lens, layout.dictionary, own):
         marker = listed[each.number]
         size = float(marker.size) if isinstance(marker.size, float | int) else layout.size
-        seen.append(seen_marker(each, marker.pose.matrix(), size, picture))
+        look.seen.append(_seen_marker(each, marker.pose.matrix(), size, picture))
         if np.isfinite(each.blur):
-            widths.append((each.blur, each.cell))
-    used = set(numbers)
+            look.widths.append((each.blur, each.cell))
+    look.blurs = [blur for blur, _ in look.widths]
+    known = {(layout.dictionary, number) for number in numbers}
     for index, board in enumerate(layout.boards):
-        made = board_of(board)
-        fine = measured_board(grey, lens, board, made, found[board.dictionary])
-        if fine is not None:
-            pixels, points, root = fine[0].corners, fine[1], root_of(fine[0])
-        else:
-            points, pixels = seen_of_board(grey, board, made, found[board.dictionary])
-            root = np.eye(2 * len(points)) / CORNER_DEVIATION
-        used |= set(range(board.first_id, board.first_id + board.columns * board.rows // 2))
-        if len(points):
-            origin_from_board = board.pose.matrix()
-            seen.append(
-                Seen(
-                    f"board {index}",
-                    ("board", index),
-                    picture,
-                    points @ origin_from_board[:3, :3].T + origin_from_board[:3, 3],
-                    pixels,
-                    root,
-                    origin_from_board[:3, 2],
-                    origin_from_board[:3, 3],
-                )
-            )
-    return seen, widths, {number for each in found.values() for number, _ in each} - used
+        own_numbers = {(board.dictionary, number) for number, _ in found[board.dictionary]} & _numbers_of(board)
+        look.pieces |= bool(own_numbers)
+        known |= own_numbers
+        _look_for_board(look, grey, lens, board, index, picture, found[board.dictionary])
+    look.strangers = {n for dictionary, each in found.items() for n, _ in each if (dictionary, n) not in known}
+    return look
 
 
-def root_of(each: Measured) -> Array:
+def _numbers_of(board: CharucoBoard) -> set[tuple[MarkerDictionary, int]]:
+    """Give the board's markers."""
+    count = board.columns * board.rows // 2
+    return {(board.dictionary, number) for number in range(board.first_id, board.first_id + count)}
+
+
+def _look_for_board(
+    look: _Look, grey: Grey, lens: Lens, board: CharucoBoard, index: int, picture: int, found: list[tuple[int, Array]]
+) -> None:
+    """Measure a board, if it is there."""
+    made = board_of(board)
+    fine = measured_board(grey, lens, board, made, found)
+    if fine is not None:
+        pixels, points, root = fine[0].corners, fine[1], _root_of(fine[0])
+        look.blurs.append(fine[0].blur)
+    else:
+        points, pixels = seen_of_board(grey, board, made, found)
+        root = np.eye(2 * len(points)) / CORNER_DEVIATION
+    if len(points):
+        placed = board.pose.matrix()
+        in_origin = points @ placed[:3, :3].T + placed[:3, 3]
+        key = ("board", index)
+        look.seen.append(Seen(f"board {index}", key, picture, in_origin, pixels, root, placed[:3, 2], placed[:3, 3]))
+
+
+def _root_of(each: Measured) -> Array:
     """Give the square root of the information of a measured marker."""
     return np.asarray(np.linalg.cholesky(each.information).T, dtype=np.float64)
 
 
-def seen_marker(each: Measured, origin_from_marker: Array, size: float, picture: int) -> Seen:
+def _seen_marker(each: Measured, origin_from_marker: Array, size: float, picture: int) -> Seen:
     """Give a measured marker as part of a problem."""
     half = size / 2
     corners = np.array([[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0]])
@@ -135,7 +164,7 @@ def seen_marker(each: Measured, origin_from_marker: Array, size: float, picture:
         picture,
         corners @ origin_from_marker[:3, :3].T + origin_from_marker[:3, 3],
         each.corners,
-        root_of(each),
+        _root_of(each),
         origin_from_marker[:3, 2],
         origin_from_marker[:3, 3],
         origin_from_marker,
@@ -143,10 +172,14 @@ def seen_marker(each: Measured, origin_from_marker: Array, size: float, picture:
     )
 
 
-def _missing(layout: Layout, others: set[int]) -> str:
+def _missing(layout: Layout, others: set[int], pieces: bool) -> str:
     """Say that nothing of a layout was seen, and what was seen instead."""
     wanted = [f"marker {marker.marker_id}" for marker in layout.markers[:8]]
     wanted += [f"a board of {board.columns} × {board.rows} squares" for board in layout.boards]
+    if pieces:
+        return (
+            f"Too little is seen of {' and '.join(wanted)}: only some of its markers. Is it too far away, or covered?"
+        )
     text = f"None of what is configured is in sight: {', '.join(wanted)}."
     if others:
         text += f" There are markers that are not configured: {', '.join(map(str, sorted(others)[:8]))}."

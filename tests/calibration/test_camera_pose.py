@@ -171,6 +171,7 @@ def test_a_board_gives_the_pose() -> None:
     assert off(found, camera)[0] < 1.0
     assert found.markers[0].name == "board 0"
     assert found.position_deviation < 0.001
+    assert 0.5 < found.blur < 2.0
     drawn = draw_camera_pose(grey, GIVEN, Layout(boards=[board]), found)
     assert cv2.imdecode(np.frombuffer(drawn, np.uint8), cv2.IMREAD_COLOR).shape[1] > 640
 
@@ -242,6 +243,13 @@ def test_a_picture_without_the_markers_is_refused_and_names_others() -> None:
     assert "marker 5, marker 6" in str(error)
     assert "3, 9, 17, 42" in str(error)
     assert refused(lambda: find_camera_pose([all_seen()], GIVEN, Layout())).reason == Reason.NO_MARKER
+
+
+def test_a_board_of_which_too_little_is_seen_is_refused() -> None:
+    board = Layout(boards=[CharucoBoard(7, 5, 0.04, 0.03)])
+    error = refused(lambda: find_camera_pose([one_ahead()], GIVEN, board))
+    assert error.reason == Reason.NO_MARKER
+    assert "Too little is seen of a board of 7 × 5 squares" in str(error)
 
 
 def test_a_blurred_picture_is_refused() -> None:
