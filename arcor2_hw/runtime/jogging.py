@@ -97,9 +97,9 @@ class Jog:
             )
         velocities = [wanted.get(name, 0.0) for name in names]
         scale = min(1.0, *(self._room(joint, rate, valid_for) for joint, rate in zip(joints, velocities, strict=True)))
-        speed = self._tcp_speed(lease, joints, velocities)
-        if speed * scale > LEVERS_CHANGE * MOST_TCP_SPEED:
-            scale = LEVERS_CHANGE * MOST_TCP_SPEED / speed
+        speed = self._tcp_speed(lease, joints, [scale * velocity for velocity in velocities])
+        if speed > LEVERS_CHANGE * MOST_TCP_SPEED:
+            scale *= LEVERS_CHANGE * MOST_TCP_SPEED / speed
         told = [scale * velocity for velocity in velocities]
         self._robot.jog(joint_velocities=told, valid_for=self._left(lease), **self._names(lease))
         return scale

@@ -6,6 +6,9 @@ from typing import Final
 OUT_OF_REACH: Final = 1e-9
 """m by which rounding may put a point beyond the stretched arm."""
 
+STRETCHED: Final = 0.05
+"""Sine of the elbow's angle below which a velocity across the arm needs joints of any speed."""
+
 
 def forward(links: tuple[float, float], q: tuple[float, float]) -> tuple[float, float, float]:
     """Give x, y of the tool centre point and its heading."""
@@ -13,6 +16,18 @@ def forward(links: tuple[float, float], q: tuple[float, float]) -> tuple[float, 
     x = links[0] * math.cos(q[0]) + links[1] * math.cos(heading)
     y = links[0] * math.sin(q[0]) + links[1] * math.sin(heading)
     return x, y, heading
+
+
+def rates(links: tuple[float, float], q: tuple[float, float], x: float, y: float) -> tuple[float, float] | None:
+    """Give the joints' rates, rad/s, for a velocity of the tool centre point, m/s; None where it is stretched."""
+    first, second = links
+    if abs(math.sin(q[1])) < STRETCHED:
+        return None
+    heading = q[0] + q[1]
+    determinant = first * second * math.sin(q[1])
+    here_x, here_y, _ = forward(links, q)
+    one = second * (math.cos(heading) * x + math.sin(heading) * y) / determinant
+    return one, -(here_x * x + here_y * y) / determinant
 
 
 def _turned(angle: float) -> float:

@@ -1,23 +1,29 @@
 """The two-axis robot as an object type: its motions."""
 
 import contextlib
+import math
 import time
-from typing import ClassVar, Final
+from typing import ClassVar, Final, Literal
 
 from arcor2_hw.actions import action
-from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.project import ProjectRobotJoints
 from arcor2_hw.data.robot import Joint, MoveEnd, MoveResult
 from arcor2_hw.exceptions import Cancelled, DeviceError, DeviceFault, DeviceTimeout, NotInControl, OutOfRange, Refused
 
+from . import kinematics
 from . import registers as reg
 from .bus import Bus
 from .controlled import GOALS, POLL, REST_WITHIN, TwoAxisControlled
 from .observed import JOINTS
+from .observer import Snapshot
+from .registers import to_ticks
 from .settings import TwoAxisRobotSettings, within
 
 REACHED: Final = 12
 """Ticks (1°) from the goal at which a joint that stands has arrived: a loaded servo rests short of its goal."""
+STILL: Final = 1e-6
+"""m/s, rad/s below which a part of a twist counts as none."""
 STANDING: Final = 0.5
 """s both joints may stand, short of the goal, before the move counts as failed."""
 
@@ -37,9 +43,7 @@ class TwoAxisRobot(TwoAxisControlled):
     def check_if_ready_to_move(self) -> None:
         """Raise what keeps the arm from moving now; return when nothing does."""
         super().check_if_ready_to_move()
-        self._require_control()
-        if self._teaching:
-            raise Refused(f"{self.name} is in hand teaching mode")
+        self._check_takes_goals()
 
     def move_to_pose(
         self, end_effector_id: str, target_pose: Pose, speed: float, safe: bool = True, linear: bool = True
@@ -58,6 +62,77 @@ class TwoAxisRobot(TwoAxisControlled):
     def move_to_joints(self, target_joints: list[Joint], speed: float, safe: bool = True) -> None:
         """Move to joint values, both joints arriving together."""
         self._move(self._checked(target_joints), speed, 1.0, self._stops)
+
+    def jog(
+        self,
+        twist: tuple[float, float, float, float, float, float] | None = None,
+        joint_velocities: list[float] | None = None,
+        frame: Literal["world", "base", "tool", "user"] = "world",
+        valid_for: float = 0.2,
+        end_effector_id: str | None = None,
+    ) -> None:
+        """Move with a velocity that runs out by itself: the goals are where the servos come to rest after that.
+
+        Of a twist, what lies in the plane; two joints cannot choose how the tool turns.
+        Raises OutOfRange, Refused for a turn, a way out of the plane and a stretched arm, NotInControl, DeviceFault.
+        """
+        within(f"{self.name}: valid_for", valid_for, 0.01, 1.0)
+        if end_effector_id is not None:
+            self._check_end_effector(end_effector_id)
+        if (twist is None) == (joint_velocities is None):
+            raise OutOfRange(f"{self.name}: jog needs either twist or joint_velocities")
+        stops, until = self._stops, time.monotonic() + valid_for
+        with self._moving():
+            self._check_takes_goals()
+            snapshot = self._observer.current()
+            rates = self._rates(twist, frame, self._angles(snapshot)) if twist is not None else joint_velocities or []
+            if len(rates) != len(JOINTS):
+                raise OutOfRange(f"{self.name}: joint_velocities must have {len(JOINTS)} numbers")
+            top, blocks = self._axes.max_joint_speed, {}
+            for joint, rate in enumerate(rates):
+                within(f"{self.name}: velocity of {JOINTS[joint]}", rate, -top, top)
+                blocks[self._axes.ids[joint]] = self._running_out(joint, rate, valid_for, snapshot)
+
+            def command(bus: Bus) -> None:
+                if self._stops != stops or not self._ours or time.monotonic() >= until:
+                    raise Cancelled(f"a jog of {self.name} was stopped, or came too late")
+                bus.sync_write(GOALS, blocks)
+
+            self._observer.do(command)
+
+    def _running_out(self, joint: int, rate: float, valid_for: float, snapshot: Snapshot) -> bytes:
+        """Give profile and goal of a joint that goes at a rate (rad/s) for a time and then comes to rest."""
+        servo, setup, ramp = snapshot.servos[joint], self._observer.setups[joint], self._axes.joint_acceleration
+        # A servo that shall stand is still brought to rest.
+        turning = rate * self._directions[joint] or servo.velocity * reg.VELOCITY
+        way = rate * self._directions[joint] * valid_for + math.copysign(turning**2 / (2.0 * ramp), turning)
+        lower, upper = sorted(to_ticks(limit, self._directions[joint]) for limit in self._limits[joint])
+        goal = servo.position + round(way / reg.TICK)
+        goal = max(lower, setup.min_position, min(upper, setup.max_position, goal))
+        return b"".join(value.to_bytes(4, "little", signed=True) for value in (*reg.profile(abs(turning), ramp), goal))
+
+    def _rates(self, twist: tuple[float, ...], frame: str, q: tuple[float, float]) -> list[float]:
+        """Give the joints' rates for a velocity of the tool centre point."""
+        heading = kinematics.forward(self._links, q)[2]
+        axes = {
+            "world": self._pose.orientation.inverted(),
+            "base": Orientation(),
+            "tool": Orientation.from_rotation_vector(0.0, 0.0, heading),
+        }.get(frame)
+        if axes is None:
+            raise Refused(f"{self.name} has no frame {frame!r} to jog in")
+        x, y, z = Position(*twist[:3]).rotated(axes)
+        if abs(z) > STILL or any(abs(part) > STILL for part in twist[3:]):
+            raise Refused(f"{self.name} moves in a plane, and its tool does not turn by itself")
+        rates = kinematics.rates(self._links, q, x, y)
+        if rates is None:
+            raise Refused(f"{self.name} is stretched or folded: jog its joints")
+        return list(rates)
+
+    def _check_takes_goals(self) -> None:
+        self._require_control()
+        if self._teaching:
+            raise Refused(f"{self.name} is in hand teaching mode")
 
     @action
     def move(self, pose: Pose, speed: float = 0.25, acceleration: float = 0.5, *, an: str | None = None) -> None:
@@ -93,9 +168,7 @@ class TwoAxisRobot(TwoAxisControlled):
         within(f"{self.name}: speed", speed, 0.001, 1.0)
         within(f"{self.name}: acceleration", acceleration, 0.01, 1.0)
         with self._moving():
-            self._require_control()
-            if self._teaching:
-                raise Refused(f"{self.name} is in hand teaching mode")
+            self._check_takes_goals()
             goals = self._ticks(q)
             self._check_servo_limits(goals)
             start = self._observer.fresh()

@@ -129,6 +129,11 @@ class TwoAxisRobotBench(Bench):
         device.set_hand_teaching_mode(True)
         device.set_hand_teaching_mode(False)
 
+    def _jog(self, device: TwoAxisRobot) -> None:
+        before = device.robot_joints()[1].value
+        device.jog(joint_velocities=[0.0, 0.5], valid_for=0.2)
+        wait_until(lambda: not self.running() and abs(device.robot_joints()[1].value - before) > 0.05, 3.0, "a jog")
+
     def _restart(self, device: TwoAxisRobot) -> None:
         self.do("hardware_error", servo=1)
         wait_until(lambda: bool(device.alarms()), 3.0, "seeing a hardware error")
@@ -144,6 +149,7 @@ class TwoAxisRobotBench(Bench):
             "move_to_pose": lambda: device.move_to_pose(
                 tool, device.forward_kinematics(tool, self._turned(device, 0.3)), 0.5, linear=False
             ),
+            "jog": lambda: self._jog(device),
             "stop": device.stop,
             "set_hand_teaching_mode": lambda: self._teach(device),
             "restart_safety": lambda: self._restart(device),

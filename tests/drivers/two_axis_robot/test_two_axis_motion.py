@@ -187,3 +187,65 @@ def test_hand_teaching(fake: FakeProcess, ready: TwoAxisRobot) -> None:
     assert servo["torque"] == 1
     assert servo["goal"] == servo["ticks"] == 2348
     ready.move_to_joints(joints(0.3, 0.0), 1.0)
+
+
+def angles(fake: FakeProcess) -> list[float]:
+    return [fake.truth()["servos"][number]["angle"] for number in ("1", "2")]
+
+
+def test_a_jog_runs_out_by_itself_and_a_renewed_one_goes_on(fake: FakeProcess, ready: TwoAxisRobot) -> None:
+    ready.move_to_joints(joints(0.0, 1.0), 0.5)
+    began = time.monotonic()
+    for _ in range(5):
+        ready.jog(joint_velocities=[0.4, 0.0], valid_for=0.2)
+        time.sleep(0.1)
+    lasted = time.monotonic() - began
+    fake.control.wait_until(standing)
+    first, second = angles(fake)
+    # From the first to 0.2 s after the last, and the way to come to rest.
+    assert 0.4 * lasted * 0.6 < first < 0.4 * (lasted + 0.3)
+    assert second == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_jog_along_the_axes_of_a_frame(fake: FakeProcess, ready: TwoAxisRobot) -> None:
+    ready.move_to_joints(joints(0.3, 1.2), 0.5)
+    for frame, axis in (("base", (1.0, 0.0)), ("tool", (math.cos(1.5), math.sin(1.5)))):
+        before = ready.forward_kinematics("tcp", ready.robot_joints()).position
+        ready.jog((0.05, 0.0, 0.0, 0.0, 0.0, 0.0), frame=frame, valid_for=0.3)  # type: ignore[arg-type]
+        time.sleep(0.1)
+        fake.control.wait_until(standing)
+        moved = ready.get_end_effector_pose("tcp").position - before
+        way = math.hypot(moved.x, moved.y)
+        assert 0.008 < way < 0.03
+        assert (moved.x * axis[0] + moved.y * axis[1]) / way > 0.95
+        ready.move_to_joints(joints(0.3, 1.2), 0.5)
+
+
+def test_a_jog_stops_at_the_limit_and_by_a_stop(fake: FakeProcess, ready: TwoAxisRobot) -> None:
+    ready.move_to_joints(joints(2.55, 1.0), 0.8)
+    ready.jog(joint_velocities=[1.0, 0.0], valid_for=0.5)
+    time.sleep(0.1)
+    fake.control.wait_until(standing)
+    assert angles(fake)[0] == pytest.approx(2.6, abs=0.02)
+    ready.jog(joint_velocities=[-0.5, 0.0], valid_for=1.0)
+    fake.control.wait_until(lambda truth: abs(truth["servos"]["1"]["speed"]) > 0.1)
+    ready.stop()
+    assert angles(fake)[0] > 2.2
+
+
+def test_what_cannot_be_jogged(ready: TwoAxisRobot) -> None:
+    ready.move_to_joints(joints(0.0, 1.0), 0.8)
+    for twist in ((0.0, 0.0, 0.1, 0.0, 0.0, 0.0), (0.1, 0.0, 0.0, 0.0, 0.0, 0.1)):
+        with pytest.raises(Refused, match="plane"):
+            ready.jog(twist)
+    for wrong in ({}, {"joint_velocities": [0.1]}, {"joint_velocities": [99.0, 0.0]}):
+        with pytest.raises(OutOfRange):
+            ready.jog(**wrong)  # type: ignore[arg-type]
+    with pytest.raises(Refused, match="no frame 'user'"):
+        ready.jog((0.1, 0.0, 0.0, 0.0, 0.0, 0.0), frame="user")
+    ready.move_to_joints(joints(0.0, 0.0), 0.8)
+    with pytest.raises(Refused, match="stretched"):
+        ready.jog((0.1, 0.0, 0.0, 0.0, 0.0, 0.0))
+    ready.release_control()
+    with pytest.raises(NotInControl):
+        ready.jog(joint_velocities=[0.1, 0.0])
