@@ -1515,9 +1515,9 @@ export interface TemporaryPackageArgs {
 /**
  * One action of a run, from its end: what went in, what came out, how long it took.
  *
- * number: counts the actions of the run from 1, in the order of their beginnings. started: when it was let begin.
- * duration: s, left out while it runs. parameters, results: as in ActionStateBefore and ActionStateAfter.
- * error: why it failed. thread_id: left out in the script's main thread.
+ * number: counts the actions of the run from 1, in the order in which they were announced. started: when that was.
+ * duration: s, without a pause before it; left out while it runs. parameters, results: as in ActionStateBefore and
+ * ActionStateAfter. error: why it failed. thread_id: left out in the script's main thread.
  */
 export interface TraceEntry {
   run: number;

@@ -10,6 +10,7 @@ import { OFFLINE } from "../store/state";
 import { applyEvent, now, setConnection, store, tell } from "../store/store";
 import { telemetry } from "../store/telemetry";
 import { followDocument, forgetFollowed } from "./following";
+import { forgetPresence, tellPresence } from "./presence";
 import { followRobots, forgetStreams } from "./streams";
 
 export const client = new ProtocolClient({ open: () => new WebSocket(address()) as never });
@@ -60,6 +61,7 @@ client.onState = (state, reason, code) => {
   if (state === "open") {
     forgetStreams();
     forgetFollowed();
+    forgetPresence();
     // What is held, who is there and what is under way is told anew; the view and the document stay.
     store.setState((known) => ({
       locks: {},
@@ -153,6 +155,7 @@ store.subscribe((state, before) => {
   if (state.live.state !== before.live.state && state.live.state === "stopped") telemetry.clear();
   followDocument(state);
   followRobots(state);
+  tellPresence(state, now);
   // The home screen is back: problems may have come or gone with what was edited.
   if (before.doc && !state.doc && state.connection.status === "ready") loadLists().catch(() => {});
 });

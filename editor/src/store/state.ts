@@ -130,8 +130,6 @@ export interface Selection {
 
 export interface Ui {
   selection: Selection | null;
-  /** What the pointer or the crosshair is on. */
-  hovered: string;
   /** The tool of the left rail that is open. */
   tool: string;
   theme: "system" | "light" | "dark";
@@ -202,6 +200,6 @@ export function initialState(): State {
     program: NO_PROGRAM,
     tasks: {},
     notices: [],
-    ui: { selection: null, hovered: "", tool: "", theme: "system", systemDark: false, leftHanded: false, quality: "auto" },
+    ui: { selection: null, tool: "", theme: "system", systemDark: false, leftHanded: false, quality: "auto" },
   };
 }

@@ -20,6 +20,15 @@ describe("joints", () => {
     expect(telemetry.interpolated("r")).toEqual({ joints: new Map([["j", 1]]), settled: true });
   });
 
+  test("take as long as between their readings, however late they come", () => {
+    const { telemetry, go } = at();
+    telemetry.takeJoints({ ...joints(0), time_ms: 5000 });
+    go(0.002);
+    telemetry.takeJoints({ ...joints(1), time_ms: 5100 });
+    go(0.025);
+    expect(telemetry.interpolated("r")?.joints.get("j")).toBeCloseTo(0.25);
+  });
+
   test("after a pause are where they are, without a journey through the pause", () => {
     const { telemetry, go } = at();
     telemetry.takeJoints(joints(0));

@@ -8,6 +8,8 @@ import type { EefPose, RobotEefData, RobotJointsData } from "../protocol/types";
 export interface Sample {
   /** Seconds, of `performance.now()`, when it came. */
   at: number;
+  /** Seconds, of the cell's clock, when it was read; as `at` where the server does not say it. */
+  read: number;
   joints: Map<string, number>;
 }
 
@@ -24,7 +26,9 @@ export class Telemetry {
   constructor(private readonly clock: () => number = () => performance.now() / 1000) {}
 
   takeJoints(data: RobotJointsData): void {
-    const sample = { at: this.clock(), joints: new Map(data.joints.map((one) => [one.name, one.value])) };
+    const at = this.clock();
+    const read = data.time_ms === undefined ? at : data.time_ms / 1000;
+    const sample = { at, read, joints: new Map(data.joints.map((one) => [one.name, one.value])) };
     this.joints.set(data.robot_id, [this.joints.get(data.robot_id)?.[1] ?? null, sample]);
     this.tell(data.robot_id);
   }
@@ -58,7 +62,8 @@ export class Telemetry {
     if (!pair) return undefined;
     const [before, last] = pair;
     // After a pause there is nothing to interpolate from; between samples a tenth of a second at most.
-    const span = before ? last.at - before.at : 0;
+    // By when they were read, not by when they came: the network bunches them.
+    const span = before ? last.read - before.read : 0;
     if (!before || span <= 0 || span > 0.25) return { joints: last.joints, settled: true };
     const part = (this.clock() - last.at) / span;
     if (part >= 1) return { joints: last.joints, settled: true };

@@ -66,7 +66,7 @@ export function View3D() {
 
   return (
     <main className="view">
-      <canvas ref={canvas} key={quality} tabIndex={0} aria-label="3D view of the workplace. Keys W, A, S, D, Q and E fly; the list of things has the same for the keyboard." />
+      <canvas ref={canvas} key={quality} tabIndex={0} role="application" aria-label="3D view of the workplace. Keys W, A, S, D, Q and E fly; the list of things has the same for the keyboard." />
       <div ref={labels} className="view-labels" aria-hidden="true" />
       {!engine && !failed && <Waiting>Preparing the view…</Waiting>}
       {failed && (
