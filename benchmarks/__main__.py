@@ -20,6 +20,7 @@ from benchmarks import (
     camera,
     documents,
     hung,
+    kinematics,
     listeners,
     operation,
     recovery,
@@ -44,6 +45,7 @@ ROOMS: Final[dict[str, Callable[[Report, Path], Awaitable[None]]]] = {
     "camera": camera.run,
     "calibration": lambda report, _: calibration.run(report, LONG in sys.argv),
     "hung": hung.run,
+    "kinematics": lambda report, _: kinematics.run(report),
     "stops": lambda report, _: stops.run(report),
     "recovery": lambda report, _: recovery.run(report, LONG in sys.argv),
 }

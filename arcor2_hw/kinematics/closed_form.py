@@ -75,44 +75,39 @@ class ThreeParallel:
 
     def _all(self, turn: Rows, wrist: Vector, q1_if_free: float, q6_if_free: float) -> Iterator[Six]:
         h1, h2, h5, h6 = self._h1, self._h2, self._h5, self._h6
-        back = _transposed(turn)
-        last = _turned(turn, h6)
         for q1 in _level(h1, wrist, h2, self._beside, q1_if_free, backwards=True):
-            unturn1 = _about(h1, -q1)
-            shoulder = _turned(unturn1, wrist)
-            for q5 in _level(h5, h6, h2, _dot(h2, _turned(unturn1, last)), 0.0):
-                turn5 = _about(h5, q5)
-                v = _turned(_transposed(turn5), h2)
-                w = _turned(back, _turned(_transposed(unturn1), h2))
-                for q6 in self._last(v, w, q6_if_free, _product(unturn1, turn), turn5, shoulder):
-                    turn56 = _product(turn5, _about(h6, q6))
-                    turn14 = _product(_product(unturn1, turn), _transposed(turn56))
-                    q14 = _between(h2, h5, _turned(turn14, h5), 0.0)
-                    rest = _sub(_sub(shoulder, self._p12), _turned(_about(h2, q14), self._p45))
+            rest_of_turn = _product(_about(h1, -q1), turn)  # of joints 2 to 6
+            back = _turned(_transposed(rest_of_turn), h2)
+            shoulder = _sub(_spun(h1, -q1, wrist), self._p12)
+            for q5 in _level(h5, h6, h2, _dot(h2, _turned(rest_of_turn, h6)), 0.0):
+                for q6 in self._last(q5, back, q6_if_free, rest_of_turn, shoulder):
+                    q14 = _between(h2, h5, _turned(rest_of_turn, _spun(h6, -q6, h5)), 0.0)
+                    rest = _sub(shoulder, _spun(h2, q14, self._p45))
                     for q3 in _folded(h2, self._p34, self._p23, rest):
-                        bent = _sum(self._p23, _turned(_about(h2, q3), self._p34))
+                        bent = _sum(self._p23, _spun(h2, q3, self._p34))
                         q2 = _between(h2, bent, rest, 0.0)
                         yield q1, q2, q3, math.remainder(q14 - q2 - q3, math.tau), q5, q6
 
-    def _last(self, v: Vector, w: Vector, if_free: float, whole: Rows, turn5: Rows, shoulder: Vector) -> list[float]:
+    def _last(self, q5: float, back: Vector, if_free: float, rest_of_turn: Rows, shoulder: Vector) -> list[float]:
         """Give the angles of joint 6. Where it turns about the axis of joints 2 to 4 it is free, as far as these reach.
 
         Then it is `if_free`, and also what lets the links just reach, since they may not with the former.
         """
-        h2, h6 = self._h2, self._h6
+        h2, h5, h6 = self._h2, self._h5, self._h6
+        v = _spun(h5, -q5, h2)
         across = _cross(h6, v)
-        if math.hypot(_dot(across, w), _dot(_cross(across, h6), w)) >= _SINGULAR:
-            return [-_between(h6, v, w, 0.0)]
-        turn14 = _product(whole, _transposed(_product(turn5, _about(h6, if_free))))
-        q14 = _between(h2, self._h5, _turned(turn14, self._h5), 0.0)
-        to, tail = (_sub(each, _scaled(h2, _dot(h2, each))) for each in (_sub(shoulder, self._p12), self._p45))
+        sine, cosine = _dot(across, back), _dot(_cross(across, h6), back)
+        if math.hypot(sine, cosine) >= _SINGULAR:
+            return [-math.atan2(sine, cosine)]
+        q14 = _between(h2, h5, _turned(rest_of_turn, _spun(h6, -if_free, h5)), 0.0)
+        to, tail = (_sub(each, _scaled(h2, _dot(h2, each))) for each in (shoulder, self._p45))
         far, short = math.hypot(*to), math.hypot(*tail)
         longest = math.hypot(*self._p23) + math.hypot(*self._p34)
         found = [if_free]
         if min(far, short) > _TINY:
             share = (far * far + short * short - longest * longest) / (2.0 * far * short)
             middle, half = _between(h2, tail, to, 0.0), math.acos(max(-1.0, min(1.0, share)))
-            sign = math.copysign(1.0, _dot(h2, _turned(turn5, h6)))
+            sign = math.copysign(1.0, _dot(h2, _spun(h5, q5, h6)))
             # Joints 2 to 4 together, and joint 6, make one turn.
             found += [math.remainder(if_free + sign * (q14 - middle - part * half), math.tau) for part in (-1, 0, 1)]
         return found
@@ -225,4 +220,15 @@ def _about(axis: Vector, angle: float) -> Rows:
         (c + x * x * t, x * y * t - z * s, x * z * t + y * s),
         (x * y * t + z * s, c + y * y * t, y * z * t - x * s),
         (x * z * t - y * s, y * z * t + x * s, c + z * z * t),
+    )
+
+
+def _spun(axis: Vector, angle: float, v: Vector) -> Vector:
+    """Give a vector turned about a unit axis."""
+    (x, y, z), (a, b, d), c, s = axis, v, math.cos(angle), math.sin(angle)
+    along = (1.0 - c) * (x * a + y * b + z * d)
+    return (
+        c * a + s * (y * d - z * b) + along * x,
+        c * b + s * (z * a - x * d) + along * y,
+        c * d + s * (x * b - y * a) + along * z,
     )

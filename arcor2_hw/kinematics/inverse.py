@@ -29,7 +29,7 @@ EXACT: Final = 1e-8
 """m and rad at which a solution counts as exact; what is less exact has to keep the end effector's tolerances."""
 SAME: Final = 1e-3
 """rad or m by which some joint of two distinct solutions differs at least."""
-_FEW: Final = 6
+_FEW: Final = 2
 _MOST_DAMPING: Final = 1e-4
 _LEAST_DAMPING: Final = 1e-14
 _SLACK: Final = 1e-6

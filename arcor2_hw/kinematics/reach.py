@@ -19,6 +19,10 @@ KEPT: Final = 20_000
 """Poses whose answers are kept."""
 
 
+_State = tuple[int, bytes]
+"""What a robot is and holds, and how those of its joints stand that the arm does not move."""
+
+
 class Reach(enum.StrEnum):
     """How an arm reaches a pose."""
 
@@ -36,18 +40,29 @@ class Judgement(Data, frozen=True):
     reason: str = ""
 
 
+@dataclass(eq=False, slots=True)
+class _Candidate:
+    """Joints that reach a pose: the arm's, the model's, why not these rather than others, the box around the arm."""
+
+    q: Array
+    whole: Array
+    reservation: str | None = None
+    box: Array | None = None
+    state: _State = (-1, b"")
+
+
 class _Candidates:
     """Joints that reach a pose, found one after the other as they are asked for, and kept."""
 
-    def __init__(self, found: Iterator[Array]) -> None:
+    def __init__(self, found: Iterator[_Candidate]) -> None:
         self._coming = found
-        self._known: list[Array] = []
+        self._known: list[_Candidate] = []
 
-    def __iter__(self) -> Iterator[Array]:
+    def __iter__(self) -> Iterator[_Candidate]:
         yield from self._known
-        for q in self._coming:
-            self._known.append(q)
-            yield q
+        for candidate in self._coming:
+            self._known.append(candidate)
+            yield candidate
 
 
 @dataclass(eq=False, slots=True)
@@ -56,7 +71,7 @@ class _Kept:
     candidates: _Candidates
     judgement: Judgement | None = None
     revision: int = -1
-    state: tuple[int, bytes] = (-1, b"")
+    state: _State = (-1, b"")
     box: Array | None = None
 
 
@@ -99,21 +114,21 @@ class Reachability:
         self._root_from_world = np.linalg.inv(self._base)
 
     # -------------------------------------------------------------------------------- one pose
-    def _judged(self, pose: Pose, state: tuple[int, bytes]) -> Judgement:
+    def _judged(self, pose: Pose, state: _State) -> Judgement:
         at, turn = pose.position, pose.orientation
         key = (at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w)
         kept = self._kept.get(key)
         if kept is None:
             self.computed += 1
             target = self._root_from_world @ pose.matrix()
-            kept = self._kept[key] = _Kept(target, _Candidates(self._inverse.candidates(target)))
+            kept = self._kept[key] = _Kept(target, _Candidates(self._found(target)))
             if len(self._kept) > KEPT:
                 self._kept.popitem(last=False)
         else:
             self._kept.move_to_end(key)
         if kept.judgement is None or kept.state != state or self._touched(kept):
             self.checked += 1
-            kept.judgement, kept.box = self._looked_at(kept.candidates, kept.target)
+            kept.judgement, kept.box = self._looked_at(kept, state)
         kept.state, kept.revision = state, self._world.revision
         return kept.judgement
 
@@ -135,26 +150,32 @@ class Reachability:
             return None
         return np.array([change.box for change in changes if change.name != self._name]).reshape(-1, 2, 3)
 
-    def _looked_at(self, candidates: _Candidates, target: Array) -> tuple[Judgement, Array | None]:
+    def _found(self, target: Array) -> Iterator[_Candidate]:
+        for q in self._inverse.candidates(target):
+            yield _Candidate(q, q)
+
+    def _looked_at(self, kept: _Kept, state: _State) -> tuple[Judgement, Array | None]:
         """Judge, and give the box around the configurations that were looked at; None: no collision matters."""
         second: Judgement | None = None
         hit: Judgement | None = None
         boxes: list[Array] = []
-        for q in candidates:
-            whole = self.arm.whole(q, self._standing.q)
-            free = self._world.is_free(self._name, whole)
-            boxes.append(self._standing.box(whole))
-            joints = tuple(map(float, q))
-            if not free:
-                hit = hit or Judgement(Reach.IN_COLLISION, joints, self._collision(whole))
+        for one in kept.candidates:
+            if one.box is None or one.state != state:
+                one.whole = self.arm.whole(one.q, self._standing.q)
+                one.box, one.state = self._standing.box(one.whole), state
+            boxes.append(one.box)
+            joints = tuple(map(float, one.q))
+            if not self._world.is_free(self._name, one.whole):
+                hit = hit or Judgement(Reach.IN_COLLISION, joints, self._collision(one.whole))
                 continue
-            reason = self._reservation(q)
-            if not reason:
+            if one.reservation is None:
+                one.reservation = self._reservation(one.q)
+            if not one.reservation:
                 return Judgement(Reach.REACHABLE, joints), _around(boxes)
-            second = second or Judgement(Reach.NEAR_LIMIT, joints, reason)
+            second = second or Judgement(Reach.NEAR_LIMIT, joints, one.reservation)
         if best := second or hit:
             return best, _around(boxes)
-        return Judgement(Reach.OUT_OF_REACH, reason=self._why_not(target)), None
+        return Judgement(Reach.OUT_OF_REACH, reason=self._why_not(kept.target)), None
 
     def _collision(self, whole: Array) -> str:
         found = self._world.contacts(self._name, whole)

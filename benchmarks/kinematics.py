@@ -1,0 +1,139 @@
+"""Kinematics of the UR5e and the collision world: how long one answer takes, and how many poses are answered.
+
+Random numbers are seeded. Times of single calls are medians of rounds, so that what else the machine does takes part as
+little as can be; processor time is in the notes.
+"""
+
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+import arcor2_drivers
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.kinematics.errors import OutOfReach
+from arcor2_hw.kinematics.inverse import InverseKinematics
+from arcor2_hw.kinematics.model import RobotModel
+from arcor2_hw.kinematics.reach import Reach, Reachability
+from arcor2_hw.kinematics.shapes import Array, Box
+from arcor2_hw.kinematics.world import CollisionWorld
+from benchmarks.figures import Figure, Report, median, percentile
+
+UR5E: Final = Path(next(iter(arcor2_drivers.__path__))) / "universal_robots" / "urdf" / "ur5e"
+SEED: Final = 20
+POSES: Final = 5000
+ORIENTATIONS: Final = (
+    Orientation(1.0, 0.0, 0.0, 0.0),
+    Orientation(0.0, 2**-0.5, 0.0, 2**-0.5),
+    Orientation(2**-0.5, 0.0, 0.0, 2**-0.5),
+)
+
+
+async def run(report: Report) -> None:
+    """Measure all of them."""
+    model = RobotModel.load(UR5E)
+    chance = np.random.default_rng(SEED)
+    report.add(forward(model, chance))
+    for figure in (*inverse(model, chance), *checks(model, chance), *reachability(model, chance)):
+        report.add(figure)
+
+
+def each(call: Callable[[Array], object], values: Array, rounds: int) -> float:
+    """Give the median over rounds of the time that a call takes, s; its share of the loop is taken off."""
+    taken = []
+    for _ in range(rounds):
+        began = time.perf_counter()
+        for _value in values:
+            pass
+        empty = time.perf_counter() - began
+        began = time.perf_counter()
+        for value in values:
+            call(value)
+        taken.append((time.perf_counter() - began - empty) / len(values))
+    return median(taken)
+
+
+def forward(model: RobotModel, chance: np.random.Generator) -> Figure:
+    """Time one call that gives the tip's matrix."""
+    arm = model.arm("tcp")
+    taken = each(arm.forward, chance.uniform(-np.pi, np.pi, (2000, 6)), 51)
+    return Figure("kinematics_forward_us", taken * 1e6, 51 * 2000, f"load {os.getloadavg()[0]:.1f}, seed {SEED}")
+
+
+def inverse(model: RobotModel, chance: np.random.Generator) -> list[Figure]:
+    """Ask for joints of poses that random joints lead to, from a random seed within a turn."""
+    arm = model.arm("tcp")
+    solver = InverseKinematics(arm)
+    times, missed = [], 0
+    for _ in range(POSES):
+        target, seed = arm.forward(chance.uniform(-np.pi, np.pi, 6)), chance.uniform(-np.pi, np.pi, 6)
+        began = time.perf_counter()
+        try:
+            found = solver.solve(target, seed)
+        except OutOfReach:
+            missed += 1
+            continue
+        times.append(time.perf_counter() - began)
+        missed += not np.allclose(arm.forward(found), target, atol=1e-5)
+    note = f"p99 {percentile(times, 99) * 1e3:.2f} ms, the longest {max(times) * 1e3:.1f} ms"
+    return [
+        Figure("kinematics_inverse_reached", 100.0 * (1.0 - missed / POSES), POSES, f"{missed} not reached"),
+        Figure("kinematics_inverse_ms", median(times) * 1e3, len(times), note),
+    ]
+
+
+def checks(model: RobotModel, chance: np.random.Generator) -> list[Figure]:
+    """Look whether configurations are free, among 20 boxes in reach, and among 1,000."""
+    figures = []
+    for count in (20, 1000):
+        world = _cluttered(model, count, chance)
+        # Of configurations that are free: what collides is found sooner.
+        tried = chance.uniform(-np.pi, np.pi, (2000, 6))
+        free = np.array([q for q in tried if world.is_free("arm", q)])[:500]
+        taken = each(lambda q, world=world: world.is_free("arm", q), free, 11)  # type: ignore[misc]
+        name = f"kinematics_check_{count}_us"
+        figures.append(Figure(name, taken * 1e6, 11 * len(free), f"{len(free)} free configurations"))
+    return figures
+
+
+def reachability(model: RobotModel, chance: np.random.Generator) -> list[Figure]:
+    """Judge 1,000 points with 3 orientations each, and again after one of the 20 boxes was moved."""
+    world = _cluttered(model, 20, chance)
+    reach = Reachability(world, "arm", model.arm("tcp"))
+    points = chance.uniform((-0.85, -0.85, 0.0), (0.85, 0.85, 0.85), (1000, 3))
+    poses = [Pose(Position(*map(float, point)), turn) for point in points for turn in ORIENTATIONS]
+    times, cpu = [], []
+    for _ in range(5):
+        reach.forget()
+        began, used = time.perf_counter(), time.process_time()
+        judged = reach.judge(poses)
+        times.append(time.perf_counter() - began)
+        cpu.append(time.process_time() - used)
+    counts = ", ".join(f"{sum(one.reach is kind for one in judged)} {kind.value}" for kind in Reach)
+    note = f"{counts}; {median(cpu):.2f} s on a core"
+    moved = []
+    for number in range(20):
+        world.move(f"box {number}", Pose(Position(*map(float, chance.uniform((-0.8, -0.8, 0.0), (0.8, 0.8, 0.8))))))
+        began = time.perf_counter()
+        reach.judge(poses)
+        moved.append(time.perf_counter() - began)
+    return [
+        Figure("kinematics_reach_3000_s", median(times), len(times), note),
+        Figure("kinematics_reach_moved_ms", median(moved) * 1e3, len(moved)),
+    ]
+
+
+def _cluttered(model: RobotModel, count: int, chance: np.random.Generator) -> CollisionWorld:
+    """Give a robot among boxes of 50 to 150 mm within its reach, none at its foot."""
+    world = CollisionWorld()
+    world.add_robot("arm", model, Pose())
+    for number in range(count):
+        way = chance.normal(size=3)
+        way *= chance.uniform(0.45, 0.95) / np.linalg.norm(way)
+        sizes = chance.uniform(0.05, 0.15, 3) * (1.0 if count < 100 else 0.3)
+        turn = Orientation.from_rotation_vector(*map(float, chance.uniform(-2.0, 2.0, 3)))
+        world.put(f"box {number}", Box(*map(float, sizes)), Pose(Position(*map(float, way)), turn))
+    return world
