@@ -40,9 +40,13 @@ class CellDevice(Data, frozen=True, forbid_unknown_fields=True):
 
 
 class Cell(Data, frozen=True, forbid_unknown_fields=True):
-    """The devices of a workplace; their names are unique."""
+    """The devices of a workplace; their names are unique.
+
+    calibration: which markers stand where, in the form of a file of markers (arcor2_hw.calibration.configuration).
+    """
 
     devices: list[CellDevice]
+    calibration: dict[str, Any] | Unset = UNSET
 
     def __post_init__(self) -> None:
         names = [device.name for device in self.devices]

@@ -31,6 +31,9 @@ app.command(
 )
 app.command("arcor2_server.cli.token:app", name="token", help="Say who may connect to a server, and in which role.")
 app.command("arcor2_server.cli.device:app", name="device", help="List, find, check devices; write a driver.")
+app.command(
+    "arcor2_server.cli.calibrate:app", name="calibrate", help="Find out where cameras, robots and tools really are."
+)
 app.command("arcor2_server.cli.fake:app", name="fake", help="List and run simulated devices, and let them fail.")
 app.command("arcor2_server.cli.analyse:analyse", help="Show what an object type offers, and what is wrong with it.")
 

@@ -19,7 +19,14 @@ import uvicorn
 import uvloop
 from cyclopts import Parameter, validators
 
-from arcor2_hw.data.cell import read_cell
+from arcor2_hw.calibration.configuration import (
+    CalibrationConfiguration,
+    configuration_of,
+    read_configuration,
+    yaml_of,
+)
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.cell import Cell, read_cell
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound, StorageError
 from arcor2_server import classic
@@ -52,6 +59,7 @@ def serve(
     port: Annotated[int | None, Parameter(validator=validators.Number(gte=0, lte=65535))] = None,
     data_dir: Path | None = None,
     cell: Path | None = None,
+    markers: Annotated[Path | None, Parameter(env_var="ARCOR2_HW_MARKERS")] = None,
     tls: tuple[Path, Path] | None = None,
     self_signed: bool = False,
     insecure: bool = False,
@@ -75,6 +83,8 @@ def serve(
         Where scenes, projects and packages are kept ($XDG_DATA_HOME/arcor2-hw); created when missing.
     cell
         A cell.yaml whose settings of devices win over those of scenes and packages, by the objects' names.
+    markers
+        Which markers stand where, by which cameras are calibrated; else as cell.yaml says, or as was told over REST.
     tls
         Files of a certificate chain and its key, in PEM, to speak TLS with.
     self_signed
@@ -99,6 +109,7 @@ def serve(
     gc.disable()
     try:
         here = None if cell is None else read_cell(cell)
+        seen = _markers(markers, cell, here)
     except Arcor2Error as error:
         sys.stderr.write(f"arcor2-hw serve: {' '.join(str(error).split())}\n")
         return ExitStatus.NOT_FOUND if isinstance(error, NotFound) else ExitStatus.CELL_UNUSABLE
@@ -109,6 +120,7 @@ def serve(
             port=port,
             data_dir=data_dir,
             cell=here,
+            markers=seen,
             insecure=insecure or None,
             legacy=legacy,
             classic_ports=classic.classic_ports() if classic_ports else None,
@@ -136,6 +148,17 @@ def serve(
         sys.stderr.write(f"arcor2-hw serve: {error}\n")
         return ExitStatus.DATABASE_UNUSABLE
     return ExitStatus.OK
+
+
+def _markers(given: Path | None, path: Path | None, cell: Cell | None) -> CalibrationConfiguration | None:
+    """Give which markers stand where: as a file of their own says, else as cell.yaml does. NotFound, InvalidData."""
+    if given is not None:
+        return read_configuration(given)
+    if cell is None or path is None or isinstance(cell.calibration, Unset):
+        return None
+    # Read again with an eye on keys that are there twice, of which YAML takes the last.
+    return configuration_of(yaml_of(path.read_bytes(), str(path))["calibration"], f"{path}: calibration")
+
 
 
 def check_access(settings: ServerSettings) -> None:

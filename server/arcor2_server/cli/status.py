@@ -43,5 +43,7 @@ class ExitStatus(enum.IntEnum):
     """Something else is there already, or is open."""
     NOT_PERMITTED = 18
     """The token is missing or not valid, or its role is too low."""
+    CALIBRATION_REFUSED = 19
+    """What was measured determines no result that could be trusted."""
     INTERRUPTED = 130
     """Ctrl-C (128 + SIGINT)."""

@@ -1,0 +1,180 @@
+"""`arcor2-hw calibrate online`: cameras and robots of the scene that a running server has in operation."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Annotated, Final
+
+from cyclopts import App, Parameter
+from rich.table import Table
+
+from arcor2_hw.calibration.configuration import read_configuration
+from arcor2_hw.calibration.records import CalibrationRecord
+from arcor2_hw.client import Client
+from arcor2_hw.data.base import UNSET, Unset
+from arcor2_hw.data.scene import Scene, SceneObject
+from arcor2_hw.exceptions import Conflict, ConnectionLost, DeviceTimeout, NotFound
+from arcor2_server.cli.calibrating import calibrated, pose_table, progress
+from arcor2_server.cli.reaching import HERE, Failed, Server
+from arcor2_server.cli.status import ExitStatus
+from arcor2_server.cli.tables import console
+
+app = App(name="online", help="Calibrate cameras and robots of the scene that a running server has in operation.")
+
+USER: Final = "calibrate"
+"""Under which the command logs in: its locks show it."""
+ENDS_WITHIN: Final = 180.0
+"""Seconds: a robot may have to move first."""
+GREETING: Final = 5.0
+
+Name = Annotated[str, Parameter(help="Name of the object in the scene.")]
+
+
+@app.command
+def camera(name: Name, *, server: Server = HERE) -> int:
+    """Put a camera of the scene where the markers that it sees say that it stands."""
+
+    async def work() -> None:
+        async with server.client() as client:
+            scene = await _open_scene(client)
+            found = _named(scene, name)
+            await _calibrate(client, found, "CameraCalibration", lambda: client.calibrate_camera(found.id))
+
+    return calibrated("online camera", work)
+
+
+@app.command
+def robot(
+    name: Name,
+    *,
+    camera: Annotated[str, Parameter(help="Name of the camera that sees it; the first of the scene otherwise.")] = "",
+    move: Annotated[bool, Parameter(help="Let the robot move to its calibration pose first, if it has one.")] = False,
+    server: Server = HERE,
+) -> int:
+    """Put a robot of the scene where a depth camera of the scene sees it."""
+
+    async def work() -> None:
+        async with server.client() as client:
+            scene = await _open_scene(client)
+            found = _named(scene, name)
+            seen_by = _named(scene, camera).id if camera else UNSET
+            await _calibrate(
+                client,
+                found,
+                "RobotCalibration",
+                lambda: client.calibrate_robot(found.id, camera_id=seen_by, move_to_calibration_pose=move),
+            )
+
+    return calibrated("online robot", work)
+
+
+@app.command
+def markers(
+    file: Annotated[Path, Parameter(help="Which markers stand where (YAML).")], *, server: Server = HERE
+) -> int:
+    """Tell a running server which markers stand where; it keeps that."""
+
+    async def work() -> None:
+        configuration = read_configuration(file)
+        async with server.rest() as rest:
+            await rest.request("PUT", "/api/calibration/markers", body=configuration)
+        console().print(f"{len(configuration.markers)} markers and {len(configuration.boards)} boards are set.")
+
+    return calibrated("online markers", work)
+
+
+@app.command
+def records(
+    name: Annotated[str, Parameter(help="Name of an object: only its calibrations.")] = "",
+    *,
+    limit: Annotated[int, Parameter(help="How many, the newest ones.")] = 20,
+    server: Server = HERE,
+) -> int:
+    """Show what was calibrated when, by whom, and how well."""
+
+    async def work() -> None:
+        async with server.rest() as rest:
+            query = {"limit": 1000 if name else limit}
+            found: list[CalibrationRecord] = await rest.request(
+                "GET", "/api/calibrations", list[CalibrationRecord], params=query
+            )
+        _show([one for one in found if name in ("", one.object_name)][:limit])
+
+    return calibrated("online records", work)
+
+
+def _show(found: list[CalibrationRecord]) -> None:
+    table = Table("date", "object", "kind", "by", "residual", "moved", "verdict", box=None, pad_edge=False)
+    for one in found:
+        residual = ""
+        if not isinstance(one.residual, Unset):
+            number = 1e3 * one.residual if one.residual_unit == "m" else one.residual
+            residual = f"{number:.2f} {'mm' if one.residual_unit == 'm' else one.residual_unit}"
+        moved = ""
+        if not isinstance(one.before, Unset) and not isinstance(one.after, Unset):
+            moved = f"{1e3 * one.before.position.distance_to(one.after.position):.1f} mm"
+        table.add_row(one.date[:19], one.object_name, one.kind.value, one.person, residual, moved, one.verdict)
+    console().print(table if found else "Nothing was calibrated yet.")
+
+
+# ------------------------------------------------------------------------------------------------ following
+async def _open_scene(client: Client) -> Scene:
+    """Give the scene that is open. Conflict when none is."""
+    try:
+        async with asyncio.timeout(GREETING):
+            async for event in client.events():
+                match event.event:
+                    case "OpenScene" | "OpenProject":
+                        scene: Scene = event.data.scene
+                        return scene
+                    case "ShowMainScreen":
+                        break
+    except TimeoutError:
+        pass
+    raise Conflict("No scene is open on the server: open one, and start it.")
+
+
+def _named(scene: Scene, name: str) -> SceneObject:
+    for each in scene.objects:
+        if each.name == name:
+            return each
+    raise NotFound(f"The scene {scene.name} has no object {name!r}; it has {', '.join(o.name for o in scene.objects)}.")
+
+
+async def _calibrate(client: Client, found: SceneObject, process: str, begin: Callable[[], Awaitable[None]]) -> None:
+    """Lock an object, begin, follow to the end, and show what came out."""
+    await client.register_user(USER)
+    await client.subscribe_events({"TaskState"})
+    await client.write_lock(found.id)
+    try:
+        await begin()
+        verdict = await _followed(client, found, process)
+    finally:
+        await client.write_unlock(found.id)
+    out = console()
+    out.print(f"[bold]{verdict or 'done'}[/bold]")
+    async for event in client.events():
+        if event.event == "SceneObjectChanged" and event.data.id == found.id:
+            out.print(pose_table(found.name, event.data.pose))
+            break
+
+
+async def _followed(client: Client, found: SceneObject, process: str) -> str:
+    """Give the verdict of a calibration. Failed with what went wrong."""
+    title = f"Calibration of {found.name}"
+    try:
+        async with asyncio.timeout(ENDS_WITHIN):
+            with progress(title) as told:
+                async for event in client.events():
+                    if event.event == "TaskState" and event.data.title == title:
+                        share = 0.0 if isinstance(event.data.progress, Unset) else event.data.progress
+                        told(share, "" if isinstance(event.data.message, Unset) else event.data.message)
+                    elif event.event == "ProcessState" and event.data.id == process:
+                        message = "" if isinstance(event.data.message, Unset) else event.data.message
+                        if event.data.state == "failed":
+                            raise Failed(ExitStatus.CALIBRATION_REFUSED, message)
+                        if event.data.state == "finished":
+                            return message
+    except TimeoutError:
+        raise DeviceTimeout(f"The calibration did not end within {ENDS_WITHIN:g} s.") from None
+    raise ConnectionLost(f"The connection to {client.url} broke.")

@@ -1,0 +1,130 @@
+"""What the calibration commands share: files that are read, progress, and how a result is shown."""
+
+import math
+import sys
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+import msgspec
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
+from rich.table import Table
+
+from arcor2_hw.calibration.configuration import yaml_of
+from arcor2_hw.calibration.refusals import CalibrationRefused
+from arcor2_hw.compute.task import MAX_PICTURE, Task
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.exceptions import InvalidData, NotFound
+from arcor2_server import logging as server_logging
+from arcor2_server.cli.reaching import Failed, run
+from arcor2_server.cli.status import ExitStatus
+from arcor2_server.compute import Compute
+from arcor2_server.compute_process import Told
+
+T = TypeVar("T")
+R = TypeVar("R")
+MAX_FILE: Final = 1 << 20
+"""Bytes of a file of numbers."""
+
+
+# ------------------------------------------------------------------------------------------------ files
+def content_of(path: Path, largest: int) -> bytes:
+    """Give a file's bytes. NotFound, InvalidData naming the file."""
+    try:
+        if path.stat().st_size > largest:
+            raise InvalidData(f"{path} is larger than {largest} bytes.")
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise NotFound(f"There is no file {path}.") from None
+    except OSError as error:
+        raise InvalidData(f"{path} cannot be read: {error.strerror}.") from None
+
+
+def picture_of(path: Path) -> bytes:
+    """Give a picture's file. NotFound, InvalidData."""
+    return content_of(path, MAX_PICTURE)
+
+
+def read_as(path: Path, kind: type[T]) -> T:
+    """Read YAML or JSON as a type. NotFound, InvalidData naming the file and what is wrong in it."""
+    content = yaml_of(content_of(path, MAX_FILE), str(path))
+    try:
+        return msgspec.convert(content, kind)
+    except (msgspec.ValidationError, ValueError) as error:
+        raise InvalidData(f"{path}: {error}.") from None
+
+
+def write(path: Path, content: bytes) -> None:
+    """Write a file, with the folders that lead to it. InvalidData naming the file."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    except OSError as error:
+        raise InvalidData(f"{path} cannot be written: {error.strerror}.") from None
+    Console(stderr=True, highlight=False).print(f"written: {path}")
+
+
+# ------------------------------------------------------------------------------------------------ computing
+def calibrated(command: str, work: Callable[[], Awaitable[Any]]) -> int:
+    """Run a command; a calibration that is refused has a status of its own."""
+
+    async def working() -> Any:
+        try:
+            return await work()
+        except CalibrationRefused as error:
+            detail = f" ({error.detail})" if error.detail else ""
+            raise Failed(ExitStatus.CALIBRATION_REFUSED, f"{error}{detail}") from error
+
+    return run(f"calibrate {command}", working)
+
+
+async def compute(task: Task[R]) -> R:
+    """Give the answer to a task, from a worker of its own, and show how far it is."""
+    server_logging.set_up("error")
+    worker = Compute(idle=60.0)
+    try:
+        with progress(task.what) as told:
+            return await worker.run(task, told=told)
+    finally:
+        await worker.close()
+
+
+@contextmanager
+def progress(what: str) -> Iterator[Told]:
+    """Show on standard error how far something is, where that is a terminal."""
+    console = Console(stderr=True)
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as shown:
+        bar = shown.add_task(what, total=1.0)
+
+        def told(share: float, message: str) -> None:
+            shown.update(bar, completed=share, description=message or what)
+
+        yield told
+
+
+# ------------------------------------------------------------------------------------------------ showing
+def show_json(result: Any) -> None:
+    """Print a result as JSON."""
+    sys.stdout.write(msgspec.json.format(msgspec.json.encode(result)).decode() + "\n")
+
+
+def pose_table(what: str, pose: Pose) -> Table:
+    """Give a pose as a technician reads it, and as it is typed in."""
+    table = Table(what, "", box=None, pad_edge=False, show_header=True)
+    x, y, z = (f"{1e3 * value:.2f}" for value in pose.position)
+    table.add_row("position", f"x {x} mm   y {y} mm   z {z} mm")
+    roll, pitch, yaw = (f"{math.degrees(value):.2f}" for value in angles(pose))
+    table.add_row("turned", f"about x {roll}°   then about y {pitch}°   then about z {yaw}° (fixed axes)")
+    table.add_row("quaternion", "   ".join(f"{n} {v:.6f}" for n, v in zip("xyzw", pose.orientation, strict=True)))
+    return table
+
+
+def angles(pose: Pose) -> tuple[float, float, float]:
+    """Give the turns about the fixed axes x, then y, then z, rad."""
+    x, y, z, w = pose.orientation
+    pitch = math.asin(min(max(2 * (w * y - z * x), -1.0), 1.0))
+    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    return roll, pitch, math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))

@@ -1,0 +1,210 @@
+"""`arcor2-hw calibrate`: from files, and on a running server."""
+
+import asyncio
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import cv2
+import httpx
+import msgspec
+import numpy as np
+import pytest
+
+from arcor2_hw.calibration.camera_results import CameraPose
+from arcor2_hw.data.camera import CameraParameters
+from arcor2_hw.data.cell import read_cell
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.exceptions import InvalidData
+from arcor2_server.cli.calibrating import angles
+from arcor2_server.cli.main import app
+from arcor2_server.cli.serve import _markers
+from arcor2_server.cli.status import ExitStatus
+from benchmarks import rendering
+from tests.server.core.serving import ServerProcess
+
+LENS = rendering.Lens(600.0, 599.0, 322.0, 237.0, (0.06, -0.1, 0.0005, -0.0004, 0.02), 640, 480)
+PARAMETERS = CameraParameters(600.0, 599.0, 322.0, 237.0, list(LENS.coefficients))
+CAMERA = rendering.looking_at(np.array([0.25, -0.6, 0.5]), np.zeros(3), 0.2)
+
+
+class Ran(NamedTuple):
+    status: int
+    out: str
+    err: str
+
+
+Cli = Callable[..., Ran]
+
+
+def flat(x: float, y: float) -> np.ndarray[Any, np.dtype[np.float64]]:
+    pose = np.eye(4)
+    pose[:2, 3] = x, y
+    return pose
+
+
+PLACES = {3: flat(-0.12, -0.02), 17: flat(0.12, -0.05)}
+
+
+@pytest.fixture
+def calibrate(capsys: pytest.CaptureFixture[str]) -> Cli:
+    def run(*arguments: str | Path) -> Ran:
+        capsys.readouterr()
+        status = app(["calibrate", *map(str, arguments)])
+        out, err = capsys.readouterr()
+        return Ran(status, out, err)
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A picture of two markers, one of none, the lens, and where the markers are."""
+    folder = tmp_path_factory.mktemp("calibrate")
+    background = rendering.table(np.random.default_rng(1), side=3.0)
+    plates = [rendering.marker(number, 0.1, place) for number, place in PLACES.items()]
+    for name, shown in (("markers", [background, *plates]), ("empty", [background])):
+        cv2.imwrite(str(folder / f"{name}.png"), rendering.render(LENS, CAMERA, shown, np.random.default_rng(2)))
+    write(folder / "lens.yaml", PARAMETERS)
+    poses = {number: {"pose": msgspec.to_builtins(Pose.from_matrix(place))} for number, place in PLACES.items()}
+    write(folder / "markers.yaml", {"marker_size": 0.1, "markers": poses})
+    return folder
+
+
+def write(path: Path, content: Any) -> Path:
+    path.write_bytes(msgspec.yaml.encode(content))
+    return path
+
+
+def test_where_a_camera_stands(files: Path, tmp_path: Path, calibrate: Cli) -> None:
+    told = ("--lens", files / "lens.yaml", "--markers", files / "markers.yaml")
+    ran = calibrate("camera", files / "markers.png", *told, "--save", tmp_path / "out", "-o", tmp_path / "pose.json")
+    assert ran.status == ExitStatus.OK, ran
+    assert "marker 17" in ran.out
+    assert "known to" in ran.out
+    found = msgspec.json.decode((tmp_path / "pose.json").read_bytes(), type=Pose)
+    truth = Pose.from_matrix(CAMERA)
+    assert found.position.distance_to(truth.position) < 0.003
+    assert cv2.imread(str(tmp_path / "out" / "markers-markers.png")).shape[1] > 640
+    ran = calibrate("camera", files / "markers.png", *told, "--json", "--method", "averaged")
+    whole = msgspec.json.decode(ran.out, type=CameraPose)
+    assert whole.method == "averaged"
+    assert len(whole.markers) == 2
+
+
+def test_what_cannot_be_told_has_a_status_and_a_line(files: Path, tmp_path: Path, calibrate: Cli) -> None:
+    told = ("--lens", files / "lens.yaml", "--markers", files / "markers.yaml")
+    twice = tmp_path / "twice.yaml"
+    twice.write_text("markers:\n  3: {pose: {}}\n  3: {pose: {}}\n")
+    lens = write(tmp_path / "lens.yaml", {"fx": 1})
+    others = write(tmp_path / "others.yaml", {"markers": [{"marker_id": 44, "pose": Pose()}]})
+    cases: list[tuple[list[str | Path], ExitStatus, str]] = [
+        (["camera", files / "empty.png", *told], ExitStatus.CALIBRATION_REFUSED, "blurred"),
+        (["camera", files / "markers.png", *told[:2], "--markers", others], ExitStatus.CALIBRATION_REFUSED, "marker"),
+        (["camera", files / "none.png", *told], ExitStatus.NOT_FOUND, "none.png"),
+        (["camera", files / "lens.yaml", *told], ExitStatus.DOCUMENT_PROBLEMS, "picture"),
+        (["camera", files / "markers.png", *told[:2], "--markers", twice], ExitStatus.DOCUMENT_PROBLEMS, "marker 3"),
+        (["camera", files / "markers.png", "--lens", lens, *told[2:]], ExitStatus.DOCUMENT_PROBLEMS, "fy"),
+        (["camera", *told], ExitStatus.DOCUMENT_PROBLEMS, "picture"),
+    ]
+    for arguments, status, words in cases:
+        ran = calibrate(*arguments)
+        assert (ran.status, ran.out) == (status, ""), (arguments, ran)
+        assert words in ran.err
+        assert ran.err.count("\n") == 1
+        assert "Traceback" not in ran.err
+
+
+def test_touched_points(tmp_path: Path, calibrate: Cli) -> None:
+    turned = Orientation.from_rotation_vector(0.0, 0.0, math.radians(30))
+    known = [Position(0, 0, 0), Position(0.3, 0, 0), Position(0, 0.2, 0), Position(0.3, 0.2, 0)]
+    touched = [point.rotated(turned) + Position(0.5, 0.1, 0.0) for point in known]
+    file = write(tmp_path / "points.yaml", {"known": known, "touched": touched})
+    ran = calibrate("touch", file, "-o", tmp_path / "frame.json")
+    assert ran.status == ExitStatus.OK, ran
+    assert "30.00°" in ran.out
+    frame = msgspec.json.decode((tmp_path / "frame.json").read_bytes(), type=Pose)
+    assert frame.position.distance_to(Position(0.5, 0.1, 0.0)) < 1e-9
+
+    tip = Position(0.01, 0.02, 0.15)
+    turns = [(0, 0, 0), (0.6, 0, 0), (0, 0.6, 0), (-0.6, 0.4, 0), (0.3, -0.5, 0.2)]
+    flanges = []
+    for turn in turns:
+        orientation = Orientation.from_rotation_vector(*turn)
+        flanges.append(Pose(Position(0.4, 0, 0.2) - tip.rotated(orientation), orientation))
+    ran = calibrate("touch", write(tmp_path / "tip.yaml", {"flanges": flanges}))
+    assert "z 150.00 mm" in ran.out
+    ran = calibrate("touch", write(tmp_path / "few.yaml", {"flanges": flanges[:1] * 5}))
+    assert (ran.status, ran.out) == (ExitStatus.CALIBRATION_REFUSED, "")
+    ran = calibrate("touch", write(tmp_path / "odd.yaml", {"known": known}))
+    assert (ran.status, ran.out) == (ExitStatus.DOCUMENT_PROBLEMS, "")
+    assert "touched" in ran.err
+
+
+def test_lens_and_hand_eye_have_their_files(files: Path, tmp_path: Path, calibrate: Cli) -> None:
+    """What they compute has tests of its own; here, that the files come together and refusals come out."""
+    board = write(tmp_path / "board.yaml", {"columns": 7, "rows": 5, "square": 0.03, "marker": 0.0225})
+    ran = calibrate("intrinsics", files / "markers.png", "--board", board)
+    assert (ran.status, ran.out) == (ExitStatus.CALIBRATION_REFUSED, ""), ran
+    ran = calibrate("intrinsics", files / "markers.png", "--board", board, "--coefficients", "3")
+    assert ran.status == ExitStatus.USAGE
+    stations = write(tmp_path / "stations.yaml", [{"picture": "gone.png", "flange": Pose()}])
+    target = write(tmp_path / "target.yaml", {"markers": [{"marker_id": 3, "pose": Pose()}], "size": 0.1})
+    more = ("--lens", files / "lens.yaml", "--target", target, "--mounting", "eye_in_hand")
+    ran = calibrate("hand-eye", stations, *more)
+    assert (ran.status, ran.out) == (ExitStatus.NOT_FOUND, "")
+    assert "gone.png" in ran.err
+    (tmp_path / "gone.png").write_bytes((files / "markers.png").read_bytes())
+    ran = calibrate("hand-eye", stations, *more)
+    assert (ran.status, ran.out) == (ExitStatus.DOCUMENT_PROBLEMS, ""), ran
+
+
+def test_angles_are_about_the_fixed_axes() -> None:
+    for roll, pitch, yaw in ((0.3, -0.4, 1.2), (-2.0, 0.9, -3.0), (0.0, 0.0, 0.0)):
+        about_x = Orientation.from_rotation_vector(roll, 0, 0)
+        about_y = Orientation.from_rotation_vector(0, pitch, 0)
+        about_z = Orientation.from_rotation_vector(0, 0, yaw)
+        assert angles(Pose(orientation=about_z * about_y * about_x)) == pytest.approx((roll, pitch, yaw))
+
+
+def test_markers_come_from_a_file_or_from_the_cell(files: Path, tmp_path: Path) -> None:
+    path = tmp_path / "cell.yaml"
+    path.write_text("devices: []\ncalibration:\n  marker_size: 0.05\n  markers:\n    4: {pose: {}}\n")
+    found = _markers(None, path, read_cell(path))
+    assert found is not None
+    assert (found.marker_size, [marker.marker_id for marker in found.markers]) == (0.05, [4])
+    given = _markers(files / "markers.yaml", path, read_cell(path))
+    assert given is not None
+    assert [marker.marker_id for marker in given.markers] == [3, 17]
+    assert _markers(None, None, None) is None
+    path.write_text(path.read_text() + "    4: {pose: {}}\n")
+    with pytest.raises(InvalidData, match=r"cell\.yaml.*marker 4 is listed twice"):
+        _markers(None, path, read_cell(path))
+
+
+def test_a_running_server_is_told_and_asked(files: Path, tmp_path: Path, calibrate: Cli) -> None:
+    with asyncio.Runner() as runner:
+        server = ServerProcess(tmp_path / "data")
+        runner.run(server.start())
+        try:
+            url = ("--url", server.url)
+            ran = calibrate("online", "markers", files / "markers.yaml", *url)
+            assert (ran.status, ran.out.strip()) == (ExitStatus.OK, "2 markers and 0 boards are set.")
+            base = server.url.replace("ws", "http", 1)
+            assert [m["marker_id"] for m in httpx.get(f"{base}/api/calibration/markers").json()["markers"]] == [3, 17]
+            by_hand = {"object_id": "obj_1", "object_name": "cam", "pose": {"position": {"x": 0.25}}, "before": {}}
+            kept = httpx.post(f"{base}/api/calibrations", json=by_hand).json()
+            ran = calibrate("online", "records", *url)
+            assert "by_hand" in ran.out
+            assert "250.0 mm" in ran.out
+            assert "Nothing was calibrated" in calibrate("online", "records", "other", *url).out
+            checked = httpx.put(f"{base}/api/calibrations/{kept['id']}/check", json={"pose": {"position": {"x": 0.26}}})
+            assert checked.json()["passed"] is False
+            ran = calibrate("online", "camera", "cam", *url)
+            assert (ran.status, ran.out) == (ExitStatus.CONFLICT, "")
+            assert "No scene is open" in ran.err
+        finally:
+            runner.run(server.stop())
+    ran = calibrate("online", "records", "--url", "ws://127.0.0.1:9")
+    assert ran.status == ExitStatus.NO_SERVER
