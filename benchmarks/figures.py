@@ -73,6 +73,13 @@ GOALS: Final[dict[str, tuple[str, str]]] = {
     "build_1000_ms": ("ms", "<= 100"),
     "build_10000_ms": ("ms", "<= 1000"),
     "read_script_1000_ms": ("ms", "<= 200"),
+    "kinematics_forward_us": ("µs", "<= 1"),
+    "kinematics_inverse_reached": ("% of random reachable poses", ">= 99.9"),
+    "kinematics_inverse_ms": ("ms", "<= 0.3"),
+    "kinematics_check_20_us": ("µs", "<= 50"),
+    "kinematics_check_1000_us": ("µs", "<= 100"),
+    "kinematics_reach_3000_s": ("s", "<= 1"),
+    "kinematics_reach_moved_ms": ("ms", "<= 200"),
 }
 
 
