@@ -278,6 +278,10 @@ class MultiArmRobot(Robot):
         """Move one arm with a velocity that runs out by itself."""
         raise Arcor2NotImplemented("jog")
 
+    def joint_limits(self, arm_id: str | None = None) -> dict[str, tuple[float, float]]:
+        """Give lower and upper limit of each joint of an arm, rad; of all arms when none is named."""
+        raise Arcor2NotImplemented("joint_limits")
+
     def tcp_speed(
         self, joint_velocities: list[float], end_effector_id: str | None = None, arm_id: str | None = None
     ) -> float:

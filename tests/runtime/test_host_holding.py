@@ -295,6 +295,53 @@ def test_hand_teaching_lasts_as_long_as_it_is_held(holder: Holder) -> None:
     assert holder.host.call(OBJ, "get_hand_teaching_mode") is False
 
 
+ARMS = """
+from arcor2_hw.objects import MultiArmRobot
+
+class Arms(MultiArmRobot):
+    _ABSTRACT = False
+    def __init__(self, obj_id, name, pose, settings=None):
+        super().__init__(obj_id, name, pose, settings)
+        self.told = []
+    def report(self): return self.told
+    def get_arm_ids(self): return {"left", "right"}
+    def get_end_effectors_ids(self, arm_id=None): return {"claw", "cup"} if arm_id == "right" else {"claw"}
+    def get_end_effector_pose(self, end_effector, arm_id=None): return Pose()
+    def robot_joints(self, include_gripper=False, arm_id=None): return [Joint(f"{arm_id}_turn", 0.0)]
+    def grippers(self, arm_id=None): return set()
+    def suctions(self, arm_id=None): return set()
+    def stop(self, arm_id=None): self.told.append(["stop"])
+    def get_hand_teaching_mode(self, arm_id=None): return False
+    def set_hand_teaching_mode(self, enabled, arm_id=None): self.told.append(["hand", enabled, arm_id])
+    def tcp_speed(self, joint_velocities, end_effector_id=None, arm_id=None): return 0.5 * abs(joint_velocities[0])
+    def jog(self, twist=None, joint_velocities=None, frame="world", valid_for=0.2, end_effector_id=None, arm_id=None):
+        self.told.append(["jog", twist, joint_velocities, end_effector_id, arm_id])
+"""
+
+
+def test_one_arm_of_several_is_held(host: HostProcess) -> None:
+    host.send(open_scene([type_code("Arms", ARMS)], scene_object("arm", "Arms", pose=True)))
+    host.expect(m.SceneOpened)
+    holder = Holder(host)
+    assert holder.granted(new=True, arm_id="left") == 1.0
+    assert 0.45 < holder.granted(joints=[Joint("left_turn", 1.0)], arm_id="left") <= 0.5
+    holder.lease(0.0, arm_id="left")
+    holder.ended()
+    assert "name one of claw, cup" in holder.refused(new=True, arm_id="right").message
+    holder.ended()
+    assert holder.granted(new=True, arm_id="right", end_effector_id="cup") == 1.0
+    holder.lease(0.0, arm_id="right")
+    holder.ended()
+    holder.granted(kind=HoldKind.HAND_TEACHING, new=True, arm_id="right")
+    holder.lease(0.0, kind=HoldKind.HAND_TEACHING)
+    holder.ended()
+    told = [one for one in host.call(OBJ, "report") if one[0] != "stop"]
+    assert [one[-1] for one in told] == ["left", "left", "right", "right", "right"]
+    assert told[1][2] == pytest.approx([0.475])
+    assert told[2][3] == "cup"
+    assert told[3:] == [["hand", True, "right"], ["hand", False, "right"]]
+
+
 def test_a_host_without_its_server_stops_what_is_held() -> None:
     host = HostProcess()
     try:
