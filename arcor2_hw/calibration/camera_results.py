@@ -117,13 +117,16 @@ class HandEyeOptions(Data, frozen=True):
 
     smallest_turn: rad, the rotation between two stations that counts as one. smallest_spread: rad, between the axes of
     two such rotations. largest_residual: px, root mean square over all. largest_deviation: m. See PoseOptions for the
-    others.
+    others. robot_position (m), robot_orientation (rad): how exact the flange's poses are, for the weights; how large
+    the errors really are is seen in the pictures.
     """
 
     smallest_turn: float = 0.15
     smallest_spread: float = 0.26
     largest_residual: float = 2.0
     largest_deviation: float = 0.003
+    robot_position: float = 0.0005
+    robot_orientation: float = 0.0005
     blur_threshold: float = 150.0
     largest_blur: float = 2.5
 

@@ -72,6 +72,8 @@ def find_hand_eye(
         raise InvalidData(f"{FEWEST} to {MOST_SAMPLES} samples are needed, not {len(samples)}")
     for index, each in enumerate(samples):
         check_pose(each.flange, f"the flange's pose of sample {index}")
+    if not (0 < options.robot_position < 1 and 0 < options.robot_orientation < 1):
+        raise InvalidData("robot_position and robot_orientation have to be small positive numbers, in m and rad")
     problems: dict[int, str] = {}
     stations: list[Station] = []
     eyes: list[Array] = []
@@ -160,7 +162,7 @@ def _solve(
             continue
         target, turn, shift = _scatter([hand @ mount @ eye for hand, eye in zip(hands, eyes, strict=True)])
         methods.append(HandEyeMethod(name, Pose.from_matrix(mount), turn, shift))
-        solution = refined(lens, stations, mount, target)
+        solution = refined(lens, stations, mount, target, (options.robot_position, options.robot_orientation))
         if solution is not None:
             found.append(solution)
     if not found:

@@ -15,6 +15,7 @@ from arcor2_hw.calibration.pose_problem import Seen
 from arcor2_hw.calibration.rigid import crossed, inverted, moved
 
 _ROUNDS: Final = 60
+_WEIGHINGS: Final = 2
 _SOFT: Final = 3.0
 """How many times the usual error a station may be off before it counts less (Cauchy)."""
 
@@ -63,70 +64,122 @@ def errors_at(lens: Lens, stations: Sequence[Station], mount: Array, target: Arr
     return result
 
 
-def refined(lens: Lens, stations: Sequence[Station], mount: Array, target: Array) -> Mount | None:
-    """Search for the mount and the target that explain all corners (Levenberg and Marquardt), from a start."""
+def refined(
+    lens: Lens, stations: Sequence[Station], mount: Array, target: Array, robot: tuple[float, float]
+) -> Mount | None:
+    """Search for the mount and the target that explain all corners best, from a start.
+
+    robot: how exact the hand's poses are, m and rad (standard deviations); only their ratio, to each other and to the
+    errors of the corners, matters. An inexact hand moves all corners of a picture together: without that in the
+    weights, the search would take such a motion for many measurements that agree.
+    """
+    found: Mount | None = None
+    for _ in range(_WEIGHINGS):
+        whiteners = _whiteners(lens, stations, mount, target, robot)
+        found = _searched(lens, stations, mount, target, whiteners) if whiteners is not None else None
+        if found is None:
+            return None
+        mount, target = found.mount, found.target
+    return found
+
+
+def _searched(
+    lens: Lens, stations: Sequence[Station], mount: Array, target: Array, whiteners: Sequence[Array]
+) -> Mount | None:
+    """Search with given weights (Levenberg and Marquardt)."""
     errors = errors_at(lens, stations, mount, target)
     if errors is None:
         return None
-    damping = 1e-4
+    damping, usual = 1e-4, 1.0
     for _ in range(_ROUNDS):
-        usual = max(float(np.median([_size(each) for each in errors])), 1e-3)
-        cost = _cost(errors, usual)
-        normal, right = _equations(lens, stations, mount, target, errors, usual)
+        usual = _usual(errors, whiteners)
+        cost = _cost(errors, whiteners, usual)
+        normal, right = _equations(lens, stations, mount, target, errors, whiteners, usual)
         gain = -1.0
         while gain < 0 and damping < 1e8:
             step = np.asarray(np.linalg.solve(normal + damping * np.diag(np.diag(normal)), right), dtype=np.float64)
             tried = moved(mount, step[:6]), moved(target, step[6:])
             new = errors_at(lens, stations, *tried)
-            gain = cost - _cost(new, usual) if new is not None else -1.0
+            gain = cost - _cost(new, whiteners, usual) if new is not None else -1.0
             damping = max(damping / 10, 1e-9) if gain >= 0 else damping * 10
         if gain < 0 or new is None:
             break
         (mount, target), errors = tried, new
         if gain < 1e-6 * max(cost, 1.0):
             break
-    usual = max(float(np.median([_size(each) for each in errors])), 1e-3)
-    normal, _ = _equations(lens, stations, mount, target, errors, usual)
-    # The robot's errors are those of a whole picture, not of a corner: every station counts as few measurements.
-    corners = sum(len(each) for each in errors)
-    spread = float(np.mean(np.concatenate([np.sum(each**2, axis=1) for each in errors]))) / usual**2
-    share = corners / max(3 * len(stations), 1)
+    usual = _usual(errors, whiteners)
+    normal, _ = _equations(lens, stations, mount, target, errors, whiteners, usual)
+    freedom = max(len(stations) - 2, 1) / len(stations)
     try:
-        covariance = np.asarray(np.linalg.inv(normal)[:6, :6] * max(spread, 0.5) * max(share, 1.0), dtype=np.float64)
+        covariance = np.asarray(np.linalg.inv(normal)[:6, :6] / freedom, dtype=np.float64)
     except np.linalg.LinAlgError:
         covariance = np.full((6, 6), np.inf)
     return Mount(mount, target, errors, covariance)
 
 
-def _size(errors: Array) -> float:
-    return float(np.sqrt(np.mean(np.sum(errors**2, axis=1))))
+def _whiteners(
+    lens: Lens, stations: Sequence[Station], mount: Array, target: Array, robot: tuple[float, float]
+) -> list[Array] | None:
+    """Give, per station, what makes its errors independent and of unit variance; None where something is behind."""
+    if errors_at(lens, stations, mount, target) is None:
+        return None
+    position, orientation = robot
+    variances = np.array([orientation**2] * 3 + [position**2] * 3)
+    result = []
+    for each in stations:
+        by_hand = _slopes(lens, each, mount, target)[:, :6]
+        covariance = (by_hand * variances) @ by_hand.T
+        first = 0
+        for seen in each.seen:
+            last = first + len(seen.root)
+            covariance[first:last, first:last] += np.linalg.inv(seen.root.T @ seen.root)
+            first = last
+        result.append(np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)), dtype=np.float64))
+    return result
 
 
-def _cost(errors: Sequence[Array], usual: float) -> float:
+def _usual(errors: Sequence[Array], whiteners: Sequence[Array]) -> float:
+    """Give the size of a station's errors, in what they were taken to be: the median."""
+    sizes = [np.mean((root @ each.ravel()) ** 2) for each, root in zip(errors, whiteners, strict=True)]
+    return max(float(np.sqrt(np.median(sizes))), 1e-3)
+
+
+def _cost(errors: Sequence[Array], whiteners: Sequence[Array], usual: float) -> float:
     total = 0.0
-    for each in errors:
-        reach = _SOFT**2 * len(each)
-        total += reach * float(np.log1p(np.sum(each**2) / usual**2 / reach))
+    for each, root in zip(errors, whiteners, strict=True):
+        reach = _SOFT**2 * each.size
+        total += reach * float(np.log1p(np.sum((root @ each.ravel()) ** 2) / usual**2 / reach))
     return total
 
 
+def _slopes(lens: Lens, each: Station, mount: Array, target: Array) -> Array:
+    """Give the derivatives of a station's pixels by small motions of mount and target (rotation, displacement)."""
+    hand_from_parent, camera_from_hand = inverted(each.hand), inverted(mount)
+    placed = each.points @ target[:3, :3].T + target[:3, 3]
+    at_hand = placed @ hand_from_parent[:3, :3].T + hand_from_parent[:3, 3]
+    camera = at_hand @ camera_from_hand[:3, :3].T + camera_from_hand[:3, 3]
+    _, by_point, _ = lens.projected_with_slopes(camera, np.zeros(len(lens.numbers)))
+    by_hand = by_point @ camera_from_hand[:3, :3]
+    by_placed = by_hand @ hand_from_parent[:3, :3]
+    a = np.concatenate((by_hand @ crossed(at_hand), -by_hand, -by_placed @ crossed(placed), by_placed), axis=2)
+    return np.asarray(a.reshape(-1, 12))
+
+
 def _equations(
-    lens: Lens, stations: Sequence[Station], mount: Array, target: Array, errors: Sequence[Array], usual: float
+    lens: Lens,
+    stations: Sequence[Station],
+    mount: Array,
+    target: Array,
+    errors: Sequence[Array],
+    whiteners: Sequence[Array],
+    usual: float,
 ) -> tuple[Array, Array]:
     """Give the normal equations for small motions of mount and target (rotation, displacement)."""
     normal, right = np.zeros((12, 12)), np.zeros(12)
-    unchanged = np.zeros(len(lens.numbers))
-    for each, left in zip(stations, errors, strict=True):
-        hand_from_parent, camera_from_hand = inverted(each.hand), inverted(mount)
-        placed = each.points @ target[:3, :3].T + target[:3, 3]
-        at_hand = placed @ hand_from_parent[:3, :3].T + hand_from_parent[:3, 3]
-        camera = at_hand @ camera_from_hand[:3, :3].T + camera_from_hand[:3, 3]
-        _, by_point, _ = lens.projected_with_slopes(camera, unchanged)
-        by_hand = by_point @ camera_from_hand[:3, :3]
-        by_placed = by_hand @ hand_from_parent[:3, :3]
-        a = np.concatenate((by_hand @ crossed(at_hand), -by_hand, -by_placed @ crossed(placed), by_placed), axis=2)
-        a = a.reshape(-1, 12)
-        weight = 1.0 / (1.0 + float(np.sum(left**2)) / usual**2 / (_SOFT**2 * len(left))) / usual**2
+    for each, left, root in zip(stations, errors, whiteners, strict=True):
+        a = root @ _slopes(lens, each, mount, target)
+        white = root @ left.ravel()
+        weight = 1.0 / (1.0 + float(white @ white) / usual**2 / (_SOFT**2 * len(white))) / usual**2
         normal += weight * a.T @ a
-        right -= weight * a.T @ left.ravel()
+        right -= weight * a.T @ white
     return normal, right

@@ -129,7 +129,11 @@ def test_an_inexact_robot_shows_in_the_residual_and_in_the_deviation() -> None:
     )
     distance, angle = off(found.pose, FLANGE_FROM_CAMERA)
     assert found.residual > 2 * in_hand().residual
-    assert found.position_deviation > 2 * in_hand().position_deviation
+    assert found.position_deviation > 1.5 * in_hand().position_deviation
+    # The hand's errors move all corners of a picture together; taken for errors of single corners they turn the camera
+    # by 0.01 rad here.
+    assert angle < 0.002
+    assert distance < 0.001
     assert distance < 4 * found.position_deviation
     assert angle < 4 * found.orientation_deviation
     assert told == [(i + 1, COUNT) for i in range(COUNT)]
