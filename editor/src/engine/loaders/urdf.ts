@@ -3,7 +3,6 @@
 import { LoadingManager, type Material, Mesh } from "three";
 import { strFromU8, unzipSync } from "three/examples/jsm/libs/fflate.module.js";
 import URDFLoader, { type URDFRobot } from "urdf-loader";
-import { loadMesh } from "./mesh";
 
 /** Bytes that an archive may have unpacked: a file of some kilobytes can claim to be any size. */
 const MOST = 512 * 1024 * 1024;
@@ -19,7 +18,7 @@ export async function loadRobot(content: ArrayBuffer, material: Material): Promi
   loader.loadMeshCb = (path, _manager, _material, done) => {
     const found = fileOf(files, path);
     const mesh = found
-      ? loadMesh(found.slice().buffer as ArrayBuffer, path)
+      ? import("./mesh").then(({ loadMesh }) => loadMesh(found.slice().buffer as ArrayBuffer, path))
       : Promise.reject(new Error("it is not in the package"));
     loading.push(
       mesh.then(

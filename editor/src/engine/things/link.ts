@@ -12,6 +12,7 @@ import {
   Quaternion,
   Sprite,
   SpriteMaterial,
+  SRGBColorSpace,
   TubeGeometry,
   Vector3,
 } from "three";
@@ -153,6 +154,7 @@ function text(word: string, ink: string, plate: string): Sprite {
   pen.fillText(word, 20, 34, 600);
   const map = new CanvasTexture(canvas);
   map.minFilter = LinearFilter;
+  map.colorSpace = SRGBColorSpace;
   const sprite = new Sprite(new SpriteMaterial({ map, depthTest: false, transparent: true }));
   sprite.scale.set((canvas.width / canvas.height) * 0.036, 0.036, 1);
   sprite.renderOrder = 5;
