@@ -10,6 +10,7 @@ from arcor2_server.rest import (  # noqa: F401
     assets,
     build,
     calibration,
+    calibration_records,
     calibrations,
     documents,
     execution,

@@ -1,9 +1,8 @@
-"""Calibrations beyond the original's, over REST (docs/protocol.md): whole results, more kinds, and their records."""
+"""Calibrations beyond the original's, over REST (docs/protocol.md): whole results, and more kinds."""
 
 import asyncio
 from typing import Annotated, Any, Final
 
-import msgspec
 from msgspec import Meta, field
 from msgspec.structs import replace
 
@@ -19,13 +18,7 @@ from arcor2_hw.calibration.camera_results import (
 )
 from arcor2_hw.calibration.configuration import CalibrationConfiguration
 from arcor2_hw.calibration.layout import CharucoBoard, Layout
-from arcor2_hw.calibration.records import (
-    CalibrationCheck,
-    CalibrationInput,
-    CalibrationKind,
-    CalibrationRecord,
-    check_against,
-)
+from arcor2_hw.calibration.records import CalibrationKind
 from arcor2_hw.calibration.results import RobotPose, TouchedFrame, TouchedOrientation, TouchedTip
 from arcor2_hw.compute import calibration_tasks as t
 from arcor2_hw.data.base import UNSET, Data, Unset
@@ -34,6 +27,7 @@ from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.rest.calibration import CALIBRATION, CalibrateRobotArgs, read_args
+from arcor2_server.rest.calibration_records import RecordAs, keep, keep_touched
 from arcor2_server.rest.operations import MIB, Binary, Upload, Uploads, operation
 from arcor2_server.robot_models import model_of_uri
 from arcor2_server.services import Services
@@ -43,16 +37,6 @@ MAX_PICTURES: Final = 256 * MIB
 MOST_POINTS: Final = 1000
 
 Points = Annotated[list[Position], Meta(max_length=MOST_POINTS)]
-
-
-class RecordAs(Data, frozen=True):
-    """What a record is kept under: of which object, and in which frame its pose is stated. before: its pose so far."""
-
-    object_id: str
-    object_name: str = ""
-    parent: str = "world"
-    before: Pose | Unset = UNSET
-    applied: bool = False
 
 
 # ------------------------------------------------------------------------------------------------ markers
@@ -135,7 +119,7 @@ async def find_camera_pose(services: Services, uploads: Uploads, person: str) ->
     found = await services.compute.run(task)
     details = {"camera_parameters": args.camera_parameters, "markers": configuration, "options": options}
     kind = CalibrationKind.CAMERA_POSE
-    await _keep(services, person, args.record, kind, found, found.residual, "px", pictures, details, found.pose)
+    await keep(services, person, args.record, kind, found, found.residual, "px", pictures, details, found.pose)
     return found
 
 
@@ -171,7 +155,7 @@ async def find_robot_pose(services: Services, uploads: Uploads, person: str) -> 
     )
     details = {"view": replace(args, record=UNSET)}
     kind = CalibrationKind.ROBOT_POSE
-    await _keep(services, person, args.record, kind, found, found.residual, "m", pictures, details, found.pose)
+    await keep(services, person, args.record, kind, found, found.residual, "m", pictures, details, found.pose)
     return found
 
 
@@ -187,7 +171,7 @@ async def find_hand_eye(services: Services, uploads: Uploads, person: str) -> Ha
     found = await services.compute.run(task)
     details = {"args": replace(args, record=UNSET)}
     kind = CalibrationKind.HAND_EYE
-    await _keep(services, person, args.record, kind, found, found.residual, "px", pictures, details, found.pose)
+    await keep(services, person, args.record, kind, found, found.residual, "px", pictures, details, found.pose)
     return found
 
 
@@ -199,7 +183,7 @@ async def find_intrinsics(services: Services, uploads: Uploads, person: str) -> 
     found = await services.compute.run(t.FindIntrinsics(pictures, args.board, args.options))
     details = {"args": replace(args, record=UNSET)}
     kind = CalibrationKind.INTRINSICS
-    await _keep(services, person, args.record, kind, found, found.residual, "px", pictures, details, UNSET)
+    await keep(services, person, args.record, kind, found, found.residual, "px", pictures, details, UNSET)
     return found
 
 
@@ -250,7 +234,7 @@ class DirectionsArgs(Data, frozen=True):
 async def frame_by_axes(services: Services, body: FrameByAxesArgs, person: str) -> TouchedFrame:
     """Give a frame from three touched points or more: origin, x axis, xy plane."""
     found = await services.compute.run(t.FrameByAxes(body.origin, body.on_x, body.in_plane))
-    await _keep_touched(services, person, body, CalibrationKind.USER_FRAME, found, found.pose)
+    await keep_touched(services, person, body, CalibrationKind.USER_FRAME, found, found.pose)
     return found
 
 
@@ -258,7 +242,7 @@ async def frame_by_axes(services: Services, body: FrameByAxesArgs, person: str) 
 async def frame_by_points(services: Services, body: FrameByPointsArgs, person: str) -> TouchedFrame:
     """Give a frame from three points or more that are known in it, and were touched: a robot's base, or an object."""
     found = await services.compute.run(t.FrameByPoints(body.known, body.touched))
-    await _keep_touched(services, person, body, CalibrationKind.BASE_FRAME, found, found.pose)
+    await keep_touched(services, person, body, CalibrationKind.BASE_FRAME, found, found.pose)
     return found
 
 
@@ -266,7 +250,7 @@ async def frame_by_points(services: Services, body: FrameByPointsArgs, person: s
 async def tip_by_touches(services: Services, body: TipArgs, person: str) -> TouchedTip:
     """Give a tool's tip on the flange, from one point touched in four orientations or more."""
     found = await services.compute.run(t.TipByTouches(body.flanges))
-    await _keep_touched(services, person, body, CalibrationKind.TOOL_TIP, found, Pose(found.position))
+    await keep_touched(services, person, body, CalibrationKind.TOOL_TIP, found, Pose(found.position))
     return found
 
 
@@ -275,7 +259,7 @@ async def orientation_by_alignment(services: Services, body: AlignmentArgs, pers
     """Give a tool's orientation on the flange, from aligning it with a reference."""
     found = await services.compute.run(t.OrientationByAlignment(body.flanges, body.reference))
     turned = Pose(orientation=found.orientation)
-    await _keep_touched(services, person, body, CalibrationKind.TOOL_ORIENTATION, found, turned)
+    await keep_touched(services, person, body, CalibrationKind.TOOL_ORIENTATION, found, turned)
     return found
 
 
@@ -284,117 +268,5 @@ async def orientation_by_points(services: Services, body: DirectionsArgs, person
     """Give a tool's orientation on the flange, from moving its tip along its +z and to its +x side."""
     found = await services.compute.run(t.OrientationByPoints(body.flange, body.tip, body.along_z, body.on_x))
     turned = Pose(orientation=found.orientation)
-    await _keep_touched(services, person, body, CalibrationKind.TOOL_ORIENTATION, found, turned)
+    await keep_touched(services, person, body, CalibrationKind.TOOL_ORIENTATION, found, turned)
     return found
-
-
-# ------------------------------------------------------------------------------------------------ records
-class RecordsQuery(Data, frozen=True):
-    """Of an object, of a kind, older than a date; at most so many."""
-
-    object_id: str | Unset = UNSET
-    kind: CalibrationKind | Unset = UNSET
-    before: str | Unset = UNSET
-    limit: Annotated[int, Meta(ge=0, le=1000)] = 100
-
-
-class ByHandArgs(Data, frozen=True):
-    """A pose that somebody typed in. remark: why, or from where."""
-
-    object_id: str
-    object_name: str
-    pose: Pose
-    parent: str = "world"
-    before: Pose | Unset = UNSET
-    remark: str = ""
-
-
-class CheckArgs(Data, frozen=True):
-    """A pose measured later, in the same frame as the record's, and how far it may be off (m, rad)."""
-
-    pose: Pose
-    distance_limit: Annotated[float, Meta(gt=0)] = 0.002
-    angle_limit: Annotated[float, Meta(gt=0)] = 0.0035
-
-
-@operation("GET", "/api/calibrations", CALIBRATION, Role.OPERATOR, plain=True)
-async def list_calibrations(services: Services, query: RecordsQuery) -> list[CalibrationRecord]:
-    """List the records of calibrations, newest first."""
-    given = {name: value for name, value in msgspec.structs.asdict(query).items() if not isinstance(value, Unset)}
-    return await services.calibration_records.find(**given)
-
-
-@operation("POST", "/api/calibrations", CALIBRATION, Role.TECHNICIAN, plain=True)
-async def record_by_hand(services: Services, body: ByHandArgs, person: str) -> CalibrationRecord:
-    """Keep a record of a pose that somebody typed in."""
-    record = CalibrationRecord(
-        CalibrationKind.BY_HAND,
-        person,
-        body.object_id,
-        body.object_name,
-        body.parent,
-        body.remark or "Typed in by hand.",
-        before=body.before,
-        after=body.pose,
-    )
-    await services.calibration_records.put(record)
-    return record
-
-
-@operation("GET", "/api/calibrations/{calibration_id}", CALIBRATION, Role.OPERATOR, plain=True)
-async def get_calibration(services: Services, calibration_id: str) -> CalibrationRecord:
-    """Give the record of a calibration."""
-    return await services.calibration_records.get(calibration_id)
-
-
-@operation("PUT", "/api/calibrations/{calibration_id}/check", CALIBRATION, Role.OPERATOR, plain=True)
-async def check_calibration(services: Services, calibration_id: str, body: CheckArgs) -> CalibrationCheck:
-    """Compare a pose measured now with that of a record."""
-    record = await services.calibration_records.get(calibration_id)
-    return check_against(record, body.pose, distance_limit=body.distance_limit, angle_limit=body.angle_limit)
-
-
-async def _keep(
-    services: Services,
-    person: str,
-    under: RecordAs | Unset,
-    kind: CalibrationKind,
-    found: Any,
-    residual: float,
-    unit: str,
-    pictures: list[bytes],
-    details: dict[str, Any],
-    after: Pose | Unset,
-) -> None:
-    """Keep a record where one is wanted."""
-    if isinstance(under, Unset):
-        return
-    result: dict[str, Any] = msgspec.to_builtins(found)
-    result.pop("picture", None)  # what can be drawn again
-    inputs = [CalibrationInput.of(f"picture {number}", each) for number, each in enumerate(pictures, 1)]
-    await services.calibration_records.put(
-        CalibrationRecord(
-            kind,
-            person,
-            under.object_id,
-            under.object_name or under.object_id,
-            under.parent,
-            found.verdict,
-            residual=residual,
-            residual_unit=unit,
-            inputs=inputs,
-            parameters=msgspec.to_builtins(details),
-            result=result,
-            before=under.before,
-            after=after,
-            applied=under.applied,
-        )
-    )
-
-
-async def _keep_touched(
-    services: Services, person: str, body: Any, kind: CalibrationKind, found: Any, after: Pose
-) -> None:
-    unit = "rad" if kind is CalibrationKind.TOOL_ORIENTATION else "m"
-    details = {"args": replace(body, record=UNSET)}
-    await _keep(services, person, body.record, kind, found, found.residual, unit, [], details, after)

@@ -1,0 +1,144 @@
+"""Records of calibrations over REST (docs/protocol.md): kept, listed, checked later."""
+
+from typing import Annotated, Any
+
+import msgspec
+from msgspec import Meta
+from msgspec.structs import replace
+
+from arcor2_hw.calibration.records import (
+    CalibrationCheck,
+    CalibrationInput,
+    CalibrationKind,
+    CalibrationRecord,
+    check_against,
+)
+from arcor2_hw.data.base import UNSET, Data, Unset
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.role import Role
+from arcor2_server.rest.calibration import CALIBRATION
+from arcor2_server.rest.operations import operation
+from arcor2_server.services import Services
+
+
+class RecordAs(Data, frozen=True):
+    """What a record is kept under: of which object, and in which frame its pose is stated. before: its pose so far."""
+
+    object_id: str
+    object_name: str = ""
+    parent: str = "world"
+    before: Pose | Unset = UNSET
+    applied: bool = False
+
+
+async def keep(
+    services: Services,
+    person: str,
+    under: RecordAs | Unset,
+    kind: CalibrationKind,
+    found: Any,
+    residual: float,
+    unit: str,
+    pictures: list[bytes],
+    details: dict[str, Any],
+    after: Pose | Unset,
+) -> None:
+    """Keep a record of what was found, where one is wanted. unit: of the residual. after: the pose, if it is one."""
+    if isinstance(under, Unset):
+        return
+    result: dict[str, Any] = msgspec.to_builtins(found)
+    result.pop("picture", None)  # what can be drawn again
+    inputs = [CalibrationInput.of(f"picture {number}", each) for number, each in enumerate(pictures, 1)]
+    await services.calibration_records.put(
+        CalibrationRecord(
+            kind,
+            person,
+            under.object_id,
+            under.object_name or under.object_id,
+            under.parent,
+            found.verdict,
+            residual=residual,
+            residual_unit=unit,
+            inputs=inputs,
+            parameters=msgspec.to_builtins(details),
+            result=result,
+            before=under.before,
+            after=after,
+            applied=under.applied,
+        )
+    )
+
+
+async def keep_touched(
+    services: Services, person: str, body: Any, kind: CalibrationKind, found: Any, after: Pose
+) -> None:
+    """Keep a record of what was found by touch, where one is wanted."""
+    unit = "rad" if kind is CalibrationKind.TOOL_ORIENTATION else "m"
+    details = {"args": replace(body, record=UNSET)}
+    await keep(services, person, body.record, kind, found, found.residual, unit, [], details, after)
+
+
+# ------------------------------------------------------------------------------------------------ records
+class RecordsQuery(Data, frozen=True):
+    """Of an object, of a kind, older than a date; at most so many."""
+
+    object_id: str | Unset = UNSET
+    kind: CalibrationKind | Unset = UNSET
+    before: str | Unset = UNSET
+    limit: Annotated[int, Meta(ge=0, le=1000)] = 100
+
+
+class ByHandArgs(Data, frozen=True):
+    """A pose that somebody typed in. remark: why, or from where."""
+
+    object_id: str
+    object_name: str
+    pose: Pose
+    parent: str = "world"
+    before: Pose | Unset = UNSET
+    remark: str = ""
+
+
+class CheckArgs(Data, frozen=True):
+    """A pose measured later, in the same frame as the record's, and how far it may be off (m, rad)."""
+
+    pose: Pose
+    distance_limit: Annotated[float, Meta(gt=0)] = 0.002
+    angle_limit: Annotated[float, Meta(gt=0)] = 0.0035
+
+
+@operation("GET", "/api/calibrations", CALIBRATION, Role.OPERATOR, plain=True)
+async def list_calibrations(services: Services, query: RecordsQuery) -> list[CalibrationRecord]:
+    """List the records of calibrations, newest first."""
+    given = {name: value for name, value in msgspec.structs.asdict(query).items() if not isinstance(value, Unset)}
+    return await services.calibration_records.find(**given)
+
+
+@operation("POST", "/api/calibrations", CALIBRATION, Role.TECHNICIAN, plain=True)
+async def record_by_hand(services: Services, body: ByHandArgs, person: str) -> CalibrationRecord:
+    """Keep a record of a pose that somebody typed in."""
+    record = CalibrationRecord(
+        CalibrationKind.BY_HAND,
+        person,
+        body.object_id,
+        body.object_name,
+        body.parent,
+        body.remark or "Typed in by hand.",
+        before=body.before,
+        after=body.pose,
+    )
+    await services.calibration_records.put(record)
+    return record
+
+
+@operation("GET", "/api/calibrations/{calibration_id}", CALIBRATION, Role.OPERATOR, plain=True)
+async def get_calibration(services: Services, calibration_id: str) -> CalibrationRecord:
+    """Give the record of a calibration."""
+    return await services.calibration_records.get(calibration_id)
+
+
+@operation("PUT", "/api/calibrations/{calibration_id}/check", CALIBRATION, Role.OPERATOR, plain=True)
+async def check_calibration(services: Services, calibration_id: str, body: CheckArgs) -> CalibrationCheck:
+    """Compare a pose measured now with that of a record."""
+    record = await services.calibration_records.get(calibration_id)
+    return check_against(record, body.pose, distance_limit=body.distance_limit, angle_limit=body.angle_limit)
