@@ -203,10 +203,13 @@ async def run(report: Report, long: bool) -> None:
     pictures = LONG if long else PICTURES
     sys.stderr.write(f"calibration: seed {SEED}, {pictures} pictures of each kind\n")
     options = PoseOptions(focal_deviation=FOCAL, centre_deviation=CENTRE, distortion_deviation=DISTORTION)
-    three = measure(lambda random, table: markers_view(random, 3, table), pictures, 3.0, options, 1.0)
-    one = measure(lambda random, table: markers_view(random, 1, table), pictures, 10.0, options, 1.0)
-    board = measure(board_view, pictures, 3.0, options, 1.0)
-    for name, tally in (("three", three), ("one", one), ("board", board)):
+    kinds: list[tuple[str, Callable[[np.random.Generator, Plate], View], float]] = [
+        ("three", lambda random, table: markers_view(random, 3, table), 3.0),
+        ("one", lambda random, table: markers_view(random, 1, table), 10.0),
+        ("board", board_view, 3.0),
+    ]
+    for name, make, limit in kinds:
+        tally = measure(make, pictures, limit, options, 1.0)
         prefix, count = f"camera_pose_{name}", len(tally.position)
         report.add(Figure(f"{prefix}_mm", median(tally.position), count, tally.note()))
         report.add(

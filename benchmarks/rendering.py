@@ -1,9 +1,9 @@
 """Pictures of markers and boards as a camera takes them, ray by ray: the truth for calibrations.
 
-Every pixel is 16 rays, or as many as are asked for. They come from the lens's own formula, inverted by Newton's method;
-where they meet the printed plates is computed in the plates' frames. Nothing is projected, and nothing of the solver,
-or of OpenCV's geometry, is used: the dictionaries' bits are all that is taken from there. A picture then gets light
-that falls off to one side, blur of lens and defocus, the camera's tone curve, noise and 8 bits.
+Every pixel has its ray, which comes from the lens's own formula, inverted by Newton's method. Where it meets a printed
+plate is computed in the plate's frame, and what is printed there is taken at 16 places around it. Nothing is projected,
+and nothing of the solver, or of OpenCV's geometry, is used: the dictionaries' bits are all that is taken from there. A
+picture then gets light that falls off to one side, blur of lens and defocus, the camera's tone curve, noise and 8 bits.
 
 Not modelled: depth (plates are painted in the order given), shadows, reflections, rolling shutter, colour filters.
 """
@@ -174,30 +174,29 @@ def _paint(picture: Array, plate: Plate, world_from_camera: Array, lens: Lens, s
     if box is None:
         return
     rows, columns = box
-    grid = rays(lens)
-    middle = grid[rows, columns]
-    after = slice(rows.start + 1, rows.stop + 1), slice(columns.start + 1, columns.stop + 1)
-    before = slice(rows.start - 1, rows.stop - 1), slice(columns.start - 1, columns.stop - 1)
-    by_u = (grid[rows, after[1]] - grid[rows, before[1]]) / 2
-    by_v = (grid[after[0], columns] - grid[before[0], columns]) / 2
+    grid = rays(lens)[rows.start - 1 : rows.stop + 1, columns.start - 1 : columns.stop + 1]
+    margin_x, margin_y = _met(plate, world_from_camera, grid[..., 0], grid[..., 1])
+    x, y = margin_x[1:-1, 1:-1], margin_y[1:-1, 1:-1]
+    # Within a pixel the place on the plate moves as it does from one neighbour to the other.
+    x_by_u, y_by_u = ((at[1:-1, 2:] - at[1:-1, :-2]) / 2 for at in (margin_x, margin_y))
+    x_by_v, y_by_v = ((at[2:, 1:-1] - at[:-2, 1:-1]) / 2 for at in (margin_x, margin_y))
     width, height = plate.size
-    # A cell is divided so finely that its edge, over which values go linearly, is as wide as the gap between two rays.
-    x, y = _met(plate, world_from_camera, middle[..., 0], middle[..., 1])
-    pixel = float(np.nanmedian(np.hypot(np.diff(x, axis=1)[:-1], np.diff(y, axis=1)[:-1])))
+    # A cell is divided so finely that its edge, over which values go linearly, is as wide as the gap between samples.
+    pixel = float(np.nanmedian(np.hypot(x_by_u, y_by_u)))
     fine = int(np.clip(plate.cell / pixel * subpixels, 1, 256)) if subpixels > 1 else 1
     target = picture[rows.start - 1 : rows.stop - 1, columns.start - 1 : columns.stop - 1]
-    total, weight = np.zeros(target.shape), np.zeros(target.shape)
+    with np.errstate(invalid="ignore"):
+        reached = np.nonzero((np.abs(x) < width / 2 + 2 * pixel) & (np.abs(y) < height / 2 + 2 * pixel))
+    x, y, x_by_u, y_by_u, x_by_v, y_by_v = (each[reached] for each in (x, y, x_by_u, y_by_u, x_by_v, y_by_v))
+    total, weight = np.zeros(len(x)), np.zeros(len(x))
     for j in range(subpixels):
         for i in range(subpixels):
             du, dv = (i + 0.5) / subpixels - 0.5, (j + 0.5) / subpixels - 0.5
-            ray = middle + du * by_u + dv * by_v
-            x, y = _met(plate, world_from_camera, ray[..., 0], ray[..., 1])
-            with np.errstate(invalid="ignore"):
-                inside = (np.abs(x) <= width / 2) & (np.abs(y) <= height / 2)
-            total[inside] += _printed(plate, x[inside], y[inside], fine)
+            at_x, at_y = x + du * x_by_u + dv * x_by_v, y + du * y_by_u + dv * y_by_v
+            inside = (np.abs(at_x) <= width / 2) & (np.abs(at_y) <= height / 2)
+            total += np.where(inside, _printed(plate, at_x, at_y, fine), 0.0)
             weight += inside
-    share = weight / subpixels**2
-    target[...] = target * (1 - share) + total / subpixels**2
+    target[reached] = target[reached] * (1 - weight / subpixels**2) + total / subpixels**2
 
 
 def _printed(plate: Plate, x: Array, y: Array, fine: int) -> Array:
@@ -239,9 +238,9 @@ def render(
     exposure: Exposure = Exposure(),
     subpixels: int = SUBPIXELS,
 ) -> npt.NDArray[np.uint8]:
-    """Take a picture: grey values, rows × columns. The first plate is the background, and gets one ray per pixel.
+    """Take a picture: grey values, rows × columns. The first plate is the background, and is sampled once per pixel.
 
-    subpixels: rows and columns of rays in every other pixel.
+    subpixels: rows and columns of samples in a pixel of the others.
     """
     reflectance = np.full((lens.height, lens.width), TABLE)
     for index, plate in enumerate(plates):
