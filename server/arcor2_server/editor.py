@@ -60,7 +60,8 @@ def read_files(directory: Path) -> dict[str, EditorFile]:
     found: dict[str, EditorFile] = {}
     endings = tuple(ending for _, ending in _ENCODINGS)
     for file in sorted(directory.rglob("*")) if directory.is_dir() else ():
-        if not file.is_file() or file.name.endswith(endings):
+        hidden = any(part.startswith(".") for part in file.relative_to(directory).parts)  # the build's own notes
+        if hidden or not file.is_file() or file.name.endswith(endings):
             continue
         content = {"": file.read_bytes()}
         for encoding, ending in _ENCODINGS:

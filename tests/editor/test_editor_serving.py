@@ -23,6 +23,8 @@ def built(tmp_path: Path) -> Path:
     (tmp_path / "assets" / "index-abc.js.gz").write_bytes(gzip.compress(SCRIPT))
     (tmp_path / "assets" / "index-abc.js.br").write_bytes(b"not asked for here")
     (tmp_path / "favicon.svg").write_bytes(b"<svg/>")
+    (tmp_path / ".vite").mkdir()
+    (tmp_path / ".vite" / "manifest.json").write_text("{}")
     return tmp_path
 
 
@@ -68,7 +70,9 @@ async def test_what_has_no_hash_in_its_name_is_asked_for_again(built: Path) -> N
     assert (icon.text, icon.headers["cache-control"]) == ("<svg/>", "no-cache")
 
 
-@pytest.mark.parametrize("path", ["assets/other.js", "index.html", "assets/../../secret", "%2e%2e/secret", ""])
+@pytest.mark.parametrize(
+    "path", ["assets/other.js", "index.html", "assets/../../secret", "%2e%2e/secret", ".vite/manifest.json", ""]
+)
 async def test_nothing_but_what_was_built_is_served(built: Path, path: str) -> None:
     (built.parent / "secret").write_text("not for the web")
     async with browser(built) as client:
