@@ -34,7 +34,9 @@ PLACE is ``"pose": POSE, "tolerance": {"position": 0.005, "height": 0.01, "tilt"
   and so 0 or negative.
 - `labelling` is the place under the label printer, and the arm whose roller presses labels on from `begin` to `end`.
 - `camera` has the pose of a camera's optical frame (x right, y down, z forward), the size of a `board`, and `things`
-  that it sees besides: boxes with `name`, `pose` of the middle, `size` and `color`.
+  that it sees besides: boxes with `name`, `pose` of the middle, `size` and `color`; and `markers` (ArUco, 4×4_50) with
+  `id`, `pose` of the middle (x right, y up, z out of the marker) and `size`, the side of the black square.
+- `robot.model` (ur3e, ur5e, ur10e) is there when the camera shall see the arm.
 - `tower` names the outputs of the I/O block that lamps hang on. What a cell does not have is left out.
 - `reader` is the place where a board, held or on the feeder, is in the reader's view; `tester` is the fixture.
 """
@@ -44,7 +46,7 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 import numpy as np
@@ -188,18 +190,28 @@ class Fixture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     color: tuple[int, int, int] = (150, 150, 150)
 
 
+class Marker(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """An ArUco marker (4×4_50) somewhere in the cell; its pose is that of its middle, z out of it."""
+
+    id: Annotated[int, Meta(ge=0, le=49)]
+    pose: Pose
+    size: Length
+
+
 class Camera(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A camera: the pose of its optical frame, what stands before it, and how large a board is."""
 
     pose: Pose
     board: tuple[Length, Length, Length]
     things: list[Fixture] = []
+    markers: list[Marker] = []
 
 
 class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Where the robot stands."""
+    """Where the robot stands, and which it is, for who looks at it."""
 
     base: Pose
+    model: Literal["ur3e", "ur5e", "ur10e"] | None = None
 
 
 class Gripper(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -5,30 +5,43 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from transforms3d.quaternions import mat2quat
 
+from arcor2_fakes.cell.arm import pose_of
 from arcor2_fakes.cell.layout import Camera, Matrix, Pose
 
 GREEN, LABELLED = (40, 110, 20), (205, 215, 215)
 """A bare board, and one whose label covers it, as red, green, blue."""
+PAPER = 1.5
+"""The side of a marker's paper, of its black square's: it has a white margin."""
+THICKNESS = 0.001
+"""m, of the paper; the marker's pose is that of its face."""
 MOVED = 0.0005
 """m; less than that is not worth a new picture."""
 
 
 def fixed(camera: Camera) -> list[dict[str, Any]]:
     """Give the things that never move."""
-    return [
+    found = [
         {"name": thing.name, "pose": _pose(thing.pose), "size": thing.size, "color": thing.color}
         for thing in camera.things
     ]
+    for marker in camera.markers:
+        side = PAPER * marker.size
+        found.append(
+            {
+                "name": f"marker {marker.id}",
+                "pose": pose_of(marker.pose.matrix() @ _down(THICKNESS / 2.0)),
+                "size": (side, side, THICKNESS),
+                "color": (235, 235, 235),
+                "marker": {"id": marker.id, "size": marker.size},
+            }
+        )
+    return found
 
 
 def board(camera: Camera, code: str, world_from_board: Matrix, labelled: bool) -> dict[str, Any]:
     """Give a board; its pose is that of its top, where it is gripped."""
-    middle = world_from_board @ _down(camera.board[2] / 2.0)
-    w, x, y, z = mat2quat(middle[:3, :3])
-    position = [float(value) for value in middle[:3, 3]]
-    pose = {"position": position, "orientation": [float(value) for value in (x, y, z, w)]}
+    pose = pose_of(world_from_board @ _down(camera.board[2] / 2.0))
     return {"name": code, "pose": pose, "size": camera.board, "color": LABELLED if labelled else GREEN}
 
 
@@ -41,8 +54,8 @@ def changes(
     return False, {name: thing["pose"] for name, thing in after.items() if _far(before[name]["pose"], thing["pose"])}
 
 
-def _look(thing: dict[str, Any]) -> tuple[Any, Any]:
-    return thing["size"], thing["color"]
+def _look(thing: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in thing.items() if key != "pose"}
 
 
 def _far(one: dict[str, Any], other: dict[str, Any]) -> bool:

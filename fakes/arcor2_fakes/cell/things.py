@@ -15,11 +15,12 @@ ControllerPose = tuple[float, float, float, float, float, float]
 
 
 class Robot(msgspec.Struct, frozen=True):
-    """One sample of the robot: the TCP in the controller's base, the TCP on the flange, the digital outputs as bits."""
+    """One sample of the robot: the TCP in the controller's base, on the flange, the digital outputs as bits, joints."""
 
     tcp_pose: ControllerPose
     tcp_offset: ControllerPose
     digital_outputs: int
+    q: tuple[float, ...] = ()
 
     def base_from_flange(self) -> Matrix:
         """Give the flange, which stands where it stands whatever TCP somebody has set."""

@@ -10,7 +10,7 @@ import numpy as np
 from transforms3d.affines import compose
 from transforms3d.euler import euler2mat
 
-from arcor2_fakes.cell import sight
+from arcor2_fakes.cell import arm, sight
 from arcor2_fakes.cell.boards import Board
 from arcor2_fakes.cell.labelling import LabelNest
 from arcor2_fakes.cell.layout import Layout, Matrix
@@ -350,6 +350,9 @@ class World:
         if camera is None:
             return {}
         found = {thing["name"]: thing for thing in sight.fixed(camera)}
+        robot = self._layout.robot
+        if robot.model is not None and self._robot is not None and len(self._robot.q) == 6:
+            found |= arm.things(robot.model, robot.base.matrix(), self._robot.q, self._flange_from_tip)
         piles: Counter[str] = Counter()
         for thing in self._things:
             if (pose := self.pose(thing)) is None:
@@ -363,7 +366,10 @@ class World:
 
     def _stations(self) -> dict[str, Any]:
         """Give what only some cells have."""
-        found: dict[str, Any] = {}
+        found: dict[str, Any] = {"robot_base": msgspec.to_builtins(self._layout.robot.base)}
+        if self._layout.camera is not None:
+            found["camera"] = msgspec.to_builtins(self._layout.camera.pose)
+            found["markers"] = msgspec.to_builtins(self._layout.camera.markers)
         if self._belt is not None:
             found["barriers"] = {str(number): on for number, on in self._barriers_told.items()}
             found["belt"] = [{"code": thing.board.code, "before_stop": -s} for thing, s in self._belt.places()]

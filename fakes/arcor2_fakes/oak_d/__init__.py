@@ -12,8 +12,9 @@ channel: ``scene`` replaces all things, ``place`` adds or replaces one, ``move``
      "color": [r, g, b], "marker": {"id": 3, "dictionary": "DICT_4X4_50", "size": 0.04}}
 
 in m; the pose is that of the box's middle, in the world. The marker lies on the top (+z) and is optional, as is colour.
-``"mesh": "part.stl"`` instead of ``size`` loads a mesh in metres; ``"charuco": {"columns": 7, "rows": 5, "square":
-0.03, "marker": 0.022}`` prints a board on the top. Depths have noise that grows with the square of the distance, holes
+``"mesh": "part.stl"`` instead of ``size`` loads a mesh in metres, ``"cylinder": [radius, length]`` and ``"capsule":
+[radius, length]`` are round about z; ``"charuco": {"columns": 7, "rows": 5, "square": 0.03, "marker": 0.022}`` prints a
+board on the top. Depths have noise that grows with the square of the distance, holes
 at edges and some elsewhere.
 
 Not modelled: XLink and USB, booting of firmware beyond its time, the two mono cameras and their disparity (depth is

@@ -22,6 +22,8 @@ BACKGROUND: Final = (58, 52, 48)
 LIGHT: Final = np.array([0.35, -0.25, 0.9]) / np.linalg.norm([0.35, -0.25, 0.9])
 AMBIENT: Final = 0.45
 PIXELS_PER_MODULE: Final = 24
+SIDES: Final = 48
+RINGS: Final = 8
 MOST_SOLIDS: Final = 500
 
 
@@ -57,6 +59,24 @@ def box(size: tuple[float, float, float]) -> Solid:
     return Solid(vertices.astype(np.float32), np.asarray(mesh.triangles, dtype=np.uint32))
 
 
+def round_body(radius: float, length: float, ball: bool) -> Solid:
+    """Give a cylinder about z, its middle at the origin, with half balls beyond both ends or flat."""
+    tilts = np.linspace(0.0, np.pi / 2.0, RINGS + 1) if ball else np.array([0.0])
+    upper = [(length / 2.0 + radius * np.sin(tilt), radius * np.cos(tilt)) for tilt in tilts]
+    if not ball:
+        upper.append((length / 2.0, 0.0))
+    heights, radii = np.array([(-h, r) for h, r in reversed(upper)] + upper).T
+    angles = np.arange(SIDES) * 2.0 * np.pi / SIDES
+    x, y = radii[:, None] * np.cos(angles), radii[:, None] * np.sin(angles)
+    vertices = np.stack([x, y, np.broadcast_to(heights[:, None], x.shape)], axis=-1).reshape(-1, 3)
+    ring, side = (each.ravel() for each in np.mgrid[: len(heights) - 1, :SIDES])
+    a, b = ring * SIDES + side, ring * SIDES + (side + 1) % SIDES
+    triangles = np.concatenate([np.stack([a, b, a + SIDES], 1), np.stack([b, b + SIDES, a + SIDES], 1)])
+    flat = vertices[triangles]
+    area = np.linalg.norm(np.cross(flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]), axis=1)
+    return Solid(vertices.astype(np.float32), triangles[area > 1e-12].astype(np.uint32))
+
+
 def _dictionary(name: str) -> Any:
     number = getattr(cv2.aruco, name, None) if name.startswith("DICT_") else None
     if not isinstance(number, int):
@@ -68,6 +88,8 @@ def solid_of(thing: Thing) -> Solid:
     """Give the triangles of a thing. Raises ValueError for a mesh or a marker that is none."""
     if thing.mesh is not None:
         return load_mesh(thing.mesh)
+    if (form := thing.capsule or thing.cylinder) is not None:
+        return round_body(*form, ball=thing.capsule is not None)
     assert thing.size is not None
     solid = box(thing.size)
     try:
@@ -92,7 +114,7 @@ def solid_of(thing: Thing) -> Solid:
 
 
 class Renderer:
-    """Casts the rays of one lens: at the table when camera or table have moved, at things only where they can be seen.
+    """Casts the rays of one lens: at what stood still from one view to the next once, at the rest where it can be seen.
 
     Not thread-safe.
     """
@@ -101,30 +123,38 @@ class Renderer:
         self._lens = lens
         self._rays = lens.rays()
         self._solids: dict[tuple[Any, ...], Solid] = {}
-        self._behind: tuple[tuple[Pose, float], View] | None = None
+        self._last: tuple[Thing, ...] = ()
+        self._behind: tuple[tuple[Pose, float, frozenset[Thing]], View] | None = None
 
     def view(self, camera: Pose, table_height: float, things: tuple[Thing, ...]) -> View:
         """Give what is seen from the camera's pose. Raises ValueError for a thing that cannot be drawn."""
         world_from_camera = camera.matrix()
         table = _Part(box(TABLE), Pose((0.0, 0.0, table_height - TABLE[2] / 2.0)).matrix(), TABLE_COLOR)
-        everywhere = (slice(0, self._lens.height), slice(0, self._lens.width))
-        if self._behind is None or self._behind[0] != (camera, table_height):
+        still = frozenset(things) & frozenset(self._last)
+        self._last = things
+        if self._behind is None or self._behind[0] != (camera, table_height, still):
             empty = View(np.zeros(self._rays.shape, np.uint8), np.zeros(self._rays.shape[:2], np.float32))
-            _Cast([table]).into(empty, self._rays, world_from_camera, everywhere)
-            self._behind = ((camera, table_height), empty)
+            standing = [self._part(thing) for thing in things if thing in still]
+            _Cast([table, *standing]).into(empty, self._rays, world_from_camera, np.ones_like(empty.depth, np.bool_))
+            self._behind = ((camera, table_height, still), empty)
         behind = self._behind[1]
         view = View(behind.color.copy(), behind.depth.copy())
-        parts = [_Part(self._solid(thing), thing.pose.matrix(), thing.color) for thing in things]
-        if parts:
-            cast = _Cast([table, *parts])
-            for part in parts:
+        parts = [self._part(thing) for thing in things]
+        mask = np.zeros(self._rays.shape[:2], np.bool_)
+        for thing, part in zip(things, parts, strict=True):
+            if thing not in still:
                 where = self._lens.bounds(np.linalg.inv(world_from_camera) @ part.pose, part.solid.vertices)
                 if where is not None:
-                    cast.into(view, self._rays, world_from_camera, where)
+                    mask[where] = True
+        if mask.any():
+            _Cast([table, *parts]).into(view, self._rays, world_from_camera, mask)
         return View(np.asarray(cv2.GaussianBlur(view.color, (3, 3), 0.7), np.uint8), view.depth)
 
+    def _part(self, thing: Thing) -> _Part:
+        return _Part(self._solid(thing), thing.pose.matrix(), thing.color)
+
     def _solid(self, thing: Thing) -> Solid:
-        key = (thing.size, thing.mesh, thing.marker, thing.charuco)
+        key = (thing.size, thing.mesh, thing.cylinder, thing.capsule, thing.marker, thing.charuco)
         if key not in self._solids:
             if len(self._solids) > MOST_SOLIDS:
                 self._solids.clear()
@@ -160,12 +190,12 @@ class _Cast:
         self._palette: Bytes = np.concatenate(palette).clip(0, 255).astype(np.uint8)
         self._offsets = np.asarray(offsets, dtype=np.int32)
 
-    def into(self, view: View, rays: Floats, world_from_camera: Matrix, where: tuple[slice, slice]) -> None:
-        """Draw what is seen in one rectangle of the picture."""
-        directions = rays[where] @ world_from_camera[:3, :3].T.astype(np.float32)
-        both = np.empty((*directions.shape[:2], 6), np.float32)
-        both[..., :3] = world_from_camera[:3, 3]
-        both[..., 3:] = directions
+    def into(self, view: View, rays: Floats, world_from_camera: Matrix, mask: npt.NDArray[np.bool_]) -> None:
+        """Draw what is seen at some pixels."""
+        directions = rays[mask] @ world_from_camera[:3, :3].T.astype(np.float32)
+        both = np.empty((len(directions), 6), np.float32)
+        both[:, :3] = world_from_camera[:3, 3]
+        both[:, 3:] = directions
         hit = self._scene.cast_rays(o3d.core.Tensor.from_numpy(both))
         # A ray is as long as 1 m along the optical axis, so that how far it went is the depth.
         reach: Floats = hit["t_hit"].numpy()
@@ -173,13 +203,13 @@ class _Cast:
         geometry = np.where(there, hit["geometry_ids"].numpy(), 0)
         index = np.where(there, self._offsets[geometry] + hit["primitive_ids"].numpy().astype(np.int32), 0)
         colors = np.take(self._palette, index, axis=0)
+        pixel = float(abs(rays[0, 1, 0] - rays[0, 0, 0]))
         for number, part in enumerate(self._parts):
             if part.solid.texture is not None:
-                _print(
-                    colors, there & (geometry == number), reach, directions, world_from_camera, part.solid, part.pose
-                )
-        view.color[where] = colors
-        view.depth[where] = np.where(there, reach, 0.0)
+                found = np.flatnonzero(there & (geometry == number))
+                _print(colors, found, reach, directions, world_from_camera, part.solid, part.pose, pixel)
+        view.color[mask] = colors
+        view.depth[mask] = np.where(there, reach, 0.0)
 
 
 def _shades(vertices: Floats, triangles: npt.NDArray[np.uint32]) -> npt.NDArray[np.float64]:
@@ -192,22 +222,31 @@ def _shades(vertices: Floats, triangles: npt.NDArray[np.uint32]) -> npt.NDArray[
 
 def _print(
     colors: Bytes,
-    mask: npt.NDArray[np.bool_],
+    found: npt.NDArray[np.intp],
     depth: Floats,
     directions: Floats,
     world_from_camera: Matrix,
     solid: Solid,
     pose: Matrix,
+    pixel: float,
 ) -> None:
-    """Put a solid's picture on its top."""
+    """Put a solid's picture on its top, where `found` are the rays that met it: each pixel the mean of four rays."""
     assert solid.texture is not None
-    rows, columns = np.nonzero(mask)
-    points = world_from_camera[:3, 3] + depth[rows, columns, None] * directions[rows, columns]
-    local = (points - pose[:3, 3]) @ pose[:3, :3]
     height, width = solid.texture.shape
-    u = (local[:, 0] / solid.texture_size[0] + 0.5) * width
-    v = (0.5 - local[:, 1] / solid.texture_size[1]) * height
-    top = local[:, 2] > solid.vertices[:, 2].max() - 1e-4
-    on = top & (u >= 0) & (u < width) & (v >= 0) & (v < height)
-    ink = solid.texture[v[on].astype(np.intp), u[on].astype(np.intp)]
-    colors[rows[on], columns[on]] = (ink.astype(np.float64) * 0.85 + 20.0).astype(np.uint8)[:, None]
+    level = float(solid.vertices[:, 2].max())
+    origin = (world_from_camera[:3, 3] - pose[:3, 3]) @ pose[:3, :3]
+    local = origin + depth[found, None] * (directions[found] @ pose[:3, :3])
+    found = found[local[:, 2] > level - 1e-4]
+    sideways = world_from_camera[:3, :2].T @ pose[:3, :3] * (pixel / 4.0)
+    ways = directions[found] @ pose[:3, :3]
+    ink, count = np.zeros(len(found)), np.zeros(len(found))
+    for right, down in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
+        way = ways + right * sideways[0] + down * sideways[1]
+        place = origin + ((level - origin[2]) / way[:, 2])[:, None] * way
+        u = (place[:, 0] / solid.texture_size[0] + 0.5) * width
+        v = (0.5 - place[:, 1] / solid.texture_size[1]) * height
+        on = (u >= 0) & (u < width) & (v >= 0) & (v < height)
+        ink[on] += solid.texture[v[on].astype(np.intp), u[on].astype(np.intp)]
+        count += on
+    whole = count == 4
+    colors[found[whole]] = (ink[whole] / 4.0 * 0.85 + 20.0).astype(np.uint8)[:, None]

@@ -63,12 +63,17 @@ class Charuco(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Thing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A box with its pose at its middle, or a mesh with its pose at the mesh's origin."""
+    """A box, cylinder or capsule with its pose at its middle, or a mesh with its pose at the mesh's origin.
+
+    cylinder and capsule: radius and length along z, without a capsule's half balls.
+    """
 
     name: str
     pose: Pose
     size: tuple[Length, Length, Length] | None = None
     mesh: str | None = None
+    cylinder: tuple[Length, Length] | None = None
+    capsule: tuple[Length, Length] | None = None
     color: tuple[Channel, Channel, Channel] = (150, 150, 150)
     marker: Marker | None = None
     charuco: Charuco | None = None
@@ -76,9 +81,9 @@ class Thing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def __post_init__(self) -> None:
         if not self.name:
             raise ValueError("a thing needs a name")
-        if (self.size is None) == (self.mesh is None):
-            raise ValueError(f"{self.name}: either size or mesh")
-        if self.mesh is not None and (self.marker or self.charuco):
+        if sum(form is not None for form in (self.size, self.mesh, self.cylinder, self.capsule)) != 1:
+            raise ValueError(f"{self.name}: either size, mesh, cylinder or capsule")
+        if self.size is None and (self.marker or self.charuco):
             raise ValueError(f"{self.name}: only a box carries a marker")
         if self.mesh is not None and not (Path(self.mesh).is_file() and Path(self.mesh).stat().st_size <= LARGEST_MESH):
             raise ValueError(f"{self.name}: mesh {self.mesh} is no file of at most {LARGEST_MESH} bytes")
