@@ -10,7 +10,7 @@ import subprocess
 import sys
 import types
 import zipfile
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ import msgspec
 import pytest
 
 from arcor2_hw.analysis import Enumeration
+from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.data.object_type import Box, Model3dType, ObjectModel
 from arcor2_hw.data.project import END, START, Project
 from arcor2_hw.data.project_index import ProjectIndex, global_pose
@@ -354,11 +355,19 @@ async def test_the_request_builds_under_the_lock_of_the_project() -> None:
         async def added(self, package_id: str) -> None:
             seen.append(f"added {package_id}")
 
-    services: Any = types.SimpleNamespace(locks=Locks(), build=Build(), execution=Execution())
-    client: Any = types.SimpleNamespace(user="ann")
+    class Tasks:
+        @contextlib.contextmanager
+        def running(self, kind: TaskKind, title: str, user: str) -> Iterator[None]:
+            seen.append(f"{kind.value} {title!r} of {user}")
+            yield
+            seen.append("finished")
+
+    services: Any = types.SimpleNamespace(locks=Locks(), build=Build(), execution=Execution(), tasks=Tasks())
+    client: Any = types.SimpleNamespace(user="ann", name="ann")
     args = BuildProjectArgs("pro_1", "Boards")
     assert await build_project(Context(services, client), args) == BuildProjectData("pkg_1")
-    assert seen == ["locked ann ('pro_1',)", "build pro_1 Boards", "unlocked", "added pkg_1"]
+    begun = f"{TaskKind.BUILD.value} 'Building the package Boards' of ann"
+    assert seen == ["locked ann ('pro_1',)", begun, "build pro_1 Boards", "finished", "unlocked", "added pkg_1"]
     client.user = None
     with pytest.raises(RequestRefused):
         await build_project(Context(services, client), args)
