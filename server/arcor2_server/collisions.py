@@ -88,7 +88,7 @@ def _standing(services: "Services") -> Iterator[tuple[str, Placed]]:
             if not isinstance(model, Unset) and not isinstance(placed.pose, Unset) and placed.id not in disabled:
                 yield placed.id, Placed(model.model(), placed.pose)
     elif (encoded := services.execution.state_and_info()[1]) is not None:
-        disabled = services.execution.not_in_the_way()
+        disabled = services.execution.board.not_in_the_way()
         yield from (one for one in _of_program(encoded) if one[0] not in disabled)
 
 

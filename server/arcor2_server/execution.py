@@ -62,7 +62,7 @@ class Execution:
         self._info: bytes | None = None
         self._before: bytes | None = None
         self._exception: ProjectExceptionData | None = None
-        self._board = DeviceBoard(services.hub)
+        self.board = DeviceBoard(services.hub)
         self._run_number = 0
         self._stopped_by: str | None = None
         self._shared_of = ""
@@ -85,19 +85,15 @@ class Execution:
 
     def devices(self) -> list[DeviceStatus]:
         """Give what the devices of the running program say of themselves."""
-        return self._board.statuses() if self.busy else []
+        return self.board.statuses() if self.busy else []
 
     def object_states(self) -> list[ObjectStateData]:
         """Give the connections of the objects of the running program."""
-        return self._board.states() if self.busy else []
+        return self.board.states() if self.busy else []
 
     def object_healths(self) -> list[ObjectHealthData]:
         """Give the health of the objects of the running program."""
-        return self._board.healths() if self.busy else []
-
-    def not_in_the_way(self) -> frozenset[str]:
-        """Give the collision objects of the running program that do not count for now."""
-        return self._board.not_in_the_way()
+        return self.board.healths() if self.busy else []
 
     @property
     def action_in_progress(self) -> bytes | None:
@@ -176,14 +172,13 @@ class Execution:
         self._require_idle()
         directory = await asyncio.to_thread(self.packages.directory, package_id)
         project_id = await asyncio.to_thread(self.packages.project_id, package_id) if how.shared_breakpoints else ""
-        shared = await self._services.breakpoints.ids(project_id) if project_id else set()
         self._require_idle()
         self.package_id = package_id
         self._shared_of = project_id
         self._stopped_by = None
         self.last_error = None
         self._info = self._before = self._exception = None
-        self._board.clear()
+        self.board.clear()
         self._enter(S.STARTED)
         period = self._services.settings.streaming_period
         message = m.RunPackage(
@@ -193,7 +188,6 @@ class Execution:
             sorted(how.breakpoints),
             period,
             self._services.settings.cell,
-            sorted(shared),
         )
         self._run_number = self._services.runs.begin(
             package_id, by=how.by, temporary=self._over is not None, start_paused=how.start_paused
@@ -214,6 +208,9 @@ class Execution:
     async def _begin(self, message: m.RunPackage) -> None:
         try:
             host = await self._services.cell.hosts.take(self)
+            if self._shared_of:  # at the last moment: a change after this is told to the program
+                shared = await self._services.breakpoints.ids(self._shared_of)
+                message = msgspec.structs.replace(message, shared_breakpoints=sorted(shared))
         except Arcor2Error as error:
             self._fail(str(error), type(error).__name__)
             self._ended()
@@ -240,7 +237,7 @@ class Execution:
 
         One that has just been started is refused, as the protocol says, unless its host has fallen silent.
         """
-        host = self._require(RUN_STATES if self._board.answering else RUN_STATES | {S.STARTED}, "stopped")
+        host = self._require(RUN_STATES if self.board.answering else RUN_STATES | {S.STARTED}, "stopped")
         self._stopped_by = by
         self._enter(S.STOPPING)
         host.send(m.StopProgram())
@@ -305,7 +302,7 @@ class Execution:
             case m.ProgramChanged():
                 self._program_changed(host, message)
             case m.DeviceChanged():
-                self._board.changed(message)
+                self.board.changed(message)
             case m.LogLine():
                 log.info("program", level=message.level, text=message.text, object=message.object_id)
 
@@ -317,7 +314,7 @@ class Execution:
                 self._info = message.encoded
                 info = msgspec.json.decode(message.encoded, type=_InfoEvent)
                 _, overlaid = overlay_for(self._services.settings.cell, info.data.scene)
-                self._board.show(info.data.scene.objects, overlaid)
+                self.board.show(info.data.scene.objects, overlaid)
                 asyncio.get_running_loop().call_later(SPARE_AFTER, self._services.cell.hosts.prepare)
             case "ActionStateBefore":
                 self._before = message.encoded
@@ -342,7 +339,7 @@ class Execution:
     def host_silent(self, host: CellHost, silent: bool) -> None:
         """Note that the host does not answer, or answers again."""
         if host is self._host:
-            self._board.answering = not silent
+            self.board.answering = not silent
             log.warning("program does not answer" if silent else "program answers again", package=self.package_id)
 
     def host_ended(self, host: CellHost, reason: str) -> None:
@@ -360,7 +357,7 @@ class Execution:
     def _ended(self, *, lost: bool = False) -> None:
         self._host = None
         self._note_end(lost)
-        self._board.clear("" if self.last_error is None else self.last_error.message)
+        self.board.clear("" if self.last_error is None else self.last_error.message)
         self._info = self._before = None
         if self._killing is not None:
             self._killing.cancel()

@@ -108,9 +108,9 @@ async def list_packages(services: Services) -> list[SummaryPackage]:
 
 
 @operation("POST", "/packages/{id}", EXECUTION, Role.PROGRAMMER, file="executionPackage", limit=MAX_UPLOAD + MIB)
-async def upload_package(services: Services, id: str, upload: Upload) -> None:  # noqa: A002 - the protocol's name
+async def upload_package(services: Services, id: str, upload: Upload, person: str) -> None:  # noqa: A002
     """Take in a package as a zip, in place of one of that id."""
-    with services.tasks.running(TaskKind.UPLOAD, f"Taking in the package {id}"):
+    with services.tasks.running(TaskKind.UPLOAD, f"Taking in the package {id}", person):
         summary = await services.execution.take(id, upload.file)
     services.hub.broadcast(make_event("PackageChanged", summary, ChangeType.ADD))
 
@@ -138,9 +138,9 @@ async def delete_package(services: Services, id: str) -> None:  # noqa: A002
 
 # ------------------------------------------------------------------------------------------------ the program
 @operation("PUT", "/packages/{id}/start", EXECUTION, Role.OPERATOR)
-async def start_package(services: Services, id: str) -> None:  # noqa: A002
+async def start_package(services: Services, id: str, person: str) -> None:  # noqa: A002
     """Run a package."""
-    await services.execution.run(id)
+    await services.execution.run(id, How(by=person))
 
 
 @operation("PUT", "/packages/{id}/breakpoints", EXECUTION, Role.OPERATOR)
@@ -158,16 +158,16 @@ async def get_breakpoints(services: Services, id: str) -> list[str]:  # noqa: A0
 
 
 @operation("PUT", "/packages/{id}/debug", EXECUTION, Role.OPERATOR)
-async def debug_package(services: Services, id: str, query: DebugQuery) -> None:  # noqa: A002
+async def debug_package(services: Services, id: str, query: DebugQuery, person: str) -> None:  # noqa: A002
     """Run a package with its breakpoints."""
     breakpoints = await Beside(services.storage).breakpoints(id)
-    await services.execution.run(id, How(query.break_on_first_action, breakpoints))
+    await services.execution.run(id, How(query.break_on_first_action, breakpoints, by=person))
 
 
 @operation("PUT", "/packages/stop", EXECUTION, Role.OPERATOR)
-async def stop_package(services: Services) -> None:
+async def stop_package(services: Services, person: str) -> None:
     """Stop the program."""
-    services.execution.stop()
+    services.execution.stop(person)
 
 
 @operation("PUT", "/packages/pause", EXECUTION, Role.OPERATOR)

@@ -2,11 +2,13 @@
 
 import asyncio
 import contextlib
+import io
 import json
 import ssl
 import stat
 import subprocess
 import sys
+import zipfile
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -282,3 +284,19 @@ def test_tokens_by_the_command_line(tmp_path: Path) -> None:
     assert run("revoke", "line 3").returncode == 0
     assert run("revoke", "line 3").returncode == ExitStatus.NOT_FOUND
     assert TokenFile(tmp_path).all() == []
+
+
+async def test_who_ran_a_package_over_rest_is_whose_token_it_was(server: ServerProcess) -> None:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        archive.writestr("script.py", "import time\ntime.sleep(30)\n")
+    programmer, operator = (
+        bearer(token(server, name, role))
+        for name, role in (("line control", Role.PROGRAMMER), ("panel", Role.OPERATOR))
+    )
+    async with rest(server, headers=operator) as http:
+        package = {"executionPackage": ("package.zip", buffer.getvalue(), "application/zip")}
+        (await http.post("/packages/pkg_1", files=package, headers=programmer)).raise_for_status()
+        (await http.put("/packages/pkg_1/start")).raise_for_status()
+        (run,) = (await http.get("/api/runs")).json()
+        assert (run["started_by"], run["end"], "project_id" in run) == ("panel", "running", False)

@@ -167,7 +167,7 @@ async def test_a_program_that_falls_silent_while_it_starts_can_be_stopped(server
     with pytest.raises(RequestRefused):
         await server.ask("StopPackage")
     async with asyncio.timeout(5):
-        while server.services.execution._board.answering:
+        while server.services.execution.board.answering:
             await asyncio.sleep(0.02)
     await server.ask("StopPackage")
     await server.client.state("stopped", "PackageState")
