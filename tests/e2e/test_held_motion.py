@@ -240,6 +240,21 @@ async def _fastest(place: Site, jog: Callable[[], Any], seconds: float) -> float
     return max(math.dist(a, b) / (later - sooner) for (sooner, a), (later, b) in steps)
 
 
+async def _teach(place: Site) -> None:
+    """The arm can be moved by hand as long as that is held, and is stiff again by itself."""
+    place.hold += 1
+    for _ in range(5):
+        sent_ms = time.monotonic() * 1e3
+        await place.client.hold_hand_teaching(robot_id=place.robot, hold=place.hold, sent_ms=sent_ms, valid_ms=300)
+        await asyncio.sleep(0.05)
+    assert place.fake.truth()["freedrive"]
+    await until(lambda: not place.fake.truth()["freedrive"], "the arm is stiff again", 1.0)
+    with pytest.raises(RequestFailed, match="press again|not renewed"):
+        await place.client.hold_hand_teaching(
+            robot_id=place.robot, hold=place.hold, sent_ms=time.monotonic() * 1e3, valid_ms=300
+        )
+
+
 async def _hold_on(jog: Callable[[], Any]) -> None:
     for _ in range(20):
         await jog()
@@ -260,6 +275,11 @@ async def test_the_tcp_keeps_its_speed_and_a_protective_stop_is_acknowledged(fak
         assert 0.2 < await _fastest(place, turn, 0.8) < 0.255
         assert await turn() < 0.9
 
+        await place.jog(valid_ms=0)
+        await _teach(place)
+        place.hold += 1
+
+        await turn()
         fake.do("protective_stop")
         with pytest.raises(RequestFailed, match="protective stop"):
             await _hold_on(turn)
