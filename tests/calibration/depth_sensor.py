@@ -69,9 +69,8 @@ def arm(joints: list[float]) -> list[Capsule]:
     frame = turn(np.array([0.0, 0.0, 1.0]), math.pi)
     frames = [frame]
     for (d, a, alpha), q in zip(UR5E, joints, strict=False):
-        frame = (
-            frame @ turn(np.array([0, 0, 1.0]), q) @ shift(a, 0, d) @ turn(np.array([1.0, 0, 0]), math.radians(alpha))
-        )
+        twist = turn(np.array([1.0, 0, 0]), math.radians(alpha))
+        frame = frame @ turn(np.array([0, 0, 1.0]), q) @ shift(a, 0, d) @ twist
         frames.append(frame)
 
     def point(number: int, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Floats:

@@ -1,4 +1,4 @@
-"""The arm and the markers as the camera is told of them: links meet, the last one ends where the controller's TCP is."""
+"""The arm and the markers as the camera is told of them: links meet, and end at the controller's flange."""
 
 import itertools
 import math

@@ -1,0 +1,176 @@
+"""Robot pose from depth: against arms that a sensor of the test's own sees, what must be refused, and bad input."""
+
+import math
+
+import cv2
+import numpy as np
+import pytest
+
+from arcor2_hw.calibration.depth import look, mean_depth, read_depth
+from arcor2_hw.calibration.pictures import InvalidPicture
+from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
+from arcor2_hw.calibration.results import Grade
+from arcor2_hw.calibration.robot_pose import RobotPoseOptions, find_robot_pose
+from arcor2_hw.calibration.surface import RobotSurface
+from arcor2_hw.data.camera import CameraParameters
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.exceptions import InvalidData
+from tests.calibration.depth_sensor import Block, Capsule, Floats, Sensor, arm, looking, shift, tool, triangles, turn
+from tests.calibration.workplace import View, drawn, surface_of_arm, told
+
+JOINTS = [0.3, -1.3, 1.4, -1.2, -1.5, 0.2]
+EYE = looking(np.array([0.0, 0.0, 0.4]), np.array([1.0, 0.7, 0.9]))
+ASSUMED = shift(0.03, -0.02, 0.03) @ turn(np.array([0.2, 0.3, 1.0]), math.radians(4.5))
+
+
+def seen(shapes: list[Block | Capsule], eye: Floats = EYE, joints: list[float] = JOINTS) -> View:
+    sensor = Sensor(shapes=shapes, wall=-2.0)
+    picture = sensor.take(eye, np.random.default_rng(3))
+    poses = (Pose.from_matrix(eye), Pose.from_matrix(ASSUMED), Pose())
+    return View(surface_of_arm(joints), picture, told(sensor), *poses)
+
+
+@pytest.fixture(scope="module")
+def plain() -> View:
+    return seen([*arm(JOINTS), *tool(JOINTS)])
+
+
+def solve(view: View, surface: RobotSurface | None = None, assumed: Pose | None = None):  # type: ignore[no-untyped-def]
+    return find_robot_pose(surface or view.surface, view.depth, view.parameters, view.camera, assumed or view.assumed)
+
+
+def refused(view: View, **changes: object) -> CalibrationRefused:
+    with pytest.raises(CalibrationRefused) as caught:
+        solve(view, **changes)  # type: ignore[arg-type]
+    return caught.value
+
+
+# ------------------------------------------------------------------------------------------------ results
+@pytest.mark.parametrize("seed", [1, 24])
+def test_an_arm_is_found_from_50_mm_and_5_degrees_off(seed: int) -> None:
+    view = drawn(seed)
+    found = solve(view)
+    distance, angle = view.error(found.pose)
+    assert distance < 0.003
+    assert angle < math.radians(0.6)
+    assert distance < 6.0 * found.position_deviation
+    assert angle < 6.0 * found.orientation_deviation
+    assert found.moved == pytest.approx(0.05, abs=0.004)
+    assert math.degrees(found.turned) == pytest.approx(5.0, abs=0.7)
+    assert found.fitness > 0.75
+    assert found.agreed >= 2
+
+
+def test_the_same_picture_gives_the_same_result(plain: View) -> None:
+    first, second = solve(plain), solve(plain)
+    assert first.pose == second.pose
+    assert first.grade is Grade.GOOD
+    assert "confirms" in first.verdict
+
+
+def test_averaged_pictures_are_better_than_one(plain: View) -> None:
+    sensor = Sensor(shapes=[*arm(JOINTS), *tool(JOINTS)], wall=-2.0, pictures=1, noise=0.004, fixed_noise=0.0)
+    rng = np.random.default_rng(5)
+    stack = np.stack([sensor.take(EYE, rng) for _ in range(10)])
+    single = look(stack[0], plain.parameters)
+    mean = look(stack, plain.parameters)
+    exact = sensor.exact(EYE)
+    inner = (single.depth > 0) & (mean.depth > 0) & (exact < 2.0)
+    assert np.std((mean.depth - exact)[inner]) < 0.5 * np.std((single.depth - exact)[inner])
+
+
+def test_a_covered_half_is_told_and_the_pose_still_right() -> None:
+    view = seen([*arm(JOINTS), *tool(JOINTS), Block(shift(0.4, 0.28, 0.35), (0.08, 0.08, 0.7))])
+    found = solve(view)
+    assert view.error(found.pose)[0] < 0.004
+    assert found.occluded > 0.12
+    assert "hidden" in found.verdict
+
+
+# ------------------------------------------------------------------------------------------------ refusals
+def test_a_round_body_leaves_its_turn_open() -> None:
+    body = Capsule(np.array([0.0, 0.0, 0.1]), np.array([0.0, 0.0, 0.8]), 0.08)
+    surface = RobotSurface.of_links([(*triangles(body), np.eye(4))], "the post")
+    error = refused(seen([body]), surface=surface)
+    assert error.reason in (Reason.UNOBSERVABLE, Reason.AMBIGUOUS)
+    assert "the post" in str(error)
+
+
+@pytest.mark.parametrize(
+    "shapes", [[], [Block(shift(0, 0, 0.3), (0.3, 0.3, 0.6))]], ids=["nobody", "a cupboard in its place"]
+)
+def test_a_place_without_the_robot_is_refused(shapes: list[Block | Capsule]) -> None:
+    assert refused(seen(shapes)).reason in (Reason.NOT_CONVERGED, Reason.NO_OVERLAP)
+
+
+def test_other_joints_than_told_are_refused(plain: View) -> None:
+    bent = list(JOINTS)
+    bent[2] += math.radians(12.0)
+    assert refused(plain, surface=surface_of_arm(bent)).reason is Reason.NOT_CONVERGED
+
+
+def test_a_robot_far_from_where_it_is_assumed_is_refused_not_found_wrong(plain: View) -> None:
+    beside = refused(plain, assumed=Pose(Position(0.3, 0.0, 0.0)))
+    assert beside.reason in (Reason.NOT_CONVERGED, Reason.NO_OVERLAP)
+    error = refused(plain, assumed=Pose(Position(-3.0, 0.0, 0.0)))
+    assert error.reason is Reason.NO_OVERLAP
+
+
+def test_a_covered_camera_is_refused(plain: View) -> None:
+    error = refused(View(**{**vars(plain), "depth": np.zeros_like(plain.depth)}))
+    assert error.reason is Reason.TOO_FEW_POINTS
+    ten = np.zeros_like(plain.depth)
+    ten[100, 100:110] = 1000
+    assert "usable points" in str(refused(View(**{**vars(plain), "depth": ten})))
+
+
+# ------------------------------------------------------------------------------------------------ bad input
+def test_a_picture_of_another_size_than_the_lens_is_named(plain: View) -> None:
+    for depth in (plain.depth[::2, ::2], np.zeros((720, 1280), np.uint16)):
+        with pytest.raises(InvalidData, match="another size"):
+            look(depth, plain.parameters)
+
+
+@pytest.mark.parametrize(
+    "depth",
+    [np.zeros((360, 640), np.uint8), np.zeros((360, 640)), np.zeros((2, 3, 4, 5), np.uint16), np.zeros(7, np.uint16)],
+    ids=["8 bit", "metres", "four axes", "a row"],
+)
+def test_what_is_no_depth_picture_is_named(depth: np.ndarray) -> None:
+    with pytest.raises(InvalidData, match="16 bit"):
+        mean_depth(depth)
+
+
+def test_wrong_lenses_and_options_are_named(plain: View) -> None:
+    for fx in (0.0, -456.0, math.nan):
+        with pytest.raises(InvalidData, match="positive"):
+            look(plain.depth, CameraParameters(fx, 456.0, 320.0, 180.0, [0.0] * 5))
+    with pytest.raises(InvalidData, match="angle_within"):
+        RobotPoseOptions(angle_within=0.0)
+
+
+def test_depth_files_are_read_and_others_named() -> None:
+    depth = np.arange(48, dtype=np.uint16).reshape(6, 8) * 100
+    encoded = cv2.imencode(".png", depth)[1].tobytes()
+    np.testing.assert_array_equal(read_depth(encoded), depth)
+    eight = cv2.imencode(".png", depth.astype(np.uint8))[1].tobytes()
+    bomb = bytearray(encoded)
+    bomb[16:24] = (60_000).to_bytes(4, "big") * 2
+    wrong = {b"": "no PNG", b"hello": "no PNG", eight: "8 bit", bytes(bomb): "the most", encoded[:60]: "damaged"}
+    for content, reason in wrong.items():
+        with pytest.raises(InvalidPicture, match=reason):
+            read_depth(content)
+
+
+def test_a_surface_that_is_none_is_named() -> None:
+    corners, one = np.eye(3), np.array([[0, 1, 2]])
+    for vertices, faces, reason in (
+        (np.zeros((0, 3)), one, "no vertices"),
+        (corners, np.zeros((0, 3), np.int64), "no triangles"),
+        (corners * np.nan, one, "not finite"),
+        (corners, one + 1, "does not exist"),
+    ):
+        with pytest.raises(InvalidData, match=reason):
+            RobotSurface(vertices, faces)
+    with pytest.raises(InvalidData, match="no links"):
+        RobotSurface.of_links([])
