@@ -131,6 +131,22 @@ class RobotState(Data, frozen=True):
     not_ready_because: list[str] = field(default_factory=list)
 
 
+class DhParameters(Data, frozen=True):
+    """One joint by Denavit and Hartenberg: theta and alpha in rad, d and a in m (classic convention)."""
+
+    theta: float
+    d: float
+    a: float
+    alpha: float
+
+
+class KinematicCalibration(Data, frozen=True):
+    """What a controller knows of the very arm at it, from the base to the flange; checksum tells arms apart."""
+
+    joints: list[DhParameters]
+    checksum: str
+
+
 class MoveEnd(enum.StrEnum):
     """How a motion ended."""
 

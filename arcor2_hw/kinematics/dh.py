@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from arcor2_hw.data.robot import KinematicCalibration
 from arcor2_hw.kinematics.errors import ModelError
 from arcor2_hw.kinematics.model import RobotModel
 from arcor2_hw.kinematics.shapes import Array
@@ -44,6 +45,11 @@ class DhRow(NamedTuple):
                 (0.0, 0.0, 0.0, 1.0),
             )
         )
+
+
+def rows_of(calibration: KinematicCalibration) -> list[DhRow]:
+    """Give the rows of what a controller told of its arm."""
+    return [DhRow(each.theta, each.d, each.a, each.alpha) for each in calibration.joints]
 
 
 def chain(rows: Sequence[DhRow], q: Sequence[float] | Array) -> Array:

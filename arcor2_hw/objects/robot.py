@@ -5,7 +5,7 @@ import threading
 from typing import ClassVar, Literal
 
 from arcor2_hw.data.geometry import Pose
-from arcor2_hw.data.robot import Joint, MoveResult, RobotState, RobotType
+from arcor2_hw.data.robot import Joint, KinematicCalibration, MoveResult, RobotState, RobotType
 from arcor2_hw.exceptions import Arcor2NotImplemented, DeviceError, KinematicsError, Refused
 from arcor2_hw.objects.generic import GenericWithPose
 from arcor2_hw.objects.settings import Settings
@@ -162,6 +162,10 @@ class Robot(GenericWithPose):
     def max_tcp_speed(self) -> float:
         """Give the configured maximum speed of the TCP, m/s."""
         raise Arcor2NotImplemented("max_tcp_speed")
+
+    def kinematic_calibration(self) -> KinematicCalibration:
+        """Ask the controller for the measured kinematics of the very arm at it."""
+        raise Arcor2NotImplemented("kinematic_calibration")
 
     def set_tool(
         self, tcp: Pose, mass: float, cog: tuple[float, float, float], inertia: tuple[float, ...] | None = None

@@ -7,7 +7,7 @@ from typing import ClassVar, Final
 from arcor2_hw.data.base import now
 from arcor2_hw.data.device import Alarm, Connection, Health, Identity, Severity
 from arcor2_hw.data.geometry import Pose
-from arcor2_hw.data.robot import Control, Joint, Mode, ProgramState, RobotState, RobotType, Safety
+from arcor2_hw.data.robot import Control, Joint, KinematicCalibration, Mode, ProgramState, RobotState, RobotType, Safety
 from arcor2_hw.exceptions import DeviceError, DeviceFault, InvalidData, NotConnected, NotFound, OutOfRange
 from arcor2_hw.objects import Robot
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
@@ -17,6 +17,7 @@ from .dashboard import Dashboard
 from .frames import from_vector, world_from_base
 from .geometry import UR5E, Dimensions
 from .observer import Observer, Sample
+from .primary import read_calibration
 from .settings import UrSettings
 from .states import MAY_MOVE, MODE_NAMES, MODE_RUNNING, REMEDIES, Runtime, power_of, program_plays, safety_of
 
@@ -157,6 +158,17 @@ class UrObserved(Robot):
     def max_tcp_speed(self) -> float:
         """Give the configured maximum of the TCP's speed, m/s."""
         return self._ur.max_tcp_speed
+
+    def kinematic_calibration(self) -> KinematicCalibration:
+        """Read the DH parameters of the very arm, in the controller's base, from the primary port; nothing is sent.
+
+        Raises NotConnected, DeviceTimeout, ConnectionLost, each naming host and port.
+        """
+        self._observer.observing.check()
+        try:
+            return read_calibration(self._ur.host)
+        except DeviceError as e:
+            raise type(e)(f"{self.name}: {e}", e.detail) from e
 
     @property
     def base_from_controller(self) -> Pose:

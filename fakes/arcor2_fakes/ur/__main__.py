@@ -12,6 +12,7 @@ from arcor2_fakes.process import announce, run, until_told_to_end
 from arcor2_fakes.ur.controller import Controller
 from arcor2_fakes.ur.dashboard import Dashboard
 from arcor2_fakes.ur.kinematics import MODELS
+from arcor2_fakes.ur.primary import PrimaryPort
 from arcor2_fakes.ur.rtde_server import RtdeServer
 from arcor2_fakes.ur.script_port import ScriptPort
 from arcor2_fakes.ur.supervision import register
@@ -53,6 +54,7 @@ def _arguments() -> argparse.Namespace:
     add("--rtde-port", type=int, default=30004)
     add("--script-port", type=int, default=30003)
     add("--dashboard-port", type=int, default=29999)
+    add("--primary-port", type=int, default=30001)
     add("--control", type=_address, default=("127.0.0.1", 0), metavar="HOST:PORT", help="control channel, port 0: free")
     add("--model", choices=MODELS, default="ur5e")
     add("--controller-version", type=_version, default="5.25", help="5.x; 10.x has no dashboard server")
@@ -68,7 +70,9 @@ async def _serve(options: argparse.Namespace) -> None:
     if options.powered_off:
         controller.power_off()
     rtde, script, dashboard = RtdeServer(controller), ScriptPort(controller), Dashboard(controller)
+    primary = PrimaryPort(MODELS[options.model], options.controller_version)
     wires = {
+        "primary": TcpWire("primary", options.host, options.primary_port, primary.opened),
         "rtde": TcpWire("rtde", options.host, options.rtde_port, rtde.opened),
         "script": TcpWire("script", options.host, options.script_port, script.opened),
     }
@@ -85,6 +89,14 @@ async def _serve(options: argparse.Namespace) -> None:
         controller.boot()
 
     control.command("power_cycle", power_cycle)
+
+    def calibration(deltas: list[list[float]], told: bool = True) -> None:
+        """What a calibration adds to theta, a, d and alpha of the joints; `told`: the primary port tells of it."""
+        if [len(row) for row in deltas] != [6] * 4:
+            raise ValueError("four rows of six numbers")
+        primary.deltas, primary.told = deltas, told
+
+    control.command("calibration", calibration)
 
     loop = asyncio.get_running_loop()
     owed = 0
