@@ -1,0 +1,81 @@
+"""Coming in: by a name that is free, with a token where one is asked for, and in the role that it gives."""
+
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+import pytest_asyncio
+from playwright.async_api import Browser, expect
+
+from arcor2_hw.data.role import Role
+from arcor2_server.tokens import TokenFile
+from tests.editor.screen import Screen, screen_of
+from tests.server.core.serving import ServerProcess, running
+
+pytestmark = pytest.mark.asyncio(loop_scope="module")
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def server(tmp_path_factory: pytest.TempPathFactory, built_editor: Path) -> AsyncIterator[ServerProcess]:
+    """A server that asks everybody for a token."""
+    data_dir = tmp_path_factory.mktemp("join") / "data"
+    TokenFile(data_dir).add("first", Role.TECHNICIAN)
+    async with running(data_dir) as process:
+        yield process
+
+
+def secret(server: ServerProcess, role: Role) -> str:
+    return TokenFile(server.data_dir).add(role.name.lower(), role)[1]
+
+
+async def home(screen: Screen) -> None:
+    await screen.page.get_by_role("radio", name="Projects").wait_for()
+
+
+async def test_a_token_is_asked_for_taken_remembered_and_no_longer_valid(
+    server: ServerProcess, browser: Browser
+) -> None:
+    async with screen_of(browser, server.url) as screen:
+        await screen.join("Eva")
+        field = screen.page.get_by_label("Token")
+        await field.fill("not-a-token")
+        await screen.press("Join")
+        await screen.sees("The token is not valid")
+        made, key = TokenFile(server.data_dir).add("Eva's tablet", Role.TECHNICIAN)
+        await field.fill(key)
+        await screen.press("Join")
+        await home(screen)
+        await screen.page.reload()
+        await home(screen)
+        TokenFile(server.data_dir).revoke(made.name)
+        await screen.sees("not valid any more")
+        await field.wait_for()
+
+
+async def test_a_token_in_the_address_lets_in_and_is_not_left_there(server: ServerProcess, browser: Browser) -> None:
+    async with screen_of(browser, server.url) as screen:
+        await screen.page.goto(f"{screen.url}/?token={secret(server, Role.OPERATOR)}&q=low")
+        await screen.page.get_by_label("Your name").fill("Operator")
+        await screen.press("Join")
+        await home(screen)
+        assert "token" not in screen.page.url
+        # An operator makes no scenes, and is shown so.
+        await screen.page.get_by_role("radio", name="Scenes").click()
+        await expect(screen.page.get_by_role("button", name="New scene")).to_be_disabled()
+
+
+async def test_a_name_that_somebody_has_is_refused_with_the_reason(server: ServerProcess, browser: Browser) -> None:
+    key = secret(server, Role.TECHNICIAN)
+    async with screen_of(browser, server.url) as one, screen_of(browser, server.url) as two:
+        for screen in (one, two):
+            await screen.page.goto(f"{screen.url}/?token={key}&q=low")
+            await screen.page.get_by_label("Your name").fill("Adam")
+            await screen.press("Join")
+            if screen is one:
+                await home(one)
+        await two.sees("The user name 'Adam' is already in use.")
+        await two.page.get_by_label("Your name").fill("Berta")
+        await two.press("Join")
+        await home(two)
+        await one.page.get_by_role("img", name="Berta").wait_for()
+        assert await one.page.get_by_role("img", name="Adam (you)").is_visible()
