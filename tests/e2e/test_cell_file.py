@@ -165,7 +165,7 @@ async def test_who_did_not_subscribe_is_told_nothing(tmp_path: Path, scale: Fake
                     names.add(event.event)
         assert "SceneState" in names
         assert "ObjectState" not in names
-        with pytest.raises(RequestFailed, match="Moon; there is .*ObjectState"):
+        with pytest.raises(RequestFailed, match=r"Moon; there is .*ObjectState"):
             await old.call("SubscribeEvents", rpc.SubscribeEventsArgs({"Moon"}))
 
 
