@@ -1,0 +1,102 @@
+"""Robot pose from depth: arms before a synthetic sensor, and scenes in which nothing may be found.
+
+The sensor meets rays with shapes in closed form and shares no code with the solver (tests/calibration/depth_sensor.py):
+1280 × 720, 8 pictures averaged, noise 1.8 mm at 1 m growing with the square of the distance, and 0.8 mm at 1 m of
+smooth noise that stays the same in all pictures; whole millimetres; flying pixels at edges, 0.5 % holes; a table, a
+wall, and on the arm a gripper and a cable that the model lacks. 1.0 to 1.8 m, 15 to 60° above, any joints above the
+table. The assumed pose is 50 mm and 5° off. fx and fy that the solver is told are off by 0.05 %, cx and cy by 0.25 px.
+"""
+
+import math
+import sys
+import time
+from typing import Final
+
+import numpy as np
+
+from arcor2_hw.calibration.refusals import CalibrationRefused
+from arcor2_hw.calibration.results import RobotPose
+from arcor2_hw.calibration.robot_pose import find_robot_pose
+from arcor2_hw.data.geometry import Pose
+from benchmarks.figures import Figure, Report, median, percentile
+from tests.calibration.depth_sensor import Block, Capsule, Sensor, arm, looking, shift, tool
+from tests.calibration.workplace import LARGE, View, drawn, joints_above_the_table, surface_of_arm, told
+
+SEED: Final = 20261121
+VIEWS: Final = 30
+LONG: Final = 300
+TELLS: Final = 4.0
+"""A result that is off by more than that many of its own standard deviations has a wrong verdict."""
+USELESS: Final = 0.005
+"""m; a result that is off by more is wrong whatever it says."""
+
+
+def run(report: Report, long: bool) -> None:
+    """Measure."""
+    count = LONG if long else VIEWS
+    sys.stderr.write(f"robot pose: {count} views from seed {SEED}\n")
+    distances, angles, seconds, refused, wrong = [], [], [], 0, 0
+    for seed in range(SEED, SEED + count):
+        view = drawn(seed, large=True)
+        began = time.perf_counter()
+        try:
+            found = _solve(view)
+        except CalibrationRefused as e:
+            refused += 1
+            sys.stderr.write(f"  seed {seed}: {e.reason.value} ({e.detail})\n")
+            continue
+        seconds.append(time.perf_counter() - began)
+        distance, angle = view.error(found.pose)
+        distances.append(distance * 1e3)
+        angles.append(math.degrees(angle))
+        told_off = distance > TELLS * found.position_deviation or angle > TELLS * found.orientation_deviation
+        wrong += told_off or distance > USELESS
+    note = f"p99 {percentile(distances, 99):.2f} mm, {percentile(angles, 99):.3f}°, seed {SEED}"
+    report.add(Figure("robot_pose_mm", median(distances), len(distances), note))
+    report.add(Figure("robot_pose_deg", median(angles), len(angles)))
+    report.add(Figure("robot_pose_s", median(seconds), len(seconds), f"longest {max(seconds):.1f} s"))
+    report.add(Figure("robot_pose_refused", 100.0 * refused / count, count))
+    report.add(Figure("robot_pose_wrong", 100.0 * wrong / count, count, f"beyond {TELLS:g} own deviations, or 5 mm"))
+    given, asked = 0, 0
+    for view in _impostors(max(12, count // 3)):
+        asked += 1
+        try:
+            found = _solve(view)
+        except CalibrationRefused:
+            continue
+        given += view.error(found.pose)[0] > USELESS
+    note = "no robot, a cupboard in its place, a joint 12° and more off, 0.3 m and more away"
+    report.add(Figure("robot_pose_impostors", 100.0 * given / asked, asked, note))
+
+
+def _solve(view: View) -> RobotPose:
+    return find_robot_pose(view.surface, view.depth, view.parameters, view.camera, view.assumed)
+
+
+def _impostors(count: int) -> list[View]:
+    """Scenes in which the robot is not there, is another one, or stands far from where it is assumed."""
+    views = []
+    for number in range(count):
+        rng = np.random.default_rng(SEED + number)
+        joints = joints_above_the_table(rng)
+        links: list[Capsule | Block] = [*arm(joints), *tool(joints)]
+        assumed, modelled = np.eye(4), list(joints)
+        if number % 4 == 0:
+            links = []
+        elif number % 4 == 1:
+            links = [Block(shift(0.0, 0.0, 0.35), (0.25, 0.35, 0.7))]
+        elif number % 4 == 2:
+            modelled[2] += math.radians(rng.uniform(12.0, 40.0)) * rng.choice([-1, 1])
+        else:
+            around = rng.uniform(-math.pi, math.pi)
+            far = rng.uniform(0.3, 0.8)
+            assumed = shift(far * math.cos(around), far * math.sin(around), 0.0)
+        sensor = Sensor(shapes=links, wall=-2.0)
+        for name, value in LARGE.items():
+            setattr(sensor, name, value)
+        around = rng.uniform(-math.pi, math.pi)
+        eye = looking(np.array([0, 0, 0.35]), np.array([1.1 * math.cos(around), 1.1 * math.sin(around), 0.9]))
+        depth = sensor.take(eye, rng)
+        poses = (Pose.from_matrix(eye), Pose.from_matrix(assumed), Pose())
+        views.append(View(surface_of_arm(modelled), depth, told(sensor), *poses))
+    return views
