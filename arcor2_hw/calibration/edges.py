@@ -25,6 +25,8 @@ _UNIT: Final = np.linspace(-1.0, 1.0, 17)
 _WEIGHTS: Final = np.where(np.abs(_UNIT) == 1.0, 0.5, 1.0) * (_UNIT[1] - _UNIT[0])
 _CLEAR: Final = 1.8
 """How many times the blur a place has to be away from where its edge turns."""
+_LEAST_SHARE: Final = 0.8
+"""Of the places at which there is a step from dark to light; with fewer it is another marker, or none."""
 _LEAST_CONTRAST: Final = 0.02
 """Of the range of grey values."""
 _WIDEST: Final = 4.0
@@ -243,7 +245,8 @@ def _crossings(
     valid = (sight.slant > 0.3) & (sight.room > min(_CLEAR * blur, 4.0))
     for ends, last in ((map_x[:, ::16], picture.shape[1] - 1), (map_y[:, ::16], picture.shape[0] - 1)):
         valid &= ((ends >= 0) & (ends <= last)).all(axis=1)
-    if np.count_nonzero(valid) < 24:
+    places = int(np.count_nonzero(valid))
+    if places < 24:
         return None
     values = cv2.remap(picture, map_x, map_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(np.float64)
     # Dark and light are taken of the whole edge, so that noise does not move single places.
@@ -257,6 +260,8 @@ def _crossings(
     if contrast <= _LEAST_CONTRAST:
         return None
     valid &= difference > 0.35 * contrast
+    if np.count_nonzero(valid) < _LEAST_SHARE * places:
+        return None
     parts = (values - dark[:, None]) / np.where(valid, difference, 1.0)[:, None]
     offsets = reach * (1.0 - parts @ _WEIGHTS) * sight.slant
     share = valid / np.maximum(reach * sight.slant, 0.1)

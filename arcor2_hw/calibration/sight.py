@@ -34,13 +34,15 @@ class _Look:
     """What one picture shows.
 
     widths: px, of the markers' edges and cells. blurs: px, of all edges that were measured. pieces: whether there are
-    markers of boards. strangers: numbers of markers that are not listed.
+    markers of boards. unclear: numbers of markers that were recognised and could not be measured. strangers: of those
+    that are not listed.
     """
 
     seen: list[Seen] = field(default_factory=list)
     widths: list[tuple[float, float]] = field(default_factory=list)
     blurs: list[float] = field(default_factory=list)
     pieces: bool = False
+    unclear: set[int] = field(default_factory=set)
     strangers: set[int] = field(default_factory=set)
 
 
@@ -61,10 +63,7 @@ def sight_of(greys: Sequence[Grey], lens: Lens, layout: Layout, blur_threshold: 
         looks.append(look)
     seen = [each for look in looks for each in look.seen]
     if not seen:
-        strangers = set().union(*(look.strangers for look in looks))
-        raise CalibrationRefused(
-            _missing(layout, strangers, any(look.pieces for look in looks)), reason=Reason.NO_MARKER
-        )
+        raise CalibrationRefused(_missing(layout, looks), reason=Reason.NO_MARKER)
     blurs = [blur for look in looks for blur in look.blurs]
     return Sighting(seen, float(np.median(blurs)) if blurs else 0.0)
 
@@ -80,7 +79,7 @@ def _check_sharp(grey: Grey, look: _Look, name: str, blur_threshold: float, larg
             Reason.BLURRED,
         )
     # Sharp edges were measured, or something was at least recognised: what is missing then is not sharpness.
-    if look.blurs or ((look.strangers or look.pieces) and not look.seen):
+    if look.blurs or ((look.strangers or look.pieces) and not look.unclear):
         return
     if (sharpness := sharpness_of(grey)) < blur_threshold:
         raise CalibrationRefused(
@@ -99,22 +98,24 @@ def _in_picture(grey: Grey, picture: int, lens: Lens, layout: Layout, name: str)
         found[dictionary] = detect(grey, dictionary, enough or min(2, len(layout.markers)))
     listed = {marker.marker_id: marker for marker in layout.markers}
     own = [each for each in found[layout.dictionary] if each[0] in listed]
-    numbers = [number for number, _ in own]
+    look = _Look()
+    for each in measured(grey, lens, layout.dictionary, own):
+        marker = listed[each.number]
+        if not np.isfinite(each.blur):
+            look.unclear.add(each.number)
+            continue
+        size = float(marker.size) if isinstance(marker.size, float | int) else layout.size
+        look.seen.append(_seen_marker(each, marker.pose.matrix(), size, picture))
+        look.widths.append((each.blur, each.cell))
+    numbers = [each.key[1] for each in look.seen]
     for number in set(numbers):
         if numbers.count(number) > 1:
             raise CalibrationRefused(
                 f"{name} shows marker {number} {numbers.count(number)} times: remove or cover the others.",
                 reason=Reason.IMPLAUSIBLE,
             )
-    look = _Look()
-    for each in measured(grey, lens, layout.dictionary, own):
-        marker = listed[each.number]
-        size = float(marker.size) if isinstance(marker.size, float | int) else layout.size
-        look.seen.append(_seen_marker(each, marker.pose.matrix(), size, picture))
-        if np.isfinite(each.blur):
-            look.widths.append((each.blur, each.cell))
     look.blurs = [blur for blur, _ in look.widths]
-    known = {(layout.dictionary, number) for number in numbers}
+    known = {(layout.dictionary, number) for number, _ in own}
     for index, board in enumerate(layout.boards):
         own_numbers = {(board.dictionary, number) for number, _ in found[board.dictionary]} & _numbers_of(board)
         look.pieces |= bool(own_numbers)
@@ -172,15 +173,22 @@ def _seen_marker(each: Measured, origin_from_marker: Array, size: float, picture
     )
 
 
-def _missing(layout: Layout, others: set[int], pieces: bool) -> str:
+def _missing(layout: Layout, looks: Sequence[_Look]) -> str:
     """Say that nothing of a layout was seen, and what was seen instead."""
     wanted = [f"marker {marker.marker_id}" for marker in layout.markers[:8]]
     wanted += [f"a board of {board.columns} × {board.rows} squares" for board in layout.boards]
-    if pieces:
+    unclear = sorted({number for look in looks for number in look.unclear})
+    others = sorted({number for look in looks for number in look.strangers})
+    if unclear:
+        return (
+            f"Marker {', '.join(map(str, unclear))} was recognised, but its edges cannot be measured: is it too small "
+            "in the picture, bent, or covered in part?"
+        )
+    if any(look.pieces for look in looks):
         return (
             f"Too little is seen of {' and '.join(wanted)}: only some of its markers. Is it too far away, or covered?"
         )
     text = f"None of what is configured is in sight: {', '.join(wanted)}."
     if others:
-        text += f" There are markers that are not configured: {', '.join(map(str, sorted(others)[:8]))}."
+        text += f" There are markers that are not configured: {', '.join(map(str, others[:8]))}."
     return text

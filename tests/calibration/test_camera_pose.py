@@ -9,10 +9,12 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from arcor2_hw.calibration import lens as measuring
 from arcor2_hw.calibration.camera_pose import draw_camera_pose, find_camera_pose
 from arcor2_hw.calibration.camera_results import CameraPose, PoseMethod, PoseOptions
+from arcor2_hw.calibration.edges import chart_of, measure
 from arcor2_hw.calibration.layout import CharucoBoard, Layout, Marker
-from arcor2_hw.calibration.markers import find_marker_corners
+from arcor2_hw.calibration.markers import detect, find_marker_corners
 from arcor2_hw.calibration.pictures import InvalidPicture
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.calibration.results import Grade
@@ -243,6 +245,17 @@ def test_a_picture_without_the_markers_is_refused_and_names_others() -> None:
     assert "marker 5, marker 6" in str(error)
     assert "3, 9, 17, 42" in str(error)
     assert refused(lambda: find_camera_pose([all_seen()], GIVEN, Layout())).reason == Reason.NO_MARKER
+
+
+def test_the_edges_of_another_marker_are_not_measured() -> None:
+    """What the detector takes for a marker by mistake does not count."""
+    grey = all_seen()
+    lens = measuring.Lens(GIVEN, 640, 480)
+    (number, corners), *_ = detect(grey, "4x4_50")
+    light = (grey / 255.0).astype(np.float32)
+    assert measure(light, (0.0, 0.0), lens, chart_of(0, number), number, corners) is not None
+    for other in {0, 1, 2, 4, 5, 30} - {number}:
+        assert measure(light, (0.0, 0.0), lens, chart_of(0, other), other, corners) is None
 
 
 def test_a_board_of_which_too_little_is_seen_is_refused() -> None:
