@@ -207,5 +207,11 @@ async def test_nothing_is_too_small_covered_or_off_the_screen(closed: Place, bro
         await screen.page.get_by_role("button", name="Stop motion").wait_for()
         await tools.filter(has_text="Devices").click()
         await look(screen, "online")
+        await screen.page.evaluate("document.documentElement.dataset.hand = 'left'")
+        await look(screen, "left hand")
+        await screen.page.set_viewport_size(VIEWPORTS["phone"])  # type: ignore[arg-type]
+        await screen.press("Make the panel larger")
+        await screen.settle()
+        assert await screen.faults() == []
         await scene_state(closed.client, SceneStateEnum.STARTED)
     assert found == {}
