@@ -176,7 +176,7 @@ class Arm:
 
     def middle(self) -> Array:
         """Give the middle of each joint's range, zero where it has none."""
-        whole = np.isfinite(self.lower + self.upper)
+        whole = np.isfinite(self.lower) & np.isfinite(self.upper)
         return np.where(whole, (np.where(whole, self.lower, 0.0) + np.where(whole, self.upper, 0.0)) / 2.0, 0.0)
 
     def within(self, q: Array, slack: float = 1e-9) -> bool:

@@ -1,8 +1,9 @@
 """Joints for a pose: nearest to a seed, within limits, free of collision if asked; or all distinct ones.
 
-An arm of the UR's kind has its up to eight configurations computed, see `closed_form`, and each refined; for any other
-arm damped least squares (Levenberg and Marquardt's) start at the seed and, if need be, at up to 40 random places. These
-places are the same in every call, so that the same question has the same answer.
+An arm of the UR's kind, or with a spherical wrist as most industrial ones, has its up to eight configurations
+computed, see `closed_form`, and each refined; for any other arm damped least squares (Levenberg and Marquardt's)
+start at the seed and, if need be, at up to 40 random places. These places are the same in every call, so that the
+same question has the same answer.
 """
 
 import itertools
@@ -13,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from arcor2_hw.kinematics.arm import Arm
-from arcor2_hw.kinematics.closed_form import NEARLY, ThreeParallel
+from arcor2_hw.kinematics.closed_form import NEARLY, SphericalWrist, ThreeParallel, closed_form
 from arcor2_hw.kinematics.errors import OnlyInCollision, OutOfReach
 from arcor2_hw.kinematics.shapes import Array
 
@@ -24,6 +25,8 @@ Blocked = Callable[[Array], str]
 """Says what joint values (the arm's) are in collision with; empty when they are free."""
 
 STARTS: Final = 40
+"""At most; an arm with few joints has no more than so many minima to be caught in."""
+_STARTS_PER_JOINT: Final = 6
 ROUNDS: Final = 60
 EXACT: Final = 1e-8
 """m and rad at which a solution counts as exact; what is less exact has to keep the end effector's tolerances."""
@@ -72,7 +75,9 @@ class InverseKinematics:
         # A turn more leads to the same place: to begin within one is enough.
         middle = np.clip(0.0, lower[wide] + np.pi, upper[wide] - np.pi)
         lower[wide], upper[wide] = middle - np.pi, middle + np.pi
-        self._starts = np.random.default_rng(0).uniform(lower, upper, (STARTS, arm.dof))
+        self._starts = np.random.default_rng(0).uniform(
+            lower, upper, (min(STARTS, _STARTS_PER_JOINT * arm.dof), arm.dof)
+        )
 
     @property
     def has_closed_form(self) -> bool:
@@ -129,7 +134,7 @@ class InverseKinematics:
         if float(np.linalg.norm(target[:3, 3] - self.arm.centre)) > self.arm.reach + self._tolerance[0]:
             return
         if self._form is not None:
-            raw = np.array(self._form.solve(target, float(seed[0]), float(seed[5]))).reshape(-1, 6)
+            raw = np.array(self._form.solve(target, seed)).reshape(-1, 6)
             near = self._near(raw, seed, NEARLY)  # calibrated, it may keep the limits yet
             some = False
             for q in self._computed(pin.SE3(target), near, seed):
@@ -199,7 +204,7 @@ class InverseKinematics:
     def _all_turns(self, q: Array) -> Iterator[Array]:
         choices = []
         for value, lower, upper, turning in zip(q, self.arm.lower, self.arm.upper, self._turning, strict=True):
-            if not turning or not np.isfinite(lower + upper):
+            if not turning or not (np.isfinite(lower) and np.isfinite(upper)):
                 choices.append([value])
                 continue
             first, last = np.ceil((lower - value) / (2 * np.pi) - 1e-9), np.floor((upper - value) / (2 * np.pi) + 1e-9)
@@ -264,7 +269,7 @@ class InverseKinematics:
         return error, float(np.sqrt(error @ error))
 
 
-def _closed_form(arm: Arm) -> ThreeParallel | None:
+def _closed_form(arm: Arm) -> ThreeParallel | SphericalWrist | None:
     """Read axes and points off the arm at zero angles."""
     if arm.dof != 6 or len(arm.moving) != 6 or any(arm.prismatic) or not np.array_equal(arm.coupling[0], np.eye(6)):
         return None
@@ -276,4 +281,4 @@ def _closed_form(arm: Arm) -> ThreeParallel | None:
         at = at @ origin
         axes.append(at[:3, :3] @ axis)
         points.append(at[:3, 3])
-    return ThreeParallel.of(np.array(axes), np.array(points), at @ arm.tip_in_last)
+    return closed_form(np.array(axes), np.array(points), at @ arm.tip_in_last)

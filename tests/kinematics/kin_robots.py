@@ -43,14 +43,14 @@ def joint(
     )
 
 
-def six_axes() -> RobotModel:
-    """An industrial arm with a spherical wrist, which has no closed form here, and an inclined foot."""
+def six_axes(wrist: float = 0.0, elbow: str = "0 1 0") -> RobotModel:
+    """An industrial arm on an inclined foot; `wrist`: by how much, m, its last axis passes by the two before."""
     text = links("base", "l1", "l2", "l3", "l4", "l5", "l6", "tool")
     text += joint("j1", "base", "l1", xyz="0 0 0.2", rpy="0.2 0 0")
     text += joint("j2", "l1", "l2", xyz="0.1 0 0.2", axis="0 1 0", limit='<limit lower="-2" upper="2.2" velocity="1"/>')
-    text += joint("j3", "l2", "l3", xyz="0 0 0.4", axis="0 1 0", limit='<limit lower="-3.4" upper="1.2" velocity="1"/>')
+    text += joint("j3", "l2", "l3", xyz="0 0 0.4", axis=elbow, limit='<limit lower="-3.4" upper="3.4" velocity="1"/>')
     text += joint("j4", "l3", "l4", xyz="0.2 0 0.05", axis="1 0 0", limit='<limit lower="-4.6" upper="4.6"/>')
     text += joint("j5", "l4", "l5", xyz="0.2 0 0", axis="0 1 0", limit='<limit lower="-2" upper="2"/>')
-    text += joint("j6", "l5", "l6", xyz="0.08 0 0", axis="1 0 0", kind="continuous", limit="")
+    text += joint("j6", "l5", "l6", xyz=f"0.08 0 {wrist}", axis="1 0 0", kind="continuous", limit="")
     text += joint("tool_joint", "l6", "tool", kind="fixed", xyz="0.1 0 0.02", rpy="0 0.3 0", limit="")
     return RobotModel.load(urdf(text, "six"))

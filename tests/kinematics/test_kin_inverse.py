@@ -152,7 +152,7 @@ def test_a_calibrated_arm_has_its_own_configurations(
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_an_arm_without_closed_form_is_searched(number: int) -> None:
-    arm = six_axes().arm("tool")
+    arm = six_axes(wrist=0.06).arm("tool")
     chance = np.random.default_rng(number)
     lower, upper = np.maximum(arm.lower, -math.pi), np.minimum(arm.upper, math.pi)
     q, seed = chance.uniform(lower, upper), chance.uniform(lower, upper)
@@ -167,17 +167,38 @@ def test_an_arm_without_closed_form_is_searched(number: int) -> None:
         assert np.abs(inverse.solve(target, np.clip(near, lower, upper)) - q).max() < 0.1
 
 
-def test_the_search_finds_all_configurations_of_an_industrial_arm() -> None:
+@pytest.mark.parametrize("elbow", ["0 1 0", "0 -1 0"])
+@given(st.tuples(*[st.floats(-1.9, 1.9)] * 6), st.tuples(*[st.floats(-1.9, 1.9)] * 6))
+def test_an_industrial_arm_has_its_configurations_computed(
+    elbow: str, values: tuple[float, ...], seed: tuple[float, ...]
+) -> None:
+    arm, q = six_axes(elbow=elbow).arm("tool"), np.array(values)
+    inverse = InverseKinematics(arm)
+    assert inverse.has_closed_form
+    target = arm.forward(q)
+    assume(arm.smallest(q) > 1e-4)
+    assert_there(arm, inverse.solve(target, np.array(seed)), target)
+    if not arm.dexterity(q).near_singularity:
+        assert np.allclose(inverse.solve(target, q), q, atol=1e-6)
+
+
+def test_what_is_computed_and_what_is_searched_agree() -> None:
     arm = six_axes().arm("tool")
     q = np.array((0.4, 0.5, -0.6, 0.8, 0.9, -0.3))
-    found = InverseKinematics(arm).solutions(arm.forward(q), q)
-    assert np.allclose(found[0], q, atol=1e-5)
-    for one, other in itertools.combinations(found, 2):
+    computing, searching = InverseKinematics(arm), InverseKinematics(arm)
+    searching._form = None
+    computed, searched = (each.solutions(arm.forward(q), q) for each in (computing, searching))
+    assert np.allclose(computed[0], q, atol=1e-6)
+    for one, other in itertools.combinations(computed, 2):
         assert np.abs(wrapped(one - other)).max() > 1e-3
-    assert len(found) >= 2
     flipped = q + np.array((0, 0, 0, -math.pi, 0, math.pi))
     flipped[4] = -q[4]
-    assert is_among(flipped, found)
+    assert is_among(flipped, computed)
+    assert len(searched) == len(computed) >= 4
+    assert all(is_among(each, computed) for each in searched)
+    # A straight wrist: joints 4 and 6 turn about one axis, and the seed's share is kept.
+    straight = np.array((0.4, 0.5, -0.6, 0.8, 0.0, -0.3))
+    assert np.allclose(computing.solve(arm.forward(straight), straight), straight, atol=1e-6)
 
 
 @given(st.tuples(*(st.floats(low, high) for low, high in dobot_kinematics.LIMITS)))

@@ -1,0 +1,151 @@
+"""Steps by which configurations are computed: angles that bring vectors to a height, onto each other, to a length.
+
+The canonical subproblems of B. Paden and W. Kahan, on plain floats: vectors of three are too short for arrays.
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+
+from arcor2_hw.kinematics.shapes import Array
+
+TINY: Final = 1e-9
+SINGULAR: Final = 1e-10
+"""Product of two sines below which an angle says nothing."""
+BEYOND: Final = 0.02
+"""By how much a cosine may be beyond 1 and still count as 1, for what is then refined."""
+
+Vector = tuple[float, float, float]
+Rows = tuple[Vector, Vector, Vector]
+Six = tuple[float, float, float, float, float, float]
+
+
+def level(
+    axis: Vector, turned: Vector, along: Vector, height: float, if_free: float, *, backwards: bool = False
+) -> list[float]:
+    """Give the angles about `axis` by which `turned` comes to a height along `along`; backwards: by minus these."""
+    across = cross(axis, turned)
+    a = dot(along, cross(across, axis))
+    b = dot(along, across)
+    constant = dot(along, axis) * dot(axis, turned)
+    size = math.hypot(a, b)
+    if size < TINY:
+        return [if_free] if abs(height - constant) < BEYOND else []
+    share = (height - constant) / size
+    if abs(share) > 1.0 + BEYOND:
+        return []
+    middle, half = math.atan2(b, a), math.acos(max(-1.0, min(1.0, share)))
+    sign = -1.0 if backwards else 1.0
+    angles = (middle + half, middle - half) if half > TINY else (middle,)
+    return [math.remainder(sign * angle, math.tau) for angle in angles]
+
+
+def between(axis: Vector, one: Vector, other: Vector, if_free: float) -> float:
+    """Give the angle about `axis` that turns `one` nearest to `other`."""
+    across = cross(axis, one)
+    sine, cosine = dot(across, other), dot(cross(across, axis), other)
+    if math.hypot(sine, cosine) < SINGULAR:
+        return if_free
+    return math.atan2(sine, cosine)
+
+
+def folded(axis: Vector, outer: Vector, inner: Vector, to: Vector) -> list[float]:
+    """Give the angles about `axis` of the outer of two links, so that both together are as long as `to`, across it."""
+    outer, inner, to = (subtract(each, scaled(axis, dot(axis, each))) for each in (outer, inner, to))
+    a, b = dot(inner, outer), dot(inner, cross(axis, outer))
+    size = math.hypot(a, b)
+    share = (dot(to, to) - dot(inner, inner) - dot(outer, outer)) / (2.0 * size)
+    if abs(share) > 1.0 + BEYOND:
+        return []
+    middle, half = math.atan2(b, a), math.acos(max(-1.0, min(1.0, share)))
+    angles = (middle + half, middle - half) if half > TINY else (middle,)
+    return [math.remainder(angle, math.tau) for angle in angles]
+
+
+def nearest_points(one: Array, along: Array, other: Array, other_along: Array) -> tuple[float, Array, Array]:
+    """Give the distance of two lines that are not parallel, and the points of both that are nearest."""
+    across = np.cross(along, other_along)
+    matrix = np.column_stack((along, -other_along, across))
+    s, t, gap = np.linalg.solve(matrix, other - one)
+    return abs(float(gap)) * float(np.linalg.norm(across)), one + s * along, other + t * other_along
+
+
+# ------------------------------------------------------------------------------------------------ vectors of three
+def vector(array: Array) -> Vector:
+    """Give the three floats of an array."""
+    return float(array[0]), float(array[1]), float(array[2])
+
+
+def rows_of(matrix: Array) -> Rows:
+    """Give the rows of a matrix (3, 3)."""
+    (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
+    return (a, b, c), (d, e, f), (g, h, i)
+
+
+def dot(a: Vector, b: Vector) -> float:
+    """Give the scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """Give the vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def add(*vectors: Vector) -> Vector:
+    """Give the sum."""
+    return sum(v[0] for v in vectors), sum(v[1] for v in vectors), sum(v[2] for v in vectors)
+
+
+def subtract(a: Vector, b: Vector) -> Vector:
+    """Give a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def scaled(a: Vector, by: float) -> Vector:
+    """Give a multiple."""
+    return a[0] * by, a[1] * by, a[2] * by
+
+
+def turned(m: Rows, v: Vector) -> Vector:
+    """Give a matrix times a vector."""
+    return dot(m[0], v), dot(m[1], v), dot(m[2], v)
+
+
+def transposed(m: Rows) -> Rows:
+    """Give the transposed matrix."""
+    (a, b, c), (d, e, f), (g, h, i) = m
+    return (a, d, g), (b, e, h), (c, f, i)
+
+
+def product(m: Rows, n: Rows) -> Rows:
+    """Give m times n."""
+    x, y, z = transposed(n)
+    return (
+        (dot(m[0], x), dot(m[0], y), dot(m[0], z)),
+        (dot(m[1], x), dot(m[1], y), dot(m[1], z)),
+        (dot(m[2], x), dot(m[2], y), dot(m[2], z)),
+    )
+
+
+def rotation(axis: Vector, angle: float) -> Rows:
+    """Give the rotation about a unit axis (Rodrigues' formula)."""
+    (x, y, z), c, s = axis, math.cos(angle), math.sin(angle)
+    t = 1.0 - c
+    return (
+        (c + x * x * t, x * y * t - z * s, x * z * t + y * s),
+        (x * y * t + z * s, c + y * y * t, y * z * t - x * s),
+        (x * z * t - y * s, y * z * t + x * s, c + z * z * t),
+    )
+
+
+def spun(axis: Vector, angle: float, v: Vector) -> Vector:
+    """Give a vector turned about a unit axis."""
+    (x, y, z), (a, b, d), c, s = axis, v, math.cos(angle), math.sin(angle)
+    along = (1.0 - c) * (x * a + y * b + z * d)
+    return (
+        c * a + s * (y * d - z * b) + along * x,
+        c * b + s * (z * a - x * d) + along * y,
+        c * d + s * (x * b - y * a) + along * z,
+    )
