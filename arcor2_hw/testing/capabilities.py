@@ -20,6 +20,7 @@ READS: Final = frozenset(
         "identify",
         "is_referenced",
         "joint_limits",
+        "kinematic_calibration",
         "machine_state",
         "max_tcp_speed",
         "permissives",
