@@ -45,7 +45,7 @@ ROOMS: Final[dict[str, Callable[[Report, Path], Awaitable[None]]]] = {
     "buses": buses.run,
     "camera": camera.run,
     "calibration": lambda report, _: calibration.run(report, LONG in sys.argv),
-    "robot-pose": lambda report, _: asyncio.to_thread(robot_pose.run, report, LONG in sys.argv),
+    "robot_pose": lambda report, _: asyncio.to_thread(robot_pose.run, report, LONG in sys.argv),
     "hung": hung.run,
     "kinematics": lambda report, _: kinematics.run(report),
     "stops": lambda report, _: stops.run(report),
