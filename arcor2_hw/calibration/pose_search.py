@@ -17,6 +17,11 @@ _TRIED: Final = 4
 """How many of the best starts are followed."""
 _TELL_APART: Final = 16.0
 """Difference of cost (chi square) from which on the better of two poses is the right one: four standard deviations."""
+_NO_RIVAL: Final = 300.0
+"""Cost of a start above that of the best pose from which on it leads to no pose that could be taken for it.
+
+The closed form for all corners gives both poses that a flat layout allows; other starts are for when it is misled.
+"""
 _SCALINGS: Final = 3
 _SAME: Final = (0.002, 0.004)
 """m, rad, up to which two poses are one."""
@@ -144,8 +149,8 @@ def _minima(problem: PoseProblem, starts: list[Array]) -> list[Solution]:
     result: list[Solution] = []
     tried: list[Array] = []
     least = float("inf")
-    for start in sorted(starts, key=problem.cost):
-        if len(tried) >= _TRIED:
+    for cost, start in sorted(((problem.cost(start), start) for start in starts), key=lambda each: each[0]):
+        if len(tried) >= _TRIED or cost > least + _NO_RIVAL:
             break
         if any(_same(start, other) for other in tried):
             continue
