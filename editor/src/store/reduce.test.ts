@@ -87,7 +87,9 @@ describe("the open document", () => {
     const change: ServerEvent = { event: "LogicItemChanged", change_type: "remove", data: PROJECT.logic[0] as never };
     expect(after(OPEN, change).doc).toMatchObject({ unsaved: true, logic: {} });
     expect(after(OPEN, change, { event: "ProjectSaved", data: undefined }).doc?.unsaved).toBe(false);
-    expect(after(OPEN, { event: "ProjectClosed", data: undefined }).doc).toBeNull();
+    const closed: ServerEvent = { event: "ProjectClosed", data: undefined };
+    expect(after(OPEN, closed).doc, "it stays while it is run as a package").not.toBeNull();
+    expect(after(OPEN, closed, { event: "ShowMainScreen", data: { what: "ProjectsList" } }).doc).toBeNull();
   });
 
   test("opened again, after the connection was lost, keeps the selection unless it is gone", () => {

@@ -37,10 +37,13 @@ export function reduce(state: State, event: ServerEvent): Partial<State> {
       return open(state, opened(event.data.scene, event.data.project));
     case "SceneClosed":
     case "ProjectClosed":
-      return { ...CLOSED, view: { ...state.view, user: {}, shared: {} }, ui: { ...state.ui, selection: null, tool: "" } };
+      // Closed for good when the lists are shown next; a project that is about to run stays on the screen.
+      return { live: OFFLINE };
     case "ShowMainScreen":
       return {
         ...CLOSED,
+        view: { ...state.view, user: {}, shared: {} },
+        ui: shut(state),
         program: { ...state.program, running: [] },
         lists: { ...state.lists, shown: event.data.what, highlight: event.data.highlight ?? "" },
       };
@@ -101,7 +104,12 @@ export function reduce(state: State, event: ServerEvent): Partial<State> {
 function open(state: State, doc: NonNullable<State["doc"]>): Partial<State> {
   const same = state.doc?.scene.id === doc.scene.id && state.doc.project?.id === doc.project?.id;
   if (same) return { doc, ui: stillThere(state, doc) };
-  return { ...CLOSED, doc, ui: { ...state.ui, selection: null, tool: "" } };
+  return { ...CLOSED, doc, ui: shut(state) };
+}
+
+/** The screen without what belonged to the document that was open. */
+function shut(state: State): State["ui"] {
+  return { ...state.ui, selection: null, connecting: null, mode: "3d", tool: "" };
 }
 
 /** The selection, unless what was selected is gone. */
@@ -109,6 +117,7 @@ function stillThere(state: State, doc: NonNullable<State["doc"]>): State["ui"] {
   const selection = state.ui.selection;
   if (!selection) return state.ui;
   const { id } = selection;
+  if (selection.kind === "terminal" && doc.project?.has_logic) return state.ui;
   const there = [doc.objects, doc.points, doc.orientations, doc.joints, doc.actions, doc.logic].some((of) => id in of);
   return there ? state.ui : { ...state.ui, selection: null };
 }
@@ -210,8 +219,8 @@ function program(state: State, event: ServerEvent): Partial<State> | null {
     }
     case "PackageInfo":
       return {
+        ...open(state, { ...opened(event.data.scene, event.data.project), unsaved: false }),
         ...become({ packageId: event.data.package_id, packageName: event.data.package_name }),
-        doc: { ...opened(event.data.scene, event.data.project), unsaved: false },
         live: OFFLINE,
       };
     case "ActionStateBefore": {

@@ -25,6 +25,7 @@ import type {
   PackageSummary,
   Parameter,
   ProjectExceptionData,
+  ProjectLogicIf,
   ProjectParameter,
   ProjectRobotJoints,
   ReachabilityData,
@@ -121,15 +122,30 @@ export interface Notice {
   time: number;
 }
 
-export type Kind = "object" | "point" | "orientation" | "joints" | "action" | "logic";
+/** `terminal`: START or END of the program. */
+export type Kind = "object" | "point" | "orientation" | "joints" | "action" | "logic" | "terminal";
 
 export interface Selection {
   kind: Kind;
   id: string;
 }
 
+/** How the open project is looked at. */
+export type Mode = "3d" | "flow" | "split" | "code";
+
+/** A step that is being drawn: the next tap says where it leads. */
+export interface Connecting {
+  from: string;
+  /** When it is to be taken; left out: what is still free. */
+  condition?: ProjectLogicIf;
+  /** The step whose end is moved, instead of a new one. */
+  item?: string;
+}
+
 export interface Ui {
   selection: Selection | null;
+  mode: Mode;
+  connecting: Connecting | null;
   /** The tool of the left rail that is open. */
   tool: string;
   theme: "system" | "light" | "dark";
@@ -200,6 +216,6 @@ export function initialState(): State {
     program: NO_PROGRAM,
     tasks: {},
     notices: [],
-    ui: { selection: null, tool: "", theme: "system", systemDark: false, leftHanded: false, quality: "auto" },
+    ui: { selection: null, mode: "3d", connecting: null, tool: "", theme: "system", systemDark: false, leftHanded: false, quality: "auto" },
   };
 }

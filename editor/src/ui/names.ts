@@ -9,6 +9,7 @@ export const KINDS: Record<Kind, string> = {
   joints: "Joints",
   action: "Action",
   logic: "Step",
+  terminal: "Program",
 };
 
 export function nameOf(state: State, id: string): string {
@@ -22,10 +23,11 @@ export function nameOf(state: State, id: string): string {
   return named?.name ?? "";
 }
 
-/** What is selected when the thing with this id is tapped; null for what is none, as START. */
+/** What is selected when the thing with this id is tapped. */
 export function selectionOf(state: State, id: string): Selection | null {
   const { doc } = state;
   if (!doc) return null;
+  if (id === "START" || id === "END") return { kind: "terminal", id };
   const kinds = { object: doc.objects, point: doc.points, orientation: doc.orientations, joints: doc.joints, action: doc.actions, logic: doc.logic };
   for (const [kind, record] of Object.entries(kinds)) if (id in record) return { kind: kind as Kind, id };
   return null;

@@ -17,7 +17,7 @@ interface Row {
   depth: number;
 }
 
-const ICONS: Record<Kind, IconName> = { object: "box", point: "point", orientation: "point", joints: "robot", action: "action", logic: "list" };
+const ICONS: Record<Kind, IconName> = { object: "box", point: "point", orientation: "point", joints: "robot", action: "action", logic: "list", terminal: "play" };
 
 /** Objects, then points below what they hang on, each with what is on it. */
 export function rowsOf(doc: OpenDocument): Row[] {
