@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     from arcor2_hw.kinematics.model import RobotModel
 
 NEAR_SINGULAR: Final = 0.02
-"""Smallest singular value, see `Dexterity`, below which a configuration counts as near a singularity: a wrist bent by
-1.6° less than it needs, where 10 mm/s at the tool ask for some 35°/s of a joint."""
+"""Smallest singular value, see `Dexterity`, below which a configuration counts as near a singularity. Of a UR5e that is
+a wrist within 2° of straight, where 0.1 rad/s at the tool ask for 250 °/s of a joint, or an elbow within 9°, where
+10 mm/s ask for 20 °/s."""
 NEAR_LIMIT: Final = 0.05
 """rad, or a twentieth of the range where that is shorter, from a limit within which a joint counts as near it."""
 
