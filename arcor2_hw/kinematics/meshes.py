@@ -51,10 +51,10 @@ def _parse(content: bytes, kind: str, name: str) -> tuple[Array, Triangles]:
 
     try:
         whole = trimesh.load_scene(io.BytesIO(content), file_type=kind, process=False, skip_materials=True).to_mesh()
+        vertices = np.asarray(whole.vertices, dtype=np.float64).reshape(-1, 3)
+        return vertices, np.asarray(whole.faces, dtype=np.int64).reshape(-1, 3)
     except Exception as error:
         raise BadMesh(f"The mesh {name} is damaged, or is none.", f"{type(error).__name__}: {error}") from error
-    vertices = np.asarray(whole.vertices, dtype=np.float64).reshape(-1, 3)
-    return vertices, np.asarray(whole.faces, dtype=np.int64).reshape(-1, 3)
 
 
 def _refuse_entities(content: bytes, name: str) -> None:

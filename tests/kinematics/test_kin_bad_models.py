@@ -1,6 +1,7 @@
 """What is wrong with a description, a package or a mesh is refused, by kind and by name."""
 
 import io
+import random
 import struct
 import zipfile
 from pathlib import Path
@@ -14,7 +15,7 @@ from arcor2_hw.kinematics.errors import BadMesh, JointLoop, MissingMesh, ModelEr
 from arcor2_hw.kinematics.meshes import read_mesh
 from arcor2_hw.kinematics.model import RobotModel
 from arcor2_hw.kinematics.shapes import Hull, TriangleMesh
-from tests.kinematics.kin_robots import joint, links, urdf
+from tests.kinematics.kin_robots import UR, joint, links, urdf
 
 GOOD = links("base", "arm") + joint("j", "base", "arm", xyz="0 0 1")
 
@@ -254,3 +255,37 @@ def test_a_flat_mesh_has_no_hull() -> None:
         RobotModel.load(content)
     with pytest.raises(ZeroLength, match="scaled to nothing"):
         RobotModel.load(packed(a_dot_urdf=with_shape('<mesh filename="f.stl" scale="1 0 1"/>'), f_dot_stl=CUBE_STL))
+
+
+# ------------------------------------------------------------------------------------------------ damage
+def damaged(content: bytes, chance: random.Random) -> bytes:
+    out = bytearray(content)
+    for _ in range(chance.choice((1, 2, 5, 30))):
+        at = chance.randrange(len(out) + 1)
+        match chance.randrange(3):
+            case 0:
+                out[at : at + 1] = bytes((chance.randrange(256),))
+            case 1:
+                del out[at : at + chance.randrange(40)]
+            case 2:
+                out[at:at] = chance.randbytes(chance.randrange(20))
+    return bytes(out)
+
+
+@pytest.mark.parametrize("kind", ["urdf", "zip", "stl", "obj", "ply", "off", "dae"])
+def test_whatever_is_damaged_is_read_or_refused_but_nothing_else(kind: str) -> None:
+    chance = random.Random(kind)
+    refused = 0
+    for _ in range(60):
+        try:
+            if kind == "urdf":
+                RobotModel.load(damaged((UR / "ur5e" / "ur5e.urdf").read_bytes(), chance), name="ur5e.urdf")
+            elif kind == "zip":
+                whole = packed(a_dot_urdf=with_shape('<mesh filename="c.stl"/>'), c_dot_stl=CUBE_STL)
+                RobotModel.load(damaged(whole, chance))
+            else:
+                exported = CUBE.export(file_type=kind)
+                read_mesh(damaged(exported if isinstance(exported, bytes) else exported.encode(), chance), f"m.{kind}")
+        except ModelError:
+            refused += 1
+    assert refused > 10
