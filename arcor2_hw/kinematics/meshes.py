@@ -1,6 +1,7 @@
 """Meshes from files: bounded before they are parsed, checked after; STL, OBJ, PLY, OFF and COLLADA."""
 
 import io
+import re
 from typing import Final
 
 import numpy as np
@@ -11,12 +12,15 @@ from arcor2_hw.kinematics.source import MAX_MESH
 
 MAX_TRIANGLES: Final = 1_000_000
 KINDS: Final = ("stl", "obj", "ply", "off", "dae")
+_UNIT: Final = re.compile(rb"<unit\b[^>]*?\bmeter\s*=\s*[\"']([^\"']*)[\"']")
 _FARTHEST: Final = 1e4
 """m: a vertex farther away than that is a mistake in the units at least."""
 
 
 def read_mesh(content: bytes, name: str, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> TriangleMesh:
     """Give the triangles of a mesh file, each axis multiplied by `scale`; `name` tells its kind by its ending.
+
+    Of COLLADA the unit is heeded and the up axis is not, as robots' descriptions have come to expect.
 
     Raises BadMesh naming the file: not of a known kind, larger than 64 MiB or a million triangles, damaged, empty,
     with numbers that are not finite or farther than 10 km.
@@ -26,9 +30,12 @@ def read_mesh(content: bytes, name: str, scale: tuple[float, float, float] = (1.
         raise BadMesh(f"The mesh {name} is of no kind that is known: {', '.join(KINDS)}.")
     if len(content) > MAX_MESH:
         raise BadMesh(f"The mesh {name} has {len(content)} bytes; at most {MAX_MESH} are taken.")
+    unit = 1.0
     if kind == "dae":
         _refuse_entities(content, name)
+        unit = _unit(content, name)
     vertices, triangles = _parse(content, kind, name)
+    vertices = vertices * unit
     if not len(triangles):
         raise BadMesh(f"The mesh {name} has no triangles.")
     if len(triangles) > MAX_TRIANGLES:
@@ -64,3 +71,15 @@ def _refuse_entities(content: bytes, name: str) -> None:
     lowered = content.lower()
     if b"<!doctype" in lowered or b"<!entity" in lowered:
         raise BadMesh(f"The mesh {name} has a document type, which is refused.")
+
+
+def _unit(content: bytes, name: str) -> float:
+    """Give the metres of a COLLADA file's unit."""
+    found = _UNIT.search(content)
+    try:
+        unit = float(found[1]) if found else 1.0
+    except ValueError:
+        unit = 0.0
+    if not 1e-6 <= unit <= 1e3:
+        raise BadMesh(f"The mesh {name} has a unit that is none.")
+    return unit

@@ -202,6 +202,18 @@ def test_a_cube_is_read_from_every_kind_and_scaled(kind: str) -> None:
     assert volume == pytest.approx(6.0)
 
 
+def test_the_unit_of_a_collada_file_is_heeded() -> None:
+    exported = CUBE.export(file_type="dae").decode()
+    for unit, factor in (
+        ('<unit name="inch" meter="0.0254"/>', 0.0254),
+        ("<unit meter='1e-3' name='mm'></unit>", 1e-3),
+    ):
+        mesh = read_mesh(exported.replace("<up_axis>", f"{unit}<up_axis>").encode(), "cube.dae")
+        assert np.allclose(np.ptp(mesh.vertices, axis=0), np.array((1.0, 2.0, 3.0)) * factor)
+    with pytest.raises(BadMesh, match=r"cube\.dae has a unit"):
+        read_mesh(exported.replace("<up_axis>", '<unit meter="0"/><up_axis>').encode(), "cube.dae")
+
+
 TRIANGLE = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
 
 
