@@ -98,6 +98,8 @@ async def test_joins_opens_the_project_and_sees_the_robot_move(closed: Place, br
         await screen.press(f"Open {place.project.name}")
         shown = await screen.item(place.robot)
         assert (shown["kind"], shown["name"], shown["endEffectors"]) == ("robot", "robot", [])
+        # Nothing was changed since it was saved, whoever else follows what is opened.
+        assert "not saved" not in (await screen.page.locator(".document").text_content() or "")
         actions = [action for point in place.project.action_points for action in point.actions]
         ids = set(await screen.page.evaluate("window.__engine.ids()"))
         assert {action.id for action in actions} | {item.id for item in place.project.logic} <= ids
@@ -207,7 +209,8 @@ async def test_nothing_is_too_small_covered_or_off_the_screen(closed: Place, bro
         await screen.page.get_by_role("button", name="Stop motion").wait_for()
         await tools.filter(has_text="Devices").click()
         await look(screen, "online")
-        await screen.page.evaluate("document.documentElement.dataset.hand = 'left'")
+        await screen.press("Settings")
+        await screen.page.get_by_role("menuitem", name="Controls for the left hand").click()
         await look(screen, "left hand")
         await screen.page.set_viewport_size(VIEWPORTS["phone"])  # type: ignore[arg-type]
         await screen.press("Make the panel larger")

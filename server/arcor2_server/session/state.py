@@ -308,14 +308,15 @@ class Session:
         scene_times = Times.of(scene)
         project_times = Times() if project is None else Times.of(project)
         await self._journal.rebase(Base(document.items(), 0, scene_times, project_times, ALL))
-        self._replace(document)
+        # Before it is told: who looks then keeps what he sees.
         self._scene_times, self._project_times = scene_times, project_times
+        self._replace(document)
 
     async def discard(self) -> None:
         """Close what is open; what is not saved is lost."""
         await self._journal.clear()
-        self._replace(Document())
         self._scene_times = self._project_times = Times()
+        self._replace(Document())
 
     def _replace(self, document: Document) -> None:
         self.document.retire()
