@@ -43,6 +43,26 @@ export async function holding<T>(id: string, work: () => Promise<T | undefined>,
   }
 }
 
+/** Do something for a form: gives why it was refused, to be shown where it happened; empty when it was done. */
+export async function refusal(work: () => Promise<unknown>): Promise<string> {
+  try {
+    await work();
+    return "";
+  } catch (error) {
+    return sentence(error);
+  }
+}
+
+/** As `holding`, but rejects with what was refused instead of telling it: for `refusal`. */
+export async function held<T>(id: string, work: () => Promise<T>, tree = false): Promise<T> {
+  await call("WriteLock", { object_id: id, lock_tree: tree });
+  try {
+    return await work();
+  } finally {
+    await call("WriteUnlock", { object_id: id }).catch(() => {});
+  }
+}
+
 export function sentence(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
 }

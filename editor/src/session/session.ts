@@ -11,6 +11,7 @@ import { applyEvent, now, setConnection, store, tell } from "../store/store";
 import { telemetry } from "../store/telemetry";
 import { followDocument, forgetFollowed } from "./following";
 import { forgetPresence, tellPresence } from "./presence";
+import { followPrograms, forgetPrograms } from "./programs";
 import { followRobots, forgetStreams } from "./streams";
 
 export const client = new ProtocolClient({ open: () => new WebSocket(address()) as never });
@@ -62,6 +63,7 @@ client.onState = (state, reason, code) => {
     forgetStreams();
     forgetFollowed();
     forgetPresence();
+    forgetPrograms();
     // What is held, who is there and what is under way is told anew; the view and the document stay.
     store.setState((known) => ({
       locks: {},
@@ -156,6 +158,7 @@ store.subscribe((state, before) => {
   followDocument(state);
   followRobots(state);
   tellPresence(state, now);
+  followPrograms(state);
   // The home screen is back: problems may have come or gone with what was edited.
   if (before.doc && !state.doc && state.connection.status === "ready") loadLists().catch(() => {});
 });

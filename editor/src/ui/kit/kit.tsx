@@ -10,6 +10,7 @@ import {
   TextField,
   type TextFieldProps,
 } from "react-aria-components";
+import { tell } from "../../store/store";
 import { Icon, type IconName } from "./icons";
 import { lazily } from "./lazily";
 import type { AskNameProps, ConfirmProps } from "./dialogs";
@@ -23,11 +24,22 @@ const MoreMenu = lazily(() => import("./menu"));
 
 export type Look = "" | "primary" | "plain" | "danger";
 
-export function Button({ look = "", icon, children, className, ...rest }: Omit<ButtonProps, "children" | "className"> & { look?: Look; icon?: IconName; children?: ReactNode; className?: string }) {
+interface PlainButtonProps extends Omit<ButtonProps, "children" | "className"> {
+  look?: Look;
+  icon?: IconName;
+  children?: ReactNode;
+  className?: string;
+  /** Why it cannot be pressed now, as a sentence: it looks so, and says it when it is pressed. Empty: it can. */
+  why?: string;
+}
+
+export function Button({ look = "", icon, children, className, why = "", onPress, ...rest }: PlainButtonProps) {
+  const press: ButtonProps["onPress"] = why ? () => tell("info", why) : onPress;
   return (
-    <AriaButton {...rest} className={`button ${look} ${className ?? ""}`}>
+    <AriaButton {...rest} onPress={press} aria-disabled={why !== "" || undefined} className={`button ${look} ${className ?? ""}`}>
       {icon && <Icon name={icon} />}
       {children}
+      {why && <span className="hidden-but-read">, not now: {why}</span>}
     </AriaButton>
   );
 }

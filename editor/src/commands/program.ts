@@ -1,0 +1,292 @@
+/** The program: actions, their parameters, the steps between them, project parameters and overrides. */
+
+import { call } from "../session/session";
+import { isRunning } from "../store/selectors";
+import type { State } from "../store/state";
+import { now, select, setUi, store, tell } from "../store/store";
+import type { Action, ActionParameter, ObjectAction, Orientation, Parameter, Position, ProjectLogicIf, Requests } from "../protocol/types";
+import { cannotLead, freeStep, incoming, outgoing, placeOf } from "../program/logic";
+import { actionNames, freeName, newOutputs } from "../program/naming";
+import { initial } from "../program/values";
+import { ask, barred, held, refusal, sentence } from "./asking";
+
+/** s within which an event that tells of what was just added has come. */
+const TOLD_WITHIN = 5;
+
+/** Give why the program cannot be edited by this request now; empty when it can. */
+export function notEditable(state: State, request: keyof Requests = "UpdateAction"): string {
+  if (!state.doc?.project) return "Open a project: a scene has no program.";
+  return barred(state, request) || (isRunning(state) ? "The program runs: stop it first." : "");
+}
+
+/** Wait for something that an event brings. Rejects when it does not come. */
+export function awaited<T>(find: (state: State) => T | undefined): Promise<T> {
+  return new Promise((resolve, reject) => {
+    const known = find(now());
+    if (known !== undefined) return resolve(known);
+    const timer = setTimeout(() => {
+      stop();
+      reject(new Error("The server has not told what became of it."));
+    }, TOLD_WITHIN * 1000);
+    const stop = store.subscribe((state) => {
+      const found = find(state);
+      if (found === undefined) return;
+      clearTimeout(timer);
+      stop();
+      resolve(found);
+    });
+  });
+}
+
+/** Where an action is to be put: on a point, or on a new one at a place. */
+export type Where = { pointId: string; orientationId?: string } | { position: Position; orientation: Orientation };
+
+/**
+ * Add an action with names for its results and what it needs: point, orientation. Gives its id, or undefined after
+ * telling why not.
+ */
+export async function addAction(objectId: string, meta: ObjectAction, where: Where): Promise<string | undefined> {
+  try {
+    const pointId = "pointId" in where ? where.pointId : await newPoint(meta.name, where.position);
+    const parameters = await startingParameters(objectId, meta, pointId, where);
+    const { doc } = now();
+    if (!doc) return undefined;
+    const name = freeName(meta.name, actionNames(doc));
+    const flows = [{ type: "default" as const, outputs: newOutputs(doc, meta.name, meta.returns.length) }];
+    await call("AddAction", { action_point_id: pointId, name, type: `${objectId}/${meta.name}`, parameters, flows });
+    const added = await awaited((state) => Object.values(state.doc?.actions ?? {}).find((each) => each.name === name));
+    select({ kind: "action", id: added.id });
+    return added.id;
+  } catch (error) {
+    tell("error", sentence(error));
+    return undefined;
+  }
+}
+
+async function newPoint(base: string, position: Position): Promise<string> {
+  const taken = Object.values(now().doc?.points ?? {}).map((each) => each.name);
+  const name = freeName(`${base}_point`, taken);
+  await call("AddActionPoint", { name, position });
+  return (await awaited((state) => Object.values(state.doc?.points ?? {}).find((each) => each.name === name))).id;
+}
+
+/** The tool looks down: what a gripper above a table needs. */
+export const DOWN: Orientation = { x: 1, y: 0, z: 0, w: 0 };
+
+async function orientationOf(pointId: string, where: Where): Promise<string> {
+  if ("pointId" in where && where.orientationId) return where.orientationId;
+  const on = (state: State) => Object.values(state.doc?.orientations ?? {}).find((each) => each.pointId === pointId)?.id;
+  const there = on(now());
+  if (there) return there;
+  const orientation = "orientation" in where ? where.orientation : DOWN;
+  await held(pointId, () => call("AddActionPointOrientation", { action_point_id: pointId, orientation, name: "default" }));
+  return awaited(on);
+}
+
+/** Joints of a robot on a point; taken from where it stands when there are none. */
+async function jointsOf(pointId: string, robotId: string): Promise<string> {
+  const on = (state: State) => Object.values(state.doc?.joints ?? {}).find((each) => each.pointId === pointId && each.robot_id === robotId)?.id;
+  const there = on(now());
+  if (there) return there;
+  const taken = Object.values(now().doc?.joints ?? {}).filter((each) => each.pointId === pointId).map((each) => each.name);
+  const name = freeName("default", taken);
+  await held(pointId, () => call("AddActionPointJointsUsingRobot", { action_point_id: pointId, robot_id: robotId, name }));
+  return awaited(on);
+}
+
+async function startingParameters(objectId: string, meta: ObjectAction, pointId: string, where: Where): Promise<ActionParameter[]> {
+  const parameters: ActionParameter[] = [];
+  for (const wanted of meta.parameters) {
+    const { name, type } = wanted;
+    const value =
+      type === "pose"
+        ? JSON.stringify(await orientationOf(pointId, where))
+        : type === "joints"
+          ? JSON.stringify(await jointsOf(pointId, objectId))
+          : type === "position"
+            ? JSON.stringify(pointId)
+            : await startingValue(objectId, wanted);
+    if (value === undefined) {
+      const other = imageFor(type);
+      if (!other) throw new Error(`${name} has to be the result of an earlier action: add that one first.`);
+      parameters.push({ name, type: "link", value: JSON.stringify(other) });
+    } else parameters.push({ name, type, value });
+  }
+  return parameters;
+}
+
+async function startingValue(objectId: string, wanted: ObjectAction["parameters"][number]): Promise<string | undefined> {
+  if (wanted.dynamic_value && wanted.default_value === undefined && wanted.type === "string") {
+    const values = await dynamicValues(objectId, wanted.name, []).catch(() => null);
+    if (values?.[0] !== undefined) return JSON.stringify(values[0]);
+  }
+  return initial(wanted);
+}
+
+/** A result of that type that there is already, as a link. */
+function imageFor(type: string): string | undefined {
+  const { doc, types } = now();
+  for (const action of Object.values(doc?.actions ?? {})) {
+    const [objectId = "", method] = action.type.split("/");
+    const returns = types.actions[doc?.objects[objectId]?.type ?? ""]?.find((each) => each.name === method)?.returns ?? [];
+    const index = returns.indexOf(type);
+    if (index >= 0 && action.flows[0]?.outputs[index]) return `${action.id}/default/${index}`;
+  }
+  return undefined;
+}
+
+/** The last known values of dynamic parameters, so that they can be chosen offline too. */
+const dynamicKnown = new Map<string, string[]>();
+const dynamicKey = (objectId: string, name: string, parents: { id: string; value: string }[]) => JSON.stringify([objectId, name, parents]);
+
+export function lastDynamicValues(objectId: string, name: string, parents: { id: string; value: string }[]): string[] | undefined {
+  return dynamicKnown.get(dynamicKey(objectId, name, parents));
+}
+
+/** The values that a parameter may take now, as the live device knows them. Rejects when it cannot be asked. */
+export async function dynamicValues(objectId: string, name: string, parents: { id: string; value: string }[]): Promise<string[]> {
+  const values = await call("ActionParamValues", { id: objectId, param_id: name, parent_params: parents });
+  dynamicKnown.set(dynamicKey(objectId, name, parents), values);
+  return values;
+}
+
+// ------------------------------------------------------------------------------------------------ actions
+
+/** Change one parameter; gives why not, for the form. */
+export const setParameter = (actionId: string, parameter: ActionParameter): Promise<string> =>
+  refusal(() =>
+    held(actionId, () => {
+      const action = now().doc?.actions[actionId];
+      if (!action) throw new Error("The action is gone.");
+      const rest = action.parameters.filter((each) => each.name !== parameter.name);
+      return call("UpdateAction", { action_id: actionId, parameters: [...rest, parameter] });
+    }),
+  );
+
+/** Name the results of an action; gives why not. */
+export const nameResults = (actionId: string, outputs: string[]): Promise<string> =>
+  refusal(() => held(actionId, () => call("UpdateAction", { action_id: actionId, flows: [{ type: "default", outputs }] })));
+
+export const renameAction = (action_id: string, new_name: string): Promise<string> =>
+  refusal(() => held(action_id, () => call("RenameAction", { action_id, new_name })));
+
+/** Another one of the same kind beside it, with results of its own and no steps. */
+export async function duplicateAction(action: Action & { pointId: string }): Promise<void> {
+  const { doc } = now();
+  if (!doc) return;
+  const name = freeName(action.name, actionNames(doc));
+  const count = action.flows[0]?.outputs.length ?? 0;
+  const flows = [{ type: "default" as const, outputs: newOutputs(doc, action.type.split("/")[1] ?? action.name, count) }];
+  if (!(await ask("AddAction", { action_point_id: action.pointId, name, type: action.type, parameters: action.parameters, flows }))) return;
+  const added = await awaited((state) => Object.values(state.doc?.actions ?? {}).find((each) => each.name === name)).catch(() => null);
+  if (added) select({ kind: "action", id: added.id });
+}
+
+/**
+ * Remove an action and its steps. Where one way alone leads on from it, what led to it leads there instead.
+ */
+export async function removeAction(id: string): Promise<void> {
+  const { doc } = now();
+  const name = doc?.actions[id]?.name;
+  if (!doc || name === undefined) return;
+  const ways = outgoing(doc, id);
+  const next = ways.length === 1 && !ways[0]?.condition ? placeOf(ways[0]?.end ?? "") : undefined;
+  const steps = incoming(doc, id);
+  try {
+    for (const way of ways) await call("RemoveLogicItem", { logic_item_id: way.id });
+    for (const { id: item, start, condition } of steps) {
+      if (next && cannotLead(now().doc ?? doc, placeOf(start), next, item) === "") {
+        await call("UpdateLogicItem", { logic_item_id: item, start, end: next, condition });
+      } else await call("RemoveLogicItem", { logic_item_id: item });
+    }
+    await call("RemoveAction", { id });
+  } catch (error) {
+    tell("error", sentence(error));
+    return;
+  }
+  const edits = ways.length + steps.length + 1;
+  tell("info", edits === 1 ? `Removed ${name}.` : `Removed ${name} with its steps, in ${edits} edits that can be undone one by one.`);
+}
+
+// ------------------------------------------------------------------------------------------------ steps
+
+/** Begin a step: the next tap on an action says where it leads. */
+export function beginStep(from: string, condition?: ProjectLogicIf, item?: string): void {
+  setUi({ connecting: { from, condition, item } });
+}
+
+export const cancelStep = (): void => setUi({ connecting: null });
+
+/** The step that was begun leads here. */
+export async function endStep(to: string): Promise<void> {
+  const { connecting } = now().ui;
+  if (!connecting) return;
+  cancelStep();
+  const { from, condition, item } = connecting;
+  if (item !== undefined) {
+    const step = now().doc?.logic[item];
+    if (step && (await updateStep(item, step.start, to, step.condition))) select({ kind: "logic", id: item });
+  } else await connect(from, to, condition);
+}
+
+/** Let `to` follow `from`, under a condition that is still free unless one is given. Tells why not. */
+export async function connect(from: string, to: string, condition?: ProjectLogicIf): Promise<void> {
+  const { doc, types } = now();
+  if (!doc) return;
+  const why = cannotLead(doc, from, to);
+  if (why) return tell("info", why);
+  let given = condition;
+  if (!given) {
+    const free = freeStep(doc, types, from);
+    if (typeof free === "string") return tell("info", free);
+    given = free.condition;
+    if (free.first && !(await updateStep(free.first.item.id, free.first.item.start, free.first.item.end, free.first.condition))) return;
+  }
+  if (!(await ask("AddLogicItem", { start: from, end: to, condition: given }))) return;
+  const added = await awaited((state) => Object.values(state.doc?.logic ?? {}).find((each) => each.start === from && each.end === to)).catch(() => null);
+  if (added) select({ kind: "logic", id: added.id });
+}
+
+export const updateStep = (logic_item_id: string, start: string, end: string, condition: ProjectLogicIf | undefined) =>
+  ask("UpdateLogicItem", { logic_item_id, start, end, condition });
+
+/** As `updateStep`, for a form. */
+export const setCondition = (id: string, condition: ProjectLogicIf | undefined): Promise<string> =>
+  refusal(() => {
+    const step = now().doc?.logic[id];
+    if (!step) throw new Error("The step is gone.");
+    return call("UpdateLogicItem", { logic_item_id: id, start: step.start, end: step.end, condition });
+  });
+
+export const removeStep = (logic_item_id: string) => ask("RemoveLogicItem", { logic_item_id });
+
+/** Put an action, START or END somewhere else in the view, for all; undefined: back to where it belongs. */
+export const placePuck = (id: string, position: Position | null) => {
+  const document = now().doc?.project?.id ?? "";
+  const key = `place/${id}`;
+  const before = now().view.shared;
+  const { [key]: _, ...rest } = before;
+  // The one event that is not sent to who makes the change.
+  store.setState((state) => ({ view: { ...state.view, shared: position ? { ...rest, [key]: position } : rest } }));
+  return ask("SetViewState", { scope: "shared", document, values: { [key]: position } }).then((done) => {
+    if (!done) store.setState((state) => ({ view: { ...state.view, shared: before } }));
+  });
+};
+
+// ------------------------------------------------------------------------------------------------ parameters
+
+export const addParameter = (name: string, type: string, value: string): Promise<string> => refusal(() => call("AddProjectParameter", { name, type, value }));
+export const updateParameter = (id: string, change: { name?: string; value?: string }): Promise<string> =>
+  refusal(() => held(id, () => call("UpdateProjectParameter", { id, ...change })));
+export const removeParameter = (id: string) => ask("RemoveProjectParameter", { id });
+
+/** Let the project replace a setting of a device, or no longer (`value` undefined). */
+export const override = (objectId: string, setting: Omit<Parameter, "value">, value: string | undefined): Promise<string> =>
+  refusal(() =>
+    held(objectId, async () => {
+      const known = now().doc?.overrides[objectId]?.[setting.name];
+      if (value === undefined) {
+        if (known) await call("DeleteOverride", { id: objectId, override: known });
+      } else await call(known ? "UpdateOverride" : "AddOverride", { id: objectId, override: { ...setting, value } });
+    }),
+  );

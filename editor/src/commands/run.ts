@@ -1,0 +1,63 @@
+/** Running: the open project, packages, single actions; breakpoints. */
+
+import { call, serves } from "../session/session";
+import { isRunning } from "../store/selectors";
+import type { State } from "../store/state";
+import { now, tell } from "../store/store";
+import { ask, barred, sentence } from "./asking";
+
+/** s: a build copies the code of the drivers, and a busy machine is slow. */
+const BUILT_WITHIN = 120;
+
+/** Give why the open project cannot be run now; empty when it can. */
+export function notRunnable(state: State): string {
+  if (!state.doc?.project) return "Open a project: a scene alone cannot be run.";
+  if (isRunning(state)) return "It runs already.";
+  if (state.live.state === "starting" || state.live.state === "stopping") return "Wait until the devices are online or offline.";
+  if (state.live.executing) return "An action is being tried: wait for it, or cancel it.";
+  return barred(state, "TemporaryPackage");
+}
+
+/** Run the open project, saved before where that is needed; gives whether it was begun. */
+export async function run({ paused = false } = {}): Promise<boolean> {
+  try {
+    if (now().doc?.unsaved) await call("SaveProject");
+    const shared = serves("SetBreakpoints") ? { shared_breakpoints: true } : { breakpoints: Object.keys(now().breakpoints) };
+    await call("TemporaryPackage", { start_paused: paused, ...shared }, { deadline: BUILT_WITHIN });
+    return true;
+  } catch (error) {
+    tell("error", `Not run. ${sentence(error)}`);
+    return false;
+  }
+}
+
+export const runPackage = (id: string, paused = false) =>
+  ask("RunPackage", { id, start_paused: paused, ...(serves("SetBreakpoints") ? { shared_breakpoints: true } : {}) }, { deadline: BUILT_WITHIN });
+export const pause = () => ask("PausePackage");
+export const resume = () => ask("ResumePackage");
+export const step = () => ask("StepAction");
+/** At once, without a question: what has been stopped can be run again. */
+export const stop = () => ask("StopPackage");
+
+/** Make a package of the open project, saved before where that is needed. */
+export async function build(name: string): Promise<boolean> {
+  const { doc } = now();
+  if (!doc?.project) return false;
+  if (doc.unsaved && !(await ask("SaveProject"))) return false;
+  const built = await ask("BuildProject", { project_id: doc.project.id, package_name: name }, { deadline: BUILT_WITHIN });
+  if (built) tell("info", `The package ${name} is built.`);
+  return built !== undefined;
+}
+
+/** Set the breakpoints of a point or action, or take them away. */
+export const breakAt = (id: string, on: boolean) => ask("SetBreakpoints", on ? { add: [id] } : { remove: [id] });
+
+/** Run, and pause before this action. */
+export async function runTo(id: string): Promise<void> {
+  if (!(id in now().breakpoints) && !(await breakAt(id, true))) return;
+  await run();
+}
+
+/** Try one action on the devices; how it ends is told by events. */
+export const execute = (action_id: string) => ask("ExecuteAction", { action_id });
+export const cancel = () => ask("CancelAction");

@@ -1,0 +1,132 @@
+/** What is wrong with a program before it is run: each fault in words, and where it is. */
+
+import type { OpenDocument, State } from "../store/state";
+import { decoded } from "./values";
+import { after, END, incoming, linkTo, metaOf, outgoing, placeOf, resultAt, resultsOf, START } from "./logic";
+
+export interface Problem {
+  /** Of the thing that has it; what a tap leads to. */
+  id: string;
+  text: string;
+  /** Without it the program could still be run. */
+  level: "error" | "warn";
+}
+
+export function problemsOf(doc: OpenDocument, types: State["types"], reach: State["reach"] = {}): Problem[] {
+  const { project } = doc;
+  if (!project) return [];
+  const found: Problem[] = [];
+  const error = (id: string, text: string) => found.push({ id, text, level: "error" });
+  const warn = (id: string, text: string) => found.push({ id, text, level: "warn" });
+  if (project.has_logic) ofLogic(doc, types, error, warn);
+  for (const action of Object.values(doc.actions)) {
+    ofAction(doc, types, action, error, warn);
+  }
+  const used = poses(doc);
+  for (const { items } of Object.values(reach)) {
+    for (const { id, reach: how, reason } of items) {
+      if ((how === "out_of_reach" || how === "in_collision") && used.has(id)) {
+        for (const user of used.get(id) ?? []) {
+          warn(user, `${doc.actions[user]?.name}: ${reason ?? (how === "in_collision" ? "the robot would touch something there." : "the robot does not reach there.")}`);
+        }
+      }
+    }
+  }
+  return found;
+}
+
+type Tell = (id: string, text: string) => void;
+
+function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Tell): void {
+  const used = after(doc, START);
+  if (outgoing(doc, START).length === 0) error(START, "Nothing follows Start: connect it to the first action.");
+  for (const action of Object.values(doc.actions)) {
+    const ways = outgoing(doc, action.id);
+    if (!used.has(action.id)) {
+      const loose = incoming(doc, action.id).length === 0;
+      warn(action.id, loose ? `${action.name} is never run: nothing leads to it.` : `${action.name} is never run: no way from Start leads there.`);
+      continue;
+    }
+    if (ways.length === 0) {
+      error(action.id, `Nothing follows ${action.name}: connect it to the next action, or to End.`);
+      continue;
+    }
+    const conditions = ways.flatMap((way) => (way.condition ? [way.condition] : []));
+    const otherwise = ways.length > conditions.length;
+    const first = conditions[0];
+    if (!first || otherwise) continue;
+    const result = resultAt(doc, types, first.what);
+    const both = conditions.some((each) => each.value === "true") && conditions.some((each) => each.value === "false");
+    if (!both) {
+      const bool = first.value === "true" || first.value === "false";
+      const missing = bool ? `${result?.name ?? "its result"} is ${first.value === "true" ? "no" : "yes"}` : "no condition holds";
+      error(action.id, `Nothing follows ${action.name} when ${missing}.`);
+    }
+  }
+  for (const item of Object.values(doc.logic)) {
+    if (item.condition && !resultAt(doc, types, item.condition.what) && typesKnown(doc, types)) {
+      error(item.id, `A step from ${doc.actions[placeOf(item.start)]?.name ?? "an action"} asks for a result that does not exist any more.`);
+    }
+  }
+  if (!Object.values(doc.logic).some((item) => placeOf(item.end) === END) && Object.keys(doc.actions).length > 0 && outgoing(doc, START).length > 0) {
+    error(END, "No way leads to End.");
+  }
+}
+
+function typesKnown(doc: OpenDocument, types: State["types"]): boolean {
+  return Object.values(doc.objects).every((object) => object.type in types.actions);
+}
+
+function ofAction(doc: OpenDocument, types: State["types"], action: OpenDocument["actions"][string], error: Tell, warn: Tell): void {
+  const [objectId = ""] = action.type.split("/");
+  const object = doc.objects[objectId];
+  if (!object) return error(action.id, `${action.name}: its device is not in the scene any more.`);
+  if (!(object.type in types.actions)) return;
+  const meta = metaOf(types, doc, action);
+  if (!meta) return error(action.id, `${action.name}: ${object.name} cannot do this any more.`);
+  if (meta.disabled) error(action.id, `${action.name}: ${meta.problem ?? "this action cannot be used."}`);
+  for (const wanted of meta.parameters) {
+    const parameter = action.parameters.find((each) => each.name === wanted.name);
+    const value = decoded(parameter?.value);
+    if (!parameter) {
+      if (wanted.default_value === undefined) error(action.id, `${action.name}: ${wanted.name} is missing.`);
+    } else if (parameter.type === "project_parameter") {
+      if (!(String(value) in doc.parameters)) error(action.id, `${action.name}: the parameter for ${wanted.name} is gone.`);
+    } else if (parameter.type === "link") {
+      const result = resultAt(doc, types, String(value));
+      if (!result) error(action.id, `${action.name}: the result for ${wanted.name} is gone.`);
+      else if (doc.project?.has_logic && !after(doc, result.action.id).has(action.id)) {
+        warn(action.id, `${action.name}: ${wanted.name} uses a result of ${result.action.name}, which does not come before it.`);
+      }
+    } else if (wanted.type === "joints" && doc.joints[String(value)]?.is_valid === false) {
+      warn(action.id, `${action.name}: the joints ${doc.joints[String(value)]?.name} were taken before their point was moved.`);
+    }
+  }
+}
+
+/** Orientations and joints by the actions that use them. */
+function poses(doc: OpenDocument): Map<string, string[]> {
+  const found = new Map<string, string[]>();
+  for (const action of Object.values(doc.actions)) {
+    for (const { type, value } of action.parameters) {
+      if (type !== "pose" && type !== "joints") continue;
+      const id = String(decoded(value));
+      found.set(id, [...(found.get(id) ?? []), action.id]);
+    }
+  }
+  return found;
+}
+
+/** Names of what uses a project parameter or a result of an action. */
+export function usersOf(doc: OpenDocument, types: State["types"], of: { parameter: string } | { action: string }): string[] {
+  const users: string[] = [];
+  const links = new Set("action" in of ? (doc.actions[of.action] ? resultsOf(doc, types, doc.actions[of.action] as never).map(linkTo) : []) : []);
+  for (const action of Object.values(doc.actions)) {
+    const uses = action.parameters.some(({ type, value }) => {
+      const id = String(decoded(value));
+      return "parameter" in of ? type === "project_parameter" && id === of.parameter : type === "link" && links.has(id);
+    });
+    if (uses) users.push(action.id);
+  }
+  return users;
+}

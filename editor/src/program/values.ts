@@ -1,0 +1,131 @@
+/** Values of parameters: how they are written, read, and checked before the server sees them. */
+
+import type { ActionParameter, ParameterMeta } from "../protocol/types";
+
+/** What an action says of a parameter beside its type. */
+export interface Extra {
+  minimum?: number;
+  maximum?: number;
+  allowed_values?: (number | string)[];
+  unit?: string;
+}
+
+export type Source = "value" | "link" | "project_parameter";
+
+/** Types that a project parameter may have. */
+export const SIMPLE = ["integer", "double", "boolean", "string"] as const;
+export type Simple = (typeof SIMPLE)[number];
+
+export const TYPE_WORDS: Record<string, string> = {
+  integer: "whole number",
+  double: "number",
+  boolean: "yes or no",
+  string: "text",
+  string_enum: "choice",
+  integer_enum: "choice",
+  pose: "pose",
+  position: "position",
+  joints: "joints",
+  image: "picture",
+  relative_pose: "relative pose",
+};
+
+export function extraOf(meta: Pick<ParameterMeta, "extra"> | undefined): Extra {
+  if (!meta?.extra) return {};
+  try {
+    return (JSON.parse(meta.extra) as Extra | null) ?? {};
+  } catch {
+    return {};
+  }
+}
+
+export function sourceOf(parameter: ActionParameter): Source {
+  return parameter.type === "link" || parameter.type === "project_parameter" ? parameter.type : "value";
+}
+
+/** The JSON in a value; undefined when it is none. */
+export function decoded(json: string | undefined): unknown {
+  if (json === undefined) return undefined;
+  try {
+    return JSON.parse(json);
+  } catch {
+    return undefined;
+  }
+}
+
+/** A value as it stands in a field. */
+export function textOf(type: string, json: string | undefined): string {
+  const value = decoded(json);
+  if (value === undefined || value === null) return "";
+  if (typeof value === "string") return value;
+  if (typeof value === "boolean") return value ? "yes" : "no";
+  return type.endsWith("pose") || typeof value === "object" ? JSON.stringify(value) : String(value);
+}
+
+export type Read = { json: string } | { problem: string };
+
+/** Read what stands in a field: JSON as the server takes it, or what is wrong, as a sentence. */
+export function read(type: string, text: string, extra: Extra = {}): Read {
+  const clean = text.trim();
+  switch (type) {
+    case "string":
+      return { json: JSON.stringify(text) };
+    case "boolean":
+      return { json: /^(yes|true|1|on)$/i.test(clean) ? "true" : "false" };
+    case "integer":
+    case "double":
+      return readNumber(type, clean, extra);
+    case "integer_enum":
+      return { json: String(Number(clean)) };
+    case "relative_pose":
+      return decoded(clean) === undefined ? { problem: "This is no pose." } : { json: clean };
+    default:
+      return clean ? { json: JSON.stringify(clean) } : { problem: "Choose one." };
+  }
+}
+
+function readNumber(type: "integer" | "double", text: string, { minimum, maximum }: Extra): Read {
+  const value = Number(text.replace(",", "."));
+  if (text === "" || !Number.isFinite(value)) return { problem: "Type a number." };
+  if (type === "integer" && !Number.isInteger(value)) return { problem: "Type a whole number." };
+  if (minimum !== undefined && value < minimum) return { problem: `At least ${minimum}.` };
+  if (maximum !== undefined && value > maximum) return { problem: `At most ${maximum}.` };
+  return { json: type === "double" ? double(value) : String(value) };
+}
+
+/** A double needs its fraction on the wire. */
+export function double(value: number): string {
+  const text = String(value);
+  return /[.e]/.test(text) ? text : `${text}.0`;
+}
+
+/** The value that a parameter of a simple type gets when nobody has said one; undefined where there is none. */
+export function initial(meta: ParameterMeta): string | undefined {
+  if (meta.default_value !== undefined) return meta.default_value;
+  const { minimum, maximum, allowed_values } = extraOf(meta);
+  const least = Math.min(Math.max(0, minimum ?? 0), maximum ?? Infinity);
+  switch (meta.type) {
+    case "boolean":
+      return "false";
+    case "integer":
+      return String(Math.ceil(least));
+    case "double":
+      return double(least);
+    case "string":
+      return '""';
+    case "string_enum":
+    case "integer_enum":
+      return allowed_values?.length ? JSON.stringify(allowed_values[0]) : undefined;
+    default:
+      return undefined;
+  }
+}
+
+/** The range as words, with its unit; empty where there is none. */
+export function rangeWords({ minimum, maximum, unit = "" }: Extra): string {
+  const tail = unit ? ` ${unit}` : "";
+  if (minimum !== undefined && maximum !== undefined) return `${minimum} to ${maximum}${tail}`;
+  if (minimum !== undefined) return `at least ${minimum}${tail}`;
+  if (maximum !== undefined) return `at most ${maximum}${tail}`;
+  return "";
+}
