@@ -28,11 +28,7 @@ import { DARK, LIGHT, type Palette } from "./palette";
 import { type Hit, onFloor, pick } from "./picking";
 import { worldPose } from "./poses";
 import type { Context, Thing } from "./thing";
-import { LinkThing } from "./things/link";
-import { ObjectThing } from "./things/object";
-import { OrientationThing } from "./things/orientation";
-import { PointThing } from "./things/point";
-import { PuckThing } from "./things/puck";
+import { make } from "./things/make";
 import { RobotThing } from "./things/robot";
 
 export type Quality = "low" | "high";
@@ -114,7 +110,7 @@ export class Engine {
     this.light();
     this.setDark(options.dark);
     this.ends.push(options.telemetry.subscribe((id) => this.reported(id)));
-    const ageing = setInterval(() => this.checkAges(), 500);
+    const ageing = setInterval(() => this.checkAges(), 250);
     this.ends.push(() => clearInterval(ageing));
     const watch = new ResizeObserver(() => this.resize());
     watch.observe(canvas.parentElement ?? canvas);
@@ -390,22 +386,5 @@ export class Engine {
       canvas.removeEventListener("pointerup", up);
       canvas.removeEventListener("pointermove", move);
     });
-  }
-}
-
-function make(item: Item, context: Context): Thing {
-  switch (item.kind) {
-    case "object":
-      return new ObjectThing(item, context) as Thing;
-    case "robot":
-      return new RobotThing(item, context) as Thing;
-    case "point":
-      return new PointThing(item, context) as Thing;
-    case "orientation":
-      return new OrientationThing(item, context) as Thing;
-    case "action":
-      return new PuckThing(item, context) as Thing;
-    case "logic":
-      return new LinkThing(item, context) as Thing;
   }
 }
