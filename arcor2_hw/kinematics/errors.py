@@ -51,3 +51,33 @@ class OnlyInCollision(KinematicsError):
     """All joints found that reach the pose are in collision; the message names a pair."""
 
     code = "in_collision"
+
+
+class StartInCollision(KinematicsError):
+    """A robot is in collision, by what is known, where it stands; the message names a pair."""
+
+    code = "start_in_collision"
+
+
+class GoalInCollision(KinematicsError):
+    """A robot would be in collision with the joints that are asked for; the message names a pair."""
+
+    code = "goal_in_collision"
+
+
+class MotionInCollision(KinematicsError):
+    """A motion that must go as it was asked for would lead into something; the message names a pair."""
+
+    code = "motion_in_collision"
+
+
+class NoPath(KinematicsError):
+    """No way free of collision was found in the time given; there may be one."""
+
+    code = "no_path"
+
+
+class NoStraightLine(KinematicsError):
+    """An end effector cannot be led straight to a pose: out of reach on the way, or joints would have to turn over."""
+
+    code = "no_straight_line"

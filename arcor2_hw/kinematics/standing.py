@@ -97,8 +97,12 @@ class StandingRobot:
         self.parts.append(Part(name, link, held, body, origin, geometry, coal.CollisionObject(geometry)))
 
     # -------------------------------------------------------------------------------- moving
-    def pose(self, q: Array, everything: bool = False) -> None:
-        """Put the parts where joint values lead, their boxes wider by the margin; `everything`: those at rest too."""
+    def pose(self, q: Array, everything: bool = False, more: float = 0.0) -> None:
+        """Put the parts where joint values lead, their boxes wider by the margin and `more`.
+
+        `everything`: those at rest too.
+        """
+        margin = self.margin + more
         pin.updateGeometryPlacements(self.tree.model, self.tree.data, self._geometry, self._data, self.tree.expand(q))
         placements = self._data.oMg
         for number in range(len(self.parts)) if everything else self.moving:
@@ -106,8 +110,8 @@ class StandingRobot:
             placed.setTranslation(body.translation)
             placed.setRotation(body.rotation)
             placed.computeAABB()
-            if self.margin:
-                placed.getAABB().expand(self.margin)
+            if margin:
+                placed.getAABB().expand(margin)
         self.manager.update()
 
     def box(self, q: Array) -> Array:

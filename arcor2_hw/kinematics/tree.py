@@ -43,6 +43,11 @@ class Tree:
         """Give the values of all joints of Pinocchio's model."""
         return np.asarray(self._factors @ q + self._offsets) if self.has_mimics else q
 
+    @property
+    def coupling(self) -> Array:
+        """Give by how much (m, n) the n joints that do not mimic move the m joints of Pinocchio's model."""
+        return self._factors
+
     def frames(self, q: Array) -> dict[str, Array]:
         """Give the frame of each link, (4, 4)."""
         pin.forwardKinematics(self.model, self.data, self.expand(q))

@@ -59,15 +59,18 @@ class CollisionWorld(Contents):
 
         Its other joints, other robots and the bodies are taken as they are now. Raises NotFound.
         """
+        return not self.robot(robot).hits_itself(q) and self.is_free_around(robot, q)
+
+    def is_free_around(self, robot: str, q: Array, more: float = 0.0) -> bool:
+        """Tell whether a robot, with what it holds, is `more` m farther than the margin from all that is around it."""
         mine = self.robot(robot)
-        if mine.hits_itself(q):
-            return False
-        mine.pose(q)
-        if self._bodies and self._collides(self._manager, mine.manager):
+        mine.pose(q, more=more)
+        margin = self.margin + more
+        if self._bodies and self._collides(self._manager, mine.manager, margin):
             return False
         if not self._apart and len(self.robots) == 1:
             return True
-        return next(self._contacts_around(mine, self._apart.values()), None) is None
+        return next(self._contacts_around(mine, self._apart.values(), margin), None) is None
 
     def contacts(self, robot: str, q: Array) -> list[Contact]:
         """Give everything that a robot in joint values, or what it holds, is in collision with. Raises NotFound."""
@@ -78,10 +81,10 @@ class CollisionWorld(Contents):
             for one, two in mine.pairs
             if (depth := _depth(mine.parts[one].object, mine.parts[two].object, 0.0)) is not None
         ]
-        found += self._contacts_around(mine, self._bodies.values())
+        found += self._contacts_around(mine, self._bodies.values(), self.margin)
         return list({(each.first, each.second): each for each in found}.values())
 
-    def _contacts_around(self, mine: StandingRobot, bodies: Iterable[Body]) -> Iterator[Contact]:
+    def _contacts_around(self, mine: StandingRobot, bodies: Iterable[Body], margin: float) -> Iterator[Contact]:
         """Give contacts of a robot that is posed already with bodies, and with other robots."""
         every = list(bodies)
         boxes = np.array([body.box for body in every]).reshape(-1, 2, 3)
@@ -92,13 +95,13 @@ class CollisionWorld(Contents):
                 body = every[index]
                 if self._may_touch(part, mine.name, (body.name,)):
                     continue
-                if (depth := _depth(part.object, body.object, self.margin)) is not None:
+                if (depth := _depth(part.object, body.object, margin)) is not None:
                     yield Contact(_name(mine, part), body.name, depth)
         for other in self.robots.values():
             if other is not mine:
-                yield from self._contacts_between(mine, other)
+                yield from self._contacts_between(mine, other, margin)
 
-    def _contacts_between(self, mine: StandingRobot, other: StandingRobot) -> Iterator[Contact]:
+    def _contacts_between(self, mine: StandingRobot, other: StandingRobot, margin: float) -> Iterator[Contact]:
         other.pose(other.q, everything=True)
         for part in mine.parts:
             low, high = corners(part.object)
@@ -109,13 +112,13 @@ class CollisionWorld(Contents):
                 names = (their.name,) if their.held is not None else (other.name, f"{other.name}/{their.link}")
                 if self._may_touch(part, mine.name, names):
                     continue
-                if (depth := _depth(part.object, their.object, self.margin)) is not None:
+                if (depth := _depth(part.object, their.object, margin)) is not None:
                     yield Contact(_name(mine, part), _name(other, their), depth)
 
-    def _collides(self, one: Any, other: Any) -> bool:
+    def _collides(self, one: Any, other: Any, margin: float) -> bool:
         callback = coal.CollisionCallBackDefault()
         callback.init()
-        callback.data.request.security_margin = self.margin
+        callback.data.request.security_margin = margin
         one.collide(other, callback)
         return bool(callback.data.result.isCollision())
 

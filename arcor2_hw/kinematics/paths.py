@@ -1,0 +1,148 @@
+"""Ways through joint values: the straight line of an end effector, corners rounded where there is room.
+
+A way is a list of waypoints, the arm's joint values, straight in joint space between: all joints in proportion.
+"""
+
+import itertools
+from collections.abc import Callable, Sequence
+from typing import Final
+
+import numpy as np
+
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.kinematics.arm import NEAR_SINGULAR, Arm
+from arcor2_hw.kinematics.errors import MotionInCollision, NoStraightLine
+from arcor2_hw.kinematics.inverse import InverseKinematics
+from arcor2_hw.kinematics.shapes import Array
+from arcor2_hw.kinematics.sweep import Sweep
+
+OFF_LINE: Final = 0.0005
+"""m that the end effector may be beside its line between two waypoints."""
+OFF_TURN: Final = 0.005
+"""rad that its orientation may be beside the one that it should have there."""
+PIECE: Final = 0.05
+"""m of a line that is taken at once at most; it is cut where that is too much."""
+TURN: Final = 0.2
+"""rad of a turn, likewise."""
+_HALVINGS: Final = 10
+_ROUNDED: Final = 0.4
+"""Share of the shorter segment at a corner that is given to its rounding at most."""
+_CORNER_POINTS: Final = 8
+_TRIES: Final = 4
+
+
+def between(a: Pose, b: Pose, share: float) -> Pose:
+    """Give the pose at a share of the way from `a` to `b`: position in a line, turning about one axis."""
+    turn = (a.orientation.inverted() * b.orientation).rotation_vector()
+    rotated = a.orientation * Orientation.from_rotation_vector(*(share * part for part in turn))
+    start, way = a.position, b.position - a.position
+    return Pose(Position(start.x + share * way.x, start.y + share * way.y, start.z + share * way.z), rotated)
+
+
+def straight_line(arm: Arm, start: Array, target: Array, name: str = "") -> list[Array]:
+    """Give waypoints that lead the end effector from where `start` has it in a straight line to a pose.
+
+    `target` is (4, 4) in the model's root frame. Between waypoints the end effector is within OFF_LINE and OFF_TURN of
+    the line. Raises OutOfReach for the pose itself; NoStraightLine, saying where it breaks and what of: reach, a limit,
+    a singularity.
+    """
+    return _Line(arm, start, Pose.from_matrix(target), name or arm.model.name).waypoints(start)
+
+
+class _Line:
+    def __init__(self, arm: Arm, start: Array, target: Pose, name: str) -> None:
+        self._arm, self._inverse, self._name = arm, InverseKinematics(arm), name
+        self._from, self._to = arm.pose(start), target
+        self._length = self._from.position.distance_to(target.position)
+        self._turns = int(np.count_nonzero(arm.rows >= 3)) == 3
+        if not self._turns:  # some turn does not matter, and comes as it may
+            self._from = Pose(self._from.position, target.orientation)
+
+    def waypoints(self, start: Array) -> list[Array]:
+        angle = self._from.orientation.angle_to(self._to.orientation) if self._turns else 0.0
+        count = max(1, int(np.ceil(self._length / PIECE)), int(np.ceil(angle / TURN)))
+        way, before = [start], 0.0
+        if next(self._inverse.candidates(self._to.matrix(), start), None) is None:
+            self._inverse.solve(self._to.matrix(), start)  # raises
+        for number in range(1, count + 1):
+            share = number / count
+            way += self._piece(way[-1], before, share, _HALVINGS)
+            before = share
+        return way
+
+    def _piece(self, q: Array, here: float, there: float, halvings: int) -> list[Array]:
+        """Give the waypoints behind `q`, which is at the share `here`, to the share `there`."""
+        pose = between(self._from, self._to, there)
+        after = next(self._inverse.candidates(pose.matrix(), q), None)
+        if after is not None and self._keeps((q + after) / 2.0, (here + there) / 2.0):
+            return [after]
+        if halvings == 0:
+            raise NoStraightLine(self._why(q, there, after), f"at {there:.3f} of the way")
+        middle = (here + there) / 2.0
+        first = self._piece(q, here, middle, halvings - 1)
+        return first + self._piece(first[-1], middle, there, halvings - 1)
+
+    def _keeps(self, q: Array, share: float) -> bool:
+        at, wanted = self._arm.pose(q), between(self._from, self._to, share)
+        if at.position.distance_to(wanted.position) > OFF_LINE:
+            return False
+        return not self._turns or at.orientation.angle_to(wanted.orientation) <= OFF_TURN
+
+    def _why(self, q: Array, share: float, after: Array | None) -> str:
+        where = f"{self._name} cannot go straight: {share * self._length:.3f} m on its way "
+        if near := self._arm.near_limits(q):
+            return where + f"{', '.join(near)} would leave {'its limit' if len(near) == 1 else 'their limits'}."
+        if self._arm.smallest(q) < NEAR_SINGULAR:
+            return where + "it comes to a singularity, where joints would have to turn over."
+        return where + ("its line leaves the reach." if after is None else "joints would have to turn over.")
+
+
+def free_line(sweep: Sweep, start: Array, target: Array, name: str = "") -> list[Array]:
+    """Give the waypoints of a straight line that meets nothing.
+
+    Raises as `straight_line`, and MotionInCollision naming what with what, and where.
+    """
+    name = name or sweep.arm.model.name
+    way = straight_line(sweep.arm, start, target, name)
+    if (hit := sweep.first_hit(way)) is not None:
+        length = float(np.linalg.norm(target[:3, 3] - sweep.arm.forward(start)[:3, 3]))
+        where = f"{hit.share * length:.3f} m on its way"
+        raise MotionInCollision(f"{name} cannot go straight: {where} it is in collision: {hit.what}.")
+    return way
+
+
+# ------------------------------------------------------------------------------------------------ corners
+def rounded(
+    way: Sequence[Array], scale: Array, is_free: Callable[[Array, Array], bool] | None = None
+) -> list[list[Array]]:
+    """Round the corners of a way, as much as is free; gives pieces, between which the arm has to stand.
+
+    Corners become arcs of a parabola, within the triangle of a corner's neighbourhood. `scale`: by how much joint
+    values count when lengths are compared. `is_free` is asked for each little step of an arc; None: all is.
+    """
+    pieces: list[list[Array]] = [[way[0]]]
+    for before, corner, after in zip(way, way[1:], way[2:], strict=False):
+        arc = _arc(before, corner, after, scale, is_free)
+        pieces[-1] += arc or [corner]
+        if not arc:
+            pieces.append([corner])
+    pieces[-1].append(way[-1])
+    return pieces
+
+
+def _arc(
+    before: Array, corner: Array, after: Array, scale: Array, is_free: Callable[[Array, Array], bool] | None
+) -> list[Array]:
+    one, two = (float(np.linalg.norm((q - corner) * scale)) for q in (before, after))
+    if min(one, two) <= 0.0:
+        return []
+    size = _ROUNDED * min(one, two)
+    for _ in range(_TRIES):
+        a, b = corner + (before - corner) * (size / one), corner + (after - corner) * (size / two)
+        arc = [
+            (1.0 - s) ** 2 * a + 2.0 * s * (1.0 - s) * corner + s**2 * b for s in np.linspace(0.0, 1.0, _CORNER_POINTS)
+        ]
+        if is_free is None or all(is_free(q, r) for q, r in itertools.pairwise(arc)):
+            return arc
+        size /= 2.0
+    return []

@@ -1,0 +1,263 @@
+"""A way for an arm through what stands around it: RRT-Connect, shortened, then checked at the full resolution.
+
+J. J. Kuffner, S. M. LaValle: RRT-Connect: an efficient approach to single-query path planning (ICRA 2000). It is
+written here because the bindings of OMPL can neither be seeded per plan nor free what a plan took
+(docs/decisions/0012-planning-of-our-own.md).
+The same question with the same seed has the same answer, unless the time runs out. A plan is exact, or it is refused.
+"""
+
+import itertools
+import time
+from collections.abc import Callable, Sequence
+from typing import Final
+
+import numpy as np
+
+from arcor2_hw.exceptions import Cancelled, InvalidData
+from arcor2_hw.kinematics.errors import GoalInCollision, NoPath, OnlyInCollision, StartInCollision
+from arcor2_hw.kinematics.inverse import InverseKinematics
+from arcor2_hw.kinematics.shapes import Array
+from arcor2_hw.kinematics.sweep import Sweep
+
+WITHIN: Final = 2.0
+"""s that a plan may take."""
+COARSE: Final = 8.0
+"""How much coarser than the resolution ways are looked at while they are searched for and shortened."""
+STEP: Final = 1.5
+"""m, in joint values times their levers, that a tree grows by at once."""
+BESIDE: Final = np.pi
+"""rad beyond start and goals within which it is searched first; a turn away there is seldom a way."""
+MOST_GOALS: Final = 8
+SHORTCUTS: Final = 60
+IDLE: Final = 15
+"""Shortcuts in a row that lead to nothing, after which no more are tried."""
+_GIVEN: Final = 1e-9
+
+Stopped = Callable[[], bool]
+
+
+class Planner:
+    """Plans motions of the arm of a `Sweep`. Joint values are the arm's, targets (4, 4) in the model's root frame.
+
+    name: of the robot in messages. Not safe for two threads at once.
+    """
+
+    def __init__(self, sweep: Sweep, name: str = "") -> None:
+        self.sweep, self.arm = sweep, sweep.arm
+        self.name = name or sweep.arm.model.name
+        self._scale = np.maximum(sweep.levers, 1e-3)
+
+    def to_pose(
+        self, start: Array, target: Array, *, within: float = WITHIN, seed: int = 0, stopped: Stopped | None = None
+    ) -> list[Array]:
+        """Give waypoints from `start` to a pose, straight in joint space between; of the ways found a short one.
+
+        Raises OutOfReach, OnlyInCollision naming a pair, StartInCollision, NoPath, Cancelled once `stopped`.
+        """
+        inverse = InverseKinematics(self.arm)
+        found = inverse.solutions(target, start)
+        if not found:
+            inverse.solve(target, start)  # raises, saying why
+        hits = [(q, self.sweep.hit(q)) for q in found]
+        goals = [q for q, hit in hits if not hit]
+        if not goals:
+            at = ", ".join(f"{value:.3f}" for value in target[:3, 3])
+            raise OnlyInCollision(f"{self.name} reaches the pose only in collision: {hits[0][1]}.", f"at {at}")
+        return self.to_any(start, goals, within=within, seed=seed, stopped=stopped)
+
+    def to_joints(
+        self, start: Array, goal: Array, *, within: float = WITHIN, seed: int = 0, stopped: Stopped | None = None
+    ) -> list[Array]:
+        """Give waypoints from `start` to joint values.
+
+        Raises InvalidData beyond a limit, GoalInCollision naming a pair, StartInCollision, NoPath, Cancelled.
+        """
+        self._check(goal, "to")
+        if hit := self.sweep.hit(goal):
+            raise GoalInCollision(f"{self.name} would be in collision there: {hit}.")
+        return self.to_any(start, [goal], within=within, seed=seed, stopped=stopped)
+
+    def to_any(
+        self,
+        start: Array,
+        goals: Sequence[Array],
+        *,
+        within: float = WITHIN,
+        seed: int = 0,
+        stopped: Stopped | None = None,
+    ) -> list[Array]:
+        """Give waypoints from `start` to one of `goals`, which are free; raises as `to_joints`."""
+        self._check(start, "from")
+        if hit := self.sweep.hit(start):
+            raise StartInCollision(f"{self.name} is in collision where it stands: {hit}.")
+        goals = sorted(goals, key=lambda q: self._length([start, q]))[:MOST_GOALS]
+        for goal in goals:
+            if self.sweep.is_free_between(start, goal):
+                return [start, goal]
+        search = _Search(self, start, goals, time.monotonic() + within, seed, stopped)
+        for resolution in (COARSE * self.sweep.resolution, self.sweep.resolution):
+            way = search.way(resolution)
+            if way is None:
+                break
+            way = search.shortened(way, resolution)
+            if all(self.sweep.is_free_between(a, b) for a, b in itertools.pairwise(way)):
+                return way
+        between = self.sweep.first_hit([start, goals[0]])
+        hit = f"; straight there it meets {between.what}" if between is not None else ""
+        raise NoPath(f"{self.name} found no way free of collision within {within:g} s{hit}.")
+
+    def _check(self, q: Array, which: str) -> None:
+        if q.shape != (self.arm.dof,) or not np.isfinite(q).all():
+            raise InvalidData(f"{self.name} needs {self.arm.dof} finite joint values to plan {which}.")
+        if not self.arm.within(q, 1e-4):
+            over = (q < self.arm.lower - 1e-4) | (q > self.arm.upper + 1e-4)
+            names = ", ".join(name for name, is_over in zip(self.arm.joint_names, over, strict=True) if is_over)
+            raise InvalidData(f"{names} of {self.name} would be beyond the limits.")
+
+    def _length(self, way: Sequence[Array]) -> float:
+        """Give the length of a way in joint values times their levers, m."""
+        return float(sum(np.linalg.norm((b - a) * self._scale) for a, b in itertools.pairwise(way)))
+
+
+class _Tree:
+    """Configurations, scaled, each with the one that it was reached from."""
+
+    def __init__(self, roots: Array) -> None:
+        self.size = len(roots)
+        self.points = np.empty((max(256, 2 * self.size), roots.shape[1]))
+        self.points[: self.size] = roots
+        self.parents = [-1] * self.size
+
+    def add(self, point: Array, parent: int) -> int:
+        if self.size == len(self.points):
+            self.points = np.concatenate((self.points, np.empty_like(self.points)))
+        self.points[self.size] = point
+        self.parents.append(parent)
+        self.size += 1
+        return self.size - 1
+
+    def nearest(self, point: Array) -> int:
+        apart = self.points[: self.size] - point
+        return int(np.argmin(np.einsum("ij,ij->i", apart, apart)))
+
+    def way_from_root(self, node: int) -> list[Array]:
+        way = []
+        while node >= 0:
+            way.append(self.points[node].copy())
+            node = self.parents[node]
+        return way[::-1]
+
+
+class _Search:
+    """One plan: two trees that grow towards each other, in joint values times their levers."""
+
+    def __init__(
+        self,
+        planner: Planner,
+        start: Array,
+        goals: Sequence[Array],
+        deadline: float,
+        seed: int,
+        stopped: Stopped | None,
+    ) -> None:
+        self._planner, self._sweep = planner, planner.sweep
+        self._scale, self._deadline, self._stopped = planner._scale, deadline, stopped
+        self._chance = np.random.default_rng(seed)
+        self._start, self._goals = start * self._scale, np.array(goals) * self._scale
+        arm, ends = planner.arm, np.array([start, *goals])
+        slides = np.array(arm.prismatic)
+        # A sliding joint, or a turning one of less than two turns, is searched along all of its range.
+        far = np.where(slides, np.inf, BESIDE)
+        lower = np.maximum(arm.lower, ends.min(axis=0) - far)
+        upper = np.minimum(arm.upper, ends.max(axis=0) + far)
+        self._box = np.minimum(lower, ends.min(axis=0)) * self._scale, np.maximum(upper, ends.max(axis=0)) * self._scale
+
+    def _over(self) -> bool:
+        if self._stopped is not None and self._stopped():
+            raise Cancelled(f"planning for {self._planner.name} was stopped")
+        return time.monotonic() > self._deadline
+
+    def _free(self, a: Array, b: Array, resolution: float) -> bool:
+        return self._sweep.is_free_between(a / self._scale, b / self._scale, resolution)
+
+    # -------------------------------------------------------------------------------- searching
+    def way(self, resolution: float) -> list[Array] | None:
+        """Give waypoints from the start to a goal, None when the time is over."""
+        forth, back = _Tree(self._start[None]), _Tree(self._goals)
+        grown, other = forth, back
+        while not self._over():
+            target = self._chance.uniform(*self._box)
+            node = self._grow(grown, target, resolution)
+            if node is not None:
+                met = self._connect(other, grown.points[node], resolution)
+                if met is not None:
+                    ends = (node, met) if grown is forth else (met, node)
+                    way = forth.way_from_root(ends[0]) + back.way_from_root(ends[1])[::-1][1:]
+                    return [point / self._scale for point in way]
+            grown, other = other, grown
+        return None
+
+    def _grow(self, tree: _Tree, target: Array, resolution: float) -> int | None:
+        """Add one step towards `target`; gives the node, None when something is in the way."""
+        near = tree.nearest(target)
+        return self._step(tree, near, target, resolution)
+
+    def _connect(self, tree: _Tree, target: Array, resolution: float) -> int | None:
+        """Add steps as far as they go; gives the node at `target`, None when it is not got to."""
+        node: int | None = tree.nearest(target)
+        while node is not None:
+            if float(np.abs(tree.points[node] - target).max()) < _GIVEN:
+                return node
+            if self._over():
+                return None
+            node = self._step(tree, node, target, resolution)
+        return None
+
+    def _step(self, tree: _Tree, node: int, target: Array, resolution: float) -> int | None:
+        at = tree.points[node]
+        way = target - at
+        length = float(np.linalg.norm(way))
+        if length < _GIVEN:
+            return node
+        point = target if length <= STEP else at + way * (STEP / length)
+        return tree.add(point, node) if self._free(at, point, resolution) else None
+
+    # -------------------------------------------------------------------------------- shortening
+    def shortened(self, way: list[Array], resolution: float) -> list[Array]:
+        """Give a shorter way: straight between random places where that is free, without needless waypoints."""
+        points = [q * self._scale for q in way]
+        points = self._without_needless(points, resolution)
+        idle = 0
+        for _ in range(SHORTCUTS):
+            if len(points) < 3 or idle >= IDLE or self._over():
+                break
+            idle += 1
+            at = np.concatenate(([0.0], np.cumsum([np.linalg.norm(b - a) for a, b in itertools.pairwise(points)])))
+            one, two = np.sort(self._chance.uniform(0.0, at[-1], 2))
+            first, last = (int(np.clip(np.searchsorted(at, s, "right") - 1, 0, len(points) - 2)) for s in (one, two))
+            if first == last:
+                continue
+            a, b = (
+                points[n] + (points[n + 1] - points[n]) * ((s - at[n]) / max(at[n + 1] - at[n], _GIVEN))
+                for n, s in ((first, one), (last, two))
+            )
+            saved = (two - one) - float(np.linalg.norm(b - a))
+            if saved < 0.02 * (two - one) or not self._free(a, b, resolution):
+                continue
+            points = [*points[: first + 1], a, b, *points[last + 1 :]]
+            idle = 0
+        return [point / self._scale for point in self._without_needless(points, resolution)]
+
+    def _without_needless(self, points: list[Array], resolution: float) -> list[Array]:
+        """Leave out waypoints without which the way is still free, as many at once as can be."""
+        kept = [points[0]]
+        at = 0
+        while at < len(points) - 1:
+            further = at + 1
+            for other in range(len(points) - 1, at + 1, -1):
+                if self._free(points[at], points[other], resolution):
+                    further = other
+                    break
+            kept.append(points[further])
+            at = further
+        return kept

@@ -1,0 +1,193 @@
+"""When an arm is where on a way: point to point (ruckig) and along many waypoints (toppra), within limits."""
+
+import bisect
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from ruckig import InputParameter, Result, Ruckig
+from ruckig import Trajectory as RuckigTrajectory
+
+from arcor2_hw.exceptions import InvalidData
+from arcor2_hw.kinematics.arm import Arm
+from arcor2_hw.kinematics.paths import rounded
+from arcor2_hw.kinematics.shapes import Array
+
+RAMP: Final = 0.4
+"""s in which a joint gets to its maximum velocity, where nothing else is known: a URDF states no accelerations."""
+JERK_RAMP: Final = 0.1
+"""s in which it gets to its maximum acceleration."""
+FASTEST: Final = 10.0
+"""rad/s, or m/s, for a joint without a velocity limit."""
+_STANDS: Final = 1e-7
+_KNOTS: Final = 3
+
+
+@dataclass(frozen=True, eq=False)
+class MotionLimits:
+    """The most that joints may do: velocity, acceleration, jerk, each (n), per s, s² and s³, above zero."""
+
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+
+    def __post_init__(self) -> None:
+        for name, values in vars(self).items():
+            if values.shape != self.velocity.shape or not (np.isfinite(values) & (values > 0.0)).all():
+                raise InvalidData(f"Each joint needs a {name} above zero.")
+
+    @classmethod
+    def of(cls, arm: Arm, speed: float = 1.0, ramp: float = RAMP) -> "MotionLimits":
+        """Give those of an arm: a fraction of its velocities, which it gets to in `ramp` s from rest."""
+        if not 0.0 < speed <= 1.0:
+            raise InvalidData(f"speed must be above 0, and at most 1, not {speed!r}.")
+        most = np.where(np.isfinite(arm.velocity) & (arm.velocity > 0.0), arm.velocity, FASTEST)
+        return cls(most * speed, most / ramp, most / (ramp * JERK_RAMP))
+
+
+class Timed:
+    """Joint values by time: `duration` s, and `at`. Made by `point_to_point`, `with_stops`, `smooth`, `led`."""
+
+    def __init__(self, pieces: Sequence[tuple[float, Callable[[float], tuple[Array, Array]]]]) -> None:
+        self._pieces = [piece for _, piece in pieces]
+        self._lengths = [length for length, _ in pieces]
+        self._begins = [0.0, *itertools.accumulate(self._lengths)][: len(self._pieces)]
+        self.duration = float(sum(self._lengths))
+
+    def at(self, time: float) -> tuple[Array, Array]:
+        """Give joint values and velocities after `time` s; before the begin and after the end it stands."""
+        time = min(max(time, 0.0), self.duration)
+        number = max(0, bisect.bisect_right(self._begins, time) - 1)
+        return self._pieces[number](min(time - self._begins[number], self._lengths[number]))
+
+    def sampled(self, period: float) -> list[tuple[float, Array, Array]]:
+        """Give time, joint values and velocities every `period` s, and at the end."""
+        times = [*np.arange(0.0, self.duration, period), self.duration]
+        return [(float(time), *self.at(float(time))) for time in times]
+
+
+# ------------------------------------------------------------------------------------------------ point to point
+def point_to_point(start: Array, goal: Array, limits: MotionLimits) -> Timed:
+    """Go from rest to rest, all joints in proportion, as fast as limits allow; jerks are limited too."""
+    return Timed([_segment(start, goal, limits)])
+
+
+def with_stops(way: Sequence[Array], limits: MotionLimits) -> Timed:
+    """Go through waypoints and stand at each: exactly the way, straight in joint space."""
+    return Timed([_segment(a, b, limits) for a, b in itertools.pairwise(way)])
+
+
+def _segment(start: Array, goal: Array, limits: MotionLimits) -> tuple[float, Callable[[float], tuple[Array, Array]]]:
+    way = goal - start
+    size = np.abs(way)
+    moving = size > _STANDS
+    if not moving.any():
+        return 0.0, lambda _: (goal, np.zeros_like(goal))
+    # One number is led from 0 to 1, within what the joint that is slowest for it allows: so none leaves the line.
+    given = InputParameter(1)
+    given.current_position, given.target_position = [0.0], [1.0]
+    given.max_velocity = [float(np.min(limits.velocity[moving] / size[moving]))]
+    given.max_acceleration = [float(np.min(limits.acceleration[moving] / size[moving]))]
+    given.max_jerk = [float(np.min(limits.jerk[moving] / size[moving]))]
+    found = RuckigTrajectory(1)
+    result = Ruckig(1).calculate(given, found)
+    if result not in (Result.Working, Result.Finished):
+        raise InvalidData(f"No motion within the limits was found: {result}.")
+
+    def at(time: float) -> tuple[Array, Array]:
+        position, velocity, _ = found.at_time(time)
+        return start + position[0] * way, velocity[0] * way
+
+    return float(found.duration), at
+
+
+# ------------------------------------------------------------------------------------------------ waypoints
+def smooth(
+    way: Sequence[Array],
+    limits: MotionLimits,
+    is_free: Callable[[Array, Array], bool] | None = None,
+) -> Timed:
+    """Go through waypoints without standing, corners rounded as much as is free; it stands where nothing is.
+
+    What is driven is looked at once more with `is_free`; when that says no, the arm goes with stops instead.
+    """
+    if len(way) < 3:
+        return with_stops(way, limits)
+    pieces = rounded(way, 1.0 / limits.velocity, is_free)
+    timed = Timed([_along(_with_knots(piece), limits) for piece in pieces])
+    if is_free is not None:
+        count = max(2, math.ceil(timed.duration / 0.02))
+        driven = [timed.at(time)[0] for time in np.linspace(0.0, timed.duration, count)]
+        if not all(is_free(a, b) for a, b in itertools.pairwise(driven)):
+            return with_stops(way, limits)
+    return timed
+
+
+def led(
+    way: Sequence[Array], limits: MotionLimits, lengths: Sequence[float], speed: float, acceleration: float
+) -> Timed:
+    """Go along near waypoints, those of a line, whose end effector is at `lengths` m of its way at each.
+
+    speed, acceleration: the most of the end effector along it, m/s and m/s².
+    """
+    if len(lengths) != len(way) or not (speed > 0.0 and acceleration > 0.0):
+        raise InvalidData("A line needs the length at each waypoint, a speed and an acceleration above zero.")
+    # How far the end effector has come is one joint more, with limits of its own.
+    longer = [np.append(q, length) for q, length in zip(way, lengths, strict=True)]
+    velocity, ramp = np.append(limits.velocity, speed), np.append(limits.acceleration, acceleration)
+    duration, at = _along(longer, MotionLimits(velocity, ramp, ramp))
+
+    def without(time: float) -> tuple[Array, Array]:
+        q, rate = at(time)
+        return q[:-1], rate[:-1]
+
+    return Timed([(duration, without)])
+
+
+def _with_knots(piece: Sequence[Array]) -> list[Array]:
+    """Put points on the longer segments, so that a spline through all of them stays on these."""
+    lengths = [float(np.linalg.norm(b - a)) for a, b in itertools.pairwise(piece)]
+    short = min((length for length in lengths if length > _STANDS), default=1.0)
+    found = [piece[0]]
+    for (a, b), length in zip(itertools.pairwise(piece), lengths, strict=True):
+        if length > 2.0 * short:
+            ends = [short / length * (n + 1) / _KNOTS for n in range(_KNOTS)]
+            shares = sorted({*ends, 0.5, *(1.0 - end for end in ends)})
+            found += [a + share * (b - a) for share in shares]
+        found.append(b)
+    return found
+
+
+def _along(way: Sequence[Array], limits: MotionLimits) -> tuple[float, Callable[[float], tuple[Array, Array]]]:
+    """Go along a smooth way from rest to rest as fast as velocities and accelerations allow."""
+    import toppra
+    from toppra import algorithm, constraint
+
+    points = [way[0]]
+    for q in way[1:]:
+        if float(np.abs(q - points[-1]).max()) > _STANDS:
+            points.append(q)
+    if len(points) < 3:
+        return _segment(points[0], points[-1], limits)
+    steps = [float(np.linalg.norm((b - a) / limits.velocity)) for a, b in itertools.pairwise(points)]
+    at = np.concatenate(([0.0], np.cumsum(steps)))
+    path: Any = toppra.SplineInterpolator(at, np.array(points), bc_type="natural")
+    velocity = np.stack((-limits.velocity, limits.velocity), axis=1)
+    acceleration = np.stack((-limits.acceleration, limits.acceleration), axis=1)
+    solver = algorithm.TOPPRA(
+        [constraint.JointVelocityConstraint(velocity), constraint.JointAccelerationConstraint(acceleration)],
+        path,
+        gridpoints=np.unique(np.concatenate([np.linspace(a, b, 6) for a, b in itertools.pairwise(at)])),
+        parametrizer="ParametrizeConstAccel",
+    )
+    found: Any = solver.compute_trajectory(0.0, 0.0)
+    if found is None:
+        raise InvalidData("No motion within the limits was found along the way.")
+
+    def where(time: float) -> tuple[Array, Array]:
+        return np.asarray(found(time), dtype=np.float64), np.asarray(found(time, 1), dtype=np.float64)
+
+    return float(found.duration), where

@@ -1,0 +1,196 @@
+"""Straight lines, rounded corners, and what is where when: against plain arithmetic of the tests' own."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.exceptions import InvalidData
+from arcor2_hw.kinematics.errors import MotionInCollision, NoStraightLine, OutOfReach
+from arcor2_hw.kinematics.model import RobotModel
+from arcor2_hw.kinematics.paths import OFF_LINE, OFF_TURN, between, free_line, rounded, straight_line
+from arcor2_hw.kinematics.shapes import Array, Box
+from arcor2_hw.kinematics.sweep import Sweep
+from arcor2_hw.kinematics.timing import MotionLimits, Timed, led, point_to_point, smooth, with_stops
+from arcor2_hw.kinematics.world import CollisionWorld
+from tests.kinematics import kin_robots
+
+READY = np.array((0.0, -1.57, 1.57, -1.57, -1.57, 0.0))
+
+
+def line_off(start: Position, end: Position, at: Position) -> float:
+    a, b, p = (np.array([*each]) for each in (start, end, at))
+    way = (b - a) / np.linalg.norm(b - a)
+    return float(np.linalg.norm((p - a) - way * ((p - a) @ way)))
+
+
+def moved(pose: Pose, x: float, y: float, z: float, *turn: float) -> Pose:
+    turned = Orientation.from_rotation_vector(*(turn or (0.0, 0.0, 0.0))) * pose.orientation
+    return Pose(pose.position + Position(x, y, z), turned)
+
+
+@pytest.mark.parametrize("model", [kin_robots.ur(), kin_robots.six_axes()], ids=["ur5e", "six axes"])
+def test_the_tip_keeps_to_the_line_and_turns_evenly(model: RobotModel) -> None:
+    arm = model.arm(next(iter(model.end_effectors), "tool"))
+    chance = np.random.default_rng(2)
+    middle = READY if model.name == "ur5e" else np.array((0.1, 0.6, -1.4, 0.3, 0.9, 0.2))
+    done = 0
+    for _ in range(16):
+        start = middle + chance.uniform(-0.1, 0.1, 6)
+        here = arm.pose(start)
+        there = moved(here, *chance.uniform(-0.15, 0.15, 3), *chance.uniform(-0.4, 0.4, 3))
+        try:
+            way = straight_line(arm, start, there.matrix())
+        except OutOfReach:
+            continue
+        done += 1
+        assert np.allclose(arm.forward(way[-1]), there.matrix(), atol=1e-6)
+        whole = here.position.distance_to(there.position)
+        for a, b in itertools.pairwise(way):
+            assert np.abs(b - a).max() < 0.6
+            for share in np.linspace(0.0, 1.0, 7):
+                at = arm.pose(a + share * (b - a))
+                assert line_off(here.position, there.position, at.position) < 3.0 * OFF_LINE
+                come = here.position.distance_to(at.position) / whole
+                assert at.orientation.angle_to(between(here, there, come).orientation) < 6.0 * OFF_TURN
+    assert done >= 5
+
+
+def test_a_line_out_of_reach_or_through_a_singularity_is_refused_where_it_breaks() -> None:
+    arm = kin_robots.ur().arm("tcp")
+    here = arm.pose(READY)
+    with pytest.raises(OutOfReach):
+        straight_line(arm, READY, moved(here, 1.5, 0.0, 0.0).matrix())
+    # Past the axis of the foot, where there is no room for a tool that points down.
+    near = Pose(Position(-0.45, 0.12, here.position.z), here.orientation)
+    with pytest.raises(NoStraightLine, match=r"arm cannot go straight: 0\.\d+ m on its way"):
+        straight_line(arm, READY, near.matrix(), "arm")
+    # Through the axis of the shoulder: the base would have to turn over.
+    start = np.array((0.0, -2.2, 2.2, -1.57, -1.57, 0.0))
+    over = arm.pose(start)
+    beyond = Pose(Position(-over.position.x, -over.position.y, over.position.z), over.orientation)
+    with pytest.raises(NoStraightLine):
+        straight_line(arm, start, beyond.matrix())
+
+
+def test_a_planar_arm_keeps_to_the_line_with_the_heading_that_comes_of_it() -> None:
+    arm = RobotModel.load(kin_robots.TWO_AXIS).arm("tcp")
+    start = np.array((0.3, 1.2))
+    here = arm.pose(start)
+    way = straight_line(arm, start, moved(here, -0.05, 0.04, 0.0).matrix())
+    assert len(way) > 2
+    for a, b in itertools.pairwise(way):
+        at = arm.pose((a + b) / 2.0).position
+        assert line_off(here.position, here.position + Position(-0.05, 0.04, 0.0), at) < 2.0 * OFF_LINE
+
+
+def test_a_line_into_something_is_refused_and_told_where() -> None:
+    model = kin_robots.ur()
+    arm = model.arm("tcp")
+    here = arm.pose(READY)
+    world = CollisionWorld()
+    world.add_robot("arm", model, Pose())
+    sweep = Sweep(world, "arm", arm)
+    there = moved(here, 0.0, 0.3, 0.0)
+    assert len(free_line(sweep, READY, there.matrix())) > 2
+    world.put("post", Box(0.02, 0.02, 0.3), Pose(here.position + Position(0.0, 0.2, 0.0)))
+    with pytest.raises(MotionInCollision, match=r"arm cannot go straight: 0\.1\d\d m on its way .*post"):
+        free_line(sweep, READY, there.matrix(), "arm")
+
+
+# ------------------------------------------------------------------------------------------------ timing
+def rates(timed: Timed, period: float = 0.002) -> tuple[Array, Array, Array]:
+    """Give values, and velocities and accelerations by differences."""
+    q = np.array([values for _, values, _ in timed.sampled(period)][:-1])
+    v = np.diff(q, axis=0) / period
+    return q, v, np.diff(v, axis=0) / period
+
+
+LIMITS = MotionLimits(np.array((1.0, 2.0)), np.array((4.0, 5.0)), np.array((40.0, 50.0)))
+
+
+def test_point_to_point_is_straight_within_limits_and_no_slower_than_they_ask() -> None:
+    start, goal = np.array((0.0, 1.0)), np.array((1.5, -0.5))
+    timed = point_to_point(start, goal, LIMITS)
+    q, v, a = rates(timed)
+    way = goal - start
+    assert np.abs(q - (start + np.outer((q[:, 0] - start[0]) / way[0], way))).max() < 1e-9
+    assert np.allclose(timed.at(timed.duration)[0], goal)
+    assert np.allclose(timed.at(timed.duration)[1], 0.0, atol=1e-9)
+    assert (np.abs(v).max(axis=0) <= LIMITS.velocity * 1.001).all()
+    assert (np.abs(a).max(axis=0) <= LIMITS.acceleration * 1.02).all()
+    assert np.abs(np.diff(a, axis=0) / 0.002).max() < 51.0
+    # Joint 1: 1.5 rad at 1 rad/s, and the ramps of velocity and acceleration.
+    assert timed.duration == pytest.approx(1.5 + 1.0 / 4.0 + 4.0 / 40.0, abs=1e-6)
+    assert point_to_point(goal, goal, LIMITS).duration == 0.0
+
+
+def test_with_stops_it_stands_at_each_waypoint() -> None:
+    way = [np.array(q) for q in ((0.0, 0.0), (0.5, 0.0), (0.5, 0.8))]
+    timed = with_stops(way, LIMITS)
+    alone = point_to_point(way[0], way[1], LIMITS).duration
+    values, velocity = timed.at(alone)
+    assert np.allclose(values, way[1])
+    assert np.allclose(velocity, 0.0, atol=1e-9)
+    assert np.allclose(timed.at(timed.duration + 9.0)[0], way[2])
+    q, _, _ = rates(timed)
+    assert np.minimum(np.abs(q[:, 1]), np.abs(q[:, 0] - 0.5)).max() < 1e-9
+
+
+def test_smooth_is_faster_within_limits_and_near_the_way() -> None:
+    way = [np.array(q) for q in ((0.0, 0.0), (0.9, 0.0), (0.9, 1.8), (0.0, 1.8))]
+    timed = smooth(way, LIMITS, lambda a, b: True)
+    q, v, a = rates(timed)
+    assert timed.duration < 0.95 * with_stops(way, LIMITS).duration
+    assert (np.abs(v).max(axis=0) <= LIMITS.velocity * 1.01).all()
+    assert (np.abs(a).max(axis=0) <= LIMITS.acceleration * 1.1).all()
+    assert np.allclose(q[0], way[0])
+    assert np.allclose(timed.at(timed.duration)[0], way[-1], atol=1e-6)
+    moving = np.linalg.norm(v, axis=1)[50:-50]
+    assert moving.min() > 0.05
+    # It leaves the segments only by what the rounding of the corners takes.
+    off = np.min([np.abs(q[:, 1]), np.abs(q[:, 0] - 0.9), np.abs(q[:, 1] - 1.8)], axis=0)
+    assert 0.02 < off.max() < 0.25
+
+
+def test_a_corner_without_room_is_not_rounded_but_stood_at() -> None:
+    way = [np.array(q) for q in ((0.0, 0.0), (0.9, 0.0), (0.9, 1.8))]
+
+    def free(a: Array, b: Array) -> bool:
+        return all(min(abs(q[1]), abs(q[0] - 0.9)) < 0.001 for q in (a, (a + b) / 2.0, b))
+
+    assert [len(piece) for piece in rounded(way, np.ones(2), free)] == [2, 2]
+    timed = smooth(way, LIMITS, free)
+    q, v, _ = rates(timed)
+    assert np.minimum(np.abs(q[:, 1]), np.abs(q[:, 0] - 0.9)).max() < 0.001
+    nearest = np.argmin(np.linalg.norm(q - way[1], axis=1))
+    assert np.linalg.norm(v[min(nearest, len(v) - 1)]) < 0.05
+
+
+def test_a_line_is_led_at_the_speed_of_the_tip() -> None:
+    arm = kin_robots.ur().arm("tcp")
+    here = arm.pose(READY)
+    there = moved(here, 0.1, 0.25, 0.0)
+    way = straight_line(arm, READY, there.matrix())
+    lengths = [here.position.distance_to(arm.pose(q).position) for q in way]
+    timed = led(way, MotionLimits.of(arm), lengths, 0.1, 0.5)
+    period = 0.01
+    at = np.array([[*arm.pose(values).position] for _, values, _ in timed.sampled(period)][:-1])
+    speed = np.linalg.norm(np.diff(at, axis=0), axis=1) / period
+    assert speed.max() <= 0.103
+    assert np.median(speed) > 0.095
+    assert timed.duration == pytest.approx(lengths[-1] / 0.1 + 0.1 / 0.5, rel=0.05)
+    for values in at:
+        assert line_off(here.position, there.position, Position(*values)) < 2.0 * OFF_LINE
+
+
+def test_limits_that_make_no_sense_are_refused() -> None:
+    arm = kin_robots.ur().arm("tcp")
+    for speed in (0.0, 1.1, float("nan")):
+        with pytest.raises(InvalidData):
+            MotionLimits.of(arm, speed)
+    with pytest.raises(InvalidData, match="acceleration"):
+        MotionLimits(np.ones(2), np.array((1.0, 0.0)), np.ones(2))
+    with pytest.raises(InvalidData):
+        led([READY, READY + 0.1], MotionLimits.of(arm), [0.0], 0.1, 0.5)
