@@ -9,6 +9,7 @@ import { ADDITIONAL_EVENTS, ROLES, type Requests, type ServerEvent } from "../pr
 import { OFFLINE } from "../store/state";
 import { applyEvent, now, setConnection, store, tell } from "../store/store";
 import { telemetry } from "../store/telemetry";
+import { followArms, forgetArms } from "./arms";
 import { followDocument, forgetFollowed } from "./following";
 import { forgetPresence, tellPresence } from "./presence";
 import { followPrograms, forgetPrograms } from "./programs";
@@ -61,6 +62,7 @@ client.onState = (state, reason, code) => {
   epoch++;
   if (state === "open") {
     forgetStreams();
+    forgetArms();
     forgetFollowed();
     forgetPresence();
     forgetPrograms();
@@ -157,6 +159,7 @@ store.subscribe((state, before) => {
   if (state.live.state !== before.live.state && state.live.state === "stopped") telemetry.clear();
   followDocument(state);
   followRobots(state);
+  followArms(state);
   tellPresence(state, now);
   followPrograms(state);
   // The home screen is back: problems may have come or gone with what was edited.

@@ -185,8 +185,10 @@ function live(state: State, event: ServerEvent): Partial<State> | null {
     case "RobotMoveToActionPointJoints": {
       const { move_event_type: phase, robot_id, message } = event.data;
       const moving = phase === "start" ? put(now.moving, robot_id, event.event) : without(now.moving, robot_id);
+      const goal = "orientation_id" in event.data ? event.data.orientation_id : "joints_id" in event.data ? event.data.joints_id : "";
+      const motions = put(now.motions, robot_id, { phase, goal, message: message ?? "" });
       const told = phase === "failed" ? notice(state, "error", message || "The robot did not reach its goal.") : {};
-      return { ...become({ moving }), ...told };
+      return { ...become({ moving, motions }), ...told };
     }
     case "ActionExecution":
       return become({ executing: event.data.action_id, result: null });

@@ -88,6 +88,22 @@ export interface Types {
   actions: Record<string, ObjectAction[]>;
 }
 
+/** An arm of a robot, with what is on it; `id` is empty where the robot has one arm. */
+export interface Arm {
+  id: string;
+  effectors: string[];
+  grippers: string[];
+  suctions: string[];
+}
+
+/** The last motion that was asked of a robot, and how it ended. */
+export interface Motion {
+  phase: "start" | "end" | "failed";
+  /** Id of the orientation or joints it leads to; empty for another goal. */
+  goal: string;
+  message: string;
+}
+
 /** The scene in operation. */
 export interface Live {
   state: SceneStateEnum;
@@ -97,7 +113,10 @@ export interface Live {
   holds: Record<string, RobotHoldData>;
   /** Robots that move, with what they are doing. */
   moving: Record<string, string>;
+  motions: Record<string, Motion>;
   handTeaching: Record<string, boolean>;
+  /** Of robots that are online; asked for when they come. */
+  arms: Record<string, Arm[]>;
   /** The action that is tried out, and how the last one ended. */
   executing: string;
   result: ActionResultData | null;
@@ -184,7 +203,9 @@ export const OFFLINE: Live = {
   health: {},
   holds: {},
   moving: {},
+  motions: {},
   handTeaching: {},
+  arms: {},
   executing: "",
   result: null,
 };

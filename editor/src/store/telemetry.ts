@@ -14,7 +14,7 @@ export interface Sample {
 }
 
 /** Seconds after which what is shown is stale. */
-export const STALE = 1;
+export const STALE = 0.5;
 
 type Listener = (robotId: string) => void;
 
