@@ -1,0 +1,57 @@
+/**
+ * What a user holds: at most one thing at a time. It ends when he lets go, and when the page cannot see his hand any
+ * longer: it is hidden, frozen, left, loses the focus or the connection. The server ends it by itself within 300 ms.
+ */
+
+import type { JogRobotArgs } from "../protocol/types";
+import { call } from "../session/session";
+import { store } from "../store/store";
+import { holding } from "./asking";
+import { Lease, type LeaseRequest } from "./lease";
+
+export type JogWhat = Omit<JogRobotArgs, "robot_id" | "hold" | "sent_ms" | "valid_ms">;
+
+/** Something that is held. `over` resolves with why it ended where it was not simply let go. */
+export interface Held {
+  end: () => void;
+  over: Promise<string>;
+}
+
+let current: Lease | null = null;
+
+/** Let go of everything. */
+export function endHolds(): void {
+  current?.end();
+}
+
+export function holdJog(robot_id: string, what: JogWhat): Held {
+  return hold(robot_id, (lease) => call("JogRobot", { robot_id, ...what, ...lease }));
+}
+
+export function holdHandTeaching(robot_id: string, arm_id?: string): Held {
+  return hold(robot_id, (lease) => call("HoldHandTeaching", { robot_id, ...(arm_id ? { arm_id } : {}), ...lease }));
+}
+
+function hold(robotId: string, send: (request: LeaseRequest) => Promise<unknown>): Held {
+  endHolds();
+  const lease = new Lease(send);
+  current = lease;
+  const over = holding(robotId, () => {
+    lease.begin();
+    return lease.over;
+  }).then((reason) => {
+    lease.end(); // not begun when the lock was refused, which was told
+    if (current === lease) current = null;
+    return reason ?? "";
+  });
+  return { end: () => lease.end(), over };
+}
+
+store.subscribe((state) => {
+  if (current && state.connection.status !== "ready") endHolds();
+});
+
+if (typeof window !== "undefined") {
+  for (const event of ["blur", "pagehide"]) window.addEventListener(event, endHolds);
+  for (const event of ["freeze", "visibilitychange"]) document.addEventListener(event, endHolds);
+}
