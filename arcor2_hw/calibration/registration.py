@@ -20,6 +20,8 @@ LEAST_SEEN: Final = 60
 COARSE: Final = 5e-4
 FINE: Final = 1e-5
 """m; a step that moves the points by less is the last one of its stage."""
+COMES_NEAR: Final = 4.0
+"""Of a stage's reach: a point farther from the surface does not come within reach any more."""
 GRAZING: Final = 0.2
 """Cosine of the angle between ray and normal below which a point is too uncertain to be used."""
 
@@ -191,15 +193,18 @@ def refine(model: Model, cloud: Floats, start: Floats, stages: tuple[Stage, ...]
     pose = start
     fit: Fit | None = None
     for stage in stages:
+        kept = np.arange(len(cloud))
         for _ in range(stage.steps):
-            points = cloud @ pose[:3, :3].T + pose[:3, 3]
+            points = cloud[kept] @ pose[:3, :3].T + pose[:3, 3]
             targets, normals = model.nearest(points)
             rays = points - pose[:3, 3]
             slope = np.abs(np.einsum("ij,ij->i", normals, rays)) / np.linalg.norm(rays, axis=1)
-            near = (slope > GRAZING) & (np.linalg.norm(targets - points, axis=1) < stage.reach)
+            gaps = np.linalg.norm(targets - points, axis=1)
+            near = (slope > GRAZING) & (gaps < stage.reach)
             if np.count_nonzero(near) < LEAST_SEEN:
                 return None
-            fit, pose = _fit(pose, points[near], np.flatnonzero(near), targets[near], normals[near], stage.reach)
+            fit, pose = _fit(pose, points[near], kept[near], targets[near], normals[near], stage.reach)
+            kept = kept[gaps < COMES_NEAR * stage.reach]  # to ask for the nearest of far points takes longest
             if fit.moved < FINE:
                 break
     return fit

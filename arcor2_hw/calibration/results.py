@@ -24,8 +24,8 @@ class RobotPose(Data, frozen=True):
     from the model's surface, m; points: how many were used. covariance: 6 × 6, of a small motion of the base in its own
     frame: position (m), then rotation vector (rad), as rows; position_deviation (m) and orientation_deviation (rad):
     standard deviation in the direction that is known worst. moved (m) and turned (rad): by how much the result differs
-    from the pose that was assumed.
-    starts: number of starts of the search; agreed: how many of them ended at this pose. seconds: time it took.
+    from the pose that was assumed. starts: of the search, 7 where all of these agreed; agreed: how many of them ended
+    at this pose. seconds: time it took.
     """
 
     pose: Pose

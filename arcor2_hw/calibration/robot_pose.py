@@ -32,8 +32,9 @@ UNEVEN: Final = (0.0025, 0.012)
 """m of unevenness up to which a result is good, and from which on it is none."""
 LEAST_KNOWN: Final = 0.05
 """Of a motion in the worst direction that distances have to show."""
-FLOOR: Final = (3e-4, math.radians(0.04))
-"""Standard deviation, m and rad, that no number of points takes away: what noise does at curved surfaces and edges."""
+FLOOR: Final = (4e-4, math.radians(0.05))
+"""Standard deviation, m and rad, that no number of points takes away: what noise does at curved surfaces and edges, and
+a lens that is known to 0.05 %."""
 GOOD: Final = (0.0015, math.radians(0.25))
 """Standard deviation, m and rad, up to which a result is good."""
 SETTLED: Final = 2e-4

@@ -23,6 +23,8 @@ FEW_POINTS: Final = 1_500
 """Of the cloud, for the way from a start."""
 MOST_POINTS: Final = 20_000
 """Of the cloud, for the result."""
+ENOUGH: Final = 7
+"""Starts after which no more are made when all of them, one along and about each axis, ended at one place."""
 CELL: Final = 0.03
 """m, of the grid on which is decided what of the cloud may be the robot."""
 FEW_RAYS: Final = 12_000
@@ -123,6 +125,8 @@ class Search:
                 found.append((fit, 1))
             else:
                 found[same] = found[same][0], found[same][1] + 1
+            if found[0][1] == self.starts == ENOUGH:  # they came from all sides to one place
+                break
         compared = [(fit, count, self.compare(fit.base_from_camera, FEW_RAYS)) for fit, count in found]
         compared.sort(key=lambda each: -each[2].score)
         ends: list[End] = []
@@ -187,10 +191,10 @@ class Search:
     def _offsets(self) -> list[Floats]:
         """Give the starts, as motions in the base frame: none, and to both sides along and about every axis."""
         offsets = [np.eye(4)]
-        for axis, sign in itertools.product(np.eye(3), (1.0, -1.0)):
+        for sign, axis in itertools.product((1.0, -1.0), np.eye(3)):
             along, about = np.eye(4), np.eye(4)
             along[:3, 3] = sign * 0.6 * self._within * axis
-            about[:3, :3] = rotation(sign * 0.6 * self._angle_within * axis)
+            about[:3, :3] = rotation(-sign * 0.6 * self._angle_within * axis)
             offsets += [along, about]
         return offsets
 

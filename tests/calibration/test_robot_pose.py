@@ -71,12 +71,12 @@ def test_the_same_picture_gives_the_same_result(plain: View) -> None:
 def test_averaged_pictures_are_better_than_one(plain: View) -> None:
     sensor = Sensor(shapes=[*arm(JOINTS), *tool(JOINTS)], wall=-2.0, pictures=1, noise=0.004, fixed_noise=0.0)
     rng = np.random.default_rng(5)
-    stack = np.stack([sensor.take(EYE, rng) for _ in range(10)])
+    stack = np.stack([sensor.take(EYE, rng) for _ in range(5)])
     single = look(stack[0], plain.parameters)
     mean = look(stack, plain.parameters)
     exact = sensor.exact(EYE)
     inner = (single.depth > 0) & (mean.depth > 0) & (exact < 2.0)
-    assert np.std((mean.depth - exact)[inner]) < 0.5 * np.std((single.depth - exact)[inner])
+    assert np.std((mean.depth - exact)[inner]) < 0.6 * np.std((single.depth - exact)[inner])
 
 
 def test_a_covered_half_is_told_and_the_pose_still_right() -> None:

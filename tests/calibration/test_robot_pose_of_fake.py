@@ -38,8 +38,8 @@ def joints(model: RobotModel) -> list[Joint]:
     return [Joint(name, value) for name, value in zip(model.joint_names, Q, strict=True)]
 
 
-@pytest.mark.parametrize("name", ["ur3e", "ur5e"])
-def test_the_arm_that_the_fake_camera_sees_stands_where_the_layout_says(name: str) -> None:
+def test_the_arm_that_the_fake_camera_sees_stands_where_the_layout_says() -> None:
+    name = "ur5e"
     lens = Lens(640, 360)
     seen = arm.things(name, BASE.matrix(), Q, TIP.matrix()).values()
     things = tuple(msgspec.convert(msgspec.to_builtins(thing), Thing) for thing in seen)
