@@ -21,7 +21,7 @@ def robot_pose(task: FindRobotPose, desk: Desk) -> RobotPose:
     if len({picture.shape for picture in depth}) > 1:
         raise InvalidData("The depth pictures are of different sizes.")
     desk.progress(0.1, "reading the robot's model")
-    surface = surface_of(desk.robot(task.robot), task.joints)
+    surface = surface_of(desk.robot(task.robot), task.joints, task.robot.called)
     desk.progress(0.3, "looking for the robot")
     options = RobotPoseOptions(within=task.distance, angle_within=task.angle)
     return find_robot_pose(surface, np.stack(depth), task.parameters, task.camera_pose, task.robot.base, options)

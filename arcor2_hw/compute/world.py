@@ -69,12 +69,13 @@ class Body(Struct, frozen=True, tag="body"):
 class RobotModel(Struct, frozen=True):
     """A robot's model: its URDF, or a package of it, and where its root link stands in the world.
 
-    settings: those of its object, by name, which the description may follow.
+    settings: those of its object, by name, which the description may follow. called: as people know this one.
     """
 
     urdf: KeptFile
     base: Pose = field(default_factory=Pose)
     settings: dict[str, Any] = field(default_factory=dict)
+    called: str = ""
 
 
 class StandingRobot(Struct, frozen=True, tag="robot"):

@@ -12,6 +12,7 @@ from arcor2_hw.calibration.configuration import read_configuration
 from arcor2_hw.calibration.records import CalibrationRecord
 from arcor2_hw.client import Client
 from arcor2_hw.data.base import UNSET, Unset
+from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import Conflict, ConnectionLost, DeviceTimeout, NotFound
 from arcor2_server.cli.calibrating import calibrated, pose_table, progress
@@ -148,20 +149,19 @@ async def _calibrate(client: Client, found: SceneObject, process: str, begin: Ca
     await client.write_lock(found.id)
     try:
         await begin()
-        verdict = await _followed(client, found, process)
+        verdict, pose = await _followed(client, found, process)
     finally:
         await client.write_unlock(found.id)
     out = console()
     out.print(f"[bold]{verdict or 'done'}[/bold]")
-    async for event in client.events():
-        if event.event == "SceneObjectChanged" and event.data.id == found.id:
-            out.print(pose_table(found.name, event.data.pose))
-            break
+    if pose is not None:
+        out.print(pose_table(found.name, pose))
 
 
-async def _followed(client: Client, found: SceneObject, process: str) -> str:
-    """Give the verdict of a calibration. Failed with what went wrong."""
+async def _followed(client: Client, found: SceneObject, process: str) -> tuple[str, Pose | None]:
+    """Give the verdict of a calibration, and the pose that everybody is told of before. Failed when it failed."""
     title = f"Calibration of {found.name}"
+    pose: Pose | None = None
     try:
         async with asyncio.timeout(ENDS_WITHIN):
             with progress(title) as told:
@@ -169,12 +169,14 @@ async def _followed(client: Client, found: SceneObject, process: str) -> str:
                     if event.event == "TaskState" and event.data.title == title:
                         share = 0.0 if isinstance(event.data.progress, Unset) else event.data.progress
                         told(share, "" if isinstance(event.data.message, Unset) else event.data.message)
+                    elif event.event == "SceneObjectChanged" and event.data.id == found.id:
+                        pose = event.data.pose
                     elif event.event == "ProcessState" and event.data.id == process:
                         message = "" if isinstance(event.data.message, Unset) else event.data.message
                         if event.data.state == "failed":
                             raise Failed(ExitStatus.CALIBRATION_REFUSED, message)
                         if event.data.state == "finished":
-                            return message
+                            return message, pose
     except TimeoutError:
         raise DeviceTimeout(f"The calibration did not end within {ENDS_WITHIN:g} s.") from None
     raise ConnectionLost(f"The connection to {client.url} broke.")

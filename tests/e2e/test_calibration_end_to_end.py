@@ -1,0 +1,302 @@
+"""A camera and a robot of a whole server, with fakes of both, are put where they really stand; what is refused."""
+
+import asyncio
+import contextlib
+import math
+import os
+import signal
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import msgspec
+import numpy as np
+import psutil
+import pytest
+import pytest_asyncio
+
+from arcor2_fakes.cell import arm
+from arcor2_hw.client import Client, RequestFailed
+from arcor2_hw.data.events import SceneStateEnum
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.parameter import Parameter
+from arcor2_server.cli.main import app
+from arcor2_server.demo.fakes import free_loopback_address
+from tests.e2e.harness import scene_state, until
+from tests.fakes.conftest import FakeProcess
+from tests.server.core.serving import ServerProcess
+
+pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(180)]
+
+Q = (0.4, -1.3, 1.5, -1.2, -1.2, 0.3)
+ROBOT = Pose(Position(0.10, 0.05, 0.0), Orientation.from_rotation_vector(0.0, 0.0, 0.35))
+"""Where the robot's base really stands."""
+MARKERS = {10: (0.45, -0.35), 11: (0.75, -0.30), 12: (0.60, 0.35), 13: (0.35, 0.45)}
+SIZE = 0.15
+
+
+def looking_at(eye: tuple[float, float, float], target: tuple[float, float, float]) -> Pose:
+    """Give the pose of a camera's optical frame."""
+    z = np.subtract(target, eye) / np.linalg.norm(np.subtract(target, eye))
+    x = np.cross(z, (0.0, 0.0, 1.0))
+    x /= np.linalg.norm(x)
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.column_stack((x, np.cross(z, x), z))
+    matrix[:3, 3] = eye
+    return Pose.from_matrix(matrix)
+
+
+CAMERA = looking_at((1.2, -0.6, 0.85), (0.42, 0.03, 0.12))
+"""Where the camera really is."""
+
+
+def pose(of: Pose) -> dict[str, Any]:
+    return {"position": list(of.position), "orientation": list(of.orientation)}
+
+
+def printed(number: int, x: float, y: float) -> dict[str, Any]:
+    """A marker on paper, as the fake camera is told of it: its face is the origin's plane."""
+    return {
+        "name": f"marker {number}",
+        "pose": {"position": [x, y, -0.0005]},
+        "size": [0.22, 0.22, 0.001],
+        "color": [235, 235, 235],
+        "marker": {"id": number, "size": SIZE},
+    }
+
+
+class World:
+    """The fakes, the server, and a client of it that holds the scene."""
+
+    def __init__(self, directory: Path) -> None:
+        self.host = free_loopback_address()
+        self.camera = FakeProcess("oak_d", "--width", "1280", "--height", "720", "--fps", "5")
+        self.robot = FakeProcess("ur", "--host", self.host, "--time-scale", "0.1")
+        self.server = ServerProcess(directory / "data")
+        self.ids: dict[str, str] = {}
+        self._exit = contextlib.AsyncExitStack()
+
+    async def start(self) -> None:
+        self._exit.callback(self.camera.end)
+        self._exit.callback(self.robot.end)
+        self.robot.control.do("place", q=Q)
+        self.show()
+        await self.server.start()
+        self._exit.push_async_callback(self.server.stop)
+        client = self.client = await self._exit.enter_async_context(Client(self.server.url, "alice", reconnect=False))
+        await client.new_scene("scene")
+        near = Pose(CAMERA.position + Position(0.1, -0.05, 0.08), CAMERA.orientation)
+        wrong = Pose(ROBOT.position + Position(0.02, -0.015, 0.01), ROBOT.orientation * tilted(0.03))
+        await client.add_object_to_scene(
+            name="cam",
+            type="OakD",
+            pose=near,
+            parameters=[
+                setting("address", self.camera.ready["stream"]),
+                # A busy machine renders slowly.
+                setting("max_age", 5.0),
+                setting("frame_timeout", 10.0),
+            ],
+        )
+        await client.add_object_to_scene(name="arm", type="UR5e", pose=wrong, parameters=[setting("host", self.host)])
+        self.assumed = {"cam": near, "arm": wrong}
+        base = self.server.url.replace("ws", "http", 1)
+        self.http = await self._exit.enter_async_context(
+            httpx.AsyncClient(base_url=base, timeout=60.0, limits=httpx.Limits(max_keepalive_connections=0))
+        )
+        async with Client(self.server.url) as other:
+            scene = (await other.next_event("OpenScene")).data.scene
+        self.ids = {obj.name: obj.id for obj in scene.objects}
+        await client.start_scene()
+        await scene_state(client, SceneStateEnum.STARTED, timeout=60.0)
+        await client.subscribe_events({"TaskState"})
+
+    def show(self, *, markers: bool = True, robot: bool = True) -> None:
+        """Put into the camera's view what stands there."""
+        things = [printed(number, *place) for number, place in MARKERS.items()] if markers else []
+        if robot:
+            things += arm.things("ur5e", ROBOT.matrix(), Q, np.eye(4)).values()
+        self.camera.control.do("scene", things=things)
+        self.camera.control.do("camera", pose=pose(CAMERA))
+
+    async def stop(self) -> None:
+        await self._exit.aclose()
+
+    @contextlib.asynccontextmanager
+    async def holding(self, name: str) -> AsyncIterator[None]:
+        """Hold the lock of an object meanwhile."""
+        await self.client.write_lock(self.ids[name])
+        try:
+            yield
+        finally:
+            await self.client.write_unlock(self.ids[name])
+
+    async def calibrated(self, name: str, **more: Any) -> tuple[str, str]:
+        """Calibrate; gives the last state of the process and its message."""
+        if name == "cam":
+            await self.client.calibrate_camera(self.ids["cam"])
+        else:
+            await self.client.calibrate_robot(self.ids["arm"], move_to_calibration_pose=False, **more)
+        while True:
+            event = await self.client.next_event("ProcessState", timeout=60.0)
+            if event.data.state != "started":
+                return event.data.state, event.data.message
+
+    async def placed(self, name: str) -> Pose:
+        async with Client(self.server.url) as other:
+            scene = (await other.next_event("OpenScene")).data.scene
+        (found,) = [obj.pose for obj in scene.objects if obj.name == name]
+        return found
+
+    def workers(self) -> list[psutil.Process]:
+        children = psutil.Process(self.server.process.pid).children()
+        return [child for child in children if "arcor2_hw.compute" in " ".join(child.cmdline())]
+
+
+def setting(name: str, value: str | float) -> Parameter:
+    return Parameter(name, "string" if isinstance(value, str) else "double", msgspec.json.encode(value).decode())
+
+
+def tilted(angle: float) -> Orientation:
+    return Orientation.from_rotation_vector(0.0, 0.0, angle)
+
+
+def off(found: Pose, truth: Pose) -> tuple[float, float]:
+    """Give by how much a pose is off, mm and degrees."""
+    return 1e3 * found.position.distance_to(truth.position), math.degrees(found.orientation.angle_to(truth.orientation))
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def world(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[World]:
+    made = World(tmp_path_factory.mktemp("calibration"))
+    try:
+        await made.start()
+        yield made
+    finally:
+        await made.stop()
+
+
+async def test_a_camera_is_found_by_its_markers(world: World) -> None:
+    async with world.holding("cam"):
+        state, message = await world.calibrated("cam")
+        assert state == "failed"
+        assert "No markers are configured" in message
+        markers = [{"marker_id": n, "pose": {"position": {"x": x, "y": y}}} for n, (x, y) in MARKERS.items()]
+        answer = await world.http.put("/api/calibration/markers", json={"marker_size": SIZE, "markers": markers})
+        assert answer.status_code == 200, answer.text
+        state, message = await world.calibrated("cam")
+        assert state == "finished", message
+        millimetres, degrees = off(await world.placed("cam"), CAMERA)
+        assert millimetres < 2.0
+        assert degrees < 0.2
+        (record, *_) = (await world.http.get("/api/calibrations", params={"object_id": world.ids["cam"]})).json()
+        assert (record["person"], record["kind"], record["verdict"]) == ("alice", "camera_pose", message)
+        assert len(record["inputs"]) == 3
+
+
+async def test_a_robot_is_found_by_what_the_camera_sees_of_it(world: World) -> None:
+    async with world.holding("arm"):
+        before = off(await world.placed("arm"), ROBOT)
+        assert before[0] > 20.0
+        state, message = await world.calibrated("arm")
+        assert state == "finished", message
+        millimetres, degrees = off(await world.placed("arm"), ROBOT)
+        assert millimetres < 2.5
+        assert degrees < 0.2
+        assert message.startswith("arm stands")
+        (record, *_) = (await world.http.get("/api/calibrations", params={"object_id": world.ids["arm"]})).json()
+        assert record["kind"] == "robot_pose"
+        assert record["parameters"]["camera_name"] == "cam"
+
+
+async def test_what_is_not_to_be_seen_is_not_found(world: World) -> None:
+    for name, hidden, words in (("cam", {"markers": False}, "shows nothing"), ("arm", {"robot": False}, "robot")):
+        async with world.holding(name):
+            before = await world.placed(name)
+            records = (await world.http.get("/api/calibrations")).json()
+            world.show(**hidden)
+            await asyncio.sleep(0.5)  # a picture that was taken before is on its way
+            try:
+                state, message = await world.calibrated(name)
+            finally:
+                world.show()
+            assert state == "failed", message
+            assert words in message
+            assert await world.placed(name) == before
+            assert (await world.http.get("/api/calibrations")).json() == records
+
+
+async def test_a_worker_that_is_killed_costs_the_calibration_that_it_was_at(world: World) -> None:
+    client = world.client
+    async with world.holding("arm"):
+        for worker in world.workers():
+            worker.kill()
+        await client.calibrate_robot(world.ids["arm"], move_to_calibration_pose=False)
+        while True:
+            event = await client.next_event("TaskState", timeout=60.0)
+            if event.data.message == "looking for the robot":
+                break
+        for worker in world.workers():
+            os.kill(worker.pid, signal.SIGKILL)
+        while (event := await client.next_event("ProcessState", timeout=60.0)).data.state == "started":
+            pass
+        assert event.data.state == "failed"
+        assert "compute worker ended by SIGKILL while it worked on the pose of a robot" in event.data.message
+    # The next one finds another worker.
+    async with world.holding("cam"):
+        state, message = await world.calibrated("cam")
+        assert state == "finished", message
+
+
+async def test_what_the_robot_holds_is_in_the_way_where_the_robot_is(world: World) -> None:
+    http, arm_id = world.http, world.ids["arm"]
+    joints = await world.client.get_robot_joints(arm_id)
+    tip = await world.client.get_end_effector_pose(robot_id=arm_id, end_effector_id="tcp")
+    part = {"position": msgspec.to_builtins(tip.position)}
+    size = {"boxId": "part", "sizeX": 0.04, "sizeY": 0.04, "sizeZ": 0.04}
+    assert (await http.put("/collisions/box", params=size, json=part)).status_code == 200
+
+    async def met(at: Position) -> Any:
+        ends = {"pt1": msgspec.to_builtins(at + Position(0, 0, 0.5)), "pt2": msgspec.to_builtins(at)}
+        return (await http.put("/utils/line-safe", json=ends)).json()
+
+    assert await met(tip.position) == {"safe": False, "object_id": "part"}
+    holder = {"robotId": arm_id, "link": "tcp"}
+    answer = await http.put("/collisions/part/attach", params=holder)
+    assert answer.status_code == 200, answer.text
+    assert (await http.put("/collisions/part/attach", params=holder)).status_code == 409
+    assert await met(tip.position) == {"safe": False, "object_id": "part"}
+    world.robot.control.do("place", q=[joints[0].value + 0.6, *(joint.value for joint in joints[1:])])
+    moved = await until(lambda: _moved(world, tip), "the arm stands elsewhere")
+    assert await met(tip.position) == {"safe": True}
+    assert await met(moved.position) == {"safe": False, "object_id": "part"}
+    answer = await http.put("/collisions/part/detach")
+    assert answer.status_code == 200, answer.text
+    stays = msgspec.convert(answer.json(), Pose)
+    assert stays.position.distance_to(moved.position) < 0.005
+    world.robot.control.do("place", q=Q)
+    await until(lambda: _moved(world, moved), "the arm is back")
+    assert await met(moved.position) == {"safe": False, "object_id": "part"}
+    assert (await http.put("/collisions/part/detach")).status_code == 409
+    assert (await http.delete("/collisions/part")).status_code == 200
+
+
+async def _moved(world: World, before: Pose) -> Pose | None:
+    now = await world.client.get_end_effector_pose(robot_id=world.ids["arm"], end_effector_id="tcp")
+    return now if now.position.distance_to(before.position) > 0.1 else None
+
+
+async def test_the_command_line_follows_it(world: World, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["calibrate", "online", "camera", "cam", "--url", world.server.url]
+    status = await asyncio.to_thread(app, arguments)
+    told = capsys.readouterr()
+    assert status == 0, told
+    assert "known to" in told.out
+    assert "position" in told.out
+    await asyncio.to_thread(app, ["calibrate", "online", "records", "cam", "--url", world.server.url])
+    assert "camera_pose" in capsys.readouterr().out
+    with pytest.raises(RequestFailed):
+        await world.client.calibrate_camera(world.ids["arm"])
+    assert await asyncio.to_thread(app, [*arguments[:3], "nose", "--url", world.server.url]) == 9
+    assert "no object 'nose'" in capsys.readouterr().err
