@@ -6,7 +6,7 @@
 import type { JogRobotArgs } from "../protocol/types";
 import { call } from "../session/session";
 import { store } from "../store/store";
-import { holding } from "./asking";
+import { held, sentence } from "./asking";
 import { Lease, type LeaseRequest } from "./lease";
 
 export type JogWhat = Omit<JogRobotArgs, "robot_id" | "hold" | "sent_ms" | "valid_ms">;
@@ -36,14 +36,16 @@ function hold(robotId: string, send: (request: LeaseRequest) => Promise<unknown>
   endHolds();
   const lease = new Lease(send);
   current = lease;
-  const over = holding(robotId, () => {
+  const over = held(robotId, () => {
     lease.begin();
     return lease.over;
-  }).then((reason) => {
-    lease.end(); // not begun when the lock was refused, which was told
-    if (current === lease) current = null;
-    return reason ?? "";
-  });
+  })
+    .catch(sentence)
+    .then((reason) => {
+      lease.end(); // not begun when the lock was refused
+      if (current === lease) current = null;
+      return reason;
+    });
   return { end: () => lease.end(), over };
 }
 

@@ -29,7 +29,7 @@ import { type Hit, onFloor, pick } from "./picking";
 import { worldPose } from "./poses";
 import type { Context, Thing } from "./thing";
 import { make } from "./things/make";
-import { RobotThing } from "./things/robot";
+import { type JointLimit, RobotThing } from "./things/robot";
 
 export type Quality = "low" | "high";
 
@@ -52,6 +52,7 @@ export interface Probe {
   visible: boolean;
   badge: string;
   joints?: Record<string, number>;
+  ghost?: Record<string, number> | null;
   endEffectors?: Pose[];
 }
 
@@ -217,9 +218,16 @@ export class Engine {
       probe.joints = Object.fromEntries(
         Object.entries(thing.robot?.joints ?? {}).map(([name, joint]) => [name, Number(joint.angle)]),
       );
+      probe.ghost = thing.ghostJoints();
       probe.endEffectors = telemetry.endEffectors(id).map((each) => each.pose);
     }
     return probe;
+  }
+
+  /** Joints of a robot with their limits; none while its model is not loaded, or where it has none. */
+  limits(id: string): JointLimit[] {
+    const thing = this.things.get(id);
+    return thing instanceof RobotThing ? thing.limits() : [];
   }
 
   ids(): string[] {

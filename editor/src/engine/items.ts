@@ -37,6 +37,8 @@ export interface RobotItem extends Base {
   /** Joints are expected; where none come it is marked as stale. */
   online: boolean;
   trouble: boolean;
+  /** Where it would be, beside where it is. */
+  ghost?: { joints: Record<string, number>; possible: boolean } | undefined;
 }
 
 export interface PointItem extends Base {

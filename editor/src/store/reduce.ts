@@ -8,6 +8,7 @@ import { NO_PROGRAM, OFFLINE, type Notice, type State } from "./state";
 /** How many are kept. */
 const NOTICES = 200;
 const TRACE = 1000;
+const TRIED = 50;
 let numberOfNotice = 0;
 
 export function notice(state: State, level: Notice["level"], text: string): Pick<State, "notices"> {
@@ -109,7 +110,7 @@ function open(state: State, doc: NonNullable<State["doc"]>): Partial<State> {
 
 /** The screen without what belonged to the document that was open. */
 function shut(state: State): State["ui"] {
-  return { ...state.ui, selection: null, connecting: null, mode: "3d", tool: "" };
+  return { ...state.ui, selection: null, connecting: null, ghost: null, mode: "3d", tool: "" };
 }
 
 /** The selection, unless what was selected is gone. */
@@ -193,7 +194,10 @@ function live(state: State, event: ServerEvent): Partial<State> | null {
     case "ActionExecution":
       return become({ executing: event.data.action_id, result: null });
     case "ActionResult":
-      return become({ executing: "", result: event.data });
+      return {
+        ...become({ executing: "", result: event.data }),
+        tried: [...state.tried, { ...event.data, time: Date.now() }].slice(-TRIED),
+      };
     case "ActionCancelled":
       return become({ executing: "" });
     case "ProcessState": {

@@ -12,6 +12,7 @@ import type {
   BareProject,
   BareScene,
   HistoryChangedData,
+  Joint,
   ListProjectsData,
   ListScenesData,
   LogicItem,
@@ -134,6 +135,11 @@ export interface Program {
   runs: Run[];
 }
 
+/** How an action that was tried by itself ended. */
+export interface Tried extends ActionResultData {
+  time: number;
+}
+
 export interface Notice {
   id: number;
   level: "info" | "warn" | "error";
@@ -161,10 +167,19 @@ export interface Connecting {
   item?: string;
 }
 
+/** A robot shown where it would be, beside where it is. */
+export interface Ghost {
+  robotId: string;
+  joints: Joint[];
+  /** What is wrong with it, as a sentence; empty when it can go there. */
+  problem: string;
+}
+
 export interface Ui {
   selection: Selection | null;
   mode: Mode;
   connecting: Connecting | null;
+  ghost: Ghost | null;
   /** The tool of the left rail that is open. */
   tool: string;
   theme: "system" | "light" | "dark";
@@ -191,6 +206,8 @@ export interface State {
   view: { user: Record<string, unknown>; shared: Record<string, unknown>; general: Record<string, unknown> };
   live: Live;
   program: Program;
+  /** Actions that were tried, the newest last. */
+  tried: Tried[];
   tasks: Record<string, TaskStateData>;
   notices: Notice[];
   ui: Ui;
@@ -235,8 +252,9 @@ export function initialState(): State {
     view: { user: {}, shared: {}, general: {} },
     live: OFFLINE,
     program: NO_PROGRAM,
+    tried: [],
     tasks: {},
     notices: [],
-    ui: { selection: null, mode: "3d", connecting: null, tool: "", theme: "system", systemDark: false, leftHanded: false, quality: "auto" },
+    ui: { selection: null, mode: "3d", connecting: null, ghost: null, tool: "", theme: "system", systemDark: false, leftHanded: false, quality: "auto" },
   };
 }

@@ -1,8 +1,9 @@
 /** From the state to what the 3D view shows: pure, and the same object for what did not change. */
 
-import type { Item, LinkItem, OrientationItem, Shape } from "../engine/items";
+import type { Item, LinkItem, OrientationItem, RobotItem, Shape } from "../engine/items";
 import type { LogicItem, ObjectTypeMeta, Position } from "../protocol/types";
-import type { OpenDocument, State } from "../store/state";
+import { isRunning } from "../store/selectors";
+import type { Ghost, OpenDocument, State } from "../store/state";
 
 export const START = "START";
 export const END = "END";
@@ -48,15 +49,16 @@ export class ItemMaker {
       const robot = state.types.robots[object.type];
       if (!object.pose && !robot) continue; // shown in lists alone
       const trouble = isTrouble(state, object.id);
-      const online = state.live.state === "started" || state.program.running.length > 0;
+      const online = state.live.state === "started" || isRunning(state);
       const preview = state.previews[object.id];
-      add(object.id, [object, type, robot, trouble, robot && online, preview, ...tell(object.id)], () => {
+      const ghost = state.ui.ghost?.robotId === object.id ? state.ui.ghost : null;
+      add(object.id, [object, type, robot, trouble, robot && online, preview, ghost, ...tell(object.id)], () => {
         const pose = {
           position: preview?.position ?? object.pose?.position ?? NO_PLACE,
           orientation: preview?.orientation ?? object.pose?.orientation ?? UPRIGHT.orientation,
         };
         const base = { ...common(object.id, object.name), pose, trouble };
-        if (robot) return { ...base, kind: "robot", urdf: robot.urdf_package_filename ?? "", online };
+        if (robot) return { ...base, kind: "robot", urdf: robot.urdf_package_filename ?? "", online, ghost: ghost ? ghostOf(ghost) : undefined };
         return { ...base, kind: "object", shape: shapeOf(type) };
       });
     }
@@ -134,6 +136,10 @@ export class ItemMaker {
       }));
     }
   }
+}
+
+function ghostOf({ joints, problem }: Ghost): RobotItem["ghost"] {
+  return { joints: Object.fromEntries(joints.map((each) => [each.name, each.value])), possible: problem === "" };
 }
 
 function isPosition(value: unknown): value is Position {

@@ -16,6 +16,15 @@ import { STALE } from "../../store/telemetry";
 import type { RobotItem } from "../items";
 import { setPose } from "../poses";
 import { disposeTree, ownedBy, Thing, type Context } from "../thing";
+import { GhostRobot } from "./ghost";
+
+/** How far a joint goes, rad, m where prismatic. */
+export interface JointLimit {
+  name: string;
+  lower: number;
+  upper: number;
+  prismatic: boolean;
+}
 
 /** rad or m: what moves less is not drawn anew. */
 const STILL = 1e-4;
@@ -31,6 +40,7 @@ export class RobotThing extends Thing<RobotItem> {
   private readonly tips = new Map<string, Object3D>();
   private readonly shown = new Map<string, number>();
   private readonly material = new MeshLambertMaterial();
+  private readonly ghost = new GhostRobot(this.root);
   private urdf: string | null = null;
   private stale = false;
 
@@ -48,8 +58,25 @@ export class RobotThing extends Thing<RobotItem> {
       void this.load(item.urdf);
     }
     this.root.visible = item.faint < 1;
+    this.ghost.show(item.ghost, this.robot, this.context.palette);
     this.checkAge();
     this.paint();
+  }
+
+  /** Joints of the ghost; null while there is none. */
+  ghostJoints(): Record<string, number> | null {
+    return this.ghost.joints;
+  }
+
+  /** Joints that can be moved, in the order of the model, with their limits. */
+  limits(): JointLimit[] {
+    return Object.entries(this.robot?.joints ?? {})
+      .filter(([, joint]) => joint.jointType !== "fixed")
+      .map(([name, joint]) => {
+        const endless = joint.jointType === "continuous";
+        const lower = endless ? -2 * Math.PI : Number(joint.limit.lower);
+        return { name, lower, upper: endless ? 2 * Math.PI : Number(joint.limit.upper), prismatic: joint.jointType === "prismatic" };
+      });
   }
 
   /** Whether what was reported differs from what is shown. */
@@ -102,6 +129,7 @@ export class RobotThing extends Thing<RobotItem> {
 
   override dispose(): void {
     this.urdf = null;
+    this.ghost.dispose();
     super.dispose();
     this.material.dispose();
   }
@@ -159,6 +187,7 @@ export class RobotThing extends Thing<RobotItem> {
       disposeTree(child);
     }
     this.robot = robot;
+    this.ghost.show(this.item.ghost, robot, this.context.palette);
     this.shown.clear();
     this.body.add(robot ?? this.standIn());
     ownedBy(this.body, this.item.id);

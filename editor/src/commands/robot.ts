@@ -1,0 +1,153 @@
+/** The robot in hand: which one, where it shall go, how it is shown where it would be. Holding it: holds.ts. */
+
+import type { Joint, Pose, RobotArg, RobotFeatures, StepAxis, StepMode, StepWhat } from "../protocol/types";
+import { call } from "../session/session";
+import { robotsOf } from "../session/streams";
+import type { Arm, State } from "../store/state";
+import { now, setUi } from "../store/store";
+import { telemetry } from "../store/telemetry";
+import { barred, held, refusal, sentence } from "./asking";
+import { keepView } from "./viewstate";
+
+/** A robot, its arm (empty where it has one) and its end effector (empty until it is known). */
+export interface Chosen {
+  robotId: string;
+  armId: string;
+  effector: string;
+}
+
+/** How a motion is asked for; `speed` is the part of the robot's own. */
+export interface Manner {
+  speed: number;
+  safe: boolean;
+  linear: boolean;
+}
+
+let known: Chosen | null = null;
+
+/** The robot that the user works with: as he chose last, else the first that there is. The same object while it is the same. */
+export function chosenRobot(state: State): Chosen | null {
+  const next = found(state);
+  if (known && next && known.robotId === next.robotId && known.armId === next.armId && known.effector === next.effector) return known;
+  known = next;
+  return known;
+}
+
+function found(state: State): Chosen | null {
+  const robots = robotsOf(state);
+  const last = (state.view.user["last_robot"] ?? {}) as Partial<Record<keyof Chosen, unknown>>;
+  const robotId = robots.find((each) => each === last.robotId) ?? robots[0];
+  if (robotId === undefined) return null;
+  const arms = state.live.arms[robotId] ?? [];
+  const arm = arms.find((each) => each.id === last.armId) ?? arms[0];
+  const effector = arm?.effectors.find((each) => each === last.effector) ?? arm?.effectors[0];
+  return { robotId, armId: arm?.id ?? "", effector: effector ?? "" };
+}
+
+export function chooseRobot(chosen: Chosen): void {
+  setUi({ ghost: null });
+  keepView("user", { last_robot: chosen });
+}
+
+export function armOf(state: State, { robotId, armId }: Chosen): Arm | undefined {
+  return state.live.arms[robotId]?.find((each) => each.id === armId);
+}
+
+export function featuresOf(state: State, robotId: string): RobotFeatures | undefined {
+  return state.types.robots[state.doc?.objects[robotId]?.type ?? ""]?.features;
+}
+
+/** As requests about points and objects name the robot. */
+export function robotArg({ robotId, armId, effector }: Chosen): RobotArg {
+  return { robot_id: robotId, end_effector: effector, ...ofArm(armId) };
+}
+
+const ofArm = (armId: string) => (armId ? { arm_id: armId } : {});
+
+/** Where the end effector is, as last reported; undefined when it is not known, or no longer. */
+export function effectorPose({ robotId, armId, effector }: Chosen): Pose | undefined {
+  return telemetry.endEffectors(robotId).find((each) => each.end_effector_id === effector && (each.arm_id ?? "") === armId)?.pose;
+}
+
+/** Why the robot cannot be asked to do something now; empty when it can. */
+export function notReady(state: State, chosen: Chosen | null, request: Parameters<typeof barred>[1] = "MoveToPose"): string {
+  if (!chosen) return "There is no robot in this scene.";
+  const name = state.doc?.objects[chosen.robotId]?.name ?? "The robot";
+  if (state.live.state !== "started") return "Go online first.";
+  const connection = state.live.objects[chosen.robotId];
+  if (connection && connection.state !== "online" && connection.state !== "back") return `${name} is not there: ${connection.reason || connection.state}.`;
+  const hold = state.live.holds[chosen.robotId];
+  if (hold && hold.user !== state.connection.user) return `${hold.user} holds ${name}.`;
+  const owner = state.locks[chosen.robotId];
+  if (owner && owner !== state.connection.user) return `${owner} works with ${name}.`;
+  return barred(state, request);
+}
+
+// ------------------------------------------------------------------------------------------------ motion
+export interface Step {
+  what: StepWhat;
+  axis: StepAxis;
+  mode: StepMode;
+  /** m or rad. */
+  step: number;
+  /** Whose axes are meant, with the mode `relative`. */
+  pose?: Pose | undefined;
+}
+
+/** Gives why it was refused, empty when the robot moves. */
+export function stepEffector({ robotId, armId, effector }: Chosen, { pose, ...step }: Step, manner: Manner): Promise<string> {
+  const args = { robot_id: robotId, end_effector_id: effector, ...step, ...(pose ? { pose } : {}), ...manner, ...ofArm(armId) };
+  return refusal(() => held(robotId, () => call("StepRobotEef", args, { deadline: 30 })));
+}
+
+export function alignDown({ robotId, armId, effector }: Chosen, manner: Manner): Promise<string> {
+  const args = { robot_id: robotId, end_effector_id: effector, ...manner, ...ofArm(armId) };
+  return refusal(() => held(robotId, () => call("SetEefPerpendicularToWorld", args, { deadline: 30 })));
+}
+
+/** Move to a pose in the world; what is left out of it stays. */
+export function moveToPose({ robotId, armId, effector }: Chosen, pose: Partial<Pose>, manner: Manner): Promise<string> {
+  return refusal(() => call("MoveToPose", { robot_id: robotId, end_effector_id: effector, ...pose, ...manner, ...ofArm(armId) }, { deadline: 30 }));
+}
+
+export function moveToJoints({ robotId, armId }: Chosen, joints: Joint[], { speed, safe }: Manner): Promise<string> {
+  return refusal(() => call("MoveToJoints", { robot_id: robotId, joints, speed, safe, ...ofArm(armId) }, { deadline: 30 }));
+}
+
+/** Move to an orientation of a point, or to joints kept there. */
+export function moveToTaught({ robotId, armId, effector }: Chosen, goal: { orientation_id: string } | { joints_id: string }, manner: Manner): Promise<string> {
+  const to = "orientation_id" in goal ? { ...goal, end_effector_id: effector } : goal;
+  return refusal(() => call("MoveToActionPoint", { robot_id: robotId, ...to, ...manner, ...ofArm(armId) }, { deadline: 30 }));
+}
+
+/** Unlock what a protective stop has left, by the person who has looked. */
+export function acknowledgeStop(object_id: string): Promise<string> {
+  return refusal(() => call("AcknowledgeStop", { object_id }, { deadline: 30 }));
+}
+
+// ------------------------------------------------------------------------------------------------ ghost
+/**
+ * Show the robot where it would be at a pose in the world. Gives what stands against it as a sentence, empty when
+ * nothing does; what would collide is shown all the same, as far as there are joints for it.
+ */
+export async function showAt(chosen: Chosen, pose: Pose): Promise<string> {
+  const ask = (avoid_collisions: boolean) =>
+    call("InverseKinematics", { robot_id: chosen.robotId, end_effector_id: chosen.effector, pose, avoid_collisions, ...ofArm(chosen.armId) });
+  try {
+    setUi({ ghost: { robotId: chosen.robotId, joints: await ask(true), problem: "" } });
+    return "";
+  } catch (error) {
+    const problem = sentence(error);
+    const joints = await ask(false).catch(() => null);
+    setUi({ ghost: joints ? { robotId: chosen.robotId, joints, problem } : null });
+    return problem;
+  }
+}
+
+export function showJoints(robotId: string, joints: Joint[], problem = ""): void {
+  setUi({ ghost: { robotId, joints, problem } });
+}
+
+export function hideGhost(): void {
+  if (now().ui.ghost) setUi({ ghost: null });
+}

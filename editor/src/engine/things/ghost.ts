@@ -1,0 +1,52 @@
+/** A robot where it would be: seen through, in another colour, and never instead of the real one. */
+
+import { type Group, type Material, type Mesh, MeshLambertMaterial } from "three";
+import type { URDFRobot } from "urdf-loader";
+import type { RobotItem } from "../items";
+import type { Palette } from "../palette";
+
+export class GhostRobot {
+  private robot: URDFRobot | null = null;
+  private of: URDFRobot | null = null;
+  private readonly material = new MeshLambertMaterial({ transparent: true, opacity: 0.45, depthWrite: false });
+
+  constructor(private readonly host: Group) {}
+
+  /** Show it, or nothing; `model` is the robot whose double it is. */
+  show(ghost: RobotItem["ghost"], model: URDFRobot | null, palette: Palette): void {
+    if (this.robot && (!ghost || this.of !== model)) this.remove();
+    if (!ghost || !model) return;
+    if (!this.robot) {
+      this.of = model;
+      this.robot = model.clone() as URDFRobot;
+      this.robot.traverse((each) => {
+        // Geometry is the model's, and goes with it; nobody can tap a ghost.
+        each.userData = { shared: true };
+        each.raycast = () => {};
+        const mesh = each as Mesh<never, Material>;
+        if (!mesh.isMesh) return;
+        mesh.material = this.material;
+        mesh.castShadow = false;
+      });
+      this.host.add(this.robot);
+    }
+    this.material.color.copy(ghost.possible ? palette.selected : palette.trouble);
+    for (const [name, value] of Object.entries(ghost.joints)) this.robot.joints[name]?.setJointValue(value);
+  }
+
+  /** What it shows, for tests. */
+  get joints(): Record<string, number> | null {
+    return this.robot && Object.fromEntries(Object.entries(this.robot.joints).map(([name, joint]) => [name, Number(joint.angle)]));
+  }
+
+  dispose(): void {
+    this.remove();
+    this.material.dispose();
+  }
+
+  private remove(): void {
+    this.robot?.removeFromParent();
+    this.robot = null;
+    this.of = null;
+  }
+}
