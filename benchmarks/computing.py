@@ -1,0 +1,95 @@
+"""What the compute workers cost the server: their start, a question, and worlds of many bodies."""
+
+import time
+from pathlib import Path
+from typing import Final
+
+import arcor2_drivers
+from arcor2_hw.compute import kinematics_tasks as t
+from arcor2_hw.compute.world import Body, BoxShape, KeptFile, RobotModel, StandingRobot, Thing
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.object_type import Box
+from arcor2_hw.data.robot import Joint
+from arcor2_server.collisions import Placed, first_hit
+from arcor2_server.compute import Compute
+from benchmarks.figures import Figure, Report, median, percentile
+
+UR5E: Final = Path(next(iter(arcor2_drivers.__path__))) / "universal_robots" / "urdf" / "ur5e"
+BODIES: Final = 1000
+ROUNDS: Final = 100
+
+
+async def run(report: Report) -> None:
+    """Measure all of them."""
+    for figure in (lines(), *await questions(), await reachability()):
+        report.add(figure)
+
+
+def lines() -> Figure:
+    """Time the safety of a line among a thousand boxes, which the server itself tells."""
+    placed = {
+        f"b{n}": Placed(Box(f"b{n}", 0.2, 0.2, 0.2), Pose(Position(n % 10, n // 10 % 10, n // 100)))
+        for n in range(BODIES)
+    }
+    taken = []
+    for number in range(ROUNDS):
+        start, end = Position(-1, number / 10, 0.5), Position(11, 10 - number / 10, 9.5)
+        began = time.perf_counter()
+        first_hit(start, end, placed.items(), 0.01)
+        taken.append(1e3 * (time.perf_counter() - began))
+    return Figure("computing_line_1000_ms", median(taken), len(taken), f"p99 {percentile(taken, 99):.2f} ms")
+
+
+async def questions() -> list[Figure]:
+    """Time the start of a worker with its first answer, one question, and one after one of many bodies moved."""
+    model = RobotModel(KeptFile(str(UR5E), "ur5e"))
+    compute = Compute(idle=60.0)
+    try:
+        began = time.perf_counter()
+        described = await compute.run(t.DescribeRobot(model))
+        start = 1e3 * (time.perf_counter() - began)
+        joints = [Joint(joint.name, 0.3) for joint in described.joints]
+        question, world = [], []
+        things: dict[str, Thing] = {f"b{n}": box(n) for n in range(BODIES)}
+        check = t.CheckLines([t.Line(Position(-1, 0, 0), Position(11, 9, 9))])
+        await compute.run(check, world=things)
+        for number in range(ROUNDS):
+            began = time.perf_counter()
+            await compute.run(t.SolveForward(model, "tcp", joints))
+            question.append(1e3 * (time.perf_counter() - began))
+            things[f"b{number}"] = box(number, 0.01 * number)
+            began = time.perf_counter()
+            await compute.run(check, world=things)
+            world.append(1e3 * (time.perf_counter() - began))
+    finally:
+        await compute.close()
+    return [
+        Figure("computing_start_ms", start, 1),
+        Figure("computing_question_ms", median(question), len(question), f"p99 {percentile(question, 99):.2f} ms"),
+        Figure("computing_world_1000_ms", median(world), len(world), f"p99 {percentile(world, 99):.2f} ms"),
+    ]
+
+
+async def reachability() -> Figure:
+    """Time 1,000 points in three orientations each, asked in pieces as the server does."""
+    robot = StandingRobot("arm", RobotModel(KeptFile(str(UR5E), "ur5e")))
+    turns = [Orientation(1, 0, 0, 0), Orientation(0, 0.5**0.5, 0, 0.5**0.5), Orientation(0.5**0.5, 0, 0, 0.5**0.5)]
+    points = [Position(0.12 * (n % 10) - 0.6, 0.12 * (n // 10 % 10) - 0.6, 0.1 * (n // 100)) for n in range(1000)]
+    poses = [Pose(point, turn) for point in points for turn in turns]
+    world: dict[str, Thing] = {"arm": robot} | {f"b{n}": box(n, 2.0) for n in range(20)}
+    compute = Compute(idle=60.0)
+    try:
+        await compute.run(t.JudgePoses("arm", "tcp", poses[:1]), world=world)
+        began = time.perf_counter()
+        for start in range(0, len(poses), 100):
+            await compute.run(t.JudgePoses("arm", "tcp", poses[start : start + 100]), world=world, background=True)
+        taken = time.perf_counter() - began
+    finally:
+        await compute.close()
+    return Figure("computing_reach_3000_s", taken, len(poses))
+
+
+def box(number: int, aside: float = 0.0) -> Body:
+    """Give one of a grid of boxes."""
+    place = Position(number % 10 + 3.0, number // 10 % 10 + aside, number // 100)
+    return Body(f"b{number}", BoxShape((0.2, 0.2, 0.2)), Pose(place))
