@@ -1,0 +1,185 @@
+/** Choices and amounts in panels: one of a few, a number with its unit, more or less of something, on or off. */
+
+import { type KeyboardEvent, type ReactNode, useId, useState } from "react";
+import { Label, Slider, SliderOutput, SliderThumb, SliderTrack, Switch, ToggleButton, ToggleButtonGroup } from "react-aria-components";
+import "./fields.css";
+
+interface OneOfProps<T extends string> {
+  label: string;
+  value: T;
+  choices: readonly (readonly [T, ReactNode])[];
+  onChange: (value: T) => void;
+  /** The label is read, not shown. */
+  quiet?: boolean;
+}
+
+/** One of a few, side by side. */
+export function OneOf<T extends string>({ label, value, choices, onChange, quiet = false }: OneOfProps<T>) {
+  const id = useId();
+  return (
+    <div className="one-of">
+      <span id={id} className={quiet ? "hidden-but-read" : "one-of-label"}>
+        {label}
+      </span>
+      <ToggleButtonGroup
+        aria-labelledby={id}
+        className="one-of-choices"
+        selectionMode="single"
+        disallowEmptySelection
+        selectedKeys={[value]}
+        onSelectionChange={(keys) => {
+          const [next] = keys;
+          if (next !== undefined) onChange(String(next) as T);
+        }}
+      >
+        {choices.map(([key, words]) => (
+          <ToggleButton key={key} id={key} className="button">
+            {words}
+          </ToggleButton>
+        ))}
+      </ToggleButtonGroup>
+    </div>
+  );
+}
+
+interface PickProps {
+  label: string;
+  value: string;
+  choices: readonly (readonly [string, string])[];
+  onChange: (value: string) => void;
+  isDisabled?: boolean;
+}
+
+/** One of many, as the device shows lists. */
+export function Pick({ label, value, choices, onChange, isDisabled = false }: PickProps) {
+  const id = useId();
+  return (
+    <div className="field">
+      <label htmlFor={id}>{label}</label>
+      <select id={id} value={value} disabled={isDisabled} onChange={(event) => onChange(event.target.value)}>
+        {choices.map(([key, words]) => (
+          <option key={key} value={key}>
+            {words}
+          </option>
+        ))}
+      </select>
+    </div>
+  );
+}
+
+interface AmountProps {
+  label: string;
+  unit: string;
+  value: number;
+  /** Called when it is to hold: by Enter, and when the field is left. */
+  onChange: (value: number) => void;
+  digits?: number;
+  least?: number;
+  most?: number;
+  /** What an arrow key adds. */
+  step?: number;
+  isDisabled?: boolean;
+}
+
+/** A number with its unit. `+5` adds to what is there, `-=5` takes away; `-5` is that number. */
+export function Amount({ label, unit, value, onChange, digits = 1, least = -Infinity, most = Infinity, step = 1, isDisabled = false }: AmountProps) {
+  const id = useId();
+  const shown = round(value, digits);
+  const [text, setText] = useState<string | null>(null);
+  const [wrong, setWrong] = useState("");
+  const give = (next: number) => {
+    if (next < least || next > most) {
+      setWrong(`From ${round(least, digits)} to ${round(most, digits)} ${unit}.`);
+      return;
+    }
+    setWrong("");
+    setText(null);
+    if (Math.abs(next - value) > 1e-9) onChange(next);
+  };
+  const commit = () => {
+    if (text === null) return;
+    const next = parsed(text, value);
+    if (next === null) setWrong("That is no number.");
+    else give(next);
+  };
+  const key = (event: KeyboardEvent) => {
+    if (event.key === "Enter") commit();
+    else if (event.key === "Escape") {
+      setText(null);
+      setWrong("");
+    } else if (event.key === "ArrowUp" || event.key === "ArrowDown") {
+      event.preventDefault();
+      give(value + (event.key === "ArrowUp" ? step : -step));
+    }
+  };
+  return (
+    <div className="amount" data-wrong={wrong !== ""}>
+      <label htmlFor={id}>
+        {label} <span className="quiet">{unit}</span>
+      </label>
+      <input
+        id={id}
+        inputMode="decimal"
+        autoComplete="off"
+        value={text ?? shown}
+        disabled={isDisabled}
+        aria-invalid={wrong !== ""}
+        aria-describedby={wrong ? `${id}-wrong` : undefined}
+        onFocus={(event) => event.target.select()}
+        onChange={(event) => setText(event.target.value)}
+        onBlur={commit}
+        onKeyDown={key}
+      />
+      {wrong && (
+        <span id={`${id}-wrong`} className="amount-wrong" role="alert">
+          {wrong}
+        </span>
+      )}
+    </div>
+  );
+}
+
+function round(value: number, digits: number): string {
+  const text = value.toFixed(digits);
+  return Number(text) === 0 ? (0).toFixed(digits) : text;
+}
+
+/** A number as people write it, or a change of the one that is there; null when it is neither. */
+export function parsed(text: string, value: number): number | null {
+  const clean = text.trim().replace(",", ".");
+  const change = /^([+-])=?\s*(\d*\.?\d+)$/.exec(clean);
+  if (change && (clean.startsWith("+") || clean.includes("="))) return value + (change[1] === "-" ? -1 : 1) * Number(change[2]);
+  return clean !== "" && Number.isFinite(Number(clean)) ? Number(clean) : null;
+}
+
+interface MoreOrLessProps {
+  label: string;
+  value: number;
+  least: number;
+  most: number;
+  step: number;
+  words: (value: number) => string;
+  onChange: (value: number) => void;
+  onEnd?: (value: number) => void;
+}
+
+export function MoreOrLess({ label, value, least, most, step, words, onChange, onEnd }: MoreOrLessProps) {
+  return (
+    <Slider className="more-or-less" value={value} minValue={least} maxValue={most} step={step} onChange={onChange} onChangeEnd={(end) => onEnd?.(end)}>
+      <Label>{label}</Label>
+      <SliderOutput>{words(value)}</SliderOutput>
+      <SliderTrack className="track">
+        <SliderThumb className="thumb" />
+      </SliderTrack>
+    </Slider>
+  );
+}
+
+export function OnOff({ children, isSelected, onChange }: { children: ReactNode; isSelected: boolean; onChange: (on: boolean) => void }) {
+  return (
+    <Switch className="on-off" isSelected={isSelected} onChange={onChange}>
+      <span className="on-off-track" aria-hidden="true" />
+      {children}
+    </Switch>
+  );
+}
