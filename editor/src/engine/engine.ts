@@ -22,6 +22,7 @@ import type { Pose } from "../protocol/types";
 import type { Telemetry } from "../store/telemetry";
 import { Batches } from "./batches";
 import { View } from "./camera";
+import { Gizmo } from "./gizmo/gizmo";
 import type { Item } from "./items";
 import { type Label, Labels } from "./labels";
 import { DARK, LIGHT, type Palette } from "./palette";
@@ -64,6 +65,8 @@ const SLOW = 1 / 30;
 export class Engine {
   readonly view: View;
   readonly scene = new Scene();
+  /** Moves, turns and sizes what the transform tool has in hand. */
+  readonly gizmo: Gizmo;
   /** Frames drawn since the start. */
   frames = 0;
   onTap: (hits: Hit[], floor: Vector3 | null) => void = () => {};
@@ -108,6 +111,13 @@ export class Engine {
       thing: (id) => this.things.get(id),
       invalidate: () => this.invalidate(),
     };
+    this.gizmo = new Gizmo({
+      canvas,
+      scene: this.scene,
+      camera: () => this.view.camera,
+      size: () => ({ width: this.width, height: this.height }),
+      draw: () => this.draw(),
+    });
     this.light();
     this.setDark(options.dark);
     this.ends.push(options.telemetry.subscribe((id) => this.reported(id)));
@@ -252,6 +262,7 @@ export class Engine {
     for (const [id, thing] of [...this.things]) this.remove(id, thing);
     this.batches.dispose();
     this.labels.dispose();
+    this.gizmo.dispose();
     this.grid?.dispose();
     this.view.dispose();
     this.sun.dispose();
@@ -343,6 +354,7 @@ export class Engine {
 
   private render(): void {
     const moving = this.place();
+    this.gizmo.place();
     this.renderer.render(this.scene, this.view.camera);
     this.frames++;
     this.labels.show(this.labelled(), this.view.camera, this.width, this.height);

@@ -1,0 +1,44 @@
+/** How a pointer that moves over the view becomes a way along an axis, in a plane, or about an axis: pure geometry. */
+
+import { type Ray, Vector3 } from "three";
+
+/** Rays flatter than this to a plane, or closer than this to an axis, would make a pixel worth metres. */
+const FLAT = 0.03;
+
+/** Where on an axis the ray comes closest to it, m from the origin; null when it runs along the axis. */
+export function alongAxis(ray: Ray, origin: Vector3, axis: Vector3): number | null {
+  const between = new Vector3().subVectors(origin, ray.origin);
+  const cosine = axis.dot(ray.direction);
+  const apart = 1 - cosine * cosine;
+  if (apart < FLAT * FLAT) return null;
+  return (cosine * ray.direction.dot(between) - axis.dot(between)) / apart;
+}
+
+/** Where the ray meets a plane in front of it. */
+export function onPlane(ray: Ray, origin: Vector3, normal: Vector3): Vector3 | null {
+  const slope = normal.dot(ray.direction);
+  if (Math.abs(slope) < FLAT) return null;
+  const distance = new Vector3().subVectors(origin, ray.origin).dot(normal) / slope;
+  return distance > 0 ? ray.origin.clone().addScaledVector(ray.direction, distance) : null;
+}
+
+/** Angle in rad from one direction to another about an axis; both need not be square to it. */
+export function angleBetween(from: Vector3, to: Vector3, axis: Vector3): number {
+  const a = from.clone().projectOnPlane(axis);
+  const b = to.clone().projectOnPlane(axis);
+  return Math.atan2(axis.dot(a.clone().cross(b)), a.dot(b));
+}
+
+/** An angle that goes on past half a turn: the one nearest to the last. */
+export function unwound(angle: number, last: number): number {
+  return angle + Math.round((last - angle) / (2 * Math.PI)) * 2 * Math.PI;
+}
+
+/** px from a point to a line between two others. */
+export function toSegment(x: number, y: number, a: { x: number; y: number }, b: { x: number; y: number }): number {
+  const dx = b.x - a.x;
+  const dy = b.y - a.y;
+  const length = dx * dx + dy * dy;
+  const part = length ? Math.min(1, Math.max(0, ((x - a.x) * dx + (y - a.y) * dy) / length)) : 0;
+  return Math.hypot(x - a.x - part * dx, y - a.y - part * dy);
+}

@@ -1,0 +1,277 @@
+/**
+ * What a thing is moved, turned and sized with in the view: arrows, squares, rings, knobs. It tells what the hand does,
+ * in the world; what becomes of the thing is for who shows it (`show`) and listens (`onDrag`).
+ */
+
+import { type Camera, Quaternion, Raycaster, type Scene, Vector2, Vector3 } from "three";
+import type { Orientation, Position } from "../../protocol/types";
+import { alongAxis, angleBetween, onPlane, unwound } from "./drags";
+import { apart, AXES, type Axis, type GizmoMode, type Handle, handlesOf, keyOf, onScreen, outline, UNIT } from "./handles";
+import { Picture } from "./picture";
+
+export interface GizmoSetup {
+  mode: GizmoMode;
+  /** Where it stands in the world, and how its axes are turned; `view`: as the viewer sees. */
+  at: Position;
+  axes: Orientation | "view";
+  /** Left out: all three. */
+  allowed?: readonly Axis[];
+  /** Of what is sized: half of its size along its own axes, m. */
+  half?: Record<Axis, number>;
+}
+
+/** What the hand has done since it took hold. */
+export interface Drag {
+  phase: "start" | "move" | "end" | "cancel";
+  handle: Handle;
+  /** m in the world. */
+  translation: Vector3;
+  /** m along the handle's axis; outwards for a face. */
+  length: number;
+  /** rad about the handle's axis, more than a turn where it went on. */
+  angle: number;
+  /** The handle's axis in the world, as it was at the start; of `free`, towards the viewer. */
+  axis: Vector3;
+  /** The pointer, px from the view's upper left corner. */
+  x: number;
+  y: number;
+}
+
+interface Surroundings {
+  canvas: HTMLCanvasElement;
+  scene: Scene;
+  camera: () => Camera;
+  size: () => { width: number; height: number };
+  draw: () => void;
+}
+
+/** px: length of an arrow, and how near a handle is hit. */
+const LENGTH = 96;
+const NEAR_MOUSE = 10;
+const NEAR_FINGER = 24;
+/** px: what is seen shorter than this points at the viewer, and cannot be pulled. */
+const SHORT = 22;
+
+export class Gizmo {
+  /** Called while somebody drags. */
+  onDrag: (drag: Drag) => void = () => {};
+
+  private setup: GizmoSetup | null = null;
+  private readonly picture: Picture;
+  private readonly caster = new Raycaster();
+  private readonly forget = new AbortController();
+  private lit = "";
+  private dragging: { handle: Handle; pointer: number; from: Vector3; origin: Vector3; axis: Vector3; last: Drag } | null = null;
+
+  constructor(private readonly around: Surroundings) {
+    this.picture = new Picture(around.scene);
+    const { canvas } = around;
+    const options = { capture: true, signal: this.forget.signal };
+    canvas.addEventListener("pointerdown", (event) => this.down(event), options);
+    canvas.addEventListener("pointermove", (event) => this.move(event), options);
+    canvas.addEventListener("pointerup", (event) => this.up(event, "end"), options);
+    canvas.addEventListener("pointercancel", (event) => this.up(event, "cancel"), options);
+    window.addEventListener("keydown", (event) => this.key(event), options);
+  }
+
+  get shown(): boolean {
+    return this.setup !== null;
+  }
+
+  get isDragging(): boolean {
+    return this.dragging !== null;
+  }
+
+  show(setup: GizmoSetup): void {
+    this.setup = setup;
+    this.picture.show(handlesOf(setup.mode, setup.allowed ?? AXES));
+    this.around.draw();
+  }
+
+  hide(): void {
+    if (this.dragging) this.finish("cancel");
+    if (!this.setup) return;
+    this.setup = null;
+    this.picture.show([]);
+    this.around.draw();
+  }
+
+  /** Where its handles are on the screen, px, by their names: for tests, and hints. */
+  places(): Record<string, { x: number; y: number }> {
+    const { setup } = this;
+    if (!setup) return {};
+    return Object.fromEntries(
+      handlesOf(setup.mode, setup.allowed ?? AXES).map((handle) => {
+        const line = this.line(handle);
+        const { x, y } = line[handle.do === "ring" ? 6 : line.length - 1] ?? { x: 0, y: 0 };
+        return [keyOf(handle), { x, y }];
+      }),
+    );
+  }
+
+  /** Called before each drawn frame: the same size on the screen from near and far. */
+  place(): void {
+    if (!this.setup) return;
+    this.picture.place(this.origin(), this.turned(), this.scale(), this.half(), (handle) => this.isShort(handle));
+  }
+
+  dispose(): void {
+    this.forget.abort();
+    this.picture.dispose();
+  }
+
+  // ------------------------------------------------------------------------------------------------ where it is
+  private origin(): Vector3 {
+    const { x, y, z } = this.setup?.at ?? { x: 0, y: 0, z: 0 };
+    return new Vector3(x, y, z);
+  }
+
+  private turned(): Quaternion {
+    const axes = this.setup?.axes ?? "view";
+    if (axes === "view") return this.around.camera().getWorldQuaternion(new Quaternion());
+    return new Quaternion(axes.x, axes.y, axes.z, axes.w).normalize();
+  }
+
+  /** m in the world that are `LENGTH` px on the screen, there where it stands. */
+  private scale(): number {
+    const camera = this.around.camera();
+    const origin = this.origin();
+    const right = new Vector3(1, 0, 0).applyQuaternion(camera.getWorldQuaternion(new Quaternion()));
+    const { width, height } = this.around.size();
+    const a = onScreen(origin, camera, width, height);
+    const b = onScreen(origin.clone().addScaledVector(right, 0.01), camera, width, height);
+    return (0.01 * LENGTH) / Math.max(0.01, Math.hypot(a.x - b.x, a.y - b.y));
+  }
+
+  /** Half the size of what is sized, in lengths of the gizmo: a knob stands a bit before its face. */
+  private half(): Record<Axis, number> {
+    const { half } = this.setup ?? {};
+    const scale = this.scale();
+    const of = (axis: Axis) => (half ? half[axis] / scale + 0.18 : 1);
+    return { x: of("x"), y: of("y"), z: of("z") };
+  }
+
+  private line(handle: Handle) {
+    const { width, height } = this.around.size();
+    const camera = this.around.camera();
+    const origin = this.origin();
+    const turned = this.turned();
+    const scale = this.scale();
+    return outline(handle, this.half()).map((point) =>
+      onScreen(point.multiplyScalar(scale).applyQuaternion(turned).add(origin), camera, width, height),
+    );
+  }
+
+  /** An arrow or knob that points at the viewer: pulling it would mean nothing. */
+  private isShort(handle: Handle): boolean {
+    if (handle.do !== "axis" && handle.do !== "face") return false;
+    const line = this.line({ do: "axis", axis: handle.axis });
+    const [a, b] = line;
+    return !a || !b || Math.hypot(a.x - b.x, a.y - b.y) < SHORT;
+  }
+
+  private at(x: number, y: number, near: number): Handle | null {
+    const { setup } = this;
+    if (!setup) return null;
+    const { width, height } = this.around.size();
+    const centre = onScreen(this.origin(), this.around.camera(), width, height);
+    let best: Handle | null = null;
+    let least = near;
+    for (const handle of handlesOf(setup.mode, setup.allowed ?? AXES)) {
+      if (this.isShort(handle)) continue;
+      const distance = apart(x, y, this.line(handle), centre);
+      if (distance >= least) continue;
+      best = handle;
+      least = distance;
+    }
+    return best;
+  }
+
+  // ------------------------------------------------------------------------------------------------ the hand
+  private pointer(event: PointerEvent): { x: number; y: number } {
+    const box = this.around.canvas.getBoundingClientRect();
+    return { x: event.clientX - box.left, y: event.clientY - box.top };
+  }
+
+  private down(event: PointerEvent): void {
+    if (!this.setup || !event.isPrimary || event.button !== 0 || this.dragging) return;
+    const { x, y } = this.pointer(event);
+    const handle = this.at(x, y, event.pointerType === "mouse" ? NEAR_MOUSE : NEAR_FINGER);
+    if (!handle) return;
+    event.stopImmediatePropagation();
+    this.around.canvas.setPointerCapture(event.pointerId);
+    const origin = this.origin();
+    const towards = new Vector3(0, 0, 1).applyQuaternion(this.around.camera().getWorldQuaternion(new Quaternion()));
+    const axis = handle.do === "free" ? towards : UNIT[handle.axis].clone().applyQuaternion(this.turned());
+    if (handle.do === "face") axis.multiplyScalar(handle.sign);
+    const last: Drag = { phase: "start", handle, translation: new Vector3(), length: 0, angle: 0, axis, x, y };
+    const from = this.reach(handle, x, y, origin, axis) ?? origin.clone();
+    this.dragging = { handle, pointer: event.pointerId, from, origin, axis, last };
+    this.light(keyOf(handle));
+    this.onDrag(last);
+  }
+
+  /** Where the pointer is on the handle's axis or plane. */
+  private reach(handle: Handle, x: number, y: number, origin: Vector3, axis: Vector3): Vector3 | null {
+    const { width, height } = this.around.size();
+    this.caster.setFromCamera(new Vector2((x / width) * 2 - 1, 1 - (y / height) * 2), this.around.camera());
+    const { ray } = this.caster;
+    if (handle.do !== "axis" && handle.do !== "face") return onPlane(ray, origin, axis);
+    const along = alongAxis(ray, origin, axis);
+    return along === null ? null : origin.clone().addScaledVector(axis, along);
+  }
+
+  private move(event: PointerEvent): void {
+    const { x, y } = this.pointer(event);
+    const { dragging } = this;
+    if (!dragging) {
+      if (this.setup && event.pointerType === "mouse" && !event.buttons) {
+        const handle = this.at(x, y, NEAR_MOUSE);
+        this.light(handle ? keyOf(handle) : "");
+      }
+      return;
+    }
+    if (event.pointerId !== dragging.pointer) return;
+    event.stopImmediatePropagation();
+    const { handle, from, origin, axis, last } = dragging;
+    const to = this.reach(handle, x, y, origin, axis);
+    if (!to) return; // the pointer went past the horizon: it stays where it was
+    const translation = new Vector3().subVectors(to, from);
+    const ring = handle.do === "ring";
+    const angle = ring ? unwound(angleBetween(from.clone().sub(origin), to.clone().sub(origin), axis), last.angle) : 0;
+    dragging.last = { phase: "move", handle, translation: ring ? new Vector3() : translation, length: translation.dot(axis), angle, axis, x, y };
+    this.onDrag(dragging.last);
+    this.around.draw();
+  }
+
+  private up(event: PointerEvent, phase: "end" | "cancel"): void {
+    if (event.pointerId !== this.dragging?.pointer) return;
+    event.stopImmediatePropagation();
+    this.finish(phase);
+  }
+
+  private key(event: KeyboardEvent): void {
+    if (event.key !== "Escape" || !this.dragging) return;
+    event.stopImmediatePropagation();
+    this.finish("cancel");
+  }
+
+  private finish(phase: "end" | "cancel"): void {
+    const { dragging } = this;
+    if (!dragging) return;
+    this.dragging = null;
+    const { canvas } = this.around;
+    if (canvas.hasPointerCapture(dragging.pointer)) canvas.releasePointerCapture(dragging.pointer);
+    this.light("");
+    this.onDrag({ ...dragging.last, phase });
+    this.around.draw();
+  }
+
+  private light(key: string): void {
+    if (key === this.lit) return;
+    this.lit = key;
+    this.picture.light(key);
+    this.around.canvas.style.cursor = key ? "grab" : "";
+    this.around.draw();
+  }
+}
