@@ -38,7 +38,7 @@ _LEAST_DAMPING: Final = 1e-14
 _SLACK: Final = 1e-6
 """rad or m by which rounding may put a joint beyond its limit; it is put back there."""
 _PATIENCE: Final = 8
-_PROGRESS: Final = 0.8
+_PROGRESS: Final = 0.9
 """Rounds after which at most this share of the error has to be left."""
 _STEP: Final = 0.7
 """rad, or m, that a joint goes in one round at most."""

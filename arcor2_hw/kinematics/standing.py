@@ -44,6 +44,7 @@ class Part:
 class StandingRobot:
     """One robot of a world. q: its present joint values, in the model's order. parts: shapes and what is held.
 
+    manager, obstacle: coal's, of the parts that move with the joints, and of all of them, as they were posed last.
     margin: m by which the world's bodies have to be away to count as free. revision: grows when what is asked of the
     robot may have another answer in the same joints: it stands elsewhere, holds something else, may touch something.
 
@@ -91,6 +92,11 @@ class StandingRobot:
         for number in self.moving:
             self.manager.registerObject(self.parts[number].object)
         self.manager.setup()
+        self.obstacle: Any = coal.DynamicAABBTreeCollisionManager()
+        for part in self.parts:
+            self.obstacle.registerObject(part.object)
+        self.obstacle.setup()
+        self._posed: tuple[bytes, float, bool] | None = None
 
     def _add(self, name: str, link: str, held: Held | None, body: int, origin: Array, shape: Shape) -> None:
         geometry = coal_geometry(shape)
@@ -103,6 +109,9 @@ class StandingRobot:
         `everything`: those at rest too.
         """
         margin = self.margin + more
+        posed = self._posed
+        if posed is not None and posed[:2] == (q.tobytes(), margin) and (posed[2] or not everything):
+            return
         pin.updateGeometryPlacements(self.tree.model, self.tree.data, self._geometry, self._data, self.tree.expand(q))
         placements = self._data.oMg
         for number in range(len(self.parts)) if everything else self.moving:
@@ -113,6 +122,9 @@ class StandingRobot:
             if margin:
                 placed.getAABB().expand(margin)
         self.manager.update()
+        if everything:
+            self.obstacle.update()
+        self._posed = q.tobytes(), margin, everything
 
     def box(self, q: Array) -> Array:
         """Give the corners (2, 3) of the box around what moves, in joint values."""

@@ -1,7 +1,7 @@
 """The collision world: bodies, robots and what these hold; what is in collision, how far apart, what a line meets.
 
 Poses are in the world. Names: of a body its id, of a robot's link "robot/link". A robot's links that do not move with
-its joints are how it is mounted, and no question of a configuration: they are never in collision with bodies. A body
+its joints are how it is mounted, and no question of a configuration: they are in collision with nothing around. A body
 that encloses something without touching it has an inside unless it is an exact mesh, which is but a surface.
 Nothing here is safe for two threads at once.
 """
@@ -68,9 +68,17 @@ class CollisionWorld(Contents):
         margin = self.margin + more
         if self._bodies and self._collides(self._manager, mine.manager, margin):
             return False
-        if not self._apart and len(self.robots) == 1:
-            return True
-        return next(self._contacts_around(mine, self._apart.values(), margin), None) is None
+        if self._apart and next(self._contacts_with(mine, self._apart.values(), margin), None) is not None:
+            return False
+        for other in self.robots.values():
+            if other is mine:
+                continue
+            other.pose(other.q, everything=True)
+            if self._collides(other.obstacle, mine.manager, margin) and (
+                not self._allowed or next(self._contacts_between(mine, other, margin), None) is not None
+            ):
+                return False
+        return True
 
     def contacts(self, robot: str, q: Array) -> list[Contact]:
         """Give everything that a robot in joint values, or what it holds, is in collision with. Raises NotFound."""
@@ -81,11 +89,15 @@ class CollisionWorld(Contents):
             for one, two in mine.pairs
             if (depth := _depth(mine.parts[one].object, mine.parts[two].object, 0.0)) is not None
         ]
-        found += self._contacts_around(mine, self._bodies.values(), self.margin)
+        found += self._contacts_with(mine, self._bodies.values(), self.margin)
+        for other in self.robots.values():
+            if other is not mine:
+                other.pose(other.q, everything=True)
+                found += self._contacts_between(mine, other, self.margin)
         return list({(each.first, each.second): each for each in found}.values())
 
-    def _contacts_around(self, mine: StandingRobot, bodies: Iterable[Body], margin: float) -> Iterator[Contact]:
-        """Give contacts of a robot that is posed already with bodies, and with other robots."""
+    def _contacts_with(self, mine: StandingRobot, bodies: Iterable[Body], margin: float) -> Iterator[Contact]:
+        """Give contacts of a robot that is posed already with bodies."""
         every = list(bodies)
         boxes = np.array([body.box for body in every]).reshape(-1, 2, 3)
         for number in mine.moving:
@@ -97,17 +109,15 @@ class CollisionWorld(Contents):
                     continue
                 if (depth := _depth(part.object, body.object, margin)) is not None:
                     yield Contact(_name(mine, part), body.name, depth)
-        for other in self.robots.values():
-            if other is not mine:
-                yield from self._contacts_between(mine, other, margin)
 
     def _contacts_between(self, mine: StandingRobot, other: StandingRobot, margin: float) -> Iterator[Contact]:
-        other.pose(other.q, everything=True)
-        for part in mine.parts:
+        """Give contacts of what moves of a robot with another robot; both are posed already."""
+        for number in mine.moving:
+            part = mine.parts[number]
             low, high = corners(part.object)
             for their in other.parts:
                 their_low, their_high = corners(their.object)
-                if (their_low > high).any() or (their_high < low).any() or not (part.body or their.body):
+                if (their_low > high).any() or (their_high < low).any():
                     continue
                 names = (their.name,) if their.held is not None else (other.name, f"{other.name}/{their.link}")
                 if self._may_touch(part, mine.name, names):
