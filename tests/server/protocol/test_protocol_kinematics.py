@@ -11,7 +11,7 @@ import pytest_asyncio
 
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import Box, ObjectModel, ObjectTypeSource
-from tests.server.protocol.devices import PART
+from tests.server.protocol.devices import DUMB_ARM, PART
 from tests.server.protocol.stage import Actor, Stage, open_stage, refused
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
@@ -19,6 +19,10 @@ pytestmark = pytest.mark.asyncio(loop_scope="module")
 BASE = Pose(Position(0.1, 0.2, 0.3), Orientation(0, 0, math.sin(0.3), math.cos(0.3)))
 TARGET = BASE * Pose(Position(0.4, 0.2, 0.3), Orientation(1, 0, 0, 0))
 CRATE = PART.replace("class Part", "class Crate")
+FORWARD = """
+    def forward_kinematics(self, end_effector_id: str, joints: list[Joint]) -> Pose:
+        raise Arcor2NotImplemented("forward_kinematics")
+"""
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
@@ -119,3 +123,30 @@ async def test_settings_of_the_object_shape_its_model(stage: Stage, alice: Actor
     there = await forward(alice, longer, joints)
     assert there.position.distance_to(short.position) == pytest.approx(0.1, abs=1e-6)
     await alice.ask("RemoveFromScene", id=longer)
+
+
+async def test_a_robot_that_computes_none_itself_is_computed_for(stage: Stage, alice: Actor) -> None:
+    """It is in operation: joints near to those that are given come from its model."""
+    silent = DUMB_ARM.replace("class DumbArm", "class Silent").replace(
+        "urdf_package_name = None", 'urdf_package_name = "ur5e.zip"'
+    )
+    silent += FORWARD
+    await stage.services.types.add(ObjectTypeSource("Silent", silent.lstrip()))
+    meta = stage.services.types.robot_meta("Silent")
+    assert not meta.features.inverse_kinematics
+    assert not meta.features.forward_kinematics
+    robot = await add(alice, stage, "silent", "Silent", BASE)
+    joints = await solve(alice, stage.ids["ur"])
+    for name in ("ur", "arm", "two"):
+        await alice.ask("RemoveFromScene", id=stage.ids[name])
+    await stage.start(alice)
+    try:
+        assert stage.services.cell.online
+        found = await solve(alice, robot, start_joints=joints)
+        assert [joint["value"] for joint in found] == pytest.approx([joint["value"] for joint in joints], abs=1e-4)
+        there = await forward(alice, robot, found)
+        assert there.position.distance_to(TARGET.position) < 1e-6
+        args = {"robot_id": stage.ids["dumb"], "end_effector_id": "tip", "pose": msgspec.to_builtins(TARGET)}
+        assert "no model" in await refused(alice, "InverseKinematics", **args)
+    finally:
+        await stage.stop(alice)
