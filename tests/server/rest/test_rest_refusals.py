@@ -1,0 +1,38 @@
+"""How refusals of what computes elsewhere come out over REST."""
+
+import msgspec
+import pytest
+
+from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
+from arcor2_hw.compute import messages as m
+from arcor2_hw.compute.task import ComputeBusy, ComputeStopped, ComputeTimeout, NotInstalled
+from arcor2_hw.exceptions import Arcor2Error, KinematicsError
+from arcor2_server.compute_process import error_of
+from arcor2_server.rest.answers import refusal
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "kind"),
+    [
+        (NotInstalled("cv2 is not installed."), 503, "General"),
+        (ComputeStopped("It ended."), 503, "General"),
+        (ComputeTimeout("It took too long."), 503, "General"),
+        (ComputeBusy("Too many."), 503, "General"),
+        (CalibrationRefused("Two answers.", reason=Reason.AMBIGUOUS), 409, "Invalid"),
+        (CalibrationRefused("No marker.", reason=Reason.NO_MARKER), 404, "NotFound"),
+        (error_of(m.Failed(["calibration_refused", "error"], "No marker.", reason="no_marker")), 404, "NotFound"),
+        (error_of(m.Failed(["bad_mesh", "robot_model", "invalid_data", "error"], "It is flat.")), 400, "Argument"),
+        (error_of(m.Failed(["out_of_reach", "kinematics", "device", "error"], "Too far.")), 409, "General"),
+    ],
+)
+def test_what_is_refused_has_its_status(error: Arcor2Error, status: int, kind: str) -> None:
+    answer = refusal("Calibration", error)
+    assert answer.status_code == status
+    said = msgspec.json.decode(answer.content)
+    assert (said["type"], said["message"], said["service"]) == (kind, str(error), "Calibration")
+
+
+def test_kinds_are_kept_across_the_process_border() -> None:
+    error = error_of(m.Failed(["out_of_reach", "kinematics", "device", "error"], "Too far.", "at 3 m"))
+    assert isinstance(error, KinematicsError)
+    assert (error.code, error.detail) == ("out_of_reach", "at 3 m")
