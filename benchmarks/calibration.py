@@ -206,7 +206,7 @@ async def run(report: Report, long: bool) -> None:
     kinds: list[tuple[str, Callable[[np.random.Generator, Plate], View], float]] = [
         ("three", lambda random, table: markers_view(random, 3, table), 3.0),
         ("one", lambda random, table: markers_view(random, 1, table), 10.0),
-        ("board", board_view, 3.0),
+        ("board", board_view, 10.0),
     ]
     for name, make, limit in kinds:
         tally = measure(make, pictures, limit, options, 1.0)

@@ -1,6 +1,7 @@
 """ChArUco boards: their points, what is seen of them, and what is wrong with how one is described."""
 
 import math
+from dataclasses import replace
 from typing import Any, Final
 
 import cv2
@@ -18,6 +19,8 @@ CORNER_DEVIATION: Final = 0.05
 """px, of a corner between squares as it is measured."""
 _MARGIN: Final = 8
 """px around a board that are looked at."""
+_EDGE_FLOOR: Final = 0.03
+"""px, by which a board's corner may be off beside what its edges' scatter says."""
 LARGEST_BOARD: Final = 64
 """Columns and rows."""
 FEWEST_CORNERS: Final = 6
@@ -108,7 +111,12 @@ def measured_board(
     left, top = max(int(left), 0), max(int(top), 0)
     light = cv2.LUT(grey[top : max(int(bottom), top + 1), left : max(int(right), left + 1)], TONES[0])
     result = measure(np.asarray(light, dtype=np.float32), (left, top), lens, chart, board.first_id, start)
-    return None if result is None else (result, np.column_stack((chart.corners * unit, np.zeros(4))))
+    if result is None:
+        return None
+    # The border of a marker is as near to an edge as the margin is wide, and draws at it in a small or blurred picture.
+    covariance = np.linalg.inv(result.information) + _EDGE_FLOOR**2 * np.eye(8)
+    known = replace(result, information=np.asarray(np.linalg.inv(covariance), dtype=np.float64))
+    return known, np.column_stack((chart.corners * unit, np.zeros(4)))
 
 
 def _chart(board: CharucoBoard, white: Array) -> Chart:
