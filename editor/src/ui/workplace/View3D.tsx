@@ -2,14 +2,17 @@
 
 import { useEffect, useRef, useState } from "react";
 import type { Engine, Quality } from "../../engine/engine";
+import { endStep } from "../../commands/program";
 import { readAsset } from "../../session/assets";
 import { setEngine } from "../../session/engine";
+import { tapTaken } from "../../session/taps";
 import { now, select, setUi, store, useEditor } from "../../store/store";
 import { telemetry } from "../../store/telemetry";
 import { ItemMaker } from "../../viewmodel/items";
 import { Button, Waiting } from "../kit/kit";
 import { persistently } from "../kit/lazily";
 import { selectionOf } from "../names";
+import { RobotChip } from "../robot/RobotChip";
 import { useTheme } from "../settings/Settings";
 
 export function View3D() {
@@ -31,8 +34,14 @@ export function View3D() {
       if (ended || !canvas.current || !labels.current) return;
       made = new Engine({ canvas: canvas.current, labels: labels.current, telemetry, asset: readAsset, quality: chosen(quality), dark: themeAtStart.current === "dark" });
       const shown = made;
-      shown.onTap = (hits) => {
+      shown.onTap = (hits, floor) => {
+        if (tapTaken(hits, floor)) return;
         const state = now();
+        if (state.ui.connecting) {
+          const target = hits.find((hit) => ["action", "terminal"].includes(selectionOf(state, hit.id)?.kind ?? ""));
+          if (target) void endStep(target.id);
+          return;
+        }
         const found = hits.map((hit) => selectionOf(state, hit.id)).filter((each) => each !== null);
         // A tap on what is selected goes to what is behind it: so everything can be reached.
         const at = found.findIndex((each) => each.id === state.ui.selection?.id);
@@ -45,6 +54,8 @@ export function View3D() {
       stop = store.subscribe((state, before) => {
         shown.show(maker.items(state));
         if (state.doc && state.doc.scene.id !== before.doc?.scene.id) shown.focus();
+        const at = state.program.running.at(-1);
+        if (state.ui.follow && at !== undefined && at !== before.program.running.at(-1)) shown.focus(at);
       });
       setEngine(shown);
       setMine(shown);
@@ -74,6 +85,7 @@ export function View3D() {
           The 3D view cannot be shown on this device: {failed} Lists and panels work without it.
         </p>
       )}
+      <RobotChip />
       {engine && (
         <div className="view-buttons">
           <Button icon="zoom" aria-label="Show all" onPress={() => engine.focus()} />

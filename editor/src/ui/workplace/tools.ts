@@ -7,6 +7,7 @@ import type { ComponentType } from "react";
 import type { State } from "../../store/state";
 import type { IconName } from "../kit/icons";
 import { devices } from "./tools/devices";
+import { robot } from "./tools/robot";
 import { things } from "./tools/things";
 
 export interface Tool {
@@ -20,4 +21,4 @@ export interface Tool {
   Panel: ComponentType;
 }
 
-export const TOOLS: readonly Tool[] = [things, devices];
+export const TOOLS: readonly Tool[] = [things, robot, devices];

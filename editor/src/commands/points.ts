@@ -1,0 +1,167 @@
+/** Points, and the orientations and joints that are taught at them. Each gives why it was refused, empty when it was done. */
+
+import type { Joint, Orientation, Position } from "../protocol/types";
+import { call } from "../session/session";
+import type { State } from "../store/state";
+import { now, select, store } from "../store/store";
+import { relativeTo, worldOf } from "../viewmodel/frames";
+import { held, refusal } from "./asking";
+import { type Chosen, robotArg } from "./robot";
+
+/** s for the event of what was added to come after the answer. */
+const SEEN_WITHIN = 3;
+
+/** A name that is not taken: `stem`, or with a number. */
+export function freeName(stem: string, taken: Iterable<string>): string {
+  const used = new Set(taken);
+  for (let number = 1; ; number++) {
+    const name = number === 1 ? stem : `${stem}_${number}`;
+    if (!used.has(name)) return name;
+  }
+}
+
+const names = (of: Record<string, { name: string }> | undefined) => Object.values(of ?? {}).map((each) => each.name);
+
+/** Names of what is at a point. */
+const namesAt = <T extends { name: string; pointId: string }>(of: Record<string, T> | undefined, point: string) =>
+  Object.values(of ?? {})
+    .filter((each) => each.pointId === point)
+    .map((each) => each.name);
+
+/** Wait until something is in the store, as told by an event; undefined when it does not come. */
+function seen<T>(look: (state: State) => T | undefined): Promise<T | undefined> {
+  return new Promise((resolve) => {
+    const found = look(now());
+    if (found !== undefined) {
+      resolve(found);
+      return;
+    }
+    const done = (value: T | undefined) => {
+      stop();
+      clearTimeout(timer);
+      resolve(value);
+    };
+    const stop = store.subscribe((state) => {
+      const value = look(state);
+      if (value !== undefined) done(value);
+    });
+    const timer = setTimeout(() => done(undefined), SEEN_WITHIN * 1000);
+  });
+}
+
+const pointNamed = (name: string) => seen((state) => Object.values(state.doc?.points ?? {}).find((each) => each.name === name));
+
+// ------------------------------------------------------------------------------------------------ points
+/** Add a point where something is in the world, on a parent if one is given, and select it. */
+export function addPoint(world: Position, parent = "", orientation?: Orientation): Promise<string> {
+  return refusal(async () => {
+    const { doc } = now();
+    if (!doc) return;
+    const name = freeName("point", names(doc.points));
+    const frame = worldOf(doc, parent);
+    const { position } = relativeTo(frame, { position: world, orientation: { x: 0, y: 0, z: 0, w: 1 } });
+    await call("AddActionPoint", { name, position, ...(parent ? { parent } : {}) });
+    const point = await pointNamed(name);
+    if (!point) return;
+    select({ kind: "point", id: point.id });
+    if (orientation) {
+      const turned = relativeTo(frame, { position: world, orientation }).orientation;
+      await held(point.id, () => call("AddActionPointOrientation", { action_point_id: point.id, orientation: turned, name: "default" }));
+    }
+  });
+}
+
+/** Keep where the robot is as a point with orientation and joints, and select it. */
+export function addPointFromRobot({ robotId, armId, effector }: Chosen): Promise<string> {
+  return refusal(async () => {
+    const name = freeName("point", names(now().doc?.points));
+    await call("AddApUsingRobot", { robot_id: robotId, end_effector_id: effector, name, ...(armId ? { arm_id: armId } : {}) });
+    const point = await pointNamed(name);
+    if (point) select({ kind: "point", id: point.id });
+  });
+}
+
+/** Move a point, in its parent's frame, with all that hangs on it. */
+export const movePoint = (id: string, position: Position) => refusal(() => held(id, () => call("UpdateActionPointPosition", { action_point_id: id, new_position: position }), true));
+
+export const movePointToRobot = (id: string, chosen: Chosen) =>
+  refusal(() => held(id, () => call("UpdateActionPointUsingRobot", { action_point_id: id, robot: robotArg(chosen) }), true));
+
+/** Hang a point on another thing, or in the world; it stays where it is. */
+export const setParent = (id: string, parent: string) => refusal(() => held(id, () => call("UpdateActionPointParent", { action_point_id: id, new_parent_id: parent })));
+
+/** What a point may hang on: what has a place, but not what hangs on it. */
+export function possibleParents(state: State, id: string): string[] {
+  const { doc } = state;
+  if (!doc) return [];
+  const below = (each: string | undefined): boolean => each !== undefined && (each === id || below(doc.points[each]?.parent));
+  const objects = Object.values(doc.objects).filter((each) => each.pose);
+  const points = Object.values(doc.points).filter((each) => !below(each.id));
+  return [...objects, ...points].map((each) => each.id);
+}
+
+/** Copy a point with all that hangs on it: `count` times, each a step from the one before, in its parent's frame. */
+export function copyPoint(id: string, count: number, step: Position): Promise<string> {
+  return refusal(async () => {
+    const from = now().doc?.points[id]?.position;
+    if (!from) return;
+    for (let number = 1; number <= count; number++) {
+      const position = { x: from.x + step.x * number, y: from.y + step.y * number, z: from.z + step.z * number };
+      await call("CopyActionPoint", { id, position }, { deadline: 30 });
+    }
+  });
+}
+
+export const removePoint = (id: string) => refusal(() => call("RemoveActionPoint", { id }));
+export const renamePoint = (id: string, new_name: string) => refusal(() => held(id, () => call("RenameActionPoint", { action_point_id: id, new_name })));
+
+// ------------------------------------------------------------------------------------------------ orientations
+export function addOrientation(point: string, orientation: Orientation, stem = "orientation"): Promise<string> {
+  const name = freeName(stem, namesAt(now().doc?.orientations, point));
+  return refusal(() => held(point, () => call("AddActionPointOrientation", { action_point_id: point, orientation, name })));
+}
+
+export function addOrientationFromRobot(point: string, chosen: Chosen): Promise<string> {
+  const name = freeName("orientation", namesAt(now().doc?.orientations, point));
+  return refusal(() => held(point, () => call("AddActionPointOrientationUsingRobot", { action_point_id: point, robot: robotArg(chosen), name })));
+}
+
+export const turnOrientation = (id: string, orientation: Orientation) => refusal(() => held(id, () => call("UpdateActionPointOrientation", { orientation_id: id, orientation })));
+export const turnOrientationToRobot = (id: string, chosen: Chosen) =>
+  refusal(() => held(id, () => call("UpdateActionPointOrientationUsingRobot", { orientation_id: id, robot: robotArg(chosen) })));
+export const renameOrientation = (id: string, new_name: string) => refusal(() => held(id, () => call("RenameActionPointOrientation", { orientation_id: id, new_name })));
+export const removeOrientation = (id: string) => refusal(() => call("RemoveActionPointOrientation", { orientation_id: id }));
+
+// ------------------------------------------------------------------------------------------------ joints
+/** The point at which joints are kept: its lock is theirs. */
+const pointOf = (joints: string): string => now().doc?.joints[joints]?.pointId ?? "";
+
+export function addJointsFromRobot(point: string, { robotId, armId, effector }: Chosen): Promise<string> {
+  const name = freeName("joints", namesAt(now().doc?.joints, point));
+  const args = { action_point_id: point, robot_id: robotId, name, end_effector_id: effector, ...(armId ? { arm_id: armId } : {}) };
+  return refusal(() => held(point, () => call("AddActionPointJointsUsingRobot", args)));
+}
+
+export const setJoints = (id: string, joints: Joint[]) => refusal(() => held(pointOf(id), () => call("UpdateActionPointJoints", { joints_id: id, joints })));
+export const setJointsToRobot = (id: string) => refusal(() => held(pointOf(id), () => call("UpdateActionPointJointsUsingRobot", { joints_id: id })));
+export const renameJoints = (id: string, new_name: string) => refusal(() => held(pointOf(id), () => call("RenameActionPointJoints", { joints_id: id, new_name })));
+export const removeJoints = (id: string) => refusal(() => held(pointOf(id), () => call("RemoveActionPointJoints", { joints_id: id })));
+
+/** Compute the joints anew, for an orientation of their point: near to what they were, so that the arm bends the same way. */
+export function solveJoints(id: string, orientationId: string): Promise<string> {
+  return refusal(async () => {
+    const { doc, live } = now();
+    const kept = doc?.joints[id];
+    if (!doc || !kept) return;
+    const effector = kept.end_effector_id ?? live.arms[kept.robot_id]?.find((each) => each.id === (kept.arm_id ?? ""))?.effectors[0];
+    if (effector === undefined) throw new Error("Go online first: which end effector is meant is not known.");
+    const joints = await call("InverseKinematics", {
+      robot_id: kept.robot_id,
+      end_effector_id: effector,
+      pose: worldOf(doc, orientationId),
+      start_joints: kept.joints,
+      ...(kept.arm_id ? { arm_id: kept.arm_id } : {}),
+    });
+    await held(kept.pointId, () => call("UpdateActionPointJoints", { joints_id: id, joints }));
+  });
+}

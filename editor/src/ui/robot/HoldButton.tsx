@@ -1,0 +1,74 @@
+/**
+ * A button that acts as long as it is held, by finger, mouse or key. It lets go when anything takes the hand from it;
+ * what else ends a hold (the page hidden, the connection lost) is in holds.ts.
+ */
+
+import { type ReactNode, useEffect, useRef, useState } from "react";
+import type { Held } from "../../commands/holds";
+import { tell } from "../../store/store";
+
+interface HoldButtonProps {
+  /** What a screen reader calls it. */
+  label: string;
+  /** Why it cannot be held now; empty: it can. */
+  why?: string;
+  className?: string;
+  onHold: () => Held;
+  /** Called when it is over: with why, where it was not simply let go. */
+  onOver?: (reason: string) => void;
+  children: ReactNode;
+}
+
+export function HoldButton({ label, why = "", className = "", onHold, onOver, children }: HoldButtonProps) {
+  const held = useRef<Held | null>(null);
+  const [down, setDown] = useState(false);
+  const begin = () => {
+    if (why) {
+      tell("info", why);
+      return;
+    }
+    if (held.current) return;
+    const mine = onHold();
+    held.current = mine;
+    setDown(true);
+    void mine.over.then((reason) => {
+      if (held.current === mine) held.current = null;
+      setDown(false);
+      onOver?.(reason);
+    });
+  };
+  const end = () => held.current?.end();
+  useEffect(() => () => held.current?.end(), []);
+  return (
+    <button
+      type="button"
+      className={`button hold ${className}`}
+      aria-label={label}
+      aria-pressed={down}
+      aria-disabled={why !== "" || undefined}
+      data-held={down}
+      onPointerDown={(event) => {
+        if (event.button !== 0) return;
+        event.currentTarget.setPointerCapture(event.pointerId);
+        begin();
+      }}
+      onPointerUp={end}
+      onPointerCancel={end}
+      onLostPointerCapture={end}
+      onKeyDown={(event) => {
+        if (event.key === "Escape") end();
+        if (event.key !== " " && event.key !== "Enter") return;
+        event.preventDefault();
+        if (!event.repeat) begin();
+      }}
+      onKeyUp={(event) => {
+        if (event.key === " " || event.key === "Enter") end();
+      }}
+      onBlur={end}
+      onContextMenu={(event) => event.preventDefault()}
+    >
+      {children}
+      {why && <span className="hidden-but-read">, not now: {why}</span>}
+    </button>
+  );
+}

@@ -1,0 +1,127 @@
+/** The joints one by one, with their limits: a step at a tap, or as long as it is held. */
+
+import { useState } from "react";
+import { holdJog } from "../../commands/holds";
+import { type Chosen, featuresOf, moveToJoints, notReady } from "../../commands/robot";
+import type { Joint } from "../../protocol/types";
+import { theEngine } from "../../session/engine";
+import { useEditor } from "../../store/store";
+import { telemetry } from "../../store/telemetry";
+import { Amount, OneOf } from "../kit/fields";
+import { Button } from "../kit/kit";
+import { HoldButton } from "./HoldButton";
+import { FASTEST, mannerNow, setManner, useManner } from "./manner";
+import { useTelemetry } from "./useTelemetry";
+
+const DEGREES = 180 / Math.PI;
+
+export interface ShownJoint extends Joint {
+  /** °, or mm where prismatic, per unit of the value. */
+  scale: number;
+  unit: string;
+  lower: number;
+  upper: number;
+}
+
+/** Joints with what the robot's model says of them; without limits where it says nothing. */
+export function shownJoints(robotId: string, joints: readonly Joint[]): ShownJoint[] {
+  const limits = theEngine()?.limits(robotId) ?? [];
+  return joints.map((joint) => {
+    const limit = limits.find((each) => each.name === joint.name);
+    const prismatic = limit?.prismatic ?? false;
+    return { ...joint, scale: prismatic ? 1000 : DEGREES, unit: prismatic ? "mm" : "°", lower: limit?.lower ?? -Infinity, upper: limit?.upper ?? Infinity };
+  });
+}
+
+export function JointsTab({ chosen }: { chosen: Chosen }) {
+  const { robotId, armId } = chosen;
+  const { way, angle, distance, speed } = useManner();
+  const features = useEditor((state) => featuresOf(state, robotId));
+  const why = useEditor((state) => notReady(state, chosen, "MoveToJoints"));
+  const joints = useTelemetry(robotId, () => telemetry.latest(robotId)?.joints);
+  const [refused, setRefused] = useState("");
+  const hold = way === "hold" && features?.jog === true;
+  const cannot = why || (hold || features?.move_to_joints ? "" : "This robot does not move to joints.");
+  if (!joints) return <p className="quiet">Its joints are not known: it reports none.</p>;
+  const shown = shownJoints(robotId, [...joints].map(([name, value]) => ({ name, value })));
+
+  const go = (name: string, value: number) => {
+    setRefused("");
+    const present = telemetry.latest(robotId)?.joints ?? joints;
+    void moveToJoints(chosen, [...present].map(([each, was]) => ({ name: each, value: each === name ? value : was })), mannerNow()).then(setRefused);
+  };
+  const jog = (name: string, sign: number, prismatic: boolean) => {
+    setRefused("");
+    const value = sign * speed * (prismatic ? FASTEST.linear : FASTEST.joint);
+    return holdJog(robotId, { joints: [{ name, value }], ...(armId ? { arm_id: armId } : {}) });
+  };
+  return (
+    <>
+      <OneOf label="A press" quiet value={hold ? "hold" : "step"} onChange={(next) => setManner({ way: next })} choices={features?.jog ? [["step", "Step"], ["hold", "Hold to move"]] : [["step", "Step"]]} />
+      <ul className="joints">
+        {shown.map((joint) => {
+          const prismatic = joint.unit === "mm";
+          const step = prismatic ? distance : angle;
+          return (
+            <li key={joint.name}>
+              <div className="joint-head">
+                <span>{joint.name.replaceAll("_", " ")}</span>
+                <Limits joint={joint} />
+              </div>
+              {([-1, 1] as const).map((sign) => {
+                const words = `${joint.name.replaceAll("_", " ")} ${sign > 0 ? "up" : "down"}${hold ? ", as long as it is held" : ""}`;
+                return hold ? (
+                  <HoldButton key={sign} label={words} why={cannot} onHold={() => jog(joint.name, sign, prismatic)} onOver={setRefused}>
+                    {sign > 0 ? "+" : "−"}
+                  </HoldButton>
+                ) : (
+                  <Button
+                    key={sign}
+                    aria-label={words}
+                    why={cannot || beyond(joint, joint.value + sign * step)}
+                    onPress={() => go(joint.name, (telemetry.latest(robotId)?.joints.get(joint.name) ?? joint.value) + sign * step)}
+                  >
+                    {sign > 0 ? "+" : "−"}
+                  </Button>
+                );
+              })}
+              <Amount
+                label="To"
+                unit={joint.unit}
+                value={joint.value * joint.scale}
+                least={joint.lower * joint.scale}
+                most={joint.upper * joint.scale}
+                isDisabled={cannot !== ""}
+                onChange={(next) => go(joint.name, next / joint.scale)}
+              />
+            </li>
+          );
+        })}
+      </ul>
+      {refused && (
+        <p className="error small" role="alert">
+          {refused}
+        </p>
+      )}
+      {!hold && <Amount label="Step" unit="°" digits={2} value={angle * DEGREES} least={0.01} most={180} onChange={(next) => setManner({ angle: next / DEGREES })} />}
+    </>
+  );
+}
+
+function beyond({ name, lower, upper, scale, unit }: ShownJoint, value: number): string {
+  if (value >= lower && value <= upper) return "";
+  return `${name.replaceAll("_", " ")} goes from ${(lower * scale).toFixed(0)} to ${(upper * scale).toFixed(0)} ${unit}.`;
+}
+
+/** Where the joint stands between its limits. */
+export function Limits({ joint: { value, lower, upper, scale, unit } }: { joint: ShownJoint }) {
+  if (!Number.isFinite(lower) || !Number.isFinite(upper)) return null;
+  const part = Math.min(1, Math.max(0, (value - lower) / (upper - lower)));
+  const near = Math.min(part, 1 - part) < 0.05;
+  return (
+    <span className="joint-limits" data-near={near} title={`from ${(lower * scale).toFixed(0)} to ${(upper * scale).toFixed(0)} ${unit}`}>
+      <span style={{ left: `${part * 100}%` }} />
+      {near && <span className="hidden-but-read">near its limit</span>}
+    </span>
+  );
+}

@@ -1,0 +1,19 @@
+/** How fast, on a straight line or not, and whether collisions are looked for: of every motion asked for in panels. */
+
+import { MoreOrLess, OnOff } from "../kit/fields";
+import { setManner, useManner } from "./manner";
+
+export function MannerFields() {
+  const { speed, safe, linear } = useManner();
+  return (
+    <div className="manner">
+      <MoreOrLess label="Speed" value={speed} least={0.01} most={1} step={0.01} words={(value) => `${Math.round(value * 100)} %`} onChange={(next) => setManner({ speed: next })} />
+      <OnOff isSelected={safe} onChange={(next) => setManner({ safe: next })}>
+        Look for collisions first
+      </OnOff>
+      <OnOff isSelected={linear} onChange={(next) => setManner({ linear: next })}>
+        On a straight line
+      </OnOff>
+    </div>
+  );
+}

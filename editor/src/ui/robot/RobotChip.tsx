@@ -1,0 +1,51 @@
+/** In the corner of the view: the robot in hand, always visible, and its place kept as a point by one tap. */
+
+import { useState } from "react";
+import { addPointFromRobot } from "../../commands/points";
+import { chosenRobot, notReady } from "../../commands/robot";
+import { isRunning } from "../../store/selectors";
+import { setUi, tell, useEditor } from "../../store/store";
+import { Icon } from "../kit/icons";
+import { nameOf } from "../names";
+import "./chip.css";
+
+export function RobotChip() {
+  const chosen = useEditor(chosenRobot);
+  const name = useEditor((state) => (chosen ? nameOf(state, chosen.robotId) : ""));
+  const open = useEditor((state) => state.ui.tool === "robot");
+  const project = useEditor((state) => state.doc?.project != null);
+  const running = useEditor(isRunning);
+  const why = useEditor((state) => notReady(state, chosen, "AddApUsingRobot"));
+  const online = useEditor((state) => state.live.state === "started");
+  const moving = useEditor((state) => chosen !== null && chosen.robotId in state.live.moving);
+  const [asking, setAsking] = useState(false);
+  if (!chosen || running) return null;
+  const words = [name, chosen.armId, chosen.effector].filter(Boolean).join(" · ");
+  const keep = () => {
+    if (why) {
+      tell("info", why);
+      return;
+    }
+    setAsking(true);
+    void addPointFromRobot(chosen).then((refused) => {
+      setAsking(false);
+      if (refused) tell("error", refused);
+      else setUi({ tool: "" });
+    });
+  };
+  return (
+    <div className="robot-chip">
+      <button type="button" className="button" aria-pressed={open} aria-label={`Robot in hand: ${words}`} onClick={() => setUi({ tool: open ? "" : "robot" })}>
+        <Icon name="robot" />
+        <span className="chip-words">{words}</span>
+        {moving && <span className="tag warn">moves</span>}
+      </button>
+      {online && project && (
+        <button type="button" className="button primary" aria-disabled={why !== "" || asking || undefined} aria-label="Keep the robot's place as a point" onClick={keep} disabled={asking}>
+          <Icon name="plus" />
+          Point
+        </button>
+      )}
+    </div>
+  );
+}

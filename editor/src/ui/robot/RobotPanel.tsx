@@ -1,0 +1,61 @@
+/** The robot in hand: how it is, and the ways to move it. */
+
+import { useState } from "react";
+import { chosenRobot, notReady } from "../../commands/robot";
+import { useEditor } from "../../store/store";
+import { OneOf } from "../kit/fields";
+import { nameOf } from "../names";
+import { GoTab } from "./GoTab";
+import { HandTab } from "./HandTab";
+import { JointsTab } from "./JointsTab";
+import { MannerFields } from "./MannerFields";
+import { RobotChooser } from "./RobotChooser";
+import { Status } from "./Status";
+import { ToolTab } from "./ToolTab";
+import "./robot.css";
+
+const WAYS = [
+  ["tool", "Tool"],
+  ["joints", "Joints"],
+  ["hand", "By hand"],
+  ["go", "Go to"],
+] as const;
+
+/** The way that was chosen last, while the page is open. */
+let last: (typeof WAYS)[number][0] = "tool";
+
+export default function RobotPanel() {
+  const chosen = useEditor(chosenRobot);
+  const name = useEditor((state) => (chosen ? nameOf(state, chosen.robotId) : ""));
+  const why = useEditor((state) => notReady(state, chosen));
+  const [way, setWay] = useState(last);
+  if (!chosen) return <p className="quiet">There is no robot in this scene.</p>;
+  return (
+    <>
+      <div className="robot-head">
+        <h3>
+          {name}
+          {chosen.effector && <span className="quiet"> · {chosen.effector}</span>}
+        </h3>
+        {why && <p className="quiet small">{why}</p>}
+      </div>
+      <RobotChooser />
+      {!why && <Status chosen={chosen} />}
+      <OneOf
+        label="How to move it"
+        quiet
+        value={way}
+        choices={WAYS}
+        onChange={(next) => {
+          last = next;
+          setWay(next);
+        }}
+      />
+      {way === "tool" && <ToolTab chosen={chosen} />}
+      {way === "joints" && <JointsTab chosen={chosen} />}
+      {way === "hand" && <HandTab chosen={chosen} />}
+      {way === "go" && <GoTab chosen={chosen} key={`${chosen.robotId}/${chosen.armId}/${chosen.effector}`} />}
+      {way !== "hand" && <MannerFields />}
+    </>
+  );
+}

@@ -1,0 +1,130 @@
+/** The tool moved along and about axes: a step at a tap, or as long as it is held. */
+
+import { useState } from "react";
+import { holdJog } from "../../commands/holds";
+import { alignDown, type Chosen, effectorPose, featuresOf, moveToPose, notReady, stepEffector } from "../../commands/robot";
+import type { Pose, Position, StepAxis } from "../../protocol/types";
+import { now, useEditor } from "../../store/store";
+import { worldOf } from "../../viewmodel/frames";
+import { Amount, OneOf } from "../kit/fields";
+import { Button } from "../kit/kit";
+import { nameOf } from "../names";
+import { HoldButton } from "./HoldButton";
+import { ANGLES, DISTANCES, FASTEST, type FrameName, mannerNow, setManner, useManner } from "./manner";
+
+const AXES: readonly StepAxis[] = ["x", "y", "z"];
+const DEGREES = 180 / Math.PI;
+
+/** What has a frame of its own among what can be selected. */
+function framed(kind: string | undefined): boolean {
+  return kind === "object" || kind === "point" || kind === "orientation";
+}
+
+export function ToolTab({ chosen }: { chosen: Chosen }) {
+  const { frame, way, what, distance, angle, speed } = useManner();
+  const selection = useEditor((state) => state.ui.selection);
+  const selected = useEditor((state) => (framed(selection?.kind) && selection && selection.id !== chosen.robotId ? nameOf(state, selection.id) : ""));
+  const features = useEditor((state) => featuresOf(state, chosen.robotId));
+  const why = useEditor((state) => notReady(state, chosen, "StepRobotEef"));
+  const [refused, setRefused] = useState("");
+  const hold = way === "hold" && features?.jog === true;
+  const used: FrameName = frame === "selected" && !selected ? "world" : frame;
+  const turning = what === "orientation";
+  const cannot = why || (hold || features?.move_to_pose ? "" : "This robot does not move to poses.");
+
+  const press = (axis: StepAxis, sign: number) => {
+    setRefused("");
+    const pose = poseOf(used, chosen);
+    const mode = used === "world" || used === "robot" ? used : "relative";
+    void stepEffector(chosen, { what, axis, mode, step: sign * (turning ? angle : distance), pose }, mannerNow()).then(setRefused);
+  };
+  const jog = (axis: StepAxis, sign: number) => {
+    setRefused("");
+    const velocity = sign * speed * (turning ? FASTEST.angular : FASTEST.linear);
+    const vector: Position = { x: 0, y: 0, z: 0, [axis]: velocity };
+    const pose = used === "selected" ? poseOf(used, chosen) : undefined;
+    return holdJog(chosen.robotId, {
+      frame: used === "selected" ? "user" : used,
+      ...(turning ? { angular: vector } : { linear: vector }),
+      ...(pose ? { pose } : {}),
+      ...(chosen.effector ? { end_effector_id: chosen.effector } : {}),
+      ...(chosen.armId ? { arm_id: chosen.armId } : {}),
+    });
+  };
+  const words = (axis: StepAxis, sign: number) => `${turning ? "Turn about" : "Move along"} ${sign > 0 ? "+" : "−"}${axis.toUpperCase()}${hold ? ", as long as it is held" : ""}`;
+
+  return (
+    <>
+      <OneOf label="A press" quiet value={hold ? "hold" : "step"} onChange={(next) => setManner({ way: next })} choices={features?.jog ? [["step", "Step"], ["hold", "Hold to move"]] : [["step", "Step"]]} />
+      <OneOf label="What" quiet value={what} onChange={(next) => setManner({ what: next })} choices={[["position", "Move"], ["orientation", "Turn"]]} />
+      <OneOf
+        label="Axes of"
+        value={used}
+        onChange={(next) => setManner({ frame: next })}
+        choices={[["world", "World"], ["robot", "Robot"], ["tool", "Tool"], ...(selected ? [["selected", selected] as const] : [])]}
+      />
+      <div className="jog-pad">
+        {AXES.flatMap((axis) =>
+          [-1, 1].map((sign) => {
+            const content = (
+              <>
+                <span className={`axis-${axis}`}>{axis.toUpperCase()}</span>
+                {sign > 0 ? "+" : "−"}
+              </>
+            );
+            return hold ? (
+              <HoldButton key={`${axis}${sign}`} label={words(axis, sign)} why={cannot} onHold={() => jog(axis, sign)} onOver={setRefused}>
+                {content}
+              </HoldButton>
+            ) : (
+              <Button key={`${axis}${sign}`} aria-label={words(axis, sign)} why={cannot} onPress={() => press(axis, sign)}>
+                {content}
+              </Button>
+            );
+          }),
+        )}
+      </div>
+      {refused && (
+        <p className="error small" role="alert">
+          {refused}
+        </p>
+      )}
+      {!hold && (turning ? <Angles angle={angle} /> : <Distances distance={distance} />)}
+      <div className="actions start">
+        <Button why={why || (features?.inverse_kinematics ? "" : "This robot computes no joints for a pose.")} onPress={() => void alignDown(chosen, mannerNow()).then(setRefused)}>
+          Tool straight down
+        </Button>
+        {selection?.kind === "orientation" && (
+          <Button why={why} onPress={() => void moveToPose(chosen, { orientation: poseOf("selected", chosen)?.orientation ?? { x: 0, y: 0, z: 0, w: 1 } }, mannerNow()).then(setRefused)}>
+            Turn as {selected}
+          </Button>
+        )}
+      </div>
+    </>
+  );
+}
+
+/** The frame whose axes are meant, in the world; undefined for those that the server knows. */
+function poseOf(frame: FrameName, chosen: Chosen): Pose | undefined {
+  if (frame === "tool") return effectorPose(chosen);
+  const { doc, ui } = now();
+  return frame === "selected" && doc ? worldOf(doc, ui.selection?.id) : undefined;
+}
+
+function Distances({ distance }: { distance: number }) {
+  return (
+    <div className="step-size">
+      <OneOf label="Step, mm" value={String(distance)} onChange={(next) => setManner({ distance: Number(next) })} choices={DISTANCES.map((each) => [String(each), String(each * 1000)] as const)} />
+      <Amount label="Or" unit="mm" digits={2} value={distance * 1000} least={0.01} most={300} onChange={(next) => setManner({ distance: next / 1000 })} />
+    </div>
+  );
+}
+
+function Angles({ angle }: { angle: number }) {
+  return (
+    <div className="step-size">
+      <OneOf label="Step, °" value={String(angle)} onChange={(next) => setManner({ angle: Number(next) })} choices={ANGLES.map((each) => [String(each), String(Math.round(each * DEGREES * 10) / 10)] as const)} />
+      <Amount label="Or" unit="°" digits={2} value={angle * DEGREES} least={0.01} most={180} onChange={(next) => setManner({ angle: next / DEGREES })} />
+    </div>
+  );
+}

@@ -1,0 +1,44 @@
+/** How the user moves robots: frame, size of a step, speed. Kept while the page is open. */
+
+import { useStore } from "zustand";
+import { createStore } from "zustand/vanilla";
+import type { Manner } from "../../commands/robot";
+
+/** `selected`: the axes of what is selected. */
+export type FrameName = "world" | "robot" | "tool" | "selected";
+
+export interface Jogging extends Manner {
+  frame: FrameName;
+  /** A tap is a step, or the robot moves as long as it is held. */
+  way: "step" | "hold";
+  what: "position" | "orientation";
+  /** m and rad. */
+  distance: number;
+  angle: number;
+}
+
+const RAD = Math.PI / 180;
+
+export const DISTANCES = [0.0001, 0.001, 0.01, 0.05, 0.1] as const;
+export const ANGLES = [0.1 * RAD, RAD, 5 * RAD, 10 * RAD, 45 * RAD] as const;
+
+/** Velocities at full speed of the slider, m/s and rad/s: held motion is slow anyway. */
+export const FASTEST = { linear: 0.25, angular: 0.8, joint: 0.6 } as const;
+
+export const manner = createStore<Jogging>(() => ({
+  frame: "world",
+  way: "step",
+  what: "position",
+  distance: 0.01,
+  angle: 5 * RAD,
+  speed: 0.25,
+  safe: true,
+  linear: true,
+}));
+
+export const useManner = (): Jogging => useStore(manner);
+export const setManner = (change: Partial<Jogging>): void => manner.setState(change);
+export const mannerNow = (): Manner => {
+  const { speed, safe, linear } = manner.getState();
+  return { speed, safe, linear };
+};

@@ -1,0 +1,13 @@
+/** The robot in hand. */
+
+import { robotsOf } from "../../../session/streams";
+import { lazily } from "../../kit/lazily";
+import type { Tool } from "../tools";
+
+export const robot: Tool = {
+  id: "robot",
+  label: "Robot",
+  icon: "robot",
+  barred: (state) => (robotsOf(state).length > 0 ? "" : "there is no robot in this scene."),
+  Panel: lazily(() => import("../../robot/RobotPanel")),
+};
