@@ -179,6 +179,8 @@ export interface Ui {
   selection: Selection | null;
   mode: Mode;
   connecting: Connecting | null;
+  /** The view goes where the program is. */
+  follow: boolean;
   ghost: Ghost | null;
   /** The tool of the left rail that is open. */
   tool: string;
@@ -255,6 +257,6 @@ export function initialState(): State {
     tried: [],
     tasks: {},
     notices: [],
-    ui: { selection: null, mode: "3d", connecting: null, ghost: null, tool: "", theme: "system", systemDark: false, leftHanded: false, quality: "auto" },
+    ui: { selection: null, mode: "3d", connecting: null, follow: false, ghost: null, tool: "", theme: "system", systemDark: false, leftHanded: false, quality: "auto" },
   };
 }
