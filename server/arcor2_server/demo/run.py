@@ -20,7 +20,7 @@ from arcor2_server.demo.display import Display
 from arcor2_server.demo.fakes import Fake, Ready, fakes, wires, world_arguments
 from arcor2_server.demo.outcome import Outcome, wrong_boards, wrong_results
 from arcor2_server.demo.processes import Child, python_module
-from arcor2_server.demo.workplace import Creation, Scalar, layout_file, load
+from arcor2_server.demo.workplace import Creation, Scalar, layout_file, load, markers_file
 
 ONLINE_TIMEOUT: Final = 30.0
 BOARD_TIMEOUT: Final = 120.0
@@ -163,7 +163,7 @@ class Demo:
             "server",
             python_module(
                 *("arcor2_server.cli.main", "serve", "--host", self._host, "--port", str(self._port)),
-                *("--data-dir", str(self._data_dir)),
+                *("--data-dir", str(self._data_dir), "--markers", str(markers_file())),
             ),
         )
         children = [self._child(fake.name, fake.command()) for fake in wanted]

@@ -93,6 +93,11 @@ def load(file: Path | None = None) -> Workplace:
     return msgspec.toml.decode(given.read_bytes(), type=Workplace)
 
 
+def markers_file() -> Any:
+    """Give the file that says where the markers lie that the camera sees."""
+    return files(__package__) / "markers.yaml"
+
+
 def layout_file() -> Any:
     """Give the file that tells the small world where things physically stand."""
     return files(__package__) / "layout.json"

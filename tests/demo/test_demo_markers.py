@@ -1,0 +1,18 @@
+"""The demo's markers lie where its world says."""
+
+import msgspec
+
+from arcor2_fakes.cell.layout import Layout
+from arcor2_hw.calibration.configuration import read_configuration
+from arcor2_server.demo.workplace import layout_file, markers_file
+
+
+def test_the_server_is_told_of_the_markers_that_are_there() -> None:
+    camera = msgspec.json.decode(layout_file().read_bytes(), type=Layout).camera
+    assert camera is not None
+    told = read_configuration(markers_file())
+    assert {(one.marker_id, tuple(one.pose.position), told.marker_size) for one in told.markers} == {
+        (one.id, one.pose.position, one.size) for one in camera.markers
+    }
+    assert all(one.pose.orientation == (0.0, 0.0, 0.0, 1.0) for one in camera.markers)
+    assert len(told.markers) >= 3
