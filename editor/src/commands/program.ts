@@ -56,6 +56,7 @@ export async function addAction(objectId: string, meta: ObjectAction, where: Whe
     await call("AddAction", { action_point_id: pointId, name, type: `${objectId}/${meta.name}`, parameters, flows });
     const added = await awaited((state) => Object.values(state.doc?.actions ?? {}).find((each) => each.name === name));
     select({ kind: "action", id: added.id });
+    setUi({ tool: "" });
     return added.id;
   } catch (error) {
     tell("error", sentence(error));

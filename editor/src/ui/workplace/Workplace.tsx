@@ -2,11 +2,11 @@
 
 import { useEditor } from "../../store/store";
 import { Notices } from "../notices/Notices";
+import { Centre } from "./Centre";
 import { Panel } from "./Panel";
 import { Rail } from "./Rail";
 import { StopMotion } from "./StopMotion";
 import { TopBar } from "./TopBar";
-import { View3D } from "./View3D";
 import "./workplace.css";
 
 export function Workplace() {
@@ -15,7 +15,7 @@ export function Workplace() {
     <div className="workplace" data-panel={panel}>
       <TopBar />
       <Rail />
-      <View3D />
+      <Centre />
       {panel && <Panel />}
       <Notices />
       <StopMotion />

@@ -5,6 +5,7 @@
 
 import type { ComponentType } from "react";
 import type { Selection, State } from "../../store/state";
+import { programSections } from "../program/sections";
 import { about } from "./sections/about";
 import { place } from "./sections/place";
 
@@ -15,4 +16,4 @@ export interface Section {
   Body: ComponentType<{ selection: Selection }>;
 }
 
-export const SECTIONS: readonly Section[] = [about, place];
+export const SECTIONS: readonly Section[] = [about, ...programSections, place];

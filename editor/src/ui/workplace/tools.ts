@@ -6,6 +6,8 @@
 import type { ComponentType } from "react";
 import type { State } from "../../store/state";
 import type { IconName } from "../kit/icons";
+import { program } from "../program/tool";
+import { run } from "../run/tool";
 import { devices } from "./tools/devices";
 import { robot } from "./tools/robot";
 import { things } from "./tools/things";
@@ -21,4 +23,4 @@ export interface Tool {
   Panel: ComponentType;
 }
 
-export const TOOLS: readonly Tool[] = [things, robot, devices];
+export const TOOLS: readonly Tool[] = [things, robot, program, run, devices];

@@ -1,0 +1,109 @@
+/** The program as the Python that runs, made by the server from what is saved. It is read, not edited. */
+
+import { useCallback, useEffect, useMemo, useState } from "react";
+import * as documents from "../../commands/documents";
+import { barred } from "../../commands/asking";
+import { remembered } from "../../session/memory";
+import { isRunning } from "../../store/selectors";
+import { select, tell, useEditor } from "../../store/store";
+import { Button, Waiting } from "../kit/kit";
+import { textOfZip } from "./package";
+import { pieces } from "./python";
+import "./code.css";
+
+type Code = { source: string } | { problem: string };
+
+async function scriptOf(projectId: string): Promise<Code> {
+  const token = remembered("token");
+  const headers: HeadersInit = token ? { Authorization: `Bearer ${token}` } : {};
+  const response = await fetch(`/project/publish?projectId=${encodeURIComponent(projectId)}`, { headers });
+  if (!response.ok) {
+    const said = (await response.json().catch(() => null)) as { message?: string } | null;
+    return { problem: said?.message ?? `The server does not give it (${response.status}).` };
+  }
+  const source = await textOfZip(await response.arrayBuffer(), "script.py");
+  return source === undefined ? { problem: "The package has no script." } : { source };
+}
+
+export default function CodeView() {
+  const id = useEditor((state) => state.doc?.project?.id ?? "");
+  const unsaved = useEditor((state) => state.doc?.unsaved ?? false);
+  const actions = useEditor((state) => state.doc?.actions);
+  const selected = useEditor((state) => state.doc?.actions[state.ui.selection?.id ?? ""]?.name ?? "");
+  const running = useEditor(isRunning);
+  const runningNames = useEditor((state) => state.program.running.map((each) => state.doc?.actions[each]?.name ?? "").join("\n"));
+  const cannotSave = useEditor((state) => barred(state, "SaveProject") || (isRunning(state) ? "The program runs." : ""));
+  const [code, setCode] = useState<Code | null>(null);
+  const load = useCallback(() => {
+    let ended = false;
+    scriptOf(id).then(
+      (found) => ended || setCode(found),
+      (error: unknown) => ended || setCode({ problem: String(error) }),
+    );
+    return () => {
+      ended = true;
+    };
+  }, [id]);
+  // Of what is saved: read again when that changed.
+  useEffect(() => (unsaved ? undefined : load()), [load, unsaved]);
+  useEffect(load, [load]);
+  const lines = useMemo(() => (code && "source" in code ? pieces(code.source) : []), [code]);
+  const byName = useMemo(() => new Map(Object.values(actions ?? {}).map((each) => [each.name, each.id])), [actions]);
+
+  if (!code) return <Waiting>Reading the program…</Waiting>;
+  const lit = new Set(runningNames.split("\n").filter(Boolean));
+  return (
+    <section className="code" aria-label="The program as Python">
+      {unsaved && !running && (
+        <p className="code-note">
+          This is the program as it was saved.{" "}
+          <Button why={cannotSave} onPress={() => void documents.save()}>
+            Save and read anew
+          </Button>
+        </p>
+      )}
+      {"problem" in code ? (
+        <p className="code-note" role="alert">
+          It is no program yet: {code.problem}
+        </p>
+      ) : (
+        <>
+          <div className="code-tools">
+            <Button
+              onPress={() => {
+                navigator.clipboard?.writeText(code.source).then(
+                  () => tell("info", "Copied."),
+                  () => tell("warn", "This browser does not let the page copy."),
+                );
+              }}
+            >
+              Copy
+            </Button>
+          </div>
+          <pre tabIndex={0}>
+            <ol>
+              {lines.map((line, index) => {
+                const called = line.map((each) => actionIn(each.text, byName)).find(Boolean) ?? "";
+                return (
+                  <li key={index} data-selected={called !== "" && called === selected} data-running={lit.has(called)} data-action={called || undefined} onClick={() => called && select({ kind: "action", id: byName.get(called) ?? "" })}>
+                    {line.map((each, at) => (
+                      <span key={at} className={each.kind}>
+                        {each.text}
+                      </span>
+                    ))}
+                  </li>
+                );
+              })}
+            </ol>
+          </pre>
+        </>
+      )}
+    </section>
+  );
+}
+
+/** The action that a text names: the script passes each action's name to its call. */
+function actionIn(text: string, byName: Map<string, string>): string {
+  const name = text.replace(/^["']|["']$/g, "");
+  return name !== text && byName.has(name) ? name : "";
+}

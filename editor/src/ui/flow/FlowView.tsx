@@ -1,0 +1,142 @@
+/** The program as a graph. What is selected here is selected everywhere; a program that runs is followed. */
+
+import { useEffect, useMemo } from "react";
+import { Background, Controls, type Edge, MarkerType, ReactFlow, ReactFlowProvider, useReactFlow } from "@xyflow/react";
+import "@xyflow/react/dist/base.css";
+import { connect, endStep, notEditable, removeAction, removeStep } from "../../commands/program";
+import { cannotLead } from "../../program/logic";
+import { problemsOf } from "../../program/problems";
+import { now, select, setUi, tell, useEditor } from "../../store/store";
+import { selectionOf } from "../names";
+import { conditionOf, FlowNode, type FlowNodeType } from "./FlowNode";
+import { graphOf } from "./graph";
+import "../program/program.css";
+import "./flow.css";
+
+const NODE_TYPES = { box: FlowNode };
+const COLOURS = { always: "var(--ink-2)", true: "var(--good)", false: "var(--warn)", value: "var(--accent)" } as const;
+const DASHES = { always: undefined, true: "14 4", false: "3 5", value: "9 6" } as const;
+
+export default function FlowView() {
+  return (
+    <ReactFlowProvider>
+      <Flow />
+    </ReactFlowProvider>
+  );
+}
+
+function Flow() {
+  const doc = useEditor((state) => state.doc);
+  const types = useEditor((state) => state.types);
+  const running = useEditor((state) => state.program.running);
+  const executing = useEditor((state) => state.live.executing);
+  const breakpoints = useEditor((state) => state.breakpoints);
+  const selected = useEditor((state) => state.ui.selection?.id ?? "");
+  const connecting = useEditor((state) => state.ui.connecting);
+  const follow = useEditor((state) => state.ui.follow);
+  const dark = useEditor((state) => state.ui.theme === "dark" || (state.ui.theme === "system" && state.ui.systemDark));
+  const graph = useMemo(() => (doc ? graphOf(doc, types) : { boxes: [], lines: [] }), [doc, types]);
+  const problems = useMemo(() => (doc ? problemsOf(doc, types) : []), [doc, types]);
+  const { fitView } = useReactFlow();
+
+  const nodes = graph.boxes.map(
+    (box): FlowNodeType => ({
+      id: box.id,
+      type: "box",
+      position: { x: box.x, y: box.y },
+      width: box.width,
+      height: box.height,
+      selected: box.id === selected,
+      ariaLabel: `${box.name}${box.detail ? `, ${box.detail}` : ""}`,
+      data: {
+        box,
+        running: running.includes(box.id) || executing === box.id,
+        breakpoint: box.id in breakpoints,
+        trouble: problems.find((each) => each.id === box.id)?.text ?? "",
+        target: connecting !== null && doc !== null && cannotLead(doc, connecting.from, box.id, connecting.item) === "",
+        from: connecting?.from === box.id,
+      },
+    }),
+  );
+  const edges = graph.lines.map((line): Edge => {
+    const colour = line.id === selected ? "#ff9500" : COLOURS[line.branch];
+    return {
+      id: line.id,
+      source: line.from,
+      target: line.to,
+      type: "smoothstep",
+      label: line.words || undefined,
+      selected: line.id === selected,
+      className: `flow-line ${line.branch}`,
+      interactionWidth: 44,
+      ariaLabel: `Step from ${graph.boxes.find((each) => each.id === line.from)?.name} to ${graph.boxes.find((each) => each.id === line.to)?.name}${line.words ? `, ${line.words}` : ""}`,
+      markerEnd: { type: MarkerType.ArrowClosed, color: colour, width: 20, height: 20 },
+      style: { stroke: colour, strokeWidth: line.id === selected ? 4 : 2.5, strokeDasharray: DASHES[line.branch] },
+    };
+  });
+
+  const last = running.at(-1);
+  useEffect(() => {
+    if (follow && last !== undefined) void fitView({ nodes: [{ id: last }], maxZoom: 1, duration: 200 });
+  }, [follow, last, fitView]);
+  // A graph that grew is seen whole again.
+  const size = graph.boxes.length;
+  useEffect(() => {
+    void fitView({ padding: 0.1, maxZoom: 1.1 });
+  }, [size, fitView]);
+
+  return (
+    <div className="flow" role="region" aria-label="The program as a graph">
+      <ReactFlow
+        nodes={nodes}
+        edges={edges}
+        nodeTypes={NODE_TYPES}
+        colorMode={dark ? "dark" : "light"}
+        nodesDraggable={false}
+        connectOnClick={false}
+        deleteKeyCode={["Delete", "Backspace"]}
+        minZoom={0.15}
+        maxZoom={2}
+        fitView
+        fitViewOptions={{ padding: 0.1, maxZoom: 1.1 }}
+        isValidConnection={({ source, target }) => doc !== null && cannotLead(doc, source, target) === ""}
+        onConnect={({ source, target, sourceHandle }) => {
+          const why = notEditable(now(), "AddLogicItem");
+          if (why) return tell("info", why);
+          const way = graph.boxes.find((each) => each.id === source)?.ways.find((each) => each.id === sourceHandle);
+          void connect(source, target, way && conditionOf(way));
+        }}
+        onNodeClick={(_, { id }) => choose(id)}
+        onEdgeClick={(_, { id }) => choose(id)}
+        onPaneClick={() => (now().ui.connecting ? setUi({ connecting: null }) : select(null))}
+        onNodesChange={(changes) => {
+          // By the keyboard: Enter on a node that has the focus.
+          for (const change of changes) if (change.type === "select" && change.selected && change.id !== now().ui.selection?.id) choose(change.id);
+        }}
+        onDelete={({ nodes: gone, edges: lines }) => void remove(gone.map((each) => each.id), lines.map((each) => each.id))}
+        proOptions={{ hideAttribution: true }}
+      >
+        <Background gap={24} />
+        <Controls showInteractive={false} position="bottom-left" />
+      </ReactFlow>
+    </div>
+  );
+}
+
+function choose(id: string): void {
+  if (now().ui.connecting) {
+    if (selectionOf(now(), id)?.kind !== "logic") void endStep(id);
+    return;
+  }
+  select(selectionOf(now(), id));
+  setUi({ tool: "" });
+}
+
+/** Only what was chosen is removed: its steps are taken care of by the command. */
+async function remove(nodes: string[], lines: string[]): Promise<void> {
+  const why = notEditable(now(), "RemoveAction");
+  if (why) return tell("info", why);
+  const { doc } = now();
+  for (const id of nodes) if (doc && id in doc.actions) await removeAction(id);
+  if (nodes.length === 0) for (const id of lines) await removeStep(id);
+}

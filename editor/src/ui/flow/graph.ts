@@ -1,0 +1,98 @@
+/** The program as nodes and edges, laid out from top to bottom: pure. */
+
+import { Graph, layout } from "@dagrejs/dagre";
+import { conditionWords, END, outgoing, placeOf, resultsOf, START } from "../../program/logic";
+import type { OpenDocument, State } from "../../store/state";
+
+export const NODE = { width: 230, height: 92 };
+const BORDER = { width: 132, height: 68 };
+
+/** A place at which a step begins: any way on, or one for a value of the result. */
+export interface Way {
+  id: "next" | "true" | "false" | "branch";
+  label: string;
+  /** `<action>/default/<index>`, for a value of a result. */
+  what?: string;
+}
+
+export interface Box {
+  id: string;
+  kind: "action" | "start" | "end";
+  name: string;
+  detail: string;
+  ways: Way[];
+  x: number;
+  y: number;
+  width: number;
+  height: number;
+}
+
+export interface Line {
+  id: string;
+  from: string;
+  to: string;
+  words: string;
+  branch: "always" | "true" | "false" | "value";
+}
+
+export function graphOf(doc: OpenDocument, types: State["types"]): { boxes: Box[]; lines: Line[] } {
+  const lines = Object.values(doc.logic).map((item): Line => {
+    const { value } = item.condition ?? {};
+    return {
+      id: item.id,
+      from: placeOf(item.start),
+      to: placeOf(item.end),
+      words: conditionWords(doc, types, item),
+      branch: value === undefined ? "always" : value === "true" || value === "false" ? value : "value",
+    };
+  });
+  const bare: Omit<Box, "x" | "y">[] = [
+    { id: START, kind: "start", name: "Start", detail: "", ways: lines.some((each) => each.from === START) ? [] : [{ id: "next", label: "next" }], ...BORDER },
+    ...Object.values(doc.actions).map((action) => ({
+      id: action.id,
+      kind: "action" as const,
+      name: action.name,
+      detail: `${doc.objects[action.type.split("/")[0] ?? ""]?.name ?? "?"} at ${doc.points[action.pointId]?.name ?? "?"}`,
+      ways: waysOf(doc, types, action.id),
+      ...NODE,
+    })),
+    { id: END, kind: "end", name: "End", detail: "", ways: [], ...BORDER },
+  ];
+  const places = placed(bare, lines);
+  return { boxes: bare.map((box) => ({ ...box, ...(places.get(box.id) ?? { x: 0, y: 0 }) })), lines };
+}
+
+/** The ways on that are still free. */
+export function waysOf(doc: OpenDocument, types: State["types"], id: string): Way[] {
+  const action = doc.actions[id];
+  if (!action) return [];
+  const ways = outgoing(doc, id);
+  const result = resultsOf(doc, types, action).find((each) => each.type === "boolean" || each.type === "integer" || each.type.endsWith("_enum"));
+  if (!result) return ways.length === 0 ? [{ id: "next", label: "next" }] : [];
+  if (result.type !== "boolean") return [ways.length === 0 ? { id: "next", label: "next" } : { id: "branch", label: "branch" }];
+  const what = `${id}/default/${result.index}`;
+  const asked = (value: string) => ways.some((each) => each.condition?.value === value);
+  if (ways.some((each) => !each.condition)) return [{ id: "branch", label: "branch" }];
+  const free: Way[] = [];
+  if (!asked("true")) free.push({ id: "true", label: "yes", what });
+  if (ways.length === 0) free.push({ id: "next", label: "next" });
+  if (!asked("false")) free.push({ id: "false", label: "no", what });
+  return free;
+}
+
+function placed(boxes: Omit<Box, "x" | "y">[], lines: Line[]): Map<string, { x: number; y: number }> {
+  const graph = new Graph({ multigraph: true });
+  graph.setGraph({ rankdir: "TB", nodesep: 36, ranksep: 56, marginx: 20, marginy: 20 });
+  graph.setDefaultEdgeLabel(() => ({}));
+  for (const { id, width, height } of boxes) graph.setNode(id, { width, height });
+  for (const { id, from, to, words } of lines) {
+    if (graph.hasNode(from) && graph.hasNode(to)) graph.setEdge(from, to, { width: words.length * 8, height: 18, labelpos: "c" }, id);
+  }
+  layout(graph);
+  return new Map(
+    boxes.map(({ id, width, height }) => {
+      const { x, y } = graph.node(id) as { x: number; y: number };
+      return [id, { x: x - width / 2, y: y - height / 2 }];
+    }),
+  );
+}

@@ -1,0 +1,176 @@
+/**
+ * Every action that can be added, by its device, with search and what was used last. One tap adds it: on the point that
+ * is selected, or on a new one where the cross in the view is. What it needs (a point, an orientation) is made with it.
+ */
+
+import { useMemo, useState } from "react";
+import { createPortal } from "react-dom";
+import { Button as AriaButton, Input, Label, SearchField, ToggleButton, ToggleButtonGroup } from "react-aria-components";
+import { addAction, notEditable, type Where } from "../../commands/program";
+import { aimedPlace } from "../../commands/aimed";
+import type { ObjectAction } from "../../protocol/types";
+import { words } from "../../program/naming";
+import type { State } from "../../store/state";
+import { now, tell, useEditor } from "../../store/store";
+import { Icon } from "../kit/icons";
+import { nameOf } from "../names";
+import { CATEGORY_ICONS } from "./categories";
+
+/** `<object id>/<action>`, the newest first; while the page is open. */
+let recent: string[] = [];
+const RECENT = 4;
+
+interface Offer {
+  key: string;
+  objectId: string;
+  object: string;
+  category: string;
+  meta: ObjectAction;
+  why: string;
+}
+
+export function AddAction() {
+  const doc = useEditor((state) => state.doc);
+  const types = useEditor((state) => state.types);
+  const cannot = useEditor((state) => notEditable(state, "AddAction"));
+  const online = useEditor((state) => state.live.state === "started");
+  const selected = useEditor(pointOfSelection);
+  const pointName = useEditor((state) => nameOf(state, selected));
+  const [search, setSearch] = useState("");
+  const [anew, setAnew] = useState(false);
+  const [busy, setBusy] = useState("");
+  const onPoint = selected && !anew ? selected : "";
+  const offers = useMemo(() => offersOf(now(), onPoint), [doc, types, onPoint, online]);
+  const wanted = search.trim().toLowerCase();
+  const found = offers.filter((each) => `${each.object} ${words(each.meta.name)} ${each.meta.description ?? ""} ${each.category}`.toLowerCase().includes(wanted));
+  const used = wanted ? [] : recent.flatMap((key) => offers.filter((each) => each.key === key));
+
+  const add = async (offer: Offer) => {
+    const why = cannot || offer.why;
+    if (why) return tell("info", `${words(offer.meta.name)}: ${why}`);
+    const where = placeFor(onPoint);
+    if (!where) return tell("info", "The cross points at nothing: turn the view so that it is on the table or a thing.");
+    setBusy(offer.key);
+    recent = [offer.key, ...recent.filter((each) => each !== offer.key)].slice(0, RECENT);
+    await addAction(offer.objectId, offer.meta, where);
+    setBusy("");
+  };
+  const row = (offer: Offer, prefix = "") => (
+    <li key={prefix + offer.key}>
+      <AriaButton className="offer" aria-disabled={offer.why !== "" || cannot !== "" || undefined} isDisabled={busy !== ""} onPress={() => void add(offer)}>
+        <span className="offer-name">
+          {words(offer.meta.name)}
+          {prefix && <span className="quiet small"> · {offer.object}</span>}
+        </span>
+        <span className="quiet small">{offer.why || offer.meta.description?.split("\n")[0]}</span>
+      </AriaButton>
+    </li>
+  );
+  return (
+    <>
+      <div className="where">
+        <ToggleButtonGroup
+          className="tabs small-tabs"
+          aria-label="Where the action is put"
+          selectionMode="single"
+          disallowEmptySelection
+          selectedKeys={[onPoint ? "point" : "here"]}
+          onSelectionChange={(keys) => setAnew([...keys][0] === "here")}
+        >
+          <ToggleButton id="here" className="tab">
+            At the cross
+          </ToggleButton>
+          <ToggleButton id="point" className="tab" isDisabled={!selected}>
+            {selected ? `On ${pointName}` : "On a point"}
+          </ToggleButton>
+        </ToggleButtonGroup>
+        <p className="quiet small">{onPoint ? "It goes on the point that is selected." : "A new point is made where the cross in the view is."}</p>
+      </div>
+      {!onPoint && <Cross />}
+      <SearchField className="field" value={search} onChange={setSearch}>
+        <Label className="hidden-but-read">Search actions</Label>
+        <Input placeholder={`Search ${offers.length} actions`} />
+      </SearchField>
+      {used.length > 0 && (
+        <section className="offers" aria-label="Used before">
+          <h3>Used before</h3>
+          <ul>{used.map((offer) => row(offer, "recent/"))}</ul>
+        </section>
+      )}
+      {groups(found).map(([object, of]) => (
+        <section key={object} className="offers" aria-label={object}>
+          <h3>
+            <Icon name={CATEGORY_ICONS[of[0]?.category ?? ""] ?? "box"} /> {object} {of[0]?.category && <span className="tag">{of[0].category}</span>}
+          </h3>
+          <ul>{of.map((offer) => row(offer))}</ul>
+        </section>
+      ))}
+      {found.length === 0 && <p className="quiet">{offers.length ? "No action is called that." : "No device of this scene has actions."}</p>}
+    </>
+  );
+}
+
+/** Marks the place in the middle of the view. */
+function Cross() {
+  const view = document.querySelector(".view");
+  return view && createPortal(<span className="crosshair" aria-hidden="true" />, view);
+}
+
+/** The point that is selected, or on which what is selected is; empty when there is none. */
+function pointOfSelection(state: State): string {
+  const { selection } = state.ui;
+  const { doc } = state;
+  if (!selection || !doc) return "";
+  const { id } = selection;
+  if (selection.kind === "point") return id;
+  return (doc.orientations[id] ?? doc.joints[id] ?? doc.actions[id])?.pointId ?? "";
+}
+
+function placeFor(pointId: string): Where | null {
+  if (!pointId) return aimedPlace();
+  const { selection } = now().ui;
+  return selection?.kind === "orientation" ? { pointId, orientationId: selection.id } : { pointId };
+}
+
+function groups(offers: Offer[]): [string, Offer[]][] {
+  const found = new Map<string, Offer[]>();
+  for (const offer of offers) found.set(offer.object, [...(found.get(offer.object) ?? []), offer]);
+  return [...found];
+}
+
+function offersOf(state: State, pointId: string): Offer[] {
+  const { doc, types } = state;
+  const rank = (type: string) => (type in types.robots ? 0 : 1);
+  const objects = Object.values(doc?.objects ?? {}).sort((a, b) => rank(a.type) - rank(b.type) || a.name.localeCompare(b.name));
+  return objects.flatMap((object) => {
+    const type = types.byName[object.type];
+    return (types.actions[object.type] ?? []).map((meta) => ({
+      key: `${object.id}/${meta.name}`,
+      objectId: object.id,
+      object: object.name,
+      category: meta.category ?? type?.category ?? "",
+      meta,
+      why: whyNot(state, object.id, meta, pointId),
+    }));
+  });
+}
+
+/** Why an action cannot be added just now; empty when it can. */
+function whyNot(state: State, objectId: string, meta: ObjectAction, pointId: string): string {
+  if (meta.disabled) return meta.problem ?? "It cannot be used.";
+  const needsJoints = meta.parameters.some((each) => each.type === "joints");
+  if (needsJoints && state.live.state !== "started") {
+    const there = Object.values(state.doc?.joints ?? {}).some((each) => each.pointId === pointId && each.robot_id === objectId);
+    if (!there) return "It needs joints: go online, and they are taken from the robot.";
+  }
+  const needsImage = meta.parameters.some((each) => each.type === "image");
+  if (needsImage) {
+    const { doc, types } = state;
+    const given = Object.values(doc?.actions ?? {}).some((action) => {
+      const [id = "", method] = action.type.split("/");
+      return types.actions[doc?.objects[id]?.type ?? ""]?.find((each) => each.name === method)?.returns.includes("image");
+    });
+    if (!given) return "It needs a picture: add the action that takes one first.";
+  }
+  return "";
+}

@@ -1,0 +1,19 @@
+/** The breakpoint of a point: the program pauses before every action that uses a pose or joints of it. */
+
+import { barred } from "../../commands/asking";
+import { breakAt } from "../../commands/run";
+import { useEditor } from "../../store/store";
+import { Button } from "../kit/kit";
+import type { Section } from "../workplace/sections";
+import "./program.css";
+
+const Breakpoint: Section["Body"] = ({ selection: { id } }) => {
+  const on = useEditor((state) => id in state.breakpoints);
+  const why = useEditor((state) => barred(state, "SetBreakpoints"));
+  return (
+    <Button aria-pressed={on} why={why} onPress={() => void breakAt(id, !on)}>
+      <span className="breakpoint-dot" data-on={on} aria-hidden="true" /> Pause whenever a robot goes here
+    </Button>
+  );
+};
+export default Breakpoint;

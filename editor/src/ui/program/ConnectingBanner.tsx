@@ -1,0 +1,28 @@
+/** Says that the next tap ends a step, and how to give it up: by Escape, or the button. */
+
+import { useEffect } from "react";
+import { cancelStep } from "../../commands/program";
+import { now, useEditor } from "../../store/store";
+import { Button } from "../kit/kit";
+import { nameOf } from "../names";
+
+export function ConnectingBanner() {
+  const connecting = useEditor((state) => state.ui.connecting);
+  useEffect(() => {
+    if (!connecting) return;
+    const escape = (event: KeyboardEvent) => {
+      if (event.key === "Escape") cancelStep();
+    };
+    window.addEventListener("keydown", escape);
+    return () => window.removeEventListener("keydown", escape);
+  }, [connecting]);
+  if (!connecting) return null;
+  return (
+    <div className="banner" role="status">
+      <span>Tap what follows {nameOf(now(), connecting.from)}.</span>
+      <Button look="plain" onPress={cancelStep}>
+        Give up
+      </Button>
+    </div>
+  );
+}

@@ -1,0 +1,107 @@
+/** What can be done with an action: try it, run to it, rename, duplicate, remove; and how the last tries ended. */
+
+import { type FormEvent, useState } from "react";
+import { duplicateAction, notEditable, removeAction, renameAction } from "../../commands/program";
+import { barred } from "../../commands/asking";
+import { breakAt, cancel, execute, notRunnable, runTo } from "../../commands/run";
+import { metaOf } from "../../program/logic";
+import { useEditor } from "../../store/store";
+import { Button, Field } from "../kit/kit";
+import { ago } from "../times";
+import type { Section } from "../workplace/sections";
+import { Values } from "./Values";
+import "./program.css";
+
+const Doing: Section["Body"] = ({ selection: { id } }) => {
+  const state = useEditor((each) => each);
+  const [renaming, setRenaming] = useState(false);
+  const { doc, types, live, tried, breakpoints } = state;
+  const action = doc?.actions[id];
+  if (!doc || !action) return null;
+  const meta = metaOf(types, doc, action);
+  const why = notEditable(state, "RemoveAction");
+  const running = live.executing === id;
+  const notNow = notEditable(state, "ExecuteAction") || (live.state !== "started" ? "Go online first: it moves the real devices." : live.executing ? "Another action is being tried." : "");
+  const stays = doc.project?.has_logic ? notRunnable(state) : "The project has no program.";
+  return (
+    <>
+      <div className="row">
+        {running ? (
+          <Button icon="close" why={meta?.meta.cancellable ? "" : "It cannot be cancelled: Stop motion stops the robot."} onPress={() => void cancel()}>
+            Cancel
+          </Button>
+        ) : (
+          <Button icon="play" why={notNow} onPress={() => void execute(id)}>
+            Try it
+          </Button>
+        )}
+        <Button icon="play" why={stays} onPress={() => void runTo(id)}>
+          Run to here
+        </Button>
+        <Button aria-pressed={id in breakpoints} why={barred(state, "SetBreakpoints")} onPress={() => void breakAt(id, !(id in breakpoints))}>
+          <span className="breakpoint-dot" data-on={id in breakpoints} aria-hidden="true" /> Pause before it
+        </Button>
+      </div>
+      {running && (
+        <p role="status">
+          <span className="spinner" aria-hidden="true" /> It is being done…
+        </p>
+      )}
+      {tried
+        .filter((each) => each.action_id === id)
+        .slice(-3)
+        .reverse()
+        .map((each) => (
+          <div key={each.time} className={`outcome ${each.error ? "bad" : "good"}`} role="status">
+            <strong>{each.error ? "Failed" : "Done"}</strong> <span className="quiet small">{ago(new Date(each.time).toISOString())}</span>
+            {each.error && <p>{each.error}</p>}
+            {each.results && each.results.length > 0 && <Values names={action.flows[0]?.outputs ?? []} values={each.results} />}
+          </div>
+        ))}
+      {renaming ? (
+        <Rename id={id} name={action.name} onClose={() => setRenaming(false)} />
+      ) : (
+        <div className="row">
+          <Button look="plain" why={why} onPress={() => setRenaming(true)}>
+            Rename
+          </Button>
+          <Button look="plain" why={why} onPress={() => void duplicateAction(action)}>
+            Duplicate
+          </Button>
+          <Button look="plain" why={why} onPress={() => void removeAction(id)}>
+            Remove
+          </Button>
+        </div>
+      )}
+    </>
+  );
+};
+export default Doing;
+
+function Rename({ id, name, onClose }: { id: string; name: string; onClose: () => void }) {
+  const [text, setText] = useState(name);
+  const [problem, setProblem] = useState("");
+  const submit = async (event: FormEvent) => {
+    event.preventDefault();
+    const wanted = text.trim();
+    const refused = wanted === name ? "" : await renameAction(id, wanted);
+    setProblem(refused);
+    if (!refused) onClose();
+  };
+  return (
+    <form onSubmit={(event) => void submit(event)} onKeyDown={(event) => event.key === "Escape" && onClose()}>
+      <Field label="New name" value={text} onChange={setText} autoFocus autoComplete="off" />
+      {problem && (
+        <p className="error" role="alert">
+          {problem}
+        </p>
+      )}
+      <div className="row">
+        <Button look="primary" type="submit" isDisabled={text.trim() === ""}>
+          Rename
+        </Button>
+        <Button onPress={onClose}>Cancel</Button>
+      </div>
+    </form>
+  );
+}

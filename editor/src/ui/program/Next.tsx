@@ -1,0 +1,97 @@
+/** The steps that lead on from an action, and the buttons that begin another one: then a tap says where it leads. */
+
+import { beginStep, endStep, notEditable, removeStep } from "../../commands/program";
+import { cannotLead, conditionsOf, conditionWords, END, linkTo, outgoing, placeOf, resultAt, START } from "../../program/logic";
+import type { ProjectLogicIf } from "../../protocol/types";
+import { select, useEditor } from "../../store/store";
+import { Icon } from "../kit/icons";
+import { Button } from "../kit/kit";
+import { nameOf } from "../names";
+import type { Section } from "../workplace/sections";
+import { ordered } from "./Steps";
+import "./program.css";
+
+const Next: Section["Body"] = ({ selection: { id } }) => {
+  const state = useEditor((each) => each);
+  const { doc, types } = state;
+  const { connecting } = state.ui;
+  if (!doc) return null;
+  const ways = outgoing(doc, id);
+  const why = notEditable(state, "AddLogicItem");
+  if (connecting?.from === id) return <Targets from={id} />;
+  const own = conditionsOf(doc, types, id)[0];
+  const asked = ways.find((each) => each.condition)?.condition;
+  const result = asked ? resultAt(doc, types, asked.what) : own?.action.id === id ? own : undefined;
+  const free = (value: string) => !ways.some((each) => each.condition?.value === value);
+  const on = (value: string): ProjectLogicIf => ({ what: asked?.what ?? linkTo(result as NonNullable<typeof result>), value });
+  return (
+    <>
+      {ways.length === 0 && <p className="quiet small">Nothing yet.</p>}
+      <ul className="ways">
+        {ways.map((way) => (
+          <li key={way.id}>
+            <Button look="plain" className="way" onPress={() => select({ kind: "logic", id: way.id })}>
+              {conditionWords(doc, types, way) && <span className={`branch ${branchOf(way.condition)}`}>{conditionWords(doc, types, way)}</span>}
+              <span aria-hidden="true">→</span> {nameOf(state, placeOf(way.end))}
+            </Button>
+            <Button look="plain" icon="close" aria-label={`Remove the step to ${nameOf(state, placeOf(way.end))}`} why={why} onPress={() => void removeStep(way.id)} />
+          </li>
+        ))}
+      </ul>
+      <div className="row">
+        {(ways.length === 0 || (result && result.type !== "boolean")) && (
+          <Button icon="plus" why={why} onPress={() => beginStep(id)}>
+            Connect
+          </Button>
+        )}
+        {result?.type === "boolean" && ways.every((each) => each.condition) && (
+          <>
+            {free("true") && (
+              <Button why={why} onPress={() => beginStep(id, on("true"))}>
+                <span className="branch true">yes</span> If {result.name}
+              </Button>
+            )}
+            {free("false") && (
+              <Button why={why} onPress={() => beginStep(id, on("false"))}>
+                <span className="branch false">no</span> If not
+              </Button>
+            )}
+          </>
+        )}
+        {result?.type === "boolean" && ways.length === 1 && !ways[0]?.condition && (
+          <Button icon="plus" why={why} onPress={() => beginStep(id)}>
+            Branch
+          </Button>
+        )}
+      </div>
+    </>
+  );
+};
+export default Next;
+
+export const branchOf = (condition: ProjectLogicIf | undefined): string => (!condition ? "always" : condition.value === "true" || condition.value === "false" ? condition.value : "value");
+
+/** Where a step can lead, for who does not tap in the view. */
+function Targets({ from }: { from: string }) {
+  const state = useEditor((each) => each);
+  const { doc } = state;
+  if (!doc) return null;
+  const { item } = state.ui.connecting ?? {};
+  const targets = [...ordered(doc), END].filter((id) => cannotLead(doc, from, id, item) === "");
+  return (
+    <>
+      <p className="small">
+        Tap what follows {from === START ? "Start" : doc.actions[from]?.name}, in the view or here. Escape gives up.
+      </p>
+      <ul className="ways targets" aria-label="What can follow">
+        {targets.map((id) => (
+          <li key={id}>
+            <Button look="plain" className="way" onPress={() => void endStep(id)}>
+              <Icon name={id === END ? "check" : "action"} size={16} /> {nameOf(state, id)}
+            </Button>
+          </li>
+        ))}
+      </ul>
+    </>
+  );
+}

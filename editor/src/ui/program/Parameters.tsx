@@ -1,0 +1,171 @@
+/** Values of the whole program: its parameters, where they are used, and settings of devices that it replaces. */
+
+import { type FormEvent, useState } from "react";
+import { Button as AriaButton } from "react-aria-components";
+import { addParameter, notEditable, override, removeParameter, updateParameter } from "../../commands/program";
+import type { ParameterMeta } from "../../protocol/types";
+import { words } from "../../program/naming";
+import { usersOf } from "../../program/problems";
+import { extraOf, read, SIMPLE, type Simple, textOf, TYPE_WORDS } from "../../program/values";
+import { select, useEditor } from "../../store/store";
+import { Button, Field } from "../kit/kit";
+import { ValueField } from "./ValueField";
+
+export function Parameters() {
+  const parameters = useEditor((state) => state.doc?.parameters);
+  return (
+    <>
+      <p className="quiet small">A value that several actions share, and that is changed in one place.</p>
+      {Object.values(parameters ?? {})
+        .sort((a, b) => a.name.localeCompare(b.name))
+        .map((each) => (
+          <One key={each.id} id={each.id} />
+        ))}
+      <NewParameter />
+      <Overrides />
+    </>
+  );
+}
+
+function One({ id }: { id: string }) {
+  const state = useEditor((each) => each);
+  const { doc, types } = state;
+  const parameter = doc?.parameters[id];
+  if (!doc || !parameter) return null;
+  const why = notEditable(state, "UpdateProjectParameter");
+  const users = usersOf(doc, types, { parameter: id });
+  const { range } = parameter;
+  const cannotRemove = notEditable(state, "RemoveProjectParameter") || (users.length > 0 ? `It is used by ${users.map((each) => doc.actions[each]?.name).join(", ")}.` : "");
+  return (
+    <section className="constant" aria-label={parameter.name}>
+      <ValueField
+        label={parameter.display_name || parameter.name}
+        name={parameter.name}
+        type={parameter.type}
+        json={parameter.value}
+        extra={range && { minimum: range.min, maximum: range.max }}
+        hint={parameter.description || TYPE_WORDS[parameter.type]}
+        why={why}
+        onSet={(value) => updateParameter(id, { value })}
+      >
+        <Button look="plain" icon="close" aria-label={`Remove ${parameter.name}`} why={cannotRemove} onPress={() => void removeParameter(id)} />
+      </ValueField>
+      <p className="small used">
+        {users.length === 0 ? <span className="quiet">not used yet</span> : "used by "}
+        {users.map((each) => (
+          <AriaButton key={each} className="chip" onPress={() => select({ kind: "action", id: each })}>
+            {doc.actions[each]?.name}
+          </AriaButton>
+        ))}
+      </p>
+    </section>
+  );
+}
+
+function NewParameter() {
+  const why = useEditor((state) => notEditable(state, "AddProjectParameter"));
+  const [open, setOpen] = useState(false);
+  const [name, setName] = useState("");
+  const [type, setType] = useState<Simple>("integer");
+  const [text, setText] = useState("");
+  const [problem, setProblem] = useState("");
+  if (!open) {
+    return (
+      <Button icon="plus" why={why} onPress={() => setOpen(true)}>
+        New value
+      </Button>
+    );
+  }
+  const submit = async (event: FormEvent) => {
+    event.preventDefault();
+    const value = read(type, text);
+    if ("problem" in value) return setProblem(value.problem);
+    const refused = await addParameter(name.trim(), type, value.json);
+    setProblem(refused);
+    if (refused) return;
+    setOpen(false);
+    setName("");
+    setText("");
+  };
+  return (
+    <form className="constant" onSubmit={(event) => void submit(event)}>
+      <Field label="Name" value={name} onChange={setName} autoFocus autoComplete="off" />
+      <div className="chips" role="radiogroup" aria-label="Kind of value">
+        {SIMPLE.map((each) => (
+          <label key={each} className="chip" data-selected={type === each}>
+            <input type="radio" className="hidden-but-read" name="kind-of-value" checked={type === each} onChange={() => setType(each)} />
+            {TYPE_WORDS[each]}
+          </label>
+        ))}
+      </div>
+      <Field label={type === "boolean" ? "Value (yes or no)" : "Value"} value={text} onChange={setText} autoComplete="off" />
+      {problem && (
+        <p className="error" role="alert">
+          {problem}
+        </p>
+      )}
+      <div className="actions">
+        <Button onPress={() => setOpen(false)}>Cancel</Button>
+        <Button look="primary" type="submit" isDisabled={name.trim() === ""}>
+          Add
+        </Button>
+      </div>
+    </form>
+  );
+}
+
+function Overrides() {
+  const state = useEditor((each) => each);
+  const [shown, setShown] = useState("");
+  const { doc, types } = state;
+  if (!doc) return null;
+  const objects = Object.values(doc.objects).filter((each) => (types.byName[each.type]?.settings.length ?? 0) > 0);
+  const object = doc.objects[shown];
+  return (
+    <section className="offers" aria-label="Settings of devices in this project">
+      <h3>Settings of devices, in this project alone</h3>
+      <div className="field">
+        <label htmlFor="override-of">Device</label>
+        <select id="override-of" value={shown} onChange={(event) => setShown(event.target.value)}>
+          <option value="">choose…</option>
+          {objects.map((each) => {
+            const count = Object.keys(doc.overrides[each.id] ?? {}).length;
+            return (
+              <option key={each.id} value={each.id}>
+                {each.name}
+                {count > 0 ? ` (${count} replaced)` : ""}
+              </option>
+            );
+          })}
+        </select>
+      </div>
+      {object && types.byName[object.type]?.settings.map((setting) => <Override key={setting.name} objectId={object.id} setting={setting} />)}
+    </section>
+  );
+}
+
+function Override({ objectId, setting }: { objectId: string; setting: ParameterMeta }) {
+  const state = useEditor((each) => each);
+  const object = state.doc?.objects[objectId];
+  if (!object) return null;
+  const { name, type } = setting;
+  const replaced = state.doc?.overrides[objectId]?.[name]?.value;
+  const given = object.parameters.find((each) => each.name === name)?.value ?? setting.default_value;
+  const why = notEditable(state, "AddOverride") || (state.live.state === "stopped" ? "" : "Go offline first: it holds from the next start.");
+  return (
+    <ValueField
+      label={words(name)}
+      name={name}
+      type={type}
+      json={replaced ?? given}
+      extra={extraOf(setting)}
+      why={why}
+      hint={replaced === undefined ? setting.description : `instead of ${textOf(type, given) || "nothing"} in the scene`}
+      onSet={(value) => override(objectId, { name, type }, value)}
+    >
+      {replaced !== undefined && (
+        <Button look="plain" icon="undo" aria-label={`${words(name)} as in the scene`} why={why} onPress={() => void override(objectId, { name, type }, undefined)} />
+      )}
+    </ValueField>
+  );
+}

@@ -1,0 +1,43 @@
+/** What is wrong with the program; a tap leads to the fault. */
+
+import { Button as AriaButton } from "react-aria-components";
+import type { Problem } from "../../program/problems";
+import { theEngine } from "../../session/engine";
+import { now, select, setUi, useEditor } from "../../store/store";
+import { Icon } from "../kit/icons";
+import { selectionOf } from "../names";
+
+export function Problems({ problems }: { problems: Problem[] }) {
+  const known = useEditor((state) => Object.values(state.doc?.objects ?? {}).every((each) => each.type in state.types.actions || !(each.type in state.types.byName)));
+  if (!known) return <p className="quiet">Reading what the devices can do…</p>;
+  if (problems.length === 0) {
+    return (
+      <p className="all-well">
+        <Icon name="check" /> Nothing is wrong: it can be run.
+      </p>
+    );
+  }
+  const sorted = [...problems].sort((a, b) => Number(a.level === "warn") - Number(b.level === "warn"));
+  return (
+    <ul className="faults">
+      {sorted.map((each, index) => (
+        <li key={`${each.id}/${index}`}>
+          <AriaButton
+            className={`fault ${each.level}`}
+            onPress={() => {
+              select(selectionOf(now(), each.id));
+              setUi({ tool: "" });
+              theEngine()?.focus(each.id);
+            }}
+          >
+            <Icon name={each.level === "error" ? "warn" : "info"} />
+            <span>
+              <span className="hidden-but-read">{each.level === "error" ? "Must be cured: " : "Should be looked at: "}</span>
+              {each.text}
+            </span>
+          </AriaButton>
+        </li>
+      ))}
+    </ul>
+  );
+}

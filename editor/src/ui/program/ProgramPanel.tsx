@@ -1,0 +1,52 @@
+/** The panel of the program: one tab for each question that is asked of it. */
+
+import { useMemo, useState } from "react";
+import { ToggleButton, ToggleButtonGroup } from "react-aria-components";
+import { problemsOf } from "../../program/problems";
+import { useEditor } from "../../store/store";
+import { AddAction } from "./AddAction";
+import { Parameters } from "./Parameters";
+import { Problems } from "./Problems";
+import { Steps } from "./Steps";
+import "./program.css";
+
+const TABS = { add: "Add", steps: "Actions", problems: "Check", parameters: "Values" } as const;
+type Tab = keyof typeof TABS;
+
+/** The tab that was open last is open again. */
+let last: Tab = "add";
+
+export default function ProgramPanel() {
+  const [tab, setTab] = useState<Tab>(last);
+  const doc = useEditor((state) => state.doc);
+  const types = useEditor((state) => state.types);
+  const reach = useEditor((state) => state.reach);
+  const problems = useMemo(() => (doc ? problemsOf(doc, types, reach) : []), [doc, types, reach]);
+  const errors = problems.filter((each) => each.level === "error").length;
+  return (
+    <>
+      <ToggleButtonGroup
+        className="tabs small-tabs"
+        aria-label="Of the program"
+        selectionMode="single"
+        disallowEmptySelection
+        selectedKeys={[tab]}
+        onSelectionChange={(keys) => {
+          last = [...keys][0] as Tab;
+          setTab(last);
+        }}
+      >
+        {(Object.keys(TABS) as Tab[]).map((each) => (
+          <ToggleButton key={each} id={each} className="tab">
+            {TABS[each]}
+            {each === "problems" && problems.length > 0 && <span className={`tag ${errors ? "bad" : "warn"}`}>{problems.length}</span>}
+          </ToggleButton>
+        ))}
+      </ToggleButtonGroup>
+      {tab === "add" && <AddAction />}
+      {tab === "steps" && <Steps problems={problems} />}
+      {tab === "problems" && <Problems problems={problems} />}
+      {tab === "parameters" && <Parameters />}
+    </>
+  );
+}

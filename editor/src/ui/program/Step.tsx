@@ -1,0 +1,82 @@
+/** One step: from where to where, and the result on which it depends. Changing it never takes it away meanwhile. */
+
+import { beginStep, notEditable, removeStep, setCondition } from "../../commands/program";
+import { conditionsOf, linkTo, outgoing, placeOf, resultAt, START } from "../../program/logic";
+import { select, useEditor } from "../../store/store";
+import { useState } from "react";
+import { Button } from "../kit/kit";
+import { nameOf, selectionOf } from "../names";
+import type { Section } from "../workplace/sections";
+import { now } from "../../store/store";
+import { ValueField } from "./ValueField";
+import "./program.css";
+
+const Step: Section["Body"] = ({ selection: { id } }) => {
+  const state = useEditor((each) => each);
+  const [problem, setProblem] = useState("");
+  const { doc, types } = state;
+  const step = doc?.logic[id];
+  if (!doc || !step) return null;
+  const from = placeOf(step.start);
+  const to = placeOf(step.end);
+  const why = notEditable(state, "UpdateLogicItem");
+  const results = from === START ? [] : conditionsOf(doc, types, from);
+  const result = step.condition && resultAt(doc, types, step.condition.what);
+  const alone = outgoing(doc, from).length === 1;
+  const choose = async (what: string) => {
+    const chosen = results.find((each) => linkTo(each) === what);
+    setProblem(await setCondition(id, chosen && { what, value: chosen.type === "boolean" ? "true" : chosen.type === "string_enum" ? '"value"' : "0" }));
+  };
+  return (
+    <>
+      <div className="row">
+        <Button look="plain" onPress={() => select(selectionOf(now(), from))}>
+          {nameOf(state, from)}
+        </Button>
+        <span aria-hidden="true">→</span>
+        <Button look="plain" onPress={() => select(selectionOf(now(), to))}>
+          {nameOf(state, to)}
+        </Button>
+      </div>
+      {results.length > 0 ? (
+        <div className="field">
+          <label htmlFor="depends-on">It depends on</label>
+          <select id="depends-on" value={step.condition?.what ?? ""} disabled={why !== ""} onChange={(event) => void choose(event.target.value)}>
+            <option value="">{alone ? "nothing: it is always taken" : "nothing: it is taken when no other is"}</option>
+            {results.map((each) => (
+              <option key={linkTo(each)} value={linkTo(each)}>
+                {each.action.id === from ? each.name : `${each.name} of ${each.action.name}`}
+              </option>
+            ))}
+          </select>
+        </div>
+      ) : (
+        <p className="quiet small">{from === START ? "The program begins with it." : `${nameOf(state, from)} has no result that could decide: yes or no, a whole number or a choice.`}</p>
+      )}
+      {step.condition && result && (
+        <ValueField
+          label={`and is taken when ${result.name} is`}
+          name={result.name}
+          type={result.type === "integer_enum" ? "integer" : result.type}
+          json={step.condition.value}
+          why={why}
+          onSet={(value) => setCondition(id, { what: step.condition?.what ?? "", value })}
+        />
+      )}
+      {problem && (
+        <p className="error" role="alert">
+          {problem}
+        </p>
+      )}
+      <div className="row">
+        <Button why={why} onPress={() => beginStep(from, undefined, id)}>
+          Lead elsewhere
+        </Button>
+        <Button look="plain" why={why} onPress={() => void removeStep(id)}>
+          Remove
+        </Button>
+      </div>
+    </>
+  );
+};
+export default Step;

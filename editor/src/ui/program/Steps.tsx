@@ -1,0 +1,82 @@
+/** All actions in the order in which they are run, those that are never run last; with breakpoints. */
+
+import { useMemo } from "react";
+import { Button as AriaButton, ToggleButton } from "react-aria-components";
+import { breakAt } from "../../commands/run";
+import { barred } from "../../commands/asking";
+import { conditionWords, incoming, outgoing, placeOf, START } from "../../program/logic";
+import type { Problem } from "../../program/problems";
+import type { OpenDocument } from "../../store/state";
+import { theEngine } from "../../session/engine";
+import { select, setUi, tell, useEditor } from "../../store/store";
+import { Icon } from "../kit/icons";
+import { nameOf } from "../names";
+
+export function Steps({ problems }: { problems: Problem[] }) {
+  const state = useEditor((each) => each);
+  const { doc, types, breakpoints, program } = state;
+  const order = useMemo(() => (doc ? ordered(doc) : []), [doc]);
+  const cannot = barred(state, "SetBreakpoints");
+  if (!doc) return null;
+  if (order.length === 0) return <p className="quiet">No action yet. Add the first one under “Add”.</p>;
+  return (
+    <ol className="steps">
+      {order.map((id) => {
+        const action = doc.actions[id];
+        if (!action) return null;
+        const problem = problems.find((each) => each.id === id);
+        const after = incoming(doc, id).map((item) => conditionWords(doc, types, item)).filter(Boolean);
+        const running = program.running.includes(id) || state.live.executing === id;
+        return (
+          <li key={id} data-running={running} data-selected={state.ui.selection?.id === id}>
+            <ToggleButton
+              className="breakpoint"
+              aria-label={`Pause before ${action.name}`}
+              isSelected={id in breakpoints}
+              onChange={(on) => (cannot ? tell("info", cannot) : void breakAt(id, on))}
+            >
+              <span className="breakpoint-dot" aria-hidden="true" />
+            </ToggleButton>
+            <AriaButton
+              className="step"
+              onPress={() => {
+                select({ kind: "action", id });
+                setUi({ tool: "" });
+                theEngine()?.focus(id);
+              }}
+            >
+              <span className="step-name">{action.name}</span>
+              <span className="quiet small">
+                {nameOf(state, action.type.split("/")[0] ?? "")} at {nameOf(state, action.pointId)}
+                {after.length > 0 && ` · when ${after.join(", ")}`}
+              </span>
+              {running && <span className="tag good">runs now</span>}
+              {problem && (
+                <span className={`tag ${problem.level === "error" ? "bad" : "warn"}`}>
+                  <Icon name="warn" size={14} /> {problem.text}
+                </span>
+              )}
+            </AriaButton>
+          </li>
+        );
+      })}
+    </ol>
+  );
+}
+
+/** Breadth first from START, then what cannot be reached. */
+export function ordered(doc: OpenDocument): string[] {
+  const found: string[] = [];
+  const waiting = [START];
+  const seen = new Set<string>([START]);
+  for (let id = waiting.shift(); id !== undefined; id = waiting.shift()) {
+    if (id in doc.actions) found.push(id);
+    for (const item of outgoing(doc, id)) {
+      const next = placeOf(item.end);
+      if (seen.has(next)) continue;
+      seen.add(next);
+      waiting.push(next);
+    }
+  }
+  return [...found, ...Object.keys(doc.actions).filter((id) => !seen.has(id))];
+}

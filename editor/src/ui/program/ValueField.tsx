@@ -1,0 +1,119 @@
+/**
+ * The field for one value, by its type. What is typed is taken over when the field is left or Enter is pressed; what is
+ * chosen, at once. A value that cannot be, or that the server refuses, stays in the field with the reason below.
+ */
+
+import { useEffect, useId, useState } from "react";
+import type { ReactNode } from "react";
+import { type Extra, rangeWords, read, textOf } from "../../program/values";
+
+export interface Choice {
+  /** JSON of the value. */
+  json: string;
+  label: string;
+}
+
+interface ValueFieldProps {
+  label: ReactNode;
+  /** For who does not see the label's place. */
+  name: string;
+  type: string;
+  json: string | undefined;
+  extra?: Extra;
+  /** For what is chosen out of a list. */
+  choices?: Choice[];
+  hint?: string;
+  /** Why it cannot be changed; empty when it can. */
+  why?: string;
+  /** Take it over; gives why not. */
+  onSet: (json: string) => Promise<string>;
+  children?: ReactNode;
+}
+
+export function ValueField({ label, name, type, json, extra = {}, choices, hint, why = "", onSet, children }: ValueFieldProps) {
+  const known = textOf(type, json);
+  const [text, setText] = useState(known);
+  const [problem, setProblem] = useState("");
+  const id = useId();
+  // Somebody else changed it, or it was taken over.
+  useEffect(() => {
+    setText(known);
+    setProblem("");
+  }, [known]);
+
+  const set = async (next: string) => {
+    if (next === json) return setProblem("");
+    setProblem(await onSet(next));
+  };
+  const leave = () => {
+    if (text === known) return setProblem("");
+    const found = read(type, text, extra);
+    if ("problem" in found) setProblem(found.problem);
+    else void set(found.json);
+  };
+  const range = rangeWords(extra);
+  const about = [hint, range].filter(Boolean).join(" · ");
+  const described = { id, "aria-invalid": problem !== "" || undefined, "aria-describedby": `${id}-about`, disabled: why !== "" };
+  const listed = choices ?? (type === "boolean" ? BOOLEAN : extra.allowed_values?.map((each) => ({ json: JSON.stringify(each), label: String(each) })));
+  return (
+    <div className="field value-field">
+      <div className="value-head">
+        <label htmlFor={id}>{label}</label>
+        {children}
+      </div>
+      {listed && listed.length <= 3 && listed.every((each) => each.label.length <= 9) ? (
+        <div className="chips" role="radiogroup" aria-label={name} id={id}>
+          {listed.map((each) => (
+            <label key={each.json} className="chip" data-selected={each.json === json}>
+              <input type="radio" className="hidden-but-read" name={id} checked={each.json === json} disabled={why !== ""} onChange={() => void set(each.json)} />
+              {each.label}
+            </label>
+          ))}
+        </div>
+      ) : listed ? (
+        <select {...described} value={json ?? ""} onChange={(event) => void set(event.target.value)}>
+          {!listed.some((each) => each.json === json) && <option value={json ?? ""}>{known ? `${known} (not in the list)` : "choose…"}</option>}
+          {listed.map((each) => (
+            <option key={each.json} value={each.json}>
+              {each.label}
+            </option>
+          ))}
+        </select>
+      ) : (
+        <span className="with-unit">
+          <input
+            {...described}
+            value={text}
+            inputMode={type === "integer" || type === "double" ? "decimal" : undefined}
+            autoComplete="off"
+            onChange={(event) => setText(event.target.value)}
+            onBlur={leave}
+            onKeyDown={(event) => {
+              if (event.key === "Enter") leave();
+              if (event.key === "Escape" && text !== known) {
+                event.stopPropagation();
+                setText(known);
+                setProblem("");
+              }
+            }}
+          />
+          {extra.unit && <span className="unit quiet">{extra.unit}</span>}
+        </span>
+      )}
+      <span id={`${id}-about`} className="quiet small about-value">
+        {problem ? (
+          <span className="error" role="alert">
+            {problem}
+          </span>
+        ) : (
+          why || about
+        )}
+      </span>
+    </div>
+  );
+}
+
+const BOOLEAN: Choice[] = [
+  { json: "true", label: "Yes" },
+  { json: "false", label: "No" },
+];

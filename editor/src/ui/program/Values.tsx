@@ -1,0 +1,41 @@
+/** Values with their names, as an action got or gave them. */
+
+import { plain } from "../../viewmodel/items";
+
+/** Longer ones can be opened. */
+const SHORT = 60;
+
+export function Values({ names, values }: { names: string[]; values: string[] }) {
+  return (
+    <dl className="values">
+      {values.map((value, index) => (
+        <div key={index}>
+          <dt>{names[index] ?? `result ${index + 1}`}</dt>
+          <dd>
+            <Value json={value} />
+          </dd>
+        </div>
+      ))}
+    </dl>
+  );
+}
+
+function Value({ json }: { json: string }) {
+  const image = pictureOf(json);
+  if (image) return <img src={image} alt="What the camera saw" />;
+  const text = json === "true" ? "yes" : json === "false" ? "no" : plain(json);
+  if (text.length <= SHORT) return text;
+  return (
+    <details>
+      <summary>{text.slice(0, SHORT)}…</summary>
+      {text}
+    </details>
+  );
+}
+
+/** A picture travels as base64 of JPEG or PNG in a string. */
+function pictureOf(json: string): string | null {
+  const found = /^"((?:\/9j\/|iVBOR)[A-Za-z0-9+/=]+)"$/.exec(json);
+  if (!found?.[1]) return null;
+  return `data:image/${found[1].startsWith("/9j/") ? "jpeg" : "png"};base64,${found[1]}`;
+}

@@ -1,0 +1,69 @@
+/** While a program runs: how it is, and what can be done with it. Always in the view, whichever panel is open. */
+
+import { barred } from "../../commands/asking";
+import * as commands from "../../commands/run";
+import { isRunning } from "../../store/selectors";
+import { useEditor } from "../../store/store";
+import { Button } from "../kit/kit";
+import { nameOf } from "../names";
+
+export const STATES: Record<string, string> = {
+  started: "Starting…",
+  running: "Running",
+  pausing: "Pausing…",
+  paused: "Paused",
+  resuming: "Going on…",
+  stopping: "Stopping…",
+  stopped: "Stopped",
+  undefined: "Has not run",
+};
+
+export function RunBar() {
+  const runs = useEditor(isRunning);
+  return runs ? <Controls /> : null;
+}
+
+function Controls() {
+  const state = useEditor((each) => each);
+  const { state: phase, running } = state.program;
+  const at = running.map((id) => nameOf(state, id)).filter(Boolean);
+  return (
+    <div className="runbar" role="group" aria-label="The program">
+      <span className="runbar-state" role="status">
+        <strong>{STATES[phase]}</strong>
+        {at.length > 0 && <span className="small quiet">{phase === "paused" ? ` before ${at.join(", ")}` : ` ${at.join(", ")}`}</span>}
+      </span>
+      <RunButtons />
+    </div>
+  );
+}
+
+/** Pause, go on, one action further, stop: those that the state allows. */
+export function RunButtons() {
+  const phase = useEditor((state) => state.program.state);
+  const why = useEditor((state) => barred(state, "StopPackage"));
+  return (
+    <>
+      {phase === "running" && (
+        <Button icon="pause" why={why} onPress={() => void commands.pause()}>
+          Pause
+        </Button>
+      )}
+      {phase === "paused" && (
+        <>
+          <Button icon="play" look="primary" why={why} onPress={() => void commands.resume()}>
+            Go on
+          </Button>
+          <Button icon="step" why={why} onPress={() => void commands.step()}>
+            One action
+          </Button>
+        </>
+      )}
+      {(phase === "running" || phase === "paused" || phase === "pausing" || phase === "resuming") && (
+        <Button icon="stop" why={why} onPress={() => void commands.stop()}>
+          Stop
+        </Button>
+      )}
+    </>
+  );
+}

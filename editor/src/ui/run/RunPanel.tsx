@@ -1,0 +1,94 @@
+/** Runs the open project, and follows it: state, what went wrong, each action with what went in and came out. */
+
+import { useState } from "react";
+import { notEditable } from "../../commands/program";
+import { barred } from "../../commands/asking";
+import { breakAt, build, notRunnable, run } from "../../commands/run";
+import { isRunning } from "../../store/selectors";
+import { select, setUi, useEditor } from "../../store/store";
+import { AskName, Button } from "../kit/kit";
+import { nameOf } from "../names";
+import { Exception } from "./Exception";
+import { History } from "./History";
+import { RunButtons, STATES } from "./RunBar";
+import { Trace } from "./Trace";
+import "./run.css";
+
+export default function RunPanel() {
+  const state = useEditor((each) => each);
+  const [asking, setAsking] = useState(false);
+  const [busy, setBusy] = useState(false);
+  const { doc, program, breakpoints } = state;
+  const runs = isRunning(state);
+  const why = notRunnable(state);
+  const cannotBuild = notEditable(state, "BuildProject");
+  const begin = async (paused: boolean) => {
+    setBusy(true);
+    await run({ paused });
+    setBusy(false);
+  };
+  const broken = Object.keys(breakpoints).filter((id) => nameOf(state, id));
+  return (
+    <>
+      <p className="run-state" role="status">
+        <strong>{busy && !runs ? "Building…" : (STATES[program.state] ?? program.state)}</strong>
+        {program.running.length > 0 && <span> {program.running.map((id) => nameOf(state, id)).join(", ")}</span>}
+      </p>
+      {runs ? (
+        <div className="row">
+          <RunButtons />
+        </div>
+      ) : (
+        <>
+          <div className="row">
+            <Button look="primary" icon="play" why={why} isDisabled={busy} onPress={() => void begin(false)}>
+              {doc?.unsaved ? "Save and run" : "Run"}
+            </Button>
+            <Button icon="step" why={why} isDisabled={busy} onPress={() => void begin(true)}>
+              Run paused
+            </Button>
+            <Button icon="box" why={cannotBuild} isDisabled={busy} onPress={() => setAsking(true)}>
+              Build…
+            </Button>
+          </div>
+          <p className="quiet small">{doc?.unsaved ? "What was changed is saved first. " : ""}“Build” makes a package that stays, for the operator's screen.</p>
+        </>
+      )}
+      <Exception />
+      {broken.length > 0 && (
+        <section className="run-part" aria-label="Breakpoints">
+          <h3>It pauses before</h3>
+          <ul className="row">
+            {broken.map((id) => (
+              <li key={id}>
+                <Button look="plain" icon="close" aria-label={`Do not pause at ${nameOf(state, id)}`} why={barred(state, "SetBreakpoints")} onPress={() => void breakAt(id, false)}>
+                  {nameOf(state, id)}
+                </Button>
+              </li>
+            ))}
+          </ul>
+        </section>
+      )}
+      <Follow />
+      <Trace
+        onChoose={(id) => {
+          setUi({ tool: "" });
+          select({ kind: "action", id });
+        }}
+      />
+      <History />
+      {asking && doc?.project && <AskName title="Build a package" initial={doc.project.name} yes={doc.unsaved ? "Save and build" : "Build"} onYes={(name) => void build(name)} onClose={() => setAsking(false)} />}
+    </>
+  );
+}
+
+/** Whether the camera goes where the program is. */
+function Follow() {
+  const on = useEditor((state) => state.ui.follow);
+  return (
+    <label className="check">
+      <input type="checkbox" checked={on} onChange={(event) => setUi({ follow: event.target.checked })} />
+      <span>The view follows the action that runs</span>
+    </label>
+  );
+}

@@ -1,0 +1,63 @@
+/** What the program has done, the newest first: each action with parameters, results and how long it took. */
+
+import { useState } from "react";
+import { Button as AriaButton } from "react-aria-components";
+import { metaOf } from "../../program/logic";
+import type { TraceEntry } from "../../protocol/types";
+import { useEditor } from "../../store/store";
+import { Button } from "../kit/kit";
+import { Values } from "../program/Values";
+import "../program/program.css";
+
+/** So many are drawn; the rest on request. */
+const SHOWN = 30;
+
+export function Trace({ onChoose }: { onChoose: (actionId: string) => void }) {
+  const trace = useEditor((state) => state.program.trace);
+  const [all, setAll] = useState(false);
+  const [open, setOpen] = useState(0);
+  if (trace.length === 0) return null;
+  const newest = [...trace].sort((a, b) => b.number - a.number);
+  const shown = all ? newest : newest.slice(0, SHOWN);
+  return (
+    <section className="run-part" aria-label="What it has done">
+      <h3>What it has done</h3>
+      <ol className="trace" reversed>
+        {shown.map((entry) => (
+          <li key={entry.number} data-failed={entry.error !== undefined} data-running={entry.duration === undefined}>
+            <AriaButton className="trace-row" aria-expanded={open === entry.number} onPress={() => setOpen(open === entry.number ? 0 : entry.number)}>
+              <span className="trace-name">{entry.name || "an action"}</span>
+              <span className="quiet small">{entry.error !== undefined ? "failed" : entry.duration === undefined ? "runs now" : seconds(entry.duration)}</span>
+            </AriaButton>
+            {open === entry.number && <Detail entry={entry} onChoose={onChoose} />}
+          </li>
+        ))}
+      </ol>
+      {!all && trace.length > SHOWN && <Button onPress={() => setAll(true)}>Show all {trace.length}</Button>}
+    </section>
+  );
+}
+
+function Detail({ entry, onChoose }: { entry: TraceEntry; onChoose: (actionId: string) => void }) {
+  const action = useEditor((state) => state.doc?.actions[entry.action_id]);
+  const meta = useEditor((state) => (action && state.doc ? metaOf(state.types, state.doc, action) : undefined));
+  const names = meta?.parameters.map((each) => each.name) ?? [];
+  return (
+    <div className="trace-detail">
+      {entry.error !== undefined && <p className="error">{entry.error}</p>}
+      {entry.parameters && entry.parameters.length > 0 && <Values names={names} values={entry.parameters} />}
+      {entry.results && entry.results.length > 0 && (
+        <>
+          <p className="small quiet">told</p>
+          <Values names={action?.flows[0]?.outputs ?? []} values={entry.results} />
+        </>
+      )}
+      <p className="small quiet">at {new Date(entry.started).toLocaleTimeString("en-GB")}</p>
+      {action && <Button onPress={() => onChoose(entry.action_id)}>Show it</Button>}
+    </div>
+  );
+}
+
+export function seconds(duration: number): string {
+  return duration < 0.995 ? `${Math.round(duration * 1000)} ms` : duration < 59.5 ? `${duration.toFixed(1)} s` : `${Math.floor(duration / 60)} min ${Math.round(duration % 60)} s`;
+}

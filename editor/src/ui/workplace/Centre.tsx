@@ -1,0 +1,52 @@
+/** The middle: the 3D view, the program as a graph, both, or its code. The 3D view stays behind what covers it. */
+
+import { Suspense } from "react";
+import { ToggleButton, ToggleButtonGroup } from "react-aria-components";
+import type { Mode } from "../../store/state";
+import { setUi, useEditor } from "../../store/store";
+import { Waiting } from "../kit/kit";
+import { lazily } from "../kit/lazily";
+import { ConnectingBanner } from "../program/ConnectingBanner";
+import { RunBar } from "../run/RunBar";
+import { View3D } from "./View3D";
+import "../run/run.css";
+import "./centre.css";
+
+const FlowView = lazily(() => import("../flow/FlowView"));
+const CodeView = lazily(() => import("../code/CodeView"));
+const WORDS: Record<Mode, string> = { "3d": "3D", flow: "Flow", split: "Both", code: "Code" };
+
+export function Centre() {
+  const project = useEditor((state) => state.doc?.project);
+  const chosen = useEditor((state) => state.ui.mode);
+  const modes: Mode[] = project?.has_logic ? ["3d", "flow", "split", "code"] : ["3d", "code"];
+  const mode = project && modes.includes(chosen) ? chosen : "3d";
+  return (
+    <div className="centre" data-mode={mode}>
+      <View3D />
+      {(mode === "flow" || mode === "split") && (
+        <Suspense fallback={<Waiting>Drawing the program…</Waiting>}>
+          <FlowView />
+        </Suspense>
+      )}
+      {mode === "code" && (
+        <Suspense fallback={<Waiting>Reading the program…</Waiting>}>
+          <CodeView />
+        </Suspense>
+      )}
+      <div className="centre-top">
+        {project && (
+          <ToggleButtonGroup className="modes" aria-label="How it is shown" selectionMode="single" disallowEmptySelection selectedKeys={[mode]} onSelectionChange={(keys) => setUi({ mode: [...keys][0] as Mode })}>
+            {modes.map((each) => (
+              <ToggleButton key={each} id={each} className="button mode">
+                {WORDS[each]}
+              </ToggleButton>
+            ))}
+          </ToggleButtonGroup>
+        )}
+        <RunBar />
+        <ConnectingBanner />
+      </div>
+    </div>
+  );
+}
