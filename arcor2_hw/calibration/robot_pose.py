@@ -28,7 +28,7 @@ Floats = npt.NDArray[np.float64]
 MANY_RAYS: Final = 60_000
 ALIKE: Final = 0.93
 """Of the best end's score that makes another one as good."""
-UNEVEN: Final = (0.0025, 0.012)
+UNEVEN: Final = (0.0015, 0.012)
 """m of unevenness up to which a result is good, and from which on it is none."""
 LEAST_KNOWN: Final = 0.05
 """Of a motion in the worst direction that distances have to show."""

@@ -109,6 +109,15 @@ def test_other_joints_than_told_are_refused(plain: View) -> None:
     assert refused(plain, surface=surface_of_arm(bent)).reason is Reason.NOT_CONVERGED
 
 
+def test_a_joint_that_is_slightly_off_makes_no_good_result(plain: View) -> None:
+    """One degree of the elbow moves the base by a centimetre: too little to refuse, and it is told."""
+    bent = list(JOINTS)
+    bent[2] += math.radians(1.0)
+    found = solve(plain, surface=surface_of_arm(bent))
+    assert found.grade is Grade.USABLE
+    assert "joints" in found.verdict
+
+
 def test_a_robot_far_from_where_it_is_assumed_is_refused_not_found_wrong(plain: View) -> None:
     beside = refused(plain, assumed=Pose(Position(0.3, 0.0, 0.0)))
     assert beside.reason in (Reason.NOT_CONVERGED, Reason.NO_OVERLAP)
