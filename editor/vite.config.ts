@@ -40,7 +40,9 @@ function lean(): Plugin {
     apply: "build",
     enforce: "pre",
     transform(code, id) {
-      if (UNUSED.test(id)) return "export default '';";
+      if (UNUSED.test(id)) {
+        return id.includes("/ShaderLib/") ? "export const vertex = '', fragment = '';" : "export default '';";
+      }
       if (id.endsWith("/three/src/extras/PMREMGenerator.js")) return "export class PMREMGenerator {}";
       if (id.endsWith("/three/src/renderers/shaders/DFGLUTData.js")) return "export const getDFGLUT = () => null;";
       if (/\/three\/src\/renderers\/shaders\/.*\.js$/.test(id)) {
