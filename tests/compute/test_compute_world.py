@@ -289,3 +289,15 @@ async def test_a_thousand_bodies_stay_fast(compute: Compute) -> None:
         assert await line(compute, *things) is None
     assert (time.perf_counter() - begun) / 20 < 0.1
     assert await line(compute) is None
+
+
+async def test_a_mesh_of_two_gigabytes_is_refused_unread(compute: Compute, tmp_path: Path) -> None:
+    huge = tmp_path / "content"
+    with huge.open("wb") as file:
+        file.truncate(2 * 1024**3)  # sparse: it takes no room
+    with pytest.raises(InvalidData, match=r"huge\.stl") as raised:
+        await compute.run(t.ReadMesh(KeptFile(str(huge), "huge.stl")))
+    assert raised.value.code == "bad_mesh"
+    with pytest.raises(InvalidData, match=r"huge\.zip") as raised:
+        await compute.run(t.DescribeRobot(RobotModel(KeptFile(str(huge), "huge.zip"))))
+    assert raised.value.code == "unsafe_description"
