@@ -162,14 +162,27 @@ class Hierarchy:
         return self._offered[base]
 
     def implemented_hooks(self, info: ClassInfo) -> frozenset[str]:
-        """Give the optional methods of our bases that the type, or an ancestor of its own, really implements."""
-        offered = {name for each in self.ancestors(info) if is_framework(each) for name in self._offers(each)}
+        """Give the optional methods of our bases that the type, or an ancestor of its own, really implements.
+
+        One of our bases does so where another of them leaves it open.
+        """
+        ours = [each for each in self.ancestors(info) if is_framework(each)]
+        offered = {name for each in ours for name in self._offers(each)}
         result = set()
         for name in offered:
             found = self.method(info, name)
-            if found is not None and not is_framework(found[0]) and not self.is_hook_only(found[1], found[0]):
+            if found is None or self.is_hook_only(found[1], found[0]):
+                continue
+            if not is_framework(found[0]) or self._fills_in(name, ours[ours.index(found[0]) + 1 :]):
                 result.add(name)
         return frozenset(result)
+
+    def _fills_in(self, name: str, bases: list[ClassInfo]) -> bool:
+        """Tell whether one of our bases leaves a method open, by a body that only raises."""
+        declared = (each.function(name) for each in bases)
+        return any(
+            node is not None and self.is_hook_only(node, each) for node, each in zip(declared, bases, strict=True)
+        )
 
 
 def is_known_library(symbol: External) -> bool:

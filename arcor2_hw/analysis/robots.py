@@ -60,11 +60,13 @@ def _robot_type(info: ClassInfo, hierarchy: Hierarchy) -> RobotType:
 
 
 def _has(info: ClassInfo, method: str, hierarchy: Hierarchy) -> bool:
-    """Tell whether a method is implemented: not ours, called as ours, and more than a raise."""
+    """Tell whether a method is implemented: called as ours, and more than a raise; some of our bases do so, too."""
     found = hierarchy.method(info, method)
-    if found is None or is_framework(found[0]):
+    if found is None:
         return False
     owner, node = found
+    if is_framework(owner):
+        return not hierarchy.is_hook_only(node, owner) and not hierarchy.is_abstract(node, owner)
     for each in hierarchy.ancestors(info):
         declared = each.function(method)
         if declared is not None and is_framework(each):

@@ -104,11 +104,16 @@ def free_line(sweep: Sweep, start: Array, target: Array, name: str = "") -> list
     """
     name = name or sweep.arm.model.name
     way = straight_line(sweep.arm, start, target, name)
+    require_free(sweep, way, name)
+    return way
+
+
+def require_free(sweep: Sweep, way: Sequence[Array], name: str) -> None:
+    """Raise MotionInCollision, naming what with what and where, unless the waypoints of a line meet nothing."""
     if (hit := sweep.first_hit(way)) is not None:
-        length = float(np.linalg.norm(target[:3, 3] - sweep.arm.forward(start)[:3, 3]))
+        length = float(np.linalg.norm(sweep.arm.forward(way[-1])[:3, 3] - sweep.arm.forward(way[0])[:3, 3]))
         where = f"{hit.share * length:.3f} m on its way"
         raise MotionInCollision(f"{name} cannot go straight: {where} it is in collision: {hit.what}.")
-    return way
 
 
 # ------------------------------------------------------------------------------------------------ corners

@@ -9,6 +9,7 @@ from arcor2_hw.data.robot import Joint, KinematicCalibration, MoveResult, RobotS
 from arcor2_hw.exceptions import Arcor2NotImplemented, DeviceError, KinematicsError, Refused
 from arcor2_hw.objects.generic import GenericWithPose
 from arcor2_hw.objects.settings import Settings
+from arcor2_hw.objects.surroundings import Nothing, Surroundings
 
 
 class RobotException(DeviceError):
@@ -35,6 +36,15 @@ class Robot(GenericWithPose):
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: Settings | None = None) -> None:
         super().__init__(obj_id, name, pose, settings)
         self._move_lock = threading.Lock()
+
+    def surround(self, surroundings: Surroundings) -> None:
+        """Take what tells of the things around the robot; called once, between `__init__` and `connect`."""
+        self._around = surroundings
+
+    @property
+    def surroundings(self) -> Surroundings:
+        """Give what tells of the things around the robot: of nothing, where nobody told of any."""
+        return self.__dict__.get("_around") or Nothing()
 
     @property
     def move_in_progress(self) -> bool:

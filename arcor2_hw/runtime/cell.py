@@ -16,6 +16,7 @@ from arcor2_hw.runtime.creation import Recipe, load_type, recipe
 from arcor2_hw.runtime.device import CLOSE_DEADLINE, STOP_DEADLINE, Device, describe, overrides, until
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.messages import OpenScene
+from arcor2_hw.runtime.surroundings import SceneSurroundings
 
 CONTROL_DEADLINE: Final = 10.0
 """Seconds for taking control: a controller may have to load and start its control program."""
@@ -96,6 +97,8 @@ class Cell:
         self._absent: dict[str, Arcor2Error] = {}
         self._ended: SimpleQueue[Job | None] = SimpleQueue()
         self._abandoned = False
+        self.assets: Mapping[str, str] = {}
+        """Files of meshes and of robots' models that were uploaded, by the asset's id."""
         self.changed: Callable[[Device], None] = lambda _: None
         """Called when the connection of a device changes, on the thread that keeps it."""
 
@@ -153,7 +156,8 @@ class Cell:
             failed(fault)
 
     def _make(self, how: Recipe) -> Device:
-        device = Device(how, lambda device: self.changed(device), self.find)
+        surroundings = SceneSurroundings(how.scene_object.id, self, self.assets)
+        device = Device(how, lambda device: self.changed(device), self.find, surroundings)
         self._devices[device.id] = device
         return device
 

@@ -18,6 +18,7 @@ from arcor2_hw.exceptions import (
 from arcor2_hw.objects import Axis, CollisionObject, Generic, Robot
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.observing import Observing, listening
+from arcor2_hw.objects.surroundings import Surroundings
 from arcor2_hw.runtime.creation import Recipe
 from arcor2_hw.runtime.lane import Job, Lane
 from arcor2_hw.runtime.values import decode_arguments
@@ -77,7 +78,7 @@ class Device:
     """One object of the scene. Every call on the instance is made on one of its lanes.
 
     `changed` is called when its connection changes, on the thread that keeps the connection. `find` gives the instance
-    of another object of the scene.
+    of another object of the scene. `surroundings` is for a robot.
     """
 
     def __init__(
@@ -85,8 +86,10 @@ class Device:
         recipe: Recipe,
         changed: "Callable[[Device], None]" = lambda _: None,
         find: Callable[[str], Generic] | None = None,
+        surroundings: Surroundings | None = None,
     ) -> None:
         self.recipe = recipe
+        self._surroundings = surroundings
         self._find = find
         self._changed = changed
         self._lives: list[Observing] = []
@@ -117,6 +120,8 @@ class Device:
                 instance.tell_enabled(lambda: self._changed(self))
             if self._find is not None:
                 instance.attach(self._find)
+            if isinstance(instance, Robot) and self._surroundings is not None:
+                instance.surround(self._surroundings)
             instance.connect()
         if self.closing:  # came up too late: nobody waits any more
             self.instance = None

@@ -119,6 +119,7 @@ class Host:
         """Bring the scene up; False when the host has to go."""
         fault: SceneFault | None = None
         self._scene = message
+        self._cell.assets = message.assets
         failed = self._missing if message.keep_going else None
         try:
             self._types = write_sources(message.types)
@@ -187,6 +188,7 @@ class Host:
             here=message.cell,
         )
         self._cell = program.cell
+        self._cell.assets = message.assets
         self._watch = Watch(program.cell, self.link.post, self._lost)
         program.inside = True
         self.program = program

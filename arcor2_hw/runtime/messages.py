@@ -53,6 +53,7 @@ class OpenScene(ToHost, frozen=True):
     """Create and connect all objects at once. Answer: SceneOpened or SceneFailed.
 
     keep_going: an object that cannot be made or connected is told as failed by DeviceChanged, and the others come up.
+    assets: files of the meshes and of robots' models that were uploaded, by id.
     """
 
     scene: Scene
@@ -62,6 +63,7 @@ class OpenScene(ToHost, frozen=True):
     streaming_period: float = 0.1
     project: Project | None = None
     keep_going: bool = False
+    assets: dict[str, str] = field(default_factory=dict)
 
 
 class RetryObject(ToHost, frozen=True):
@@ -75,7 +77,8 @@ class RunPackage(ToHost, frozen=True):
     """Run script.py of a package directory. The script's life is told by ProgramChanged and ProgramEvent.
 
     cell: the settings of devices at this place, which win over those of the package. breakpoints: ids of action points
-    and actions, which must be there. shared_breakpoints: more of them, left out where the project lacks them.
+    and actions, which must be there. shared_breakpoints: more of them, left out where the project lacks them. assets:
+    files of meshes and of robots' models that were uploaded, by id.
     """
 
     package_id: str
@@ -85,6 +88,7 @@ class RunPackage(ToHost, frozen=True):
     streaming_period: float = 0.1
     cell: Cell | None = None
     shared_breakpoints: list[str] = field(default_factory=list)
+    assets: dict[str, str] = field(default_factory=dict)
 
 
 class Call(ToHost, frozen=True):

@@ -26,6 +26,7 @@ from arcor2_hw.runtime import messages as m
 from arcor2_server.build.versions import check_versions
 from arcor2_server.cell.devices import DeviceBoard, DeviceStatus, overlay_for
 from arcor2_server.cell.host import CellHost
+from arcor2_server.cell.opening import shapes_put_in
 from arcor2_server.packages import Packages
 from arcor2_server.rpc.registry import RequestRefused, make_event
 from arcor2_server.runs import How
@@ -188,6 +189,7 @@ class Execution:
             sorted(how.breakpoints),
             period,
             self._services.settings.cell,
+            assets=shapes_put_in(self._services),
         )
         self._run_number = self._services.runs.begin(
             package_id, by=how.by, temporary=self._over is not None, start_paused=how.start_paused

@@ -1,6 +1,6 @@
 """What the cell host is told in order to bring a scene up."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectModel
@@ -10,6 +10,16 @@ from arcor2_server.cell.devices import overlay_for
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services
+
+
+SHAPES: Final = (".stl", ".obj", ".ply", ".off", ".dae", ".zip", ".urdf")
+"""How the ids of assets end that are meshes or models of robots."""
+
+
+def shapes_put_in(services: "Services") -> dict[str, str]:
+    """Give the files of the meshes and robots' models that were put in, by id: those of drivers lie beside these."""
+    found = [asset.id for asset in services.assets.infos() if asset.id.lower().endswith(SHAPES)]
+    return {key: str(services.assets.file(key)) for key in found}
 
 
 def opening(services: "Services", scene: Scene, keep_going: bool) -> tuple[m.OpenScene, dict[str, list[str]]]:
@@ -32,5 +42,6 @@ def opening(services: "Services", scene: Scene, keep_going: bool) -> tuple[m.Ope
         [*([] if project is None else project.object_overrides), *here],
         services.settings.streaming_period,
         keep_going=keep_going,
+        assets=shapes_put_in(services),
     )
     return message, overlaid

@@ -1,0 +1,394 @@
+"""A robot type that says how to drive joints, and nothing else about its moves: what it can do, what it refuses."""
+
+import importlib
+import itertools
+import shutil
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import arcor2_drivers
+from arcor2_hw.analysis.library import Library
+from arcor2_hw.analysis.source import SourceFile
+from arcor2_hw.data import object_type
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.robot import Joint
+from arcor2_hw.exceptions import Cancelled, InvalidData, NotFound, OutOfRange, Refused
+from arcor2_hw.kinematics.model import RobotModel
+from arcor2_hw.kinematics.shapes import Box
+from arcor2_hw.kinematics.world import CollisionWorld
+from arcor2_hw.objects import Robot, safe_moves
+from arcor2_hw.objects.surroundings import Obstacle
+
+URDF = Path(next(iter(arcor2_drivers.__path__))) / "universal_robots" / "urdf" / "ur5e" / "ur5e.urdf"
+NAMES = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
+READY = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
+ACROSS = (np.pi - 0.4, -1.57, 1.57, -1.57, -1.57, 0.0)
+BASE = Pose(Position(0.5, -0.2, 0.1), Orientation.from_rotation_vector(0.0, 0.0, 0.7))
+SOURCE = '''"""A robot arm that goes from joint values to joint values."""
+
+from arcor2_hw.data.robot import Joint
+from arcor2_hw.exceptions import Cancelled
+from arcor2_hw.objects.safe_moves import Way
+from arcor2_hw.objects.urdf_robot import UrdfRobot
+
+
+class PlainArm(UrdfRobot):
+    """A plain arm."""
+
+    _ABSTRACT = False
+    urdf_package_name = "plain_arm.zip"
+
+    def robot_joints(self, include_gripper: bool = False) -> list[Joint]:
+        """Give the present joint values."""
+        gripper = [Joint("finger", 0.01)] if include_gripper else []
+        return [*self.now, *gripper]
+
+    def follow(self, way: Way) -> None:
+        """Go from waypoint to waypoint."""
+        self.ways.append(way)
+        for waypoint in way.waypoints[1:]:
+            self.now = waypoint
+
+    def stop(self) -> None:
+        """Stop."""
+        super().stop()
+'''
+
+
+class Around:
+    """Surroundings that the test says."""
+
+    def __init__(self) -> None:
+        self.things: list[Obstacle] = []
+        self.others: list[tuple[Robot, list[Joint]]] = []
+        self.unknown = ""
+        self.files: dict[str, Path] = {}
+
+    def obstacles(self) -> list[Obstacle]:
+        return self.things
+
+    def robots(self) -> list[tuple[Robot, list[Joint]]]:
+        if self.unknown:
+            raise Refused(f"where {self.unknown} stands is not known")
+        return self.others
+
+    def asset(self, asset_id: str) -> Path | None:
+        return self.files.get(asset_id)
+
+    def box(self, name: str, at: Position, *sizes: float) -> None:
+        self.things.append(Obstacle(name, object_type.Box(name, *sizes), BASE * Pose(at)))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """The driver as it would lie in a distribution."""
+    root = tmp_path_factory.mktemp("plain")
+    package = root / "plain_driver"
+    (package / "urdf" / "plain_arm").mkdir(parents=True)
+    shutil.copy(URDF, package / "urdf" / "plain_arm" / "arm.urdf")
+    (package / "__init__.py").write_text("")
+    (package / "plain_arm.py").write_text(SOURCE)
+    sys.path.insert(0, str(root))
+    yield package
+    sys.path.remove(str(root))
+    for name in [name for name in sys.modules if name.startswith("plain_driver")]:
+        del sys.modules[name]
+
+
+@pytest.fixture
+def around() -> Around:
+    return Around()
+
+
+@pytest.fixture
+def arm(folder: Path, around: Around) -> Any:
+    return made(folder, around, "plain")
+
+
+def made(folder: Path, around: Around, name: str, pose: Pose = BASE) -> Any:
+    cls = importlib.import_module("plain_driver.plain_arm").PlainArm
+    device = cls("id", name, pose)
+    device.now, device.ways = joints(READY), []
+    device.surround(around)
+    return device
+
+
+def joints(values: tuple[float, ...]) -> list[Joint]:
+    return [Joint(f"{name}_joint", float(value)) for name, value in zip(NAMES, values, strict=True)]
+
+
+def values(found: list[Joint]) -> Any:
+    return np.array([joint.value for joint in found])
+
+
+def moved(pose: Pose, x: float, y: float, z: float) -> Pose:
+    """In the axes of the robot's base."""
+    return Pose(pose.position + Position(x, y, z).rotated(BASE.orientation), pose.orientation)
+
+
+def assert_free(arm: Any, around: Around, way: list[list[Joint]]) -> None:
+    """By a world of the test's own, finer than what was looked at."""
+    model = RobotModel.load(URDF)
+    world = CollisionWorld()
+    world.add_robot("arm", model, BASE)
+    for thing in around.things:
+        box = thing.model
+        assert isinstance(box, object_type.Box)
+        world.put(thing.name, Box(box.size_x, box.size_y, box.size_z), thing.pose)
+    for a, b in itertools.pairwise(values(waypoint) for waypoint in way):
+        for share in np.linspace(0.0, 1.0, 2 + int(np.abs(b - a).max() / 0.005)):
+            assert world.is_free("arm", a + share * (b - a)), world.contacts("arm", a + share * (b - a))
+
+
+WALL = (Position(0.0, 0.55, 0.5), 0.04, 0.5, 1.0)
+
+
+# ------------------------------------------------------------------------------------------------ what a type can do
+def test_analysis_shows_what_comes_from_the_urdf(folder: Path) -> None:
+    path = folder / "plain_arm.py"
+    library = Library([SourceFile("PlainArm", "plain_driver.plain_arm", path.read_text(), str(path))])
+    found = library.analyse("PlainArm")
+    assert found.problem is None
+    assert found.robot is not None
+    features = found.robot.features
+    assert features.forward_kinematics
+    assert features.inverse_kinematics
+    assert features.move_to_pose
+    assert features.move_to_joints
+    assert features.stop
+    assert not features.hand_teaching
+    assert found.robot.urdf_package_filename == "plain_arm.zip"
+    assert {"move_to_pose", "joint_limits", "inverse_kinematics", "stop"} <= found.implemented
+    assert not {"jog", "move_path", "wrench", "connect", "state"} & found.implemented
+    assert not found.meta.abstract
+
+
+def test_a_type_without_a_stop_may_not_be_placed(folder: Path) -> None:
+    text = SOURCE[: SOURCE.index("    def stop")]
+    found = Library([SourceFile("PlainArm", "plain_driver.plain_arm", text, str(folder / "plain_arm.py"))])
+    assert found.analyse("PlainArm").meta.abstract
+
+
+def test_kinematics_in_the_world(arm: Any) -> None:
+    assert arm.get_end_effectors_ids() == {"tcp"}
+    there = arm.get_end_effector_pose("tcp")
+    model = RobotModel.load(URDF).arm("tcp")
+    assert np.allclose(there.matrix(), (BASE * model.pose(np.array(READY))).matrix())
+    goal = moved(there, 0.0, 0.1, 0.05)
+    found = arm.inverse_kinematics("tcp", goal)
+    assert np.allclose(arm.forward_kinematics("tcp", found).matrix(), goal.matrix(), atol=1e-6)
+    assert np.abs(values(found) - np.array(READY)).max() < 0.5
+    assert arm.joint_limits()["elbow_joint"][1] == pytest.approx(np.pi, abs=3.2)
+    with pytest.raises(NotFound, match="no end effector 'pen'; there are tcp"):
+        arm.forward_kinematics("pen", found)
+    with pytest.raises(arm.KinematicsException, match="plain cannot reach"):
+        arm.inverse_kinematics("tcp", moved(there, 3.0, 0.0, 0.0))
+    with pytest.raises(InvalidData, match="elbow_joint"):
+        arm.forward_kinematics("tcp", joints(READY)[:2])
+
+
+def test_inverse_kinematics_avoids_what_is_there_if_asked(arm: Any, around: Around) -> None:
+    goal = moved(arm.get_end_effector_pose("tcp"), 0.0, 0.1, 0.0)
+    first = arm.inverse_kinematics("tcp", goal)
+    model = RobotModel.load(URDF)
+    elbow = model.link_poses(values(first))["forearm_link"][:3, 3]
+    around.box("post", Position(*map(float, elbow)), 0.05, 0.05, 0.05)
+    other = arm.inverse_kinematics("tcp", goal)
+    assert np.abs(values(other) - values(first)).max() > 0.5
+    assert arm.safe_moves.contacts(other) == []
+    assert any("post" in pair for pair in arm.safe_moves.contacts(first))
+    assert np.allclose(values(arm.inverse_kinematics("tcp", goal, None, False)), values(first))
+
+
+# ------------------------------------------------------------------------------------------------ moves
+def test_a_safe_move_leads_around_and_an_unsafe_one_straight(arm: Any, around: Around) -> None:
+    around.box("wall", *WALL)
+    arm.move_to_joints(joints(ACROSS), 0.5)
+    (way,) = arm.ways
+    assert len(way.waypoints) > 2
+    assert_free(arm, around, way.waypoints)
+    assert np.allclose(values(arm.now), ACROSS)
+    arm.now = joints(READY)
+    arm.move_to_joints(joints(ACROSS), 0.5, safe=False)
+    assert len(arm.ways[-1].waypoints) == 2
+    with pytest.raises(AssertionError):
+        assert_free(arm, around, arm.ways[-1].waypoints)
+
+
+def test_a_safe_move_to_a_pose_leads_around(arm: Any, around: Around) -> None:
+    around.box("wall", *WALL)
+    goal = arm.forward_kinematics("tcp", joints(ACROSS))
+    arm.move_to_pose("tcp", goal, 0.5, safe=True, linear=False)
+    assert_free(arm, around, arm.ways[-1].waypoints)
+    assert np.allclose(arm.get_end_effector_pose("tcp").matrix(), goal.matrix(), atol=1e-5)
+
+
+def test_a_line_is_a_line_or_refused(arm: Any, around: Around) -> None:
+    here = arm.get_end_effector_pose("tcp")
+    goal = moved(here, 0.0, 0.3, 0.0)
+    arm.move_to_pose("tcp", goal, 0.5)
+    way = arm.ways[-1]
+    assert way.line
+    for waypoint in way.waypoints:
+        at = arm.forward_kinematics("tcp", waypoint).position
+        share = here.position.distance_to(at) / 0.3
+        on = moved(here, 0.0, 0.3 * share, 0.0).position
+        assert on.distance_to(at) < 1e-4
+    arm.now = joints(READY)
+    post = BASE.inverted() * moved(here, 0.0, 0.2, 0.0)
+    around.box("post", post.position, 0.02, 0.02, 0.3)
+    with pytest.raises(arm.KinematicsException, match=r"plain cannot go straight: 0\.1\d\d m .* plain/.* and post"):
+        arm.move_to_pose("tcp", goal, 0.5)
+    assert len(arm.ways) == 1
+    arm.move_to_pose("tcp", goal, 0.5, safe=False)
+    assert len(arm.ways) == 2
+
+
+def test_down_to_a_table_that_it_stands_on_nearly(arm: Any, around: Around) -> None:
+    """A pick ends nearer to the table than ways keep away from it, but does not touch it."""
+    here = BASE.inverted() * arm.get_end_effector_pose("tcp")
+    around.box("table", here.position + Position(0.0, 0.0, -0.152), 0.4, 0.4, 0.1)
+    arm.move_to_pose("tcp", moved(arm.get_end_effector_pose("tcp"), 0.0, 0.0, -0.1), 0.2)
+    arm.move_to_pose("tcp", BASE * here, 0.2)
+    with pytest.raises(arm.KinematicsException, match="table"):
+        arm.move_to_pose("tcp", moved(BASE * here, 0.0, 0.0, -0.105), 0.2)
+
+
+def test_refused_naming_why(arm: Any, around: Around) -> None:
+    tip = BASE.inverted() * arm.forward_kinematics("tcp", joints(ACROSS))
+    around.box("crate", tip.position, 0.1, 0.1, 0.1)
+    with pytest.raises(arm.KinematicsException, match="in collision there: plain/wrist_3_link and crate"):
+        arm.move_to_joints(joints(ACROSS), 0.5)
+    around.unknown = "second"
+    with pytest.raises(Refused, match="where second stands is not known"):
+        arm.move_to_joints(joints(ACROSS), 0.5)
+    arm.move_to_joints(joints(ACROSS), 0.5, safe=False)
+    for speed in (0.0, 1.5, float("nan")):
+        with pytest.raises(OutOfRange, match="speed"):
+            arm.move_to_joints(joints(READY), speed)
+    with pytest.raises(OutOfRange, match="elbow_joint"):
+        arm.move_to_joints(joints((0.0, 0.0, 9.0, 0.0, 0.0, 0.0)), 0.5)
+    with pytest.raises(InvalidData):
+        arm.move_to_joints(joints(READY)[1:], 0.5)
+    assert len(arm.ways) == 1
+
+
+def test_another_robot_is_in_the_way_as_it_stands(folder: Path, arm: Any, around: Around) -> None:
+    beside = BASE * Pose(Position(0.75, 0.0, 0.0), Orientation.from_rotation_vector(0.0, 0.0, np.pi))
+    second = made(folder, Around(), "second", beside)
+    around.others = [(second, joints((0.0, -1.57, 0.0, -1.57, 0.0, 0.0)))]
+    here = arm.get_end_effector_pose("tcp")
+    arm.move_to_pose("tcp", moved(here, 0.0, 0.0, 0.02), 0.5)
+    around.others = [(second, joints(READY))]
+    with pytest.raises(arm.KinematicsException, match=r"plain/.* and second/"):
+        arm.move_to_pose("tcp", here, 0.5)
+
+
+def test_a_mesh_that_is_not_here_is_a_refusal_and_one_that_is_counts(arm: Any, around: Around, tmp_path: Path) -> None:
+    import trimesh
+
+    around.things.append(Obstacle("shield", object_type.Mesh("shield", "shield.stl"), BASE * Pose(WALL[0])))
+    with pytest.raises(Refused, match="mesh of shield is not known here"):
+        arm.move_to_joints(joints(ACROSS), 0.5)
+    around.files["shield.stl"] = tmp_path / "0f3a"
+    around.files["shield.stl"].write_bytes(trimesh.creation.box(WALL[1:]).export(file_type="stl"))
+    arm.move_to_joints(joints(ACROSS), 0.5)
+    around.things = []
+    around.box("wall", *WALL)
+    assert_free(arm, around, arm.ways[-1].waypoints)
+
+
+def test_an_uploaded_model_stands_before_the_drivers(arm: Any, around: Around, tmp_path: Path) -> None:
+    longer = tmp_path / "88c1"
+    text = URDF.read_text().replace('xyz="0 0 0.0996"', 'xyz="0 0 0.1996"')
+    assert text != URDF.read_text()
+    longer.write_text(text)
+    around.files["plain_arm.zip"] = longer
+    tip = (BASE.inverted() * arm.get_end_effector_pose("tcp")).position
+    nominal = RobotModel.load(URDF).arm("tcp").pose(np.array(READY)).position
+    assert nominal.distance_to(tip) == pytest.approx(0.1, abs=1e-6)
+
+
+def test_without_a_model_it_says_so(folder: Path, around: Around) -> None:
+    cls = importlib.import_module("plain_driver.plain_arm").PlainArm
+    other = type("Nameless", (cls,), {"urdf_package_name": "missing.zip", "__module__": cls.__module__})
+    device = other("id", "nameless", BASE)
+    with pytest.raises(Refused, match="nameless has no model"):
+        device.get_end_effectors_ids()
+
+
+# ------------------------------------------------------------------------------------------------ time, and stop
+def test_a_way_by_time(arm: Any, around: Around) -> None:
+    around.box("wall", *WALL)
+    arm.move_to_joints(joints(ACROSS), 0.5)
+    way = arm.ways[-1]
+    timed = way.timed()
+    limits = RobotModel.load(URDF).velocity
+    rates = np.array([velocity for _, _, velocity in timed.sampled(0.01)])
+    assert (np.abs(rates).max(axis=0) <= 0.5 * limits * 1.001).all()
+    assert np.allclose(timed.at(timed.duration)[0], ACROSS)
+    assert_free(arm, around, [joints(tuple(q)) for _, q, _ in timed.sampled(0.02)])
+    arm.now = joints(READY)
+    arm.move_to_pose("tcp", moved(arm.get_end_effector_pose("tcp"), 0.0, 0.25, 0.0), 1.0, safe=False)
+    assert arm.ways[-1].timed(0.05).duration == pytest.approx(0.25 / 0.05 + 0.25, rel=0.1)
+
+
+def fences(around: Around) -> None:
+    """Plates from the foot outwards on both sides, higher than the arm: its shoulder cannot turn past them."""
+    for side in (-1.0, 1.0):
+        around.box(f"fence {side:+.0f}", Position(0.0, side * 0.68, 0.5), 0.02, 1.06, 3.0)
+
+
+BEFORE, BEHIND = (0.8, *READY[1:]), (0.8 + np.pi, *READY[1:])
+
+
+def test_no_way_is_a_refusal(arm: Any, around: Around, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(safe_moves, "WITHIN", 0.3)
+    fences(around)
+    arm.now = joints(BEFORE)
+    with pytest.raises(arm.KinematicsException, match=r"plain found no way .* within 0\.3 s; .* and fence"):
+        arm.move_to_joints(joints(BEHIND), 0.5)
+    assert arm.ways == []
+
+
+def test_a_stop_ends_what_is_planned(arm: Any, around: Around, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(safe_moves, "WITHIN", 60.0)
+    fences(around)
+    arm.now = joints(BEFORE)
+    ended: list[BaseException] = []
+
+    def move() -> None:
+        try:
+            arm.move_to_joints(joints(BEHIND), 0.5)
+        except BaseException as error:
+            ended.append(error)
+
+    thread = threading.Thread(target=move)
+    thread.start()
+    try:
+        while not arm.move_in_progress:
+            time.sleep(0.001)
+        time.sleep(0.3)
+        assert arm.move_in_progress
+    finally:
+        arm.stop()
+        thread.join(10.0)
+    assert [type(error) for error in ended] == [Cancelled]
+    assert arm.ways == []
+
+
+def test_one_move_at_a_time(arm: Any) -> None:
+    def follow(_: Any) -> None:
+        with pytest.raises(Refused, match="moving already"):
+            arm.move_to_joints(joints(READY), 0.5)
+
+    arm.follow = follow
+    arm.move_to_joints(joints(ACROSS), 0.5)
+    assert not arm.move_in_progress
