@@ -38,7 +38,9 @@ from arcor2_hw.data.rpc import (
     StopRobotArgs,
 )
 from arcor2_hw.data.scene import SceneObject
+from arcor2_hw.exceptions import NotInControl
 from arcor2_server import solving
+from arcor2_server.cell.host import CellError
 from arcor2_server.cell.motion import (
     Told,
     move,
@@ -165,7 +167,15 @@ async def solve_inverse(context: Context, args: InverseKinematicsArgs) -> list[J
     }
     if not isinstance(args.start_joints, Unset):
         arguments["start_joints"] = args.start_joints
-    joints: list[Joint] = await cell.ask(list[Joint], args.robot_id, "inverse_kinematics", arguments)
+    joints: list[Joint]
+    try:
+        joints = await cell.ask(list[Joint], args.robot_id, "inverse_kinematics", arguments)
+    except CellError as error:
+        robot = cell.robot(args.robot_id)
+        # Some controllers answer only whom they obey. The question moves nothing: its model answers as well.
+        if error.code != NotInControl.code or model_of_type(context.services, robot.type) is None:
+            raise
+        return await solving.inverse(context.services, robot, args)
     return joints
 
 
