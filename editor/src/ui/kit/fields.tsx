@@ -1,7 +1,7 @@
 /** Choices and amounts in panels: one of a few, a number with its unit, more or less of something, on or off. */
 
 import { type KeyboardEvent, type ReactNode, useId, useState } from "react";
-import { Label, Slider, SliderOutput, SliderThumb, SliderTrack, Switch, ToggleButton, ToggleButtonGroup } from "react-aria-components";
+import { Switch, ToggleButton, ToggleButtonGroup } from "react-aria-components";
 import "./fields.css";
 
 interface OneOfProps<T extends string> {
@@ -164,14 +164,14 @@ interface MoreOrLessProps {
 }
 
 export function MoreOrLess({ label, value, least, most, step, words, onChange, onEnd }: MoreOrLessProps) {
+  const id = useId();
+  const end = () => onEnd?.(value);
   return (
-    <Slider className="more-or-less" value={value} minValue={least} maxValue={most} step={step} onChange={onChange} onChangeEnd={(end) => onEnd?.(end)}>
-      <Label>{label}</Label>
-      <SliderOutput>{words(value)}</SliderOutput>
-      <SliderTrack className="track">
-        <SliderThumb className="thumb" />
-      </SliderTrack>
-    </Slider>
+    <div className="more-or-less">
+      <label htmlFor={id}>{label}</label>
+      <output htmlFor={id}>{words(value)}</output>
+      <input id={id} type="range" min={least} max={most} step={step} value={value} aria-valuetext={words(value)} onChange={(event) => onChange(Number(event.target.value))} onPointerUp={end} onKeyUp={end} />
+    </div>
   );
 }
 

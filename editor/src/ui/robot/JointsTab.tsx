@@ -86,7 +86,7 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
                 );
               })}
               <Amount
-                label="To"
+                label={`${joint.name.replaceAll("_", " ")} to`}
                 unit={joint.unit}
                 value={joint.value * joint.scale}
                 least={joint.lower * joint.scale}

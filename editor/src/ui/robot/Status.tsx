@@ -20,11 +20,14 @@ export function Status({ chosen }: { chosen: Chosen }) {
   const arm = useEditor((state) => armOf(state, chosen));
   const why = useEditor((state) => notReady(state, chosen, "AcknowledgeStop"));
   const [refused, setRefused] = useState("");
-  const tools = [...(arm?.grippers ?? []).map((name) => `gripper ${name}`), ...(arm?.suctions ?? []).map((name) => `suction ${name}`)];
+  const tools = [
+    ["Grippers", arm?.grippers ?? []],
+    ["Suction cups", arm?.suctions ?? []],
+  ] as const;
   return (
     <div className="robot-status">
       <Pose chosen={chosen} />
-      {tools.length > 0 && <p className="quiet small">With {tools.join(", ")}.</p>}
+      {tools.map(([what, names]) => names.length > 0 && <p key={what} className="quiet small">{`${what}: ${names.join(", ")}`}</p>)}
       {hold && (
         <p className="tag warn">
           {hold.user} {hold.kind === "jog" ? "holds it" : "moves it by hand"}
