@@ -16,3 +16,14 @@ export function keepView(scope: ViewScope, values: Record<string, unknown>): voi
   // Lost with the connection: then it is as it was, as told when it is back.
   call("SetViewState", { scope, document: openId(now()), values }).catch(() => {});
 }
+
+/** Keep values of the user that belong to no document, by their keys: stars, how he likes his tools. */
+export function keepGeneral(values: Record<string, unknown>): void {
+  store.setState((state) => {
+    const kept = { ...state.view.general, ...values };
+    for (const [key, value] of Object.entries(values)) if (value === null) delete kept[key];
+    return { view: { ...state.view, general: kept } };
+  });
+  if (!serves("SetViewState")) return;
+  call("SetViewState", { scope: "user", values }).catch(() => {}); // as above
+}

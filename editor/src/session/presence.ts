@@ -20,6 +20,7 @@ export function presenceOf(state: State): Presence {
   return {
     document: openId(state),
     selected: selection ? [selection.id] : [],
+    ...(state.ui.draft ? { editing: state.ui.draft.id } : {}),
     view: state.doc ? "3d" : "home",
   };
 }

@@ -20,11 +20,13 @@ import type {
   NamedOrientation,
   ObjectAction,
   ObjectHealthData,
+  ObjectModel,
   ObjectStateData,
   ObjectTypeMeta,
   PackageStateEnum,
   PackageSummary,
   Parameter,
+  Pose,
   ProjectExceptionData,
   ProjectLogicIf,
   ProjectParameter,
@@ -175,8 +177,21 @@ export interface Ghost {
   problem: string;
 }
 
+/** What the user does to a thing and has not told the server yet: shown by him, and to others as a preview. */
+export interface Draft {
+  id: string;
+  /** The thing as it was: with the next event about it the draft is over. */
+  of: unknown;
+  /** In the frame in which it is stored. */
+  pose: Pose;
+  /** Its type as it was, and the shape that it is to have. */
+  type?: unknown;
+  model?: ObjectModel;
+}
+
 export interface Ui {
   selection: Selection | null;
+  draft?: Draft | undefined;
   mode: Mode;
   connecting: Connecting | null;
   /** The view goes where the program is. */

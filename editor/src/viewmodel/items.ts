@@ -1,9 +1,9 @@
 /** From the state to what the 3D view shows: pure, and the same object for what did not change. */
 
 import type { Item, LinkItem, OrientationItem, RobotItem, Shape } from "../engine/items";
-import type { LogicItem, ObjectTypeMeta, Position } from "../protocol/types";
+import type { LogicItem, ObjectTypeMeta, Pose, Position } from "../protocol/types";
 import { isRunning } from "../store/selectors";
-import type { Ghost, OpenDocument, State } from "../store/state";
+import type { Draft, Ghost, OpenDocument, State } from "../store/state";
 
 export const START = "START";
 export const END = "END";
@@ -33,7 +33,7 @@ export class ItemMaker {
       this.known.set(id, kept);
       found.push(kept.item);
     };
-    const { selection } = state.ui;
+    const { selection, draft } = state.ui;
     const me = state.connection.user;
     const common = (id: string, name: string) => ({
       id,
@@ -50,20 +50,21 @@ export class ItemMaker {
       if (!object.pose && !robot) continue; // shown in lists alone
       const trouble = isTrouble(state, object.id);
       const online = state.live.state === "started" || isRunning(state);
-      const preview = state.previews[object.id];
+      const preview = drafted(draft, object) ?? state.previews[object.id];
+      const model = type && draft?.type === type ? draft.model : undefined;
       const ghost = state.ui.ghost?.robotId === object.id ? state.ui.ghost : null;
-      add(object.id, [object, type, robot, trouble, robot && online, preview, ghost, ...tell(object.id)], () => {
+      add(object.id, [object, type, robot, trouble, robot && online, preview, model, ghost, ...tell(object.id)], () => {
         const pose = {
           position: preview?.position ?? object.pose?.position ?? NO_PLACE,
           orientation: preview?.orientation ?? object.pose?.orientation ?? UPRIGHT.orientation,
         };
         const base = { ...common(object.id, object.name), pose, trouble };
         if (robot) return { ...base, kind: "robot", urdf: robot.urdf_package_filename ?? "", online, ghost: ghost ? ghostOf(ghost) : undefined };
-        return { ...base, kind: "object", shape: shapeOf(type) };
+        return { ...base, kind: "object", shape: shapeOf(type && model ? { ...type, object_model: model } : type) };
       });
     }
     for (const point of Object.values(doc.points)) {
-      const preview = state.previews[point.id]?.position;
+      const preview = (drafted(draft, point) ?? state.previews[point.id])?.position;
       const breakpoint = point.id in state.breakpoints;
       add(point.id, [point, preview, breakpoint, ...tell(point.id)], () => ({
         ...common(point.id, point.name),
@@ -75,7 +76,7 @@ export class ItemMaker {
     }
     const reach = bestReach(state);
     for (const one of Object.values(doc.orientations)) {
-      const preview = state.previews[one.id]?.orientation;
+      const preview = (drafted(draft, one) ?? state.previews[one.id])?.orientation;
       add(one.id, [one, preview, reach[one.id], ...tell(one.id)], () => ({
         ...common(one.id, one.name),
         kind: "orientation",
@@ -99,19 +100,23 @@ export class ItemMaker {
     tell: (id: string) => unknown[],
   ): void {
     const levels = new Map<string, number>();
+    const counts = new Map<string, number>();
+    for (const { pointId } of Object.values(doc.actions)) counts.set(pointId, (counts.get(pointId) ?? 0) + 1);
     const colours = Object.keys(doc.objects);
     for (const action of Object.values(doc.actions)) {
       const level = levels.get(action.pointId) ?? 0;
       levels.set(action.pointId, level + 1);
+      const count = counts.get(action.pointId) ?? 1;
       const running = state.program.running.includes(action.id) || state.live.executing === action.id;
       const breakpoint = action.id in state.breakpoints;
       const colour = Math.max(0, colours.indexOf(action.type.split("/")[0] ?? ""));
       const place = state.view.shared[`place/${action.id}`];
-      add(action.id, [action, level, running, breakpoint, colour, place, ...tell(action.id)], () => ({
+      add(action.id, [action, level, count, running, breakpoint, colour, place, ...tell(action.id)], () => ({
         ...common(action.id, action.name),
         kind: "action",
         ...(isPosition(place) ? { position: place } : { parent: action.pointId }),
         level,
+        count,
         role: "action",
         running,
         breakpoint,
@@ -129,6 +134,7 @@ export class ItemMaker {
         kind: "action",
         position: isPosition(place) ? place : (PLACES[id] ?? NO_PLACE),
         level: 0,
+        count: 1,
         role,
         running: false,
         breakpoint: false,
@@ -140,6 +146,11 @@ export class ItemMaker {
 
 function ghostOf({ joints, problem }: Ghost): RobotItem["ghost"] {
   return { joints: Object.fromEntries(joints.map((each) => [each.name, each.value])), possible: problem === "" };
+}
+
+/** Where the user has a thing just now, while the server still knows it as it was. */
+function drafted(draft: Draft | undefined, thing: { id: string }): Pose | undefined {
+  return draft?.of === thing ? draft.pose : undefined;
 }
 
 function isPosition(value: unknown): value is Position {

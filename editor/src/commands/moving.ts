@@ -1,0 +1,176 @@
+/**
+ * Moves, turns and sizes a thing: shown at once, told to the others while it lasts, and asked of the server once, at its
+ * end. The thing is held meanwhile.
+ */
+
+import type { ObjectModel, Pose } from "../protocol/types";
+import { call, serves } from "../session/session";
+import { now, setUi, store } from "../store/store";
+import { same } from "../transform/placing";
+import type { Target } from "../transform/target";
+import { relativeTo } from "../viewmodel/frames";
+import { ask, holding } from "./asking";
+
+/** s between two previews. */
+const PREVIEW = 1 / 30;
+/** s after which single steps are over. */
+export const SETTLED = 0.6;
+
+/** One change that is going on. */
+export class Moving {
+  /** It came to nothing: refused, or given up. */
+  failed = false;
+  /** Resolves when the server has it, or has refused it. */
+  readonly over: Promise<void>;
+  private end: (keep: boolean) => void = () => {};
+  /** Nothing more can be added to it. */
+  finishing = false;
+  private ended = false;
+  private stored: Pose | null = null;
+  private model: ObjectModel | null = null;
+  private told = 0;
+  private telling: ReturnType<typeof setTimeout> | undefined;
+  private settling: ReturnType<typeof setTimeout> | undefined;
+  private held = false;
+
+  constructor(readonly target: Target) {
+    const decided = new Promise<boolean>((resolve) => (this.end = resolve));
+    const work = async () => {
+      this.held = true;
+      this.tell();
+      return !(await decided) || (await this.store());
+    };
+    const before = latest;
+    // Its lock would be given back by the one before, if both were under way.
+    this.over = before
+      .then(() => holding(target.id, work, target.kind === "point"))
+      .then((done) => {
+        this.ended = true;
+        clearTimeout(this.telling);
+        clearTimeout(this.settling);
+        if (current === this) current = null;
+        if (done) return;
+        this.failed = true;
+        this.forget();
+      });
+    latest = this.over;
+  }
+
+  /** Show it at a pose in the world. */
+  to(pose: Pose, model?: ObjectModel): void {
+    if (this.failed || this.ended) return;
+    const { target } = this;
+    this.stored = relativeTo(target.frame, pose);
+    if (model) this.model = model;
+    const state = now();
+    const type = this.model && target.type ? { model: this.model, type: state.types.byName[target.type] } : {};
+    setUi({ draft: { id: target.id, of: known(state, target.id), pose: this.stored, ...type } });
+    this.tell();
+  }
+
+  /** It is where it is to be. */
+  finish(): void {
+    this.finishing = true;
+    this.end(true);
+  }
+
+  /** As `finish`, when nothing more came for a moment. */
+  settle(): void {
+    clearTimeout(this.settling);
+    this.settling = setTimeout(() => this.finish(), SETTLED * 1000);
+  }
+
+  /** Put it back to where it was; nobody asked for anything. */
+  cancel(): void {
+    this.failed = this.finishing = true;
+    this.forget();
+    this.end(false);
+  }
+
+  private forget(): void {
+    if (now().ui.draft?.id === this.target.id) setUi({ draft: undefined });
+  }
+
+  /** Tell the others where it is just now, the newest alone. */
+  private tell(): void {
+    if (!this.held || !this.stored || this.failed || this.telling !== undefined || !serves("PreviewMove")) return;
+    const wait = Math.max(0, this.told + PREVIEW * 1000 - performance.now());
+    this.telling = setTimeout(() => {
+      this.telling = undefined;
+      if (!this.stored || this.failed || this.ended) return;
+      this.told = performance.now();
+      const { kind, id } = this.target;
+      const { position, orientation } = this.stored;
+      const shown = { ...(kind === "orientation" ? {} : { position }), ...(kind === "point" ? {} : { orientation }) };
+      call("PreviewMove", { id, ...shown }).catch(() => {}); // the next one, or the end, tells where it is
+    }, wait);
+  }
+
+  /** Ask for it; gives whether it is so. */
+  private async store(): Promise<boolean> {
+    const { target, stored, model } = this;
+    if (model && target.type) {
+      const { type } = target;
+      if (!(await holding(type, () => ask("UpdateObjectModel", { object_type_id: type, object_model: model })))) return false;
+    }
+    if (!stored || same(stored, relativeTo(target.frame, target.pose))) {
+      this.forget();
+      return true;
+    }
+    return (await asked(target, stored)) !== undefined;
+  }
+}
+
+function asked({ kind, id }: Target, { position, orientation }: Pose) {
+  switch (kind) {
+    case "object":
+      return ask("UpdateObjectPose", { object_id: id, pose: { position, orientation } });
+    case "point":
+      return ask("UpdateActionPointPosition", { action_point_id: id, new_position: position });
+    case "orientation":
+      return ask("UpdateActionPointOrientation", { orientation_id: id, orientation });
+  }
+}
+
+let current: Moving | null = null;
+let latest: Promise<void> = Promise.resolve();
+
+/** Begin to move something, or go on with it. What was moved before is finished. */
+export function moving(target: Target): Moving {
+  if (current && !current.finishing && !current.failed && current.target.id === target.id) return current;
+  current?.finish();
+  current = new Moving(target);
+  return current;
+}
+
+/** Put it to a pose in the world, by one edit. */
+export async function place(target: Target, pose: Pose, model?: ObjectModel): Promise<boolean> {
+  const one = moving(target);
+  one.to(pose, model);
+  one.finish();
+  await one.over;
+  return !one.failed;
+}
+
+/** A step: several that come quickly are one edit. */
+export function step(target: Target, pose: Pose): void {
+  const one = moving(target);
+  one.to(pose);
+  one.settle();
+}
+
+store.subscribe((state, before) => {
+  // What was begun is not left behind when another thing is selected.
+  const { selection, draft } = state.ui;
+  if (current && selection?.id !== before.ui.selection?.id && selection?.id !== current.target.id) current.finish();
+  if (!draft || state.doc === before.doc) return;
+  const thing = known(state, draft.id);
+  if (thing === draft.of) return;
+  // The edit came back as an event: what was shown until then is over, unless the next one has begun already.
+  const goesOn = thing !== undefined && current?.target.id === draft.id && !current.finishing;
+  setUi({ draft: goesOn ? { ...draft, of: thing } : undefined });
+});
+
+function known({ doc }: ReturnType<typeof now>, id: string): unknown {
+  return doc?.objects[id] ?? doc?.points[id] ?? doc?.orientations[id];
+}

@@ -1,0 +1,95 @@
+/** What can be moved, where it is, and by which request it gets elsewhere. */
+
+import { barred } from "../commands/asking";
+import type { ObjectModel, Pose } from "../protocol/types";
+import { heldBy, isOnline, isRunning } from "../store/selectors";
+import type { Selection, State } from "../store/state";
+import { composed, ORIGIN, worldOf } from "../viewmodel/frames";
+import type { FrameName } from "./placing";
+
+export interface Target {
+  kind: "object" | "point" | "orientation";
+  id: string;
+  /** The thing as the server knows it. */
+  of: unknown;
+  /** The frame in which it is stored, and where it is now, in the world. */
+  frame: Pose;
+  pose: Pose;
+  moves: boolean;
+  turns: boolean;
+  /** Its collision model, where it has one that can be sized, and the name of the type that has it. */
+  model?: ObjectModel;
+  type?: string;
+}
+
+/** The selected thing as what can be moved; null for what has no place of its own. */
+export function targetOf(state: State, selection: Selection | null): Target | null {
+  const { doc } = state;
+  if (!doc || !selection) return null;
+  const { id } = selection;
+  const object = doc.objects[id];
+  const draft = state.ui.draft;
+  const at = (frame: Pose, known: unknown, stored: Pose) => composed(frame, draft && draft.of === known ? draft.pose : stored);
+  if (object) {
+    if (!object.pose) return null;
+    const type = state.types.byName[object.type];
+    const model = type && draft?.type === type && draft.model ? draft.model : type?.object_model;
+    const sized = model && !model.mesh && type && isShapeAlone(state, object.type) ? { model, type: object.type } : {};
+    return { kind: "object", id, of: object, frame: ORIGIN, pose: at(ORIGIN, object, object.pose), moves: true, turns: true, ...sized };
+  }
+  const point = doc.points[id];
+  if (point) {
+    const frame = worldOf(doc, point.parent);
+    const pose = at(frame, point, { position: point.position, orientation: ORIGIN.orientation });
+    return { kind: "point", id, of: point, frame, pose, moves: true, turns: false };
+  }
+  const one = doc.orientations[id];
+  if (!one) return null;
+  const frame = worldOf(doc, one.pointId);
+  const pose = at(frame, one, { position: ORIGIN.position, orientation: one.orientation });
+  return { kind: "orientation", id, of: one, frame, pose, moves: false, turns: true };
+}
+
+/** A type that was made as a shape or mesh of its own, not a device that has a model. */
+export function isShapeAlone(state: State, type: string): boolean {
+  for (let name: string | undefined = type, left = 10; name && left > 0; left--) {
+    if (name === "CollisionObject" || name === "VirtualCollisionObject") return true;
+    name = state.types.byName[name]?.base;
+  }
+  return false;
+}
+
+const REQUESTS = { object: "UpdateObjectPose", point: "UpdateActionPointPosition", orientation: "UpdateActionPointOrientation" } as const;
+
+/** Why it cannot be moved now, as a sentence; empty when it can. */
+export function notMovable(state: State, { kind, id }: Pick<Target, "kind" | "id">): string {
+  const { doc } = state;
+  if (isRunning(state)) return "A program runs: stop it first.";
+  if (kind === "object" && doc?.project) return "Objects are moved in the scene: close the project, and open the scene.";
+  const type = doc?.objects[id]?.type ?? "";
+  if (kind === "object" && type in state.types.robots && isOnline(state)) return "A robot cannot be moved in the scene while it is online.";
+  const holder = heldBy(state, id);
+  if (holder) return `${holder} works on it.`;
+  return barred(state, REQUESTS[kind]);
+}
+
+/** Why its size cannot be changed now. */
+export function notSizable(state: State, target: Pick<Target, "kind" | "id">): string {
+  return notMovable(state, target) || (state.live.state !== "stopped" ? "Go offline to change its size." : "") || barred(state, "UpdateObjectModel");
+}
+
+/** A frame by its name, in the world; for `view` what the viewer sees. */
+export function frameOf(state: State, name: FrameName, target: Pick<Target, "frame" | "pose">, robot: string, view: Pose): Pose {
+  switch (name) {
+    case "world":
+      return ORIGIN;
+    case "parent":
+      return target.frame;
+    case "own":
+      return target.pose;
+    case "robot":
+      return state.doc ? worldOf(state.doc, robot) : ORIGIN;
+    case "view":
+      return view;
+  }
+}
