@@ -5,6 +5,7 @@ import { join } from "node:path";
 import { brotliCompressSync, constants, gzipSync } from "node:zlib";
 import react from "@vitejs/plugin-react";
 import { defineConfig, type Plugin } from "vitest/config";
+import { lean } from "./lean.ts";
 
 const OUT = join(import.meta.dirname, "../server/arcor2_server/editor_files");
 const SERVER = process.env["ARCOR2_HW_URL"] ?? "http://127.0.0.1:6789";
@@ -22,38 +23,6 @@ function compressed(): Plugin {
         writeFileSync(`${path}.gz`, gzipSync(content, { level: 9 }));
         writeFileSync(`${path}.br`, brotliCompressSync(content, { params: { [constants.BROTLI_PARAM_QUALITY]: 11 } }));
       }
-    },
-  };
-}
-
-/** Shaders of materials that the engine does not use: physical, toon, matcap and points, and backgrounds that are pictures. */
-const UNUSED =
-  /\/three\/src\/renderers\/shaders\/Shader(Lib\/(meshphysical|meshtoon|meshmatcap|meshphong|points|background|backgroundCube|cube|equirect)|Chunk\/(lights_physical_\w+|lights_toon_\w+|lights_phong_\w+|transmission_\w+|iridescence_\w+|clearcoat_\w+|cube_uv_reflection_fragment|envmap_physical_pars_fragment|bsdfs_physical))\.glsl\.js$/;
-
-/**
- * Leaves out what libraries carry along and nobody needs here: unused shaders and what prepares their light, comments in
- * the others, words in other languages than the editor's own.
- */
-function lean(): Plugin {
-  return {
-    name: "lean",
-    apply: "build",
-    enforce: "pre",
-    transform(code, id) {
-      if (UNUSED.test(id)) {
-        return id.includes("/ShaderLib/") ? "export const vertex = '', fragment = '';" : "export default '';";
-      }
-      if (id.endsWith("/three/src/extras/PMREMGenerator.js")) return "export class PMREMGenerator {}";
-      if (id.endsWith("/three/src/renderers/shaders/DFGLUTData.js")) return "export const getDFGLUT = () => null;";
-      if (/\/three\/src\/renderers\/shaders\/.*\.js$/.test(id)) {
-        return code
-          .replace(/\/\*(?! glsl)[\s\S]*?\*\//g, "")
-          .replace(/^[ \t]*\/\/.*$/gm, "")
-          .replace(/^[ \t]+/gm, "")
-          .replace(/\n{2,}/g, "\n");
-      }
-      if (/\/intl\/.*\/[a-z]{2}-[A-Z]{2}\.m?js$/.test(id) && !id.includes("en-US")) return "export default {};";
-      return null;
     },
   };
 }
@@ -76,6 +45,7 @@ export default defineConfig({
     proxy: {
       "/assets": SERVER,
       "/api": SERVER,
+      "/project/publish": SERVER,
       "/ws": { target: SERVER, ws: true },
     },
   },

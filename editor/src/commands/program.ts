@@ -261,18 +261,23 @@ export const setCondition = (id: string, condition: ProjectLogicIf | undefined):
 
 export const removeStep = (logic_item_id: string) => ask("RemoveLogicItem", { logic_item_id });
 
-/** Put an action, START or END somewhere else in the view, for all; undefined: back to where it belongs. */
-export const placePuck = (id: string, position: Position | null) => {
-  const document = now().doc?.project?.id ?? "";
+/** Show the puck of an action, START or END somewhere, to nobody else; undefined: where it belongs. */
+export function showPuck(id: string, position: unknown): void {
   const key = `place/${id}`;
-  const before = now().view.shared;
-  const { [key]: _, ...rest } = before;
-  // The one event that is not sent to who makes the change.
-  store.setState((state) => ({ view: { ...state.view, shared: position ? { ...rest, [key]: position } : rest } }));
-  return ask("SetViewState", { scope: "shared", document, values: { [key]: position } }).then((done) => {
-    if (!done) store.setState((state) => ({ view: { ...state.view, shared: before } }));
+  store.setState(({ view }) => {
+    const { [key]: _, ...rest } = view.shared;
+    return { view: { ...view, shared: position ? { ...rest, [key]: position } : rest } };
   });
-};
+}
+
+/** Put the puck of an action, START or END somewhere else in the view, for all; null: back to where it belongs. */
+export async function placePuck(id: string, position: Position | null): Promise<void> {
+  const document = now().doc?.project?.id ?? "";
+  const before = now().view.shared[`place/${id}`];
+  // Of a change of the view state everybody is told but who makes it.
+  showPuck(id, position);
+  if (!(await ask("SetViewState", { scope: "shared", document, values: { [`place/${id}`]: position } }))) showPuck(id, before);
+}
 
 // ------------------------------------------------------------------------------------------------ parameters
 

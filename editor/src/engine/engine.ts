@@ -109,6 +109,7 @@ export class Engine {
       batches: this.batches,
       asset: options.asset,
       thing: (id) => this.things.get(id),
+      metresPerPixel: (at) => (2 * this.view.camera.position.distanceTo(at) * Math.tan((this.view.camera.fov * Math.PI) / 360)) / this.height,
       invalidate: () => this.invalidate(),
     };
     this.gizmo = new Gizmo({
@@ -191,8 +192,9 @@ export class Engine {
     });
   }
 
-  floor(x: number, y: number): Vector3 | null {
-    return onFloor(x, y, { width: this.width, height: this.height }, this.view.camera);
+  /** Where a place of the view is on the floor, or on a level above it, m. */
+  floor(x: number, y: number, level = 0): Vector3 | null {
+    return onFloor(x, y, { width: this.width, height: this.height }, this.view.camera, 20, level);
   }
 
   /** Bring an item, or all, into the view. */
@@ -353,6 +355,7 @@ export class Engine {
   }
 
   private render(): void {
+    for (const thing of this.things.values()) if (thing.resized()) this.dirty = true;
     const moving = this.place();
     this.gizmo.place();
     this.renderer.render(this.scene, this.view.camera);

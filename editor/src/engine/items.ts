@@ -61,6 +61,8 @@ export interface PuckItem extends Base {
   position?: Position;
   /** Which it is of the pucks above its point, from 0. */
   level: number;
+  /** How many there are. */
+  count: number;
   role: "action" | "start" | "end";
   running: boolean;
   breakpoint: boolean;

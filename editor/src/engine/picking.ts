@@ -68,12 +68,12 @@ function idOf(hit: Intersection): string | undefined {
   return undefined;
 }
 
-/** Where the ray meets the floor (z = 0), within `far` m. */
-export function onFloor(x: number, y: number, size: Size, camera: Camera, far = 20): Vector3 | null {
+/** Where the ray meets the floor, or the level of that z, within `far` m. */
+export function onFloor(x: number, y: number, size: Size, camera: Camera, far = 20, level = 0): Vector3 | null {
   place.set((x / size.width) * 2 - 1, 1 - (y / size.height) * 2);
   caster.setFromCamera(place, camera);
   const { origin, direction } = caster.ray;
   if (direction.z >= -1e-6) return null;
-  const distance = -origin.z / direction.z;
-  return distance < far ? origin.clone().addScaledVector(direction, distance) : null;
+  const distance = (level - origin.z) / direction.z;
+  return distance > 0 && distance < far ? origin.clone().addScaledVector(direction, distance) : null;
 }

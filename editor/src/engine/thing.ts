@@ -14,6 +14,8 @@ export interface Context {
   asset: (id: string) => Promise<{ name: string; content: ArrayBuffer }>;
   /** The thing with an id, for what connects two. */
   thing: (id: string) => Thing | undefined;
+  /** m in the world that one pixel is worth at a place. */
+  metresPerPixel: (at: Vector3) => number;
   /** Something has to be drawn anew. */
   invalidate: () => void;
 }
@@ -30,6 +32,11 @@ export abstract class Thing<I extends Item = Item> {
 
   /** Called before each drawn frame when something moved; gives whether it goes on moving by itself. */
   frame(): boolean {
+    return false;
+  }
+
+  /** Called before each drawn frame, also when only the camera moved: gives whether it has another size now. */
+  resized(): boolean {
     return false;
   }
 

@@ -1,13 +1,21 @@
-/** An action: a disc above its point, stacked when there are several. START and END stand where people put them. */
+/**
+ * An action: a disc above its point; several stand around it, each a step higher. START and END stand where people put
+ * them. From afar they grow, so that they stay as large as fingers need.
+ */
 
 import { CylinderGeometry, Matrix4, MeshLambertMaterial, Object3D, Vector3 } from "three";
 import type { Batch, Instance } from "../batches";
 import type { PuckItem } from "../items";
 import { Thing, type Context } from "../thing";
 
-/** m: height of the first puck above its point, and from one to the next. */
+/** m: radius of a puck, height of the first one above its point, and from one to the next. */
+const RADIUS = 0.018;
 const FIRST = 0.035;
-const NEXT = 0.022;
+const NEXT = 0.006;
+/** Pixels: the least radius on the screen. */
+const LEAST = 13;
+/** So much it grows at most; by steps, since lines between pucks are drawn anew with each. */
+const MOST = 4;
 const up = new Vector3();
 
 export class PuckThing extends Thing<PuckItem> {
@@ -15,13 +23,14 @@ export class PuckThing extends Thing<PuckItem> {
   item: PuckItem;
   private readonly batch: Batch;
   private readonly instance: Instance;
+  private grown = 1;
 
   constructor(item: PuckItem, context: Context) {
     super(context);
     this.item = item;
     const edge = item.role === "action";
     this.batch = context.batches.of(edge ? "puck" : "start and end", () => [
-      (edge ? new CylinderGeometry(0.018, 0.018, 0.01, 24) : new CylinderGeometry(0.03, 0.03, 0.014, 6)).rotateX(Math.PI / 2),
+      (edge ? new CylinderGeometry(RADIUS, RADIUS, 0.01, 24) : new CylinderGeometry(0.03, 0.03, 0.014, 6)).rotateX(Math.PI / 2),
       new MeshLambertMaterial(),
     ]);
     this.instance = { id: item.id, frame: this.root, offset: new Matrix4(), color: context.palette.point };
@@ -30,7 +39,10 @@ export class PuckThing extends Thing<PuckItem> {
 
   update(item: PuckItem): void {
     this.item = item;
-    if (item.position) this.root.position.set(item.position.x, item.position.y, item.position.z);
+    if (item.position) {
+      this.root.position.set(item.position.x, item.position.y, item.position.z);
+      this.root.matrixAutoUpdate = this.root.matrixWorldAutoUpdate = true;
+    }
     const { palette } = this.context;
     this.instance.color = item.selected
       ? palette.selected
@@ -45,14 +57,33 @@ export class PuckThing extends Thing<PuckItem> {
               : item.lockedBy
                 ? palette.locked
                 : (palette.actions[item.colour % palette.actions.length] ?? palette.point);
-    const size = item.faint >= 1 ? 0 : item.selected || item.running ? 1.25 : 1;
+    this.scale();
+  }
+
+  private scale(): void {
+    const { faint, selected, running } = this.item;
+    const size = faint >= 1 ? 0 : this.grown * (selected || running ? 1.25 : 1);
     this.instance.offset.makeScale(size, size, size);
+  }
+
+  override resized(): boolean {
+    const wanted = (LEAST * this.context.metresPerPixel(this.anchor(up))) / RADIUS;
+    const grown = Math.min(MOST, Math.max(1, 2 ** (Math.ceil(Math.log2(wanted) * 2) / 2)));
+    if (grown === this.grown) return false;
+    this.grown = grown;
+    this.scale();
+    return true;
   }
 
   /** Above the point in the world, however the point's parent is turned. */
   override placed(): void {
     if (this.item.position || !this.root.parent) return;
-    this.root.parent.getWorldPosition(up).z += FIRST + this.item.level * NEXT;
+    const { level, count } = this.item;
+    const around = count > 1 ? (1.15 * RADIUS * this.grown) / Math.sin(Math.PI / count) : 0;
+    const angle = (2 * Math.PI * level) / count;
+    this.root.parent.getWorldPosition(up).z += (FIRST + level * NEXT) * this.grown;
+    up.x += around * Math.cos(angle);
+    up.y += around * Math.sin(angle);
     this.root.matrixAutoUpdate = false;
     this.root.matrixWorldAutoUpdate = false;
     this.root.matrixWorld.makeTranslation(up);

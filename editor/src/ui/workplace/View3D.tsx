@@ -4,6 +4,7 @@ import { useEffect, useRef, useState } from "react";
 import type { Engine, Quality } from "../../engine/engine";
 import { endStep } from "../../commands/program";
 import { readAsset } from "../../session/assets";
+import { dragPucks } from "../../session/puckDrag";
 import { setEngine } from "../../session/engine";
 import { tapTaken } from "../../session/taps";
 import { now, select, setUi, store, useEditor } from "../../store/store";
@@ -51,12 +52,17 @@ export function View3D() {
       };
       shown.show(maker.items(now()));
       shown.focus();
-      stop = store.subscribe((state, before) => {
+      const noDrags = dragPucks(shown, canvas.current);
+      const unsubscribe = store.subscribe((state, before) => {
         shown.show(maker.items(state));
         if (state.doc && state.doc.scene.id !== before.doc?.scene.id) shown.focus();
         const at = state.program.running.at(-1);
         if (state.ui.follow && at !== undefined && at !== before.program.running.at(-1)) shown.focus(at);
       });
+      stop = () => {
+        noDrags();
+        unsubscribe();
+      };
       setEngine(shown);
       setMine(shown);
     };

@@ -1,0 +1,55 @@
+/** Drags a puck that is selected over the level on which it stands; where it is let go, all see it. */
+
+import type { Engine } from "../engine/engine";
+import { notEditable, placePuck, showPuck } from "../commands/program";
+import { now } from "../store/store";
+
+/** Pixels that a finger moves before it drags: less is a tap. */
+const BEGINS = 6;
+
+/** Listen on the canvas of the view; gives what ends that. */
+export function dragPucks(engine: Engine, canvas: HTMLCanvasElement): () => void {
+  let held: { id: string; level: number; x: number; y: number; moved: boolean; pointer: number; before: unknown } | null = null;
+  const place = (event: PointerEvent) => {
+    const box = canvas.getBoundingClientRect();
+    return [event.clientX - box.left, event.clientY - box.top] as const;
+  };
+  const down = (event: PointerEvent) => {
+    const { selection } = now().ui;
+    if (held || !event.isPrimary || event.button !== 0 || !selection || now().ui.connecting) return;
+    if (selection.kind !== "action" && selection.kind !== "terminal") return;
+    const [x, y] = place(event);
+    if (engine.pick(x, y, event.pointerType === "mouse" ? 4 : 14)[0]?.id !== selection.id || notEditable(now(), "PreviewMove")) return;
+    const level = engine.item(selection.id)?.pose.position.z ?? 0;
+    held = { id: selection.id, level, x, y, moved: false, pointer: event.pointerId, before: now().view.shared[`place/${selection.id}`] };
+    engine.view.enable(false);
+    canvas.setPointerCapture(event.pointerId);
+  };
+  const move = (event: PointerEvent) => {
+    if (!held || event.pointerId !== held.pointer) return;
+    const [x, y] = place(event);
+    held.moved ||= Math.hypot(x - held.x, y - held.y) > BEGINS;
+    const at = held.moved && engine.floor(x, y, held.level);
+    if (at) showPuck(held.id, { x: at.x, y: at.y, z: held.level });
+  };
+  const end = (event: PointerEvent) => {
+    if (!held || event.pointerId !== held.pointer) return;
+    const { id, level, moved, before } = held;
+    held = null;
+    engine.view.enable(true);
+    if (!moved) return;
+    const at = event.type === "pointerup" && engine.floor(...place(event), level);
+    if (at) void placePuck(id, { x: at.x, y: at.y, z: level });
+    else showPuck(id, before);
+  };
+  canvas.addEventListener("pointerdown", down, true);
+  canvas.addEventListener("pointermove", move);
+  canvas.addEventListener("pointerup", end);
+  canvas.addEventListener("pointercancel", end);
+  return () => {
+    canvas.removeEventListener("pointerdown", down, true);
+    canvas.removeEventListener("pointermove", move);
+    canvas.removeEventListener("pointerup", end);
+    canvas.removeEventListener("pointercancel", end);
+  };
+}
