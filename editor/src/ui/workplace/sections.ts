@@ -6,6 +6,7 @@
 import type { ComponentType } from "react";
 import type { Selection, State } from "../../store/state";
 import { programSections } from "../program/sections";
+import { pointSections } from "../points/sections";
 import { about } from "./sections/about";
 import { place } from "./sections/place";
 
@@ -16,4 +17,4 @@ export interface Section {
   Body: ComponentType<{ selection: Selection }>;
 }
 
-export const SECTIONS: readonly Section[] = [about, ...programSections, place];
+export const SECTIONS: readonly Section[] = [about, ...pointSections, ...programSections, place];

@@ -6,6 +6,7 @@
 import type { ComponentType } from "react";
 import type { State } from "../../store/state";
 import type { IconName } from "../kit/icons";
+import { points } from "../points/tool";
 import { program } from "../program/tool";
 import { run } from "../run/tool";
 import { devices } from "./tools/devices";
@@ -23,4 +24,4 @@ export interface Tool {
   Panel: ComponentType;
 }
 
-export const TOOLS: readonly Tool[] = [things, robot, program, run, devices];
+export const TOOLS: readonly Tool[] = [things, robot, points, program, run, devices];

@@ -1,0 +1,34 @@
+/** A point copied with all that hangs on it: once, or in a row. */
+
+import { useState } from "react";
+import { copyPoint } from "../../commands/points";
+import type { Position } from "../../protocol/types";
+import { Amount } from "../kit/fields";
+import { Button } from "../kit/kit";
+import type { Section } from "../workplace/sections";
+import { RefusedText, useAsking } from "./Doing";
+import { useWhyNot } from "./editing";
+
+const CopiesSection: Section["Body"] = ({ selection: { id } }) => {
+  const [count, setCount] = useState(1);
+  const [step, setStep] = useState<Position>({ x: 0.05, y: 0, z: 0 });
+  const why = useWhyNot(id, "CopyActionPoint");
+  const { refused, busy, ask } = useAsking();
+  return (
+    <details className="by-numbers">
+      <summary>Copies in a row</summary>
+      <div className="amounts">
+        {(["x", "y", "z"] as const).map((axis) => (
+          <Amount key={axis} label={`Step ${axis.toUpperCase()}`} unit="mm" value={step[axis] * 1000} step={10} onChange={(next) => setStep({ ...step, [axis]: next / 1000 })} />
+        ))}
+        <Amount label="Copies" unit="" digits={0} value={count} least={1} most={50} onChange={(next) => setCount(Math.round(next))} />
+      </div>
+      <Button why={why} isDisabled={busy} onPress={() => void ask(copyPoint(id, count, step))}>
+        {count === 1 ? "Make a copy" : `Make ${count} copies`}
+      </Button>
+      <RefusedText>{refused}</RefusedText>
+    </details>
+  );
+};
+
+export default CopiesSection;

@@ -1,0 +1,68 @@
+/** The robot sent to what is taught: shown by a ghost first, then moved. */
+
+import { useEffect, useState } from "react";
+import { hideGhost, moveToTaught, notReady, chosenRobot, showAt, showJoints } from "../../commands/robot";
+import { now, useEditor } from "../../store/store";
+import { worldOf } from "../../viewmodel/frames";
+import { Button } from "../kit/kit";
+import { nameOf } from "../names";
+import { Answer } from "../robot/GoTab";
+import { mannerNow, useManner } from "../robot/manner";
+import { MannerFields } from "../robot/MannerFields";
+import type { Section } from "../workplace/sections";
+import { RefusedText, useAsking } from "./Doing";
+import "../robot/robot.css";
+
+const GoThere: Section["Body"] = ({ selection: { kind, id } }) => {
+  const chosen = useEditor(chosenRobot);
+  const joints = useEditor((state) => state.doc?.joints[id]);
+  const orientation = useEditor((state) => state.doc?.orientations[id]);
+  // Joints belong to their robot, whichever is in hand.
+  const robotId = joints?.robot_id ?? chosen?.robotId ?? "";
+  const name = useEditor((state) => nameOf(state, robotId));
+  const cannotAsk = useEditor((state) => (state.connection.status === "ready" ? (chosen?.effector || joints ? "" : "Go online first: its end effectors are not known.") : "There is no connection to the server."));
+  const why = useEditor((state) => notReady(state, chosen && { ...chosen, robotId }, "MoveToActionPoint"));
+  const { speed } = useManner();
+  const [answer, setAnswer] = useState<string | null>(null);
+  const { refused, busy, ask } = useAsking();
+  useEffect(() => {
+    setAnswer(null);
+    return hideGhost;
+  }, [id]);
+  if (!chosen) return <p className="quiet">There is no robot in this scene.</p>;
+  const show = () => {
+    const { doc } = now();
+    if (joints) {
+      const known = now().reach;
+      const reach = Object.values(known).flatMap((each) => each.items).find((each) => each.id === id);
+      const problem = reach?.reason ?? "";
+      showJoints(joints.robot_id, joints.joints, problem);
+      setAnswer(problem);
+    } else if (orientation && doc) void showAt(chosen, worldOf(doc, id)).then(setAnswer);
+  };
+  return (
+    <>
+      <div className="actions start">
+        <Button why={cannotAsk} onPress={show}>
+          Show {name} there
+        </Button>
+        <Button
+          look="primary"
+          why={why}
+          isDisabled={busy}
+          onPress={() => void ask(moveToTaught(joints ? { ...chosen, robotId, armId: joints.arm_id ?? "" } : chosen, kind === "joints" ? { joints_id: id } : { orientation_id: id }, mannerNow()))}
+        >
+          Move it there
+        </Button>
+      </div>
+      <Answer answer={answer} />
+      <RefusedText>{refused}</RefusedText>
+      <details className="by-numbers">
+        <summary>{`At ${Math.round(speed * 100)} % of its speed`}</summary>
+        <MannerFields />
+      </details>
+    </>
+  );
+};
+
+export default GoThere;

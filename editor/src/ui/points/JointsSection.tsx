@@ -1,0 +1,76 @@
+/** Joints kept at a point: their values within the limits, taken over from the robot, or computed anew when the point moved. */
+
+import { renameJoints, setJoints, setJointsToRobot, solveJoints } from "../../commands/points";
+import { notReady } from "../../commands/robot";
+import { select, useEditor } from "../../store/store";
+import { Amount } from "../kit/fields";
+import { Button, More } from "../kit/kit";
+import { nameOf } from "../names";
+import { Limits, shownJoints } from "../robot/JointsTab";
+import type { Section } from "../workplace/sections";
+import { RefusedText, useAsking } from "./Doing";
+import { useWhyNot } from "./editing";
+import { NameField } from "./NameField";
+import { ReachAnswers } from "./Reach";
+import "./points.css";
+import "../robot/robot.css";
+
+const JointsSection: Section["Body"] = ({ selection: { id } }) => {
+  const kept = useEditor((state) => state.doc?.joints[id]);
+  const all = useEditor((state) => state.doc?.orientations);
+  const point = useEditor((state) => (kept ? nameOf(state, kept.pointId) : ""));
+  const robot = useEditor((state) => (kept ? nameOf(state, kept.robot_id) : ""));
+  const why = useWhyNot(kept?.pointId ?? "", "UpdateActionPointJoints");
+  const noRobot = useEditor((state) => notReady(state, kept ? { robotId: kept.robot_id, armId: kept.arm_id ?? "", effector: "" } : null, "UpdateActionPointJointsUsingRobot"));
+  const { refused, busy, ask } = useAsking();
+  if (!kept) return null;
+  const orientations = Object.values(all ?? {}).filter((each) => each.pointId === kept.pointId);
+  const [only] = orientations;
+  const shown = shownJoints(kept.robot_id, kept.joints);
+  return (
+    <>
+      <NameField key={id} label="Name of the joints" name={kept.name} why={why} onRename={(name) => renameJoints(id, name)} />
+      <Button look="plain" icon="point" onPress={() => select({ kind: "point", id: kept.pointId })}>
+        of {robot}, at {point}
+      </Button>
+      {!kept.is_valid && <p className="tag warn">The point has moved since: these joints no longer lead to it.</p>}
+      <ul className="joints">
+        {shown.map((joint) => (
+          <li key={joint.name} className="kept">
+            <div className="joint-head">
+              <span>{joint.name.replaceAll("_", " ")}</span>
+              <Limits joint={joint} />
+            </div>
+            <Amount
+              label={joint.name.replaceAll("_", " ")}
+              unit={joint.unit}
+              value={joint.value * joint.scale}
+              least={joint.lower * joint.scale}
+              most={joint.upper * joint.scale}
+              isDisabled={why !== "" || busy}
+              onChange={(next) => void ask(setJoints(id, kept.joints.map((each) => (each.name === joint.name ? { ...each, value: next / joint.scale } : each))))}
+            />
+          </li>
+        ))}
+      </ul>
+      <div className="actions start">
+        <Button icon="robot" why={why || noRobot} isDisabled={busy} onPress={() => void ask(setJointsToRobot(id))}>
+          As the robot is
+        </Button>
+        {orientations.length > 1 ? (
+          <More label="Compute them anew" look="" icon="redo" choices={orientations.map((each) => ({ id: each.id, label: `for ${each.name}`, not: why, act: () => void ask(solveJoints(id, each.id)) }))}>
+            Compute anew
+          </More>
+        ) : (
+          <Button icon="redo" why={why || (only ? "" : "The point has no orientation to compute them for.")} isDisabled={busy} onPress={() => only && void ask(solveJoints(id, only.id))}>
+            Compute anew
+          </Button>
+        )}
+      </div>
+      <RefusedText>{refused}</RefusedText>
+      <ReachAnswers id={id} />
+    </>
+  );
+};
+
+export default JointsSection;

@@ -1,0 +1,39 @@
+/** A name that is changed where it stands: it holds when the field is left, or by Enter. */
+
+import { useId, useState } from "react";
+import { RefusedText, useAsking } from "./Doing";
+
+export function NameField({ label, name, why, onRename }: { label: string; name: string; why: string; onRename: (name: string) => Promise<string> }) {
+  const id = useId();
+  const [text, setText] = useState<string | null>(null);
+  const { refused, busy, ask } = useAsking();
+  const commit = () => {
+    const wanted = (text ?? name).trim().replaceAll(" ", "_");
+    if (text === null) return;
+    if (wanted === name || wanted === "") setText(null);
+    else void ask(onRename(wanted)).then((done) => done && setText(null));
+  };
+  return (
+    <div className="field name-field">
+      <label htmlFor={id} className="hidden-but-read">
+        {label}
+      </label>
+      <input
+        id={id}
+        value={text ?? name}
+        autoComplete="off"
+        disabled={busy}
+        readOnly={why !== ""}
+        title={why}
+        aria-invalid={refused !== ""}
+        onChange={(event) => setText(event.target.value)}
+        onBlur={commit}
+        onKeyDown={(event) => {
+          if (event.key === "Enter") commit();
+          if (event.key === "Escape") setText(null);
+        }}
+      />
+      <RefusedText>{refused}</RefusedText>
+    </div>
+  );
+}

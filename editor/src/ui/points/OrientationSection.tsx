@@ -1,0 +1,59 @@
+/** An orientation: its name, its angles, which robots get there, and the robot's own taken over. */
+
+import { renameOrientation, turnOrientation, turnOrientationToRobot } from "../../commands/points";
+import { chosenRobot, notReady } from "../../commands/robot";
+import { select, useEditor } from "../../store/store";
+import { fromRollPitchYaw } from "../../viewmodel/frames";
+import { rollPitchYaw } from "../../viewmodel/rotations";
+import { Amount } from "../kit/fields";
+import { Button } from "../kit/kit";
+import { nameOf } from "../names";
+import type { Section } from "../workplace/sections";
+import { RefusedText, useAsking } from "./Doing";
+import { useWhyNot } from "./editing";
+import { NameField } from "./NameField";
+import { ReachAnswers } from "./Reach";
+import "./points.css";
+
+const OrientationSection: Section["Body"] = ({ selection: { id } }) => {
+  const one = useEditor((state) => state.doc?.orientations[id]);
+  const point = useEditor((state) => (one ? nameOf(state, one.pointId) : ""));
+  const chosen = useEditor(chosenRobot);
+  const why = useWhyNot(id, "UpdateActionPointOrientation");
+  const noRobot = useEditor((state) => notReady(state, chosen, "UpdateActionPointOrientationUsingRobot"));
+  const { refused, busy, ask } = useAsking();
+  if (!one) return null;
+  const angles = rollPitchYaw(one.orientation);
+  return (
+    <>
+      <NameField key={id} label="Name of the orientation" name={one.name} why={why} onRename={(name) => renameOrientation(id, name)} />
+      <Button look="plain" icon="point" onPress={() => select({ kind: "point", id: one.pointId })}>
+        at {point}
+      </Button>
+      <div className="amounts">
+        {(["Roll", "Pitch", "Yaw"] as const).map((name, n) => (
+          <Amount
+            key={name}
+            label={name}
+            unit="°"
+            step={5}
+            value={angles[n] ?? 0}
+            isDisabled={why !== "" || busy}
+            onChange={(next) => {
+              const turned: [number, number, number] = [...angles];
+              turned[n] = next;
+              void ask(turnOrientation(id, fromRollPitchYaw(turned)));
+            }}
+          />
+        ))}
+      </div>
+      <Button icon="robot" why={why || noRobot} isDisabled={busy} onPress={() => chosen && void ask(turnOrientationToRobot(id, chosen))}>
+        Turn it as the robot is
+      </Button>
+      <RefusedText>{refused}</RefusedText>
+      <ReachAnswers id={id} />
+    </>
+  );
+};
+
+export default OrientationSection;

@@ -1,0 +1,78 @@
+/** A point: its name, what it hangs on, a note, and its place taken over from the robot. */
+
+import { useState } from "react";
+import { holdHandTeaching } from "../../commands/holds";
+import { movePointToRobot, possibleParents, renamePoint, setParent } from "../../commands/points";
+import { chosenRobot, featuresOf, notReady } from "../../commands/robot";
+import { keepView } from "../../commands/viewstate";
+import { useEditor } from "../../store/store";
+import { Pick } from "../kit/fields";
+import { Button } from "../kit/kit";
+import { nameOf } from "../names";
+import { HoldButton } from "../robot/HoldButton";
+import type { Section } from "../workplace/sections";
+import { RefusedText, useAsking } from "./Doing";
+import { useWhyNot } from "./editing";
+import { NameField } from "./NameField";
+import "./points.css";
+
+const PointSection: Section["Body"] = ({ selection: { id } }) => {
+  const point = useEditor((state) => state.doc?.points[id]);
+  const parents = useEditor((state) => possibleParents(state, id).join("\n"));
+  const names = useEditor((state) => possibleParents(state, id).map((each) => nameOf(state, each)).join("\n"));
+  const chosen = useEditor(chosenRobot);
+  const why = useWhyNot(id, "UpdateActionPointPosition");
+  const noRobot = useEditor((state) => notReady(state, chosen, "UpdateActionPointUsingRobot"));
+  const byHand = useEditor((state) => (chosen && featuresOf(state, chosen.robotId)?.hand_teaching ? "" : "This robot cannot be moved by hand."));
+  const { refused, busy, ask } = useAsking();
+  if (!point) return null;
+  const labels = names.split("\n");
+  const choices = parents ? parents.split("\n").map((each, n) => [each, `on ${labels[n] ?? ""}`] as const) : [];
+  return (
+    <>
+      <NameField key={id} label="Name of the point" name={point.name} why={why} onRename={(name) => renamePoint(id, name)} />
+      <Pick label="Hangs" value={point.parent ?? ""} choices={[["", "in the world"], ...choices]} isDisabled={why !== "" || busy} onChange={(parent) => void ask(setParent(id, parent))} />
+      <div className="actions start">
+        <Button icon="robot" why={why || noRobot} isDisabled={busy} onPress={() => chosen && void ask(movePointToRobot(id, chosen))}>
+          Put it where the robot is
+        </Button>
+        <HoldButton
+          label="Hold, move the arm by hand, and let go: the point is put there"
+          why={why || noRobot || byHand}
+          onHold={() => holdHandTeaching(chosen?.robotId ?? "", chosen?.armId || undefined)}
+          onOver={(reason) => void ask(reason || !chosen ? Promise.resolve(reason) : movePointToRobot(id, chosen))}
+        >
+          Hold: by hand
+        </HoldButton>
+      </div>
+      <RefusedText>{refused}</RefusedText>
+      <Note key={`note ${id}`} id={id} />
+    </>
+  );
+};
+
+export default PointSection;
+
+/** What people write down about a point; all see it. The protocol has no request for a point's description. */
+function Note({ id }: { id: string }) {
+  const key = `note/${id}`;
+  const kept = useEditor((state) => state.view.shared[key]);
+  const why = useEditor((state) => (state.connection.status === "ready" && state.connection.role >= 2 ? "" : "read only"));
+  const [text, setText] = useState<string | null>(null);
+  return (
+    <label className="field">
+      <span>Note</span>
+      <textarea
+        className="note"
+        maxLength={2000}
+        readOnly={why !== ""}
+        value={text ?? (typeof kept === "string" ? kept : "")}
+        onChange={(event) => setText(event.target.value)}
+        onBlur={() => {
+          if (text !== null) keepView("shared", { [key]: text.trim() || null });
+          setText(null);
+        }}
+      />
+    </label>
+  );
+}

@@ -1,0 +1,108 @@
+/** Points of the project: added on a surface that is tapped, at the cross, by numbers, or where the robot is. */
+
+import { useState } from "react";
+import { createPortal } from "react-dom";
+import { aimedPlace } from "../../commands/aimed";
+import { barred } from "../../commands/asking";
+import { addPoint, addPointFromRobot } from "../../commands/points";
+import { chosenRobot, notReady } from "../../commands/robot";
+import type { Position } from "../../protocol/types";
+import { theEngine } from "../../session/engine";
+import { isRunning } from "../../store/selectors";
+import { now, setUi, tell, useEditor } from "../../store/store";
+import { composed, ORIGIN, worldOf } from "../../viewmodel/frames";
+import { Amount, OnOff, OneOf } from "../kit/fields";
+import { Button } from "../kit/kit";
+import { nameOf } from "../names";
+import { against } from "../../commands/aimed";
+import { usePlaceTap } from "../robot/usePlaceTap";
+import { RefusedText, useAsking } from "./Doing";
+import { PointTree } from "./PointTree";
+import "./points.css";
+
+/** What a new point may hang on: the selected object or point; that of the selected orientation, joints or action. */
+function parentOfSelection(): string {
+  const { doc, ui } = now();
+  const id = ui.selection?.id ?? "";
+  if (!doc) return "";
+  if (doc.points[id] || doc.objects[id]?.pose) return id;
+  return (doc.orientations[id] ?? doc.joints[id] ?? doc.actions[id])?.pointId ?? "";
+}
+
+export default function PointsPanel() {
+  const chosen = useEditor(chosenRobot);
+  const selected = useEditor((state) => state.ui.selection?.id);
+  const candidate = selected === undefined ? "" : parentOfSelection();
+  const parentName = useEditor((state) => (candidate ? nameOf(state, candidate) : ""));
+  const why = useEditor((state) => (isRunning(state) ? "A program runs." : barred(state, "AddActionPoint")));
+  const noRobot = useEditor((state) => notReady(state, chosen, "AddApUsingRobot"));
+  const [on, setOn] = useState<"parent" | "world">("parent");
+  const [tapping, setTapping] = useState(false);
+  const [standing, setStanding] = useState(true);
+  const [typed, setTyped] = useState<Position>(ORIGIN.position);
+  const { refused, busy, ask } = useAsking();
+  const parent = candidate && on === "parent" ? candidate : "";
+  const added = (work: Promise<string>) =>
+    void ask(work).then((done) => {
+      if (!done) return;
+      setTapping(false);
+      setUi({ tool: "" });
+    });
+
+  usePlaceTap(tapping, ({ position, normal }) => {
+    added(addPoint(position, parent, standing && normal ? against(normal) : undefined));
+  });
+
+  const atCross = () => {
+    const place = aimedPlace();
+    if (place) added(addPoint(place.position, parent, standing ? place.orientation : undefined));
+    else tell("info", "The cross points at nothing: turn the view so that it is on the table or a thing.");
+  };
+  return (
+    <>
+      <Cross />
+      {parentName && <OneOf label="A new point hangs" value={on} onChange={setOn} choices={[["parent", `on ${parentName}`], ["world", "in the world"]]} />}
+      <div className="add-point">
+        <Button icon="robot" look="primary" why={why || noRobot} isDisabled={busy} onPress={() => chosen && added(addPointFromRobot(chosen))}>
+          Where the robot is
+        </Button>
+        <Button icon="point" why={why} isDisabled={busy} aria-pressed={tapping} onPress={() => setTapping(!tapping)}>
+          {tapping ? "Tap a place…" : "Where I tap"}
+        </Button>
+        <Button icon="plus" why={why} isDisabled={busy} onPress={atCross}>
+          At the cross
+        </Button>
+      </div>
+      <OnOff isSelected={standing} onChange={setStanding}>
+        With an orientation: tool onto the surface
+      </OnOff>
+      <details className="by-numbers">
+        <summary>By numbers</summary>
+        <p className="quiet small">{parent ? `In the frame of ${parentName}.` : "In the world."}</p>
+        <div className="amounts">
+          {(["x", "y", "z"] as const).map((axis) => (
+            <Amount key={axis} label={axis.toUpperCase()} unit="mm" value={typed[axis] * 1000} step={10} onChange={(next) => setTyped({ ...typed, [axis]: next / 1000 })} />
+          ))}
+        </div>
+        <Button
+          why={why}
+          isDisabled={busy}
+          onPress={() => {
+            const { doc } = now();
+            if (doc) added(addPoint(composed(worldOf(doc, parent), { ...ORIGIN, position: typed }).position, parent));
+          }}
+        >
+          Add the point
+        </Button>
+      </details>
+      <RefusedText>{refused}</RefusedText>
+      <PointTree />
+    </>
+  );
+}
+
+/** In the middle of the view, as long as there is something to aim for. */
+function Cross() {
+  const view = theEngine() && document.querySelector(".view");
+  return view && createPortal(<span className="aim-cross" aria-hidden="true" />, view);
+}

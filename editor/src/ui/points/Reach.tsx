@@ -1,0 +1,69 @@
+/** Whether robots get there: a word and a sign of its own for each answer, not the colour alone. */
+
+import type { Reach, ReachOfItem } from "../../protocol/types";
+import type { State } from "../../store/state";
+import { useEditor } from "../../store/store";
+import { nameOf } from "../names";
+import "./reach.css";
+
+const SIGNS: Record<Reach, string> = { reachable: "✓", near_limit: "!", in_collision: "◆", out_of_reach: "✕", unknown: "?" };
+const WORDS: Record<Reach, string> = {
+  reachable: "reaches it",
+  near_limit: "near a limit",
+  in_collision: "in collision",
+  out_of_reach: "out of reach",
+  unknown: "not known",
+};
+const TONES: Record<Reach, string> = { reachable: "good", near_limit: "warn", in_collision: "bad", out_of_reach: "bad", unknown: "" };
+
+interface Answer extends ReachOfItem {
+  robot: string;
+}
+
+/** What each robot, arm and end effector says of an orientation or joints. */
+function answers(state: State, id: string): Answer[] {
+  const found: Answer[] = [];
+  for (const one of Object.values(state.reach)) {
+    const item = one.items.find((each) => each.id === id);
+    if (item) found.push({ ...item, robot: [nameOf(state, one.robot_id), one.arm_id, one.end_effector_id].filter(Boolean).join(" · ") });
+  }
+  return found;
+}
+
+/** Small, for lists and actions: of the robot that gets there best. */
+export function ReachBadge({ id }: { id: string }) {
+  const reach = useEditor((state) => best(answers(state, id))?.reach ?? "");
+  if (!reach) return null;
+  return (
+    <span className={`tag reach ${TONES[reach]}`} title={WORDS[reach]}>
+      <span aria-hidden="true">{SIGNS[reach]}</span>
+      <span className="hidden-but-read">{WORDS[reach]}</span>
+    </span>
+  );
+}
+
+/** All answers, with the reason where one does not get there. */
+export function ReachAnswers({ id }: { id: string }) {
+  const reach = useEditor((state) => state.reach);
+  const doc = useEditor((state) => state.doc);
+  const found = reach && doc ? answers({ reach, doc } as State, id) : [];
+  if (found.length === 0) return <p className="quiet small">Whether a robot gets there is not known.</p>;
+  return (
+    <ul className="reaches">
+      {found.map((one) => (
+        <li key={one.robot}>
+          <span className={`tag reach ${TONES[one.reach]}`}>
+            <span aria-hidden="true">{SIGNS[one.reach]}</span> {one.robot}: {WORDS[one.reach]}
+          </span>
+          {one.reason && <span className="small quiet">{one.reason}</span>}
+        </li>
+      ))}
+    </ul>
+  );
+}
+
+const ORDER: Reach[] = ["reachable", "near_limit", "unknown", "in_collision", "out_of_reach"];
+
+function best(found: Answer[]): Answer | undefined {
+  return [...found].sort((a, b) => ORDER.indexOf(a.reach) - ORDER.indexOf(b.reach))[0];
+}

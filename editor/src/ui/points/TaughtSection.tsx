@@ -1,0 +1,99 @@
+/** What is taught at a point: orientations and joints, with whether robots get there. */
+
+import { addJointsFromRobot, addOrientation, addOrientationFromRobot, removeJoints, removeOrientation } from "../../commands/points";
+import { chosenRobot, notReady } from "../../commands/robot";
+import { theEngine } from "../../session/engine";
+import type { Kind } from "../../store/state";
+import { now, select, useEditor } from "../../store/store";
+import { relativeTo, worldOf } from "../../viewmodel/frames";
+import { Icon } from "../kit/icons";
+import { Button, More } from "../kit/kit";
+import { nameOf } from "../names";
+import type { Section } from "../workplace/sections";
+import { RefusedText, useAsking } from "./Doing";
+import { useWhyNot } from "./editing";
+import { ReachBadge } from "./Reach";
+
+const DOWN = { x: 1, y: 0, z: 0, w: 0 };
+
+export const Orientations: Section["Body"] = ({ selection: { id } }) => {
+  const doc = useEditor((state) => state.doc);
+  const chosen = useEditor(chosenRobot);
+  const why = useWhyNot(id, "AddActionPointOrientation");
+  const noRobot = useEditor((state) => notReady(state, chosen, "AddActionPointOrientationUsingRobot"));
+  const { refused, busy, ask } = useAsking();
+  const taught = Object.values(doc?.orientations ?? {}).filter((each) => each.pointId === id);
+  const down = () => {
+    const open = now().doc;
+    if (!open) return;
+    const { orientation } = relativeTo(worldOf(open, id), { ...worldOf(open, id), orientation: DOWN });
+    void ask(addOrientation(id, orientation, "down"));
+  };
+  return (
+    <>
+      <ul className="taught">
+        {taught.map((each) => (
+          <li key={each.id}>
+            <Taught kind="orientation" id={each.id} name={each.name} />
+            <Button look="plain" icon="close" aria-label={`Remove the orientation ${each.name}`} why={why} isDisabled={busy} onPress={() => void ask(removeOrientation(each.id))} />
+          </li>
+        ))}
+      </ul>
+      <div className="actions start">
+        <Button icon="robot" why={why || noRobot} isDisabled={busy} onPress={() => chosen && void ask(addOrientationFromRobot(id, chosen))}>
+          From the robot
+        </Button>
+        <More
+          label="Add an orientation"
+          icon="plus"
+          look=""
+          choices={[
+            { id: "down", label: "Tool straight down", not: why, act: down },
+            { id: "parent", label: "As what the point hangs on", not: why, act: () => void ask(addOrientation(id, { x: 0, y: 0, z: 0, w: 1 })) },
+          ]}
+        >
+          Add
+        </More>
+      </div>
+      <RefusedText>{refused}</RefusedText>
+    </>
+  );
+};
+
+export const JointsList: Section["Body"] = ({ selection: { id } }) => {
+  const doc = useEditor((state) => state.doc);
+  const chosen = useEditor(chosenRobot);
+  const why = useWhyNot(id, "AddActionPointJointsUsingRobot");
+  const noRobot = useEditor((state) => notReady(state, chosen, "AddActionPointJointsUsingRobot"));
+  const robots = useEditor((state) => Object.values(doc?.joints ?? {}).map((each) => nameOf(state, each.robot_id)).join("\n")).split("\n");
+  const { refused, busy, ask } = useAsking();
+  const taught = Object.values(doc?.joints ?? {}).map((each, n) => ({ ...each, robot: robots[n] ?? "" })).filter((each) => each.pointId === id);
+  return (
+    <>
+      <ul className="taught">
+        {taught.map((each) => (
+          <li key={each.id}>
+            <Taught kind="joints" id={each.id} name={`${each.name} · ${each.robot}`} />
+            {!each.is_valid && <span className="tag warn">point has moved</span>}
+            <Button look="plain" icon="close" aria-label={`Remove the joints ${each.name}`} why={why} isDisabled={busy} onPress={() => void ask(removeJoints(each.id))} />
+          </li>
+        ))}
+      </ul>
+      <Button icon="robot" why={why || noRobot} isDisabled={busy} onPress={() => chosen && void ask(addJointsFromRobot(id, chosen))}>
+        From the robot
+      </Button>
+      <RefusedText>{refused}</RefusedText>
+    </>
+  );
+};
+
+/** Opens it; shown in the view while the pointer is on it. */
+function Taught({ kind, id, name }: { kind: Kind; id: string; name: string }) {
+  return (
+    <Button className="taught-name" look="plain" onPress={() => select({ kind, id })} onHoverStart={() => theEngine()?.hover(id)} onHoverEnd={() => theEngine()?.hover("")}>
+      <Icon name={kind === "joints" ? "robot" : "point"} size={18} />
+      {name}
+      <ReachBadge id={id} />
+    </Button>
+  );
+}

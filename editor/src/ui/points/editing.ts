@@ -1,0 +1,16 @@
+/** Why something of the open document cannot be changed by this user just now. */
+
+import { barred } from "../../commands/asking";
+import type { Requests } from "../../protocol/types";
+import { heldBy, isRunning } from "../../store/selectors";
+import type { State } from "../../store/state";
+import { useEditor } from "../../store/store";
+
+export function whyNotNow(state: State, id: string, request: keyof Requests): string {
+  if (isRunning(state)) return "A program runs.";
+  const holder = heldBy(state, id);
+  if (holder) return `${holder} works on it.`;
+  return barred(state, request);
+}
+
+export const useWhyNot = (id: string, request: keyof Requests): string => useEditor((state) => whyNotNow(state, id, request));
