@@ -30,6 +30,8 @@ TIP_MISFIT: Final = 0.01
 TURN_FITS: Final = math.radians(0.5)
 TURN_MISFIT: Final = math.radians(5.0)
 _MOST: Final = 1000
+_FARTHEST: Final = 1e4
+"""m; no robot reaches there, and its square is a number still."""
 
 
 def frame_by_axes(origin: Position, on_x: Position, in_plane: Sequence[Position]) -> TouchedFrame:
@@ -250,6 +252,9 @@ def _points(name: str, points: Sequence[Position], least: int) -> Floats:
     if not np.isfinite(found).all():
         wrong = int(np.argmin(np.isfinite(found).all(axis=1)))
         raise InvalidData(f"Point {wrong + 1} of the {name} points is not finite.")
+    if np.abs(found).max(initial=0.0) > _FARTHEST:
+        wrong = int(np.argmax(np.abs(found).max(axis=1)))
+        raise InvalidData(f"Point {wrong + 1} of the {name} points is farther away than {_FARTHEST:g} m.")
     return found
 
 

@@ -217,3 +217,11 @@ def test_moves_that_show_no_axes_are_refused() -> None:
         touch.orientation_by_points(DOWN, Position(), Position(0, 0, 0.1), Position(0.001, 0, 0.2))
     with pytest.raises(CalibrationRefused, match="less than"):
         touch.orientation_by_points(DOWN, Position(), Position(0, 0, 0.002), Position(0.1, 0, 0))
+
+
+def test_what_no_robot_reaches_is_refused() -> None:
+    far = [Position(0, 0, 0), Position(1e200, 0, 0), Position(0, 1, 0)]
+    with pytest.raises(InvalidData, match="Point 2 of the touched points is farther"):
+        touch.frame_by_axes(far[0], far[1], far[2:])
+    with pytest.raises(InvalidData, match="farther"):
+        touch.tip_by_touches([Pose(point) for point in [*far, Position()]])
