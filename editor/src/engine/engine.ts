@@ -5,15 +5,10 @@
 
 import {
   Box3,
-  DirectionalLight,
   Fog,
   GridHelper,
-  HemisphereLight,
-  Mesh,
   PCFSoftShadowMap,
-  PlaneGeometry,
   Scene,
-  ShadowMaterial,
   SRGBColorSpace,
   Vector3,
   WebGLRenderer,
@@ -22,9 +17,12 @@ import type { Pose } from "../protocol/types";
 import type { Telemetry } from "../store/telemetry";
 import { Batches } from "./batches";
 import { View } from "./camera";
+import { DropLine, heightWords } from "./drop";
 import { Gizmo } from "./gizmo/gizmo";
 import type { Item } from "./items";
-import { type Label, Labels } from "./labels";
+import { Labels } from "./labels";
+import { light } from "./light";
+import { labelsOf } from "./naming";
 import { DARK, LIGHT, type Palette } from "./palette";
 import { type Hit, onFloor, pick } from "./picking";
 import { worldPose } from "./poses";
@@ -57,7 +55,6 @@ export interface Probe {
   endEffectors?: Pose[];
 }
 
-const WEIGHTS: Record<Item["kind"], number> = { robot: 40, object: 10, point: 20, action: 30, orientation: 5, logic: 0 };
 const SMALL = new Set<Item["kind"]>(["point", "orientation", "action", "logic"]);
 /** s between frames at low quality. */
 const SLOW = 1 / 30;
@@ -78,8 +75,6 @@ export class Engine {
   private readonly batches: Batches;
   private readonly labels: Labels;
   private readonly context: Context;
-  private readonly sun = new DirectionalLight(0xffffff, 2.1);
-  private readonly sky = new HemisphereLight(0xffffff, 0x8d8f94, 1.5);
   private grid: GridHelper | null = null;
   private palette: Palette = LIGHT;
   private scheduled = 0;
@@ -89,6 +84,10 @@ export class Engine {
   private width = 1;
   private height = 1;
   private hovered = "";
+  private readonly notes = new Map<string, string>();
+  /** What is said of a thing while somebody moves it, in place of how high it is. */
+  private said = { id: "", text: "" };
+  private readonly drop: DropLine;
   private readonly ends: (() => void)[] = [];
   private down: { x: number; y: number; time: number } | null = null;
 
@@ -112,6 +111,7 @@ export class Engine {
       metresPerPixel: (at) => (2 * this.view.camera.position.distanceTo(at) * Math.tan((this.view.camera.fov * Math.PI) / 360)) / this.height,
       invalidate: () => this.invalidate(),
     };
+    this.drop = new DropLine(this.scene);
     this.gizmo = new Gizmo({
       canvas,
       scene: this.scene,
@@ -119,7 +119,7 @@ export class Engine {
       size: () => ({ width: this.width, height: this.height }),
       draw: () => this.draw(),
     });
-    this.light();
+    this.ends.push(light(this.scene, quality === "high"));
     this.setDark(options.dark);
     this.ends.push(options.telemetry.subscribe((id) => this.reported(id)));
     const ageing = setInterval(() => this.checkAges(), 250);
@@ -158,6 +158,12 @@ export class Engine {
     if (!changed) return;
     for (const thing of this.things.values()) this.hang(thing);
     this.invalidate();
+  }
+
+  /** Say something beside a thing's name; nothing is said any more with empty words. */
+  note(id: string, text: string): void {
+    this.said = { id: text ? id : "", text };
+    this.draw();
   }
 
   /** Show the label of what the pointer is on. */
@@ -265,29 +271,10 @@ export class Engine {
     this.batches.dispose();
     this.labels.dispose();
     this.gizmo.dispose();
+    this.drop.dispose();
     this.grid?.dispose();
     this.view.dispose();
-    this.sun.dispose();
     this.renderer.dispose();
-  }
-
-  private light(): void {
-    this.sky.position.set(0, 0, 1);
-    this.sun.position.set(1.6, -1.1, 3.2);
-    this.sun.castShadow = true;
-    this.sun.shadow.mapSize.set(2048, 2048);
-    const { camera } = this.sun.shadow;
-    camera.left = camera.bottom = -2.2;
-    camera.right = camera.top = 2.2;
-    camera.far = 9;
-    this.sun.shadow.bias = -0.0005;
-    this.scene.add(this.sky, this.sun);
-    if (this.options.quality !== "high") return;
-    const ground = new Mesh(new PlaneGeometry(20, 20), new ShadowMaterial({ opacity: 0.22 }));
-    ground.receiveShadow = true;
-    ground.userData["ground"] = true;
-    ground.position.z = -0.0005;
-    this.scene.add(ground);
   }
 
   private remove(id: string, thing: Thing): void {
@@ -358,25 +345,22 @@ export class Engine {
     for (const thing of this.things.values()) if (thing.resized()) this.dirty = true;
     const moving = this.place();
     this.gizmo.place();
+    this.tellHeight();
     this.renderer.render(this.scene, this.view.camera);
     this.frames++;
-    this.labels.show(this.labelled(), this.view.camera, this.width, this.height);
+    this.labels.show(labelsOf(this.things, this.hovered, this.notes), this.view.camera, this.width, this.height);
     this.onFrame();
     if (moving) this.invalidate();
   }
 
-  private labelled(): Label[] {
-    const found: Label[] = [];
-    for (const [id, thing] of this.things) {
-      const { item } = thing;
-      const badge = thing.badge();
-      const hovered = id === this.hovered;
-      const named = item.kind === "robot" || (item.kind === "action" && (item.running || item.role !== "action"));
-      if (item.faint >= 1 || !(item.selected || hovered || badge || named || item.kind === "object")) continue;
-      const weight = (item.selected ? 1000 : 0) + (hovered ? 500 : 0) + (badge ? 100 : 0) + WEIGHTS[item.kind];
-      found.push({ id, text: item.name, badge, selected: item.selected, weight, anchor: (target) => thing.anchor(target) });
-    }
-    return found;
+  /** The line below what is selected, and how high it is. */
+  private tellHeight(): void {
+    this.notes.clear();
+    const chosen = [...this.things.values()].find((each) => each.item.selected && each.item.kind !== "logic");
+    const at = chosen && chosen.item.faint < 1 ? chosen.root.getWorldPosition(new Vector3()) : null;
+    const height = this.drop.show(at, this.palette);
+    if (chosen) this.notes.set(chosen.item.id, heightWords(height));
+    if (this.said.id) this.notes.set(this.said.id, this.said.text);
   }
 
   /** A tap is short, and stays where it began: everything else turns the view. */

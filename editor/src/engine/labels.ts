@@ -10,6 +10,8 @@ export interface Label {
   id: string;
   text: string;
   badge: string;
+  /** How high it is, or how it is moved. */
+  note: string;
   selected: boolean;
   /** The higher, the earlier. */
   weight: number;
@@ -66,14 +68,16 @@ export class Labels {
     if (!element) {
       element = document.createElement("div");
       element.className = "view-label";
-      element.append(document.createElement("span"), document.createElement("small"));
+      element.append(document.createElement("span"), document.createElement("small"), document.createElement("em"));
       this.elements.set(label.id, element);
       this.host.append(element);
     }
-    const [name, badge] = element.children as unknown as [HTMLElement, HTMLElement];
+    const [name, badge, note] = element.children as unknown as [HTMLElement, HTMLElement, HTMLElement];
     if (name.textContent !== label.text) name.textContent = label.text;
     if (badge.textContent !== label.badge) badge.textContent = label.badge;
     badge.hidden = !label.badge;
+    if (note.textContent !== label.note) note.textContent = label.note;
+    note.hidden = !label.note;
     element.dataset["selected"] = String(label.selected);
     return element;
   }

@@ -119,3 +119,8 @@ export function poseFrom(text: string, now: Pose): Pose | null {
 export function poseText({ position: p, orientation: o }: Pose): string {
   return [p.x, p.y, p.z, o.x, o.y, o.z, o.w].map((each) => Number(each.toFixed(6))).join(", ");
 }
+
+/** A place some way along a direction from another. */
+export function plusOf(from: Position, direction: Position, by: number): Position {
+  return { x: from.x + direction.x * by, y: from.y + direction.y * by, z: from.z + direction.z * by };
+}

@@ -1,0 +1,53 @@
+/** How high something is, to be seen from any side: a dashed line down to the floor, and a ring where it stands above. */
+
+import { BufferGeometry, Group, LineDashedMaterial, LineSegments, Mesh, MeshBasicMaterial, RingGeometry, type Scene, Vector3 } from "three";
+import type { Palette } from "./palette";
+
+/** m: what is lower stands on the floor. */
+const LOW = 0.005;
+
+export class DropLine {
+  private readonly root = new Group();
+  private readonly line = new LineSegments(
+    new BufferGeometry().setFromPoints([new Vector3(), new Vector3(0, 0, -1)]),
+    new LineDashedMaterial({ dashSize: 0.02, gapSize: 0.015, transparent: true, opacity: 0.9 }),
+  );
+  private readonly ring = new Mesh(new RingGeometry(0.03, 0.036, 32), new MeshBasicMaterial({ transparent: true, opacity: 0.8 }));
+
+  constructor(scene: Scene) {
+    this.root.userData["ground"] = true; // not to be picked
+    this.root.add(this.line, this.ring);
+    this.root.visible = false;
+    scene.add(this.root);
+  }
+
+  /** Show it below a place in the world; null: nowhere. Gives how high that is, m. */
+  show(at: Vector3 | null, palette: Palette): number {
+    this.root.visible = at !== null && Math.abs(at.z) > LOW;
+    if (!at || !this.root.visible) return at?.z ?? 0;
+    this.line.material.color.copy(palette.selected);
+    this.ring.material.color.copy(palette.selected);
+    this.line.position.copy(at);
+    this.line.scale.set(1, 1, at.z);
+    // Dashes are measured before the scale.
+    this.line.material.scale = Math.abs(at.z);
+    this.line.computeLineDistances();
+    this.ring.position.set(at.x, at.y, 0.001);
+    this.root.updateMatrixWorld(true);
+    return at.z;
+  }
+
+  dispose(): void {
+    this.root.removeFromParent();
+    this.line.geometry.dispose();
+    this.line.material.dispose();
+    this.ring.geometry.dispose();
+    this.ring.material.dispose();
+  }
+}
+
+/** A height as words; the unit is mm, as in most drawings. */
+export function heightWords(z: number): string {
+  if (Math.abs(z) <= LOW) return "";
+  return `${Math.round(Math.abs(z) * 1000)} mm ${z > 0 ? "above" : "below"} the floor`;
+}

@@ -1,0 +1,78 @@
+/** Sizes of shapes: what pulling a face, or a number, makes of them. Pure; all in m. */
+
+import type { ObjectModel, Pose, Position } from "../protocol/types";
+import { inverted, rotated } from "../viewmodel/frames";
+import { dot, plusOf, type Axis } from "./placing";
+
+/** Thinner would not be seen, and could not be taken hold of. */
+export const THINNEST = 0.001;
+const WIDEST = 50;
+
+const within = (value: number) => Math.min(WIDEST, Math.max(THINNEST, value));
+
+/** Half of its size along its own axes. */
+export function halfOf({ box, cylinder, sphere }: ObjectModel): Record<Axis, number> {
+  if (box) return { x: box.size_x / 2, y: box.size_y / 2, z: box.size_z / 2 };
+  if (cylinder) return { x: cylinder.radius, y: cylinder.radius, z: cylinder.height / 2 };
+  const radius = sphere?.radius ?? 0;
+  return { x: radius, y: radius, z: radius };
+}
+
+/**
+ * Pull a face outwards by so much. What has an opposite face keeps it where it is, so its middle goes by half of that
+ * (`shift`, m); round things grow about their axis.
+ */
+export function pulled(model: ObjectModel, axis: Axis, by: number): { model: ObjectModel; shift: number } {
+  const { box, cylinder, sphere } = model;
+  if (box) {
+    const side = `size_${axis}` as const;
+    const size = within(box[side] + by);
+    return { model: { ...model, box: { ...box, [side]: size } }, shift: (size - box[side]) / 2 };
+  }
+  if (cylinder && axis === "z") {
+    const height = within(cylinder.height + by);
+    return { model: { ...model, cylinder: { ...cylinder, height } }, shift: (height - cylinder.height) / 2 };
+  }
+  if (cylinder) return { model: { ...model, cylinder: { ...cylinder, radius: within(cylinder.radius + by) } }, shift: 0 };
+  if (sphere) return { model: { ...model, sphere: { ...sphere, radius: within(sphere.radius + by) } }, shift: 0 };
+  return { model, shift: 0 };
+}
+
+/** A measure of a shape that can be typed. */
+export interface Measure {
+  label: string;
+  value: number;
+  put: (value: number) => ObjectModel;
+}
+
+export function measures(model: ObjectModel): Measure[] {
+  const { box, cylinder, sphere } = model;
+  if (box) {
+    return (["x", "y", "z"] as const).map((axis) => {
+      const side = `size_${axis}` as const;
+      return { label: axis.toUpperCase(), value: box[side], put: (value) => ({ ...model, box: { ...box, [side]: within(value) } }) };
+    });
+  }
+  if (cylinder) {
+    return [
+      { label: "Radius", value: cylinder.radius, put: (value) => ({ ...model, cylinder: { ...cylinder, radius: within(value) } }) },
+      { label: "Height", value: cylinder.height, put: (value) => ({ ...model, cylinder: { ...cylinder, height: within(value) } }) },
+    ];
+  }
+  if (!sphere) return [];
+  return [{ label: "Radius", value: sphere.radius, put: (value) => ({ ...model, sphere: { ...sphere, radius: within(value) } }) }];
+}
+
+/** Where something stands that is put onto a surface: as far before it as it reaches behind its own middle. */
+export function lifted(point: Position, normal: Position, { pose, model }: { pose: Pose; model?: ObjectModel }): Position {
+  if (!model) return { x: point.x, y: point.y, z: point.z };
+  const { x, y, z } = rotated(normal, inverted(pose.orientation));
+  const half = halfOf(model);
+  const { box, cylinder, sphere } = model;
+  const reach = box
+    ? dot({ x: Math.abs(x), y: Math.abs(y), z: Math.abs(z) }, half)
+    : cylinder
+      ? Math.abs(z) * half.z + Math.hypot(x, y) * half.x
+      : (sphere?.radius ?? 0);
+  return plusOf(point, normal, reach);
+}

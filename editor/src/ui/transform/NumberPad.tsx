@@ -1,0 +1,93 @@
+/** Keys for a number, large enough for fingers, with units and changes; the keyboard writes into the same field. */
+
+import { type FormEvent, useId, useState } from "react";
+import { amount, ANGLE_UNITS, isAngle, LENGTH_UNITS, show, type Unit } from "../../transform/amounts";
+import { Button } from "../kit/kit";
+
+interface NumberPadProps {
+  label: string;
+  /** m or rad. */
+  value: number;
+  unit: Unit;
+  /** What is typed is a change. */
+  by: boolean;
+  /** Absolute values make no sense here. */
+  onlyBy?: boolean;
+  onUnit: (unit: Unit) => void;
+  onBy: (by: boolean) => void;
+  onDone: (value: number) => void;
+  onClose: () => void;
+}
+
+const KEYS = ["7", "8", "9", "4", "5", "6", "1", "2", "3", "0", ".", "−"] as const;
+
+export function NumberPad({ label, value, unit, by, onlyBy = false, onUnit, onBy, onDone, onClose }: NumberPadProps) {
+  const id = useId();
+  const change = by || onlyBy;
+  const [text, setText] = useState("");
+  const next = text.trim() === "" ? null : amount(text, value, unit, change);
+  const wrong = text.trim() !== "" && next === null;
+  const submit = (event: FormEvent) => {
+    event.preventDefault();
+    if (next === null) return;
+    onDone(next);
+    onClose();
+  };
+  return (
+    <form className="pad" onSubmit={submit} aria-label={`Type ${label}`}>
+      <div className="pad-head">
+        <label htmlFor={id}>
+          {label} {change ? "by" : "to"}
+        </label>
+        <output className="quiet small" aria-live="polite">
+          {wrong ? "This is no amount." : `${show(value, unit)} → ${next === null ? "…" : show(next, unit)} ${unit}`}
+        </output>
+      </div>
+      <div className="pad-field">
+        <input
+          id={id}
+          // The device's own keyboard would cover what is moved.
+          inputMode="none"
+          autoComplete="off"
+          autoFocus
+          placeholder={change ? "0" : show(value, unit)}
+          value={text}
+          aria-invalid={wrong}
+          onChange={(event) => setText(event.target.value)}
+          onKeyDown={(event) => {
+            if (event.key === "Escape") onClose();
+          }}
+        />
+        <Button aria-label="Take the last sign away" onPress={() => setText(text.slice(0, -1))}>
+          ⌫
+        </Button>
+      </div>
+      <div className="pad-keys">
+        {KEYS.map((key) => (
+          <Button key={key} className="pad-key" excludeFromTabOrder aria-label={key === "−" ? "minus" : key === "." ? "point" : key} onPress={() => setText(text + (key === "−" ? "-" : key))}>
+            {key}
+          </Button>
+        ))}
+        <Button className="pad-key" excludeFromTabOrder aria-label="plus" onPress={() => setText(`${text}+`)}>
+          +
+        </Button>
+        {(isAngle(unit) ? ANGLE_UNITS : LENGTH_UNITS).map((each) => (
+          <Button key={each} className="pad-key" excludeFromTabOrder aria-pressed={each === unit} aria-label={`in ${each}`} onPress={() => onUnit(each)}>
+            {each}
+          </Button>
+        ))}
+      </div>
+      <div className="actions">
+        {!onlyBy && (
+          <Button aria-pressed={change} onPress={() => onBy(!by)}>
+            Change by
+          </Button>
+        )}
+        <Button onPress={onClose}>Cancel</Button>
+        <Button look="primary" type="submit" isDisabled={next === null}>
+          Set
+        </Button>
+      </div>
+    </form>
+  );
+}

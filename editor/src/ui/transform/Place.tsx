@@ -1,0 +1,263 @@
+/** Where the selected thing stands, and all ways to put it elsewhere: by hand in the view, by steps, by numbers. */
+
+import { useState } from "react";
+import { moving, place, step } from "../../commands/moving";
+import { keepGeneral } from "../../commands/viewstate";
+import type { GizmoMode } from "../../engine/gizmo/handles";
+import type { ObjectModel, Pose } from "../../protocol/types";
+import type { Selection, State } from "../../store/state";
+import { now, tell, useEditor } from "../../store/store";
+import { ANGLE_STEPS, type AngleUnit, LENGTH_STEPS, type LengthUnit, stepWords, type Unit } from "../../transform/amounts";
+import { angles, AXES, type Axis, type FrameName, moved, placedAt, poseFrom, poseText, same, squared, turned, turnedTo } from "../../transform/placing";
+import { measures } from "../../transform/sizes";
+import { notMovable, notSizable, type Target, targetOf } from "../../transform/target";
+import { type Snap, TOOL, type ToolSettings, toolSettings } from "../../transform/tool";
+import { relativeTo } from "../../viewmodel/frames";
+import { Amount, OneOf, Pick } from "../kit/fields";
+import { Button } from "../kit/kit";
+import { nameOf } from "../names";
+import { NumberPad } from "./NumberPad";
+import { Row } from "./Row";
+import { toolFrame, useGizmo } from "./useGizmo";
+import "./transform.css";
+
+const SNAPS: readonly (readonly [Snap, string])[] = [
+  ["none", "nothing"],
+  ["grid", "steps"],
+  ["surface", "surfaces"],
+  ["point", "other things"],
+];
+const keep = (change: Partial<ToolSettings>) => keepGeneral({ [TOOL]: { ...toolSettings(now()), ...change } });
+/** A step that is none of the table's. */
+const FREE = "free";
+
+export default function Place({ selection }: { selection: Selection }) {
+  const target = useTarget(selection);
+  if (!target) return <p className="quiet">It has no place of its own.</p>;
+  return <Placing key={selection.id} selection={selection} target={target} />;
+}
+
+/** The target, drawn anew when something about it changed. */
+function useTarget(selection: Selection): Target | null {
+  useEditor((state) => state.doc);
+  useEditor((state) => state.ui.draft);
+  useEditor((state) => state.types.byName);
+  return targetOf(now(), selection);
+}
+
+function Placing({ selection, target }: { selection: Selection; target: Target }) {
+  const settings = useEditor(toolSettings);
+  const whyNot = useEditor((state) => notMovable(state, target));
+  const whySize = useEditor((state) => notSizable(state, target));
+  const [wanted, setMode] = useState<GizmoMode>(target.moves ? "move" : "turn");
+  const [open, setOpen] = useState("");
+  const [before, setBefore] = useState<{ pose: Pose; model?: ObjectModel }>({ pose: target.pose, model: target.model });
+  const mode = wanted === "size" && !target.model ? "move" : wanted;
+  useGizmo(selection, mode);
+  const state = now();
+  const frame = toolFrame(state, target);
+  const why = mode === "size" ? whySize : whyNot;
+  const relative = settings.frame === "own" || settings.frame === "view";
+  const modes: [GizmoMode, string][] = [];
+  if (target.moves) modes.push(["move", "Move"]);
+  if (target.turns) modes.push(["turn", "Turn"]);
+  if (target.model) modes.push(["size", "Size"]);
+  const changed = !same(before.pose, target.pose) || JSON.stringify(before.model) !== JSON.stringify(target.model);
+  const settle = (pose: Pose, model?: ObjectModel) => void place(targetOf(now(), selection) ?? target, pose, model);
+  return (
+    <>
+      {modes.length > 1 && <OneOf label="What to do" quiet value={mode} choices={modes} onChange={(next) => (setMode(next), setOpen(""))} />}
+      {why && <p className="small quiet">{why}</p>}
+      <div className="axis-rows">
+        {mode === "size"
+          ? target.model && <Sizes model={target.model} target={target} settings={settings} why={why} open={open} onOpen={setOpen} />
+          : AXES.map((axis) => (
+              <Coordinate key={axis} {...{ axis, mode, target, settings, frame, relative, why, selection }} open={open === axis} onOpen={(on) => setOpen(on ? axis : "")} />
+            ))}
+      </div>
+      <div className="tool-settings">
+        <Steps settings={settings} turn={mode === "turn"} />
+        {mode !== "size" && <Pick label="Axes of" value={settings.frame} choices={framesOf(state, target)} onChange={(value) => keep({ frame: value as FrameName })} />}
+        <Pick label="Snap to" value={settings.snap} choices={SNAPS} onChange={(value) => keep({ snap: value as Snap })} />
+      </div>
+      <div className="tool-actions">
+        <Button
+          icon="undo"
+          isDisabled={!changed || why !== ""}
+          onPress={() => {
+            settle(before.pose, before.model !== target.model ? before.model : undefined);
+          }}
+        >
+          Put back
+        </Button>
+        {target.turns && (
+          <Button isDisabled={why !== ""} onPress={() => settle({ ...target.pose, orientation: squared(target.pose.orientation, frame.orientation) })}>
+            Square up
+          </Button>
+        )}
+        <Button onPress={() => void copy(target.pose)}>Copy</Button>
+        <Button isDisabled={why !== ""} onPress={() => void paste(target, settle)}>
+          Paste
+        </Button>
+        {changed && (
+          <Button look="plain" onPress={() => setBefore({ pose: target.pose, model: target.model })}>
+            Keep as start
+          </Button>
+        )}
+      </div>
+    </>
+  );
+}
+
+interface CoordinateProps {
+  axis: Axis;
+  mode: GizmoMode;
+  target: Target;
+  settings: ToolSettings;
+  frame: Pose;
+  /** The frame goes with the thing, or the viewer: only changes make sense. */
+  relative: boolean;
+  why: string;
+  selection: Selection;
+  open: boolean;
+  onOpen: (on: boolean) => void;
+}
+
+const ANGLES: Record<Axis, string> = { x: "Roll", y: "Pitch", z: "Yaw" };
+
+function Coordinate({ axis, mode, target, settings, frame, relative, why, selection, open, onOpen }: CoordinateProps) {
+  const turn = mode === "turn";
+  const seen = relativeTo(frame, target.pose);
+  const value = relative ? 0 : turn ? (angles(seen.orientation)[AXES.indexOf(axis)] ?? 0) : seen.position[axis];
+  const unit: Unit = turn ? settings.angle : settings.length;
+  const size = turn ? settings.angleStep : settings.lengthStep;
+  const label = turn && !relative ? ANGLES[axis] : axis.toUpperCase();
+  const by = (pose: Pose, amount: number) => (turn ? turned(pose, frame, axis, amount) : moved(pose, frame, axis, amount));
+  return (
+    <>
+      <Row
+        label={label}
+        value={value}
+        unit={unit}
+        step={size}
+        why={why}
+        open={open}
+        onOpen={() => (why ? tell("info", why) : onOpen(!open))}
+        onSteps={(steps) => {
+          const latest = targetOf(now(), selection);
+          if (latest) step(latest, by(latest.pose, steps * size));
+        }}
+      />
+      {open && (
+        <NumberPad
+          label={label}
+          value={value}
+          unit={unit}
+          by={settings.by}
+          onlyBy={relative}
+          onUnit={(next) => keep(turn ? { angle: next as AngleUnit } : { length: next as LengthUnit })}
+          onBy={(next) => keep({ by: next })}
+          onDone={(next) => {
+            const latest = targetOf(now(), selection) ?? target;
+            const pose = relative ? by(latest.pose, next) : turn ? turnedTo(latest.pose, frame, axis, next) : placedAt(latest.pose, frame, axis, next);
+            void place(latest, pose);
+          }}
+          onClose={() => onOpen(false)}
+        />
+      )}
+    </>
+  );
+}
+
+interface SizesProps {
+  model: ObjectModel;
+  target: Target;
+  settings: ToolSettings;
+  why: string;
+  open: string;
+  onOpen: (label: string) => void;
+}
+
+function Sizes({ model, target, settings, why, open, onOpen }: SizesProps) {
+  const latest = (label: string) => {
+    const at = targetOf(now(), { kind: "object", id: target.id }) ?? target;
+    return { at, measure: measures(at.model ?? model).find((each) => each.label === label) };
+  };
+  const put = (label: string, value: number) => {
+    const { at, measure } = latest(label);
+    if (measure) void place(at, at.pose, measure.put(value));
+  };
+  return measures(model).map(({ label, value }) => (
+    <div key={label}>
+      <Row
+        label={label}
+        value={value}
+        unit={settings.length}
+        step={settings.lengthStep}
+        why={why}
+        open={open === label}
+        onOpen={() => (why ? tell("info", why) : onOpen(open === label ? "" : label))}
+        onSteps={(steps) => {
+          const { at, measure } = latest(label);
+          if (!measure) return;
+          const one = moving(at);
+          one.to(at.pose, measure.put(measure.value + steps * settings.lengthStep));
+          one.settle();
+        }}
+      />
+      {open === label && (
+        <NumberPad label={label} value={value} unit={settings.length} by={settings.by} onUnit={(next) => keep({ length: next as LengthUnit })} onBy={(next) => keep({ by: next })} onDone={(next) => put(label, next)} onClose={() => onOpen("")} />
+      )}
+    </div>
+  ));
+}
+
+/** The step of the wheel: one of the table's, or any. */
+function Steps({ settings, turn }: { settings: ToolSettings; turn: boolean }) {
+  const [free, setFree] = useState(false);
+  const steps = turn ? ANGLE_STEPS : LENGTH_STEPS;
+  const value = turn ? settings.angleStep : settings.lengthStep;
+  const put = (next: number) => keep(turn ? { angleStep: next } : { lengthStep: next });
+  const known = steps.find(([each]) => Math.abs(each - value) < 1e-12);
+  const choices: [string, string][] = steps.map(([each, words]) => [String(each), words]);
+  choices.push([FREE, known ? "other…" : stepWords(value, turn ? "angle" : "length")]);
+  const worth = turn ? Math.PI / 180 : 0.001;
+  return (
+    <>
+      <Pick label="Step" value={known && !free ? String(known[0]) : FREE} choices={choices} onChange={(next) => (setFree(next === FREE), next === FREE || put(Number(next)))} />
+      {(free || !known) && <Amount label="Own step" unit={turn ? "°" : "mm"} digits={3} value={value / worth} least={0.001} most={10_000} onChange={(next) => put(next * worth)} />}
+    </>
+  );
+}
+
+function framesOf(state: State, target: Target): [FrameName, string][] {
+  const parent = target.kind === "point" ? state.doc?.points[target.id]?.parent : state.doc?.orientations[target.id]?.pointId;
+  const robots = Object.values(state.doc?.objects ?? {}).some((each) => each.type in state.types.robots);
+  const choices: [FrameName, string][] = [["world", "the world"]];
+  if (parent) choices.push(["parent", nameOf(state, parent)]);
+  if (robots) choices.push(["robot", "the robot's base"]);
+  choices.push(["own", "the thing itself"], ["view", "the view"]);
+  // A frame that was chosen elsewhere and is none here: it counts as the world's.
+  const { frame } = toolSettings(state);
+  if (!choices.some(([each]) => each === frame)) choices.push([frame, "the world (no parent)"]);
+  return choices;
+}
+
+async function copy(pose: Pose): Promise<void> {
+  const text = poseText(pose);
+  try {
+    await navigator.clipboard.writeText(text);
+    tell("info", "The pose is copied: position in m, and quaternion, in the world.");
+  } catch {
+    tell("info", text); // without https there is no clipboard: it can be marked and copied by hand
+  }
+}
+
+async function paste(target: Target, settle: (pose: Pose) => void): Promise<void> {
+  const text = await navigator.clipboard.readText().catch(() => null);
+  if (text === null) return tell("info", "This page may not read the clipboard: type the numbers instead.");
+  const pose = poseFrom(text, target.pose);
+  if (pose) settle(pose);
+  else tell("info", "What was copied is no pose: 3 numbers are a position in m, 4 a quaternion, 6 or 7 both.");
+}
+
