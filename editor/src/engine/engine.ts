@@ -7,7 +7,7 @@ import {
   Box3,
   Fog,
   GridHelper,
-  PCFSoftShadowMap,
+  PCFShadowMap,
   Scene,
   SRGBColorSpace,
   Vector3,
@@ -97,7 +97,7 @@ export class Engine {
     this.renderer.outputColorSpace = SRGBColorSpace;
     this.renderer.setPixelRatio(quality === "low" ? 1 : Math.min(2, window.devicePixelRatio));
     this.renderer.shadowMap.enabled = quality === "high";
-    this.renderer.shadowMap.type = PCFSoftShadowMap;
+    this.renderer.shadowMap.type = PCFShadowMap;
     this.renderer.shadowMap.autoUpdate = false;
     this.view = new View(canvas, () => this.draw());
     this.batches = new Batches(this.scene);
