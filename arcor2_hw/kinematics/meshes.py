@@ -1,58 +1,99 @@
-"""Meshes from files: bounded before they are parsed, checked after; STL, OBJ, PLY, OFF and COLLADA."""
+"""Meshes from files: bounded before they are parsed, checked after; STL, OBJ, PLY, OFF, COLLADA and binary glTF."""
 
 import io
+import json
 import re
-from typing import Final
+import struct
+from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from arcor2_hw.kinematics.errors import BadMesh
 from arcor2_hw.kinematics.shapes import Array, TriangleMesh, Triangles
 from arcor2_hw.kinematics.source import MAX_MESH
 
 MAX_TRIANGLES: Final = 1_000_000
-KINDS: Final = ("stl", "obj", "ply", "off", "dae")
+KINDS: Final = ("stl", "obj", "ply", "off", "dae", "glb")
+_MAGIC: Final = ((b"glTF", "glb"), (b"ply\n", "ply"), (b"ply\r", "ply"), (b"OFF", "off"))
 _UNIT: Final = re.compile(rb"<unit\b[^>]*?\bmeter\s*=\s*[\"']([^\"']*)[\"']")
+_UP: Final = re.compile(rb"<up_axis>\s*([XYZ])_UP\s*</up_axis>")
+_Z_FROM_UP: Final = {
+    "X": np.array(((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0))),
+    "Y": np.array(((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))),
+}
+"""Turns what has this axis up so that z is; COLLADA's X_UP has y to the left and z to the viewer."""
 _FARTHEST: Final = 1e4
 """m: a vertex farther away than that is a mistake in the units at least."""
+_NO_COLOUR: Final = ((102, 102, 102, 255),)
+"""What trimesh takes where a file says nothing of colours."""
 
 
-def read_mesh(content: bytes, name: str, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> TriangleMesh:
-    """Give the triangles of a mesh file, each axis multiplied by `scale`; `name` tells its kind by its ending.
+class Surface(NamedTuple):
+    """What a mesh looks like: vertices (n, 3) in m, triangles (m, 3), colours (n, 3) of red, green and blue in sRGB,
+    0..1, None where the file has none.
+    """
 
-    Of COLLADA the unit is heeded and the up axis is not, as robots' descriptions have come to expect.
+    vertices: Array
+    triangles: Triangles
+    colours: NDArray[np.float32] | None
+
+
+def kind_of(content: bytes, name: str) -> str:
+    """Tell of which kind a mesh is: by its first bytes, and where they say nothing by the ending of its name.
+
+    Raises BadMesh when neither says.
+    """
+    for magic, kind in _MAGIC:
+        if content.startswith(magic):
+            return kind
+    if b"<COLLADA" in content[:4096]:
+        return "dae"
+    ending = name.rsplit(".", 1)[-1].lower()
+    if ending in KINDS:
+        return ending
+    binary = len(content) >= 84 and len(content) == 84 + 50 * int(struct.unpack_from("<I", content, 80)[0])
+    if binary or content.startswith(b"solid"):
+        return "stl"
+    raise BadMesh(f"The mesh {name} is of no kind that is known: {', '.join(KINDS)}.")
+
+
+def read_mesh(
+    content: bytes, name: str, scale: tuple[float, float, float] = (1.0, 1.0, 1.0), *, upright: bool = True
+) -> TriangleMesh:
+    """Give the triangles of a mesh file, each axis multiplied by `scale`.
+
+    Of COLLADA the unit is heeded. upright: what COLLADA and glTF have up comes to be along z; without, axes stay as
+    they are in the file, as robots' descriptions have come to expect.
 
     Raises BadMesh naming the file: not of a known kind, larger than 64 MiB or a million triangles, damaged, empty,
     with numbers that are not finite or farther than 10 km.
     """
-    kind = name.rsplit(".", 1)[-1].lower()
-    if kind not in KINDS:
-        raise BadMesh(f"The mesh {name} is of no kind that is known: {', '.join(KINDS)}.")
-    if len(content) > MAX_MESH:
-        raise BadMesh(f"The mesh {name} has {len(content)} bytes; at most {MAX_MESH} are taken.")
-    unit = 1.0
-    if kind == "dae":
-        _refuse_entities(content, name)
-        unit = _unit(content, name)
+    kind = _looked_at(content, name, MAX_MESH)
     vertices, triangles = _parse(content, kind, name)
-    vertices = vertices * unit
-    if not len(triangles):
-        raise BadMesh(f"The mesh {name} has no triangles.")
-    if len(triangles) > MAX_TRIANGLES:
-        raise BadMesh(f"The mesh {name} has {len(triangles)} triangles; at most {MAX_TRIANGLES} are taken.")
-    if triangles.min() < 0 or triangles.max() >= len(vertices):
-        raise BadMesh(f"The mesh {name} has triangles of vertices that it does not have.")
-    used = vertices[np.unique(triangles)]
-    if not np.isfinite(used).all():
-        raise BadMesh(f"The mesh {name} has vertices that are not finite numbers.")
-    scaled = np.where(np.isfinite(vertices), vertices, 0.0) * np.asarray(scale)
-    if np.abs(used * np.asarray(scale)).max() > _FARTHEST:
-        raise BadMesh(f"The mesh {name} reaches farther than {_FARTHEST:g} m; are its units right?")
+    vertices = _checked(vertices * _unit(content, kind, name), triangles, name, MAX_TRIANGLES)
+    if upright:
+        vertices = _turned(vertices, content, kind)
+    scaled = vertices * np.asarray(scale)
+    _refuse_far(scaled[np.unique(triangles)], name)
     if np.prod(scale) < 0.0:  # mirrored: what was outside must not become inside
         triangles = triangles[:, ::-1]
     return TriangleMesh(np.ascontiguousarray(scaled), np.ascontiguousarray(triangles))
 
 
+def read_surface(content: bytes, name: str, *, upright: bool, most_bytes: int, most_triangles: int) -> Surface:
+    """Give what a mesh file looks like, with its colours; those of textures as they are at the vertices.
+
+    Bounds are the caller's, all else is as of `read_mesh`. Nothing that a file refers to is read. Raises BadMesh.
+    """
+    kind = _looked_at(content, name, most_bytes)
+    vertices, triangles, colours = _parse_coloured(content, kind, name)
+    vertices = _checked(vertices * _unit(content, kind, name), triangles, name, most_triangles)
+    _refuse_far(vertices[np.unique(triangles)], name)
+    return Surface(_turned(vertices, content, kind) if upright else vertices, triangles, colours)
+
+
+# ------------------------------------------------------------------------------------------------ reading
 def _parse(content: bytes, kind: str, name: str) -> tuple[Array, Triangles]:
     import trimesh
 
@@ -64,6 +105,99 @@ def _parse(content: bytes, kind: str, name: str) -> tuple[Array, Triangles]:
         raise BadMesh(f"The mesh {name} is damaged, or is none.", f"{type(error).__name__}: {error}") from error
 
 
+def _parse_coloured(content: bytes, kind: str, name: str) -> tuple[Array, Triangles, NDArray[np.float32] | None]:
+    import trimesh
+
+    try:
+        scene = trimesh.load_scene(io.BytesIO(content), file_type=kind, process=False)
+        meshes = [each for each in scene.dump() if isinstance(each, trimesh.Trimesh) and len(each.faces)]
+        parts = [_part(mesh, linear=kind == "glb") for mesh in meshes]
+    except Exception as error:
+        raise BadMesh(f"The mesh {name} is damaged, or is none.", f"{type(error).__name__}: {error}") from error
+    if not parts:
+        raise BadMesh(f"The mesh {name} has no triangles.")
+    starts = np.cumsum([0, *(len(vertices) for vertices, _, _ in parts)])
+    vertices = np.concatenate([vertices for vertices, _, _ in parts])
+    triangles = np.concatenate([faces + start for (_, faces, _), start in zip(parts, starts, strict=False)])
+    if all(colours is None for _, _, colours in parts):
+        return vertices, triangles, None
+    plain = np.full(3, 0.75, dtype=np.float32)
+    colours = [np.broadcast_to(plain if given is None else given, (len(at), 3)) for at, _, given in parts]
+    return vertices, triangles, np.concatenate(colours)
+
+
+def _part(mesh: Any, *, linear: bool) -> tuple[Array, Triangles, NDArray[np.float32] | None]:
+    """Give one mesh of a file: vertices, triangles, and colours (n, 3) or (3,)."""
+    vertices = np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3)
+    faces = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
+    visual, given = mesh.visual, None
+    if visual.kind == "texture":
+        given, linear = _textured(visual, linear)
+    elif visual.kind == "face" and len(visual.face_colors) == len(faces):
+        vertices = vertices[faces].reshape(-1, 3)
+        faces = np.arange(len(vertices), dtype=np.int64).reshape(-1, 3)
+        given = np.repeat(np.asarray(visual.face_colors), 3, axis=0)
+    elif visual.kind == "vertex" and len(visual.vertex_colors) == len(vertices):
+        given = np.asarray(visual.vertex_colors)
+    if given is None or not np.isfinite(given).all():
+        return vertices, faces, None
+    colours = np.clip(given[..., :3].astype(np.float32) / 255.0, 0.0, 1.0)
+    return vertices, faces, srgb(colours) if linear else colours
+
+
+def _textured(visual: Any, linear: bool) -> tuple[NDArray[Any] | None, bool]:
+    """Give the colours of a material, and whether they are linear, as glTF has its factors but not its textures."""
+    material = visual.material
+    image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
+    if image is not None and visual.uv is not None and len(visual.uv):
+        return np.asarray(visual.to_color().vertex_colors), False
+    if hasattr(material, "baseColorFactor") and material.baseColorFactor is None:
+        return None, linear
+    colour = np.asarray(material.main_color)
+    return (None if tuple(colour.tolist()) in _NO_COLOUR else colour), linear
+
+
+def srgb(linear: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Give colours in sRGB (IEC 61966-2-1), 0..1, of those that are linear."""
+    return np.where(linear <= 0.0031308, linear * 12.92, 1.055 * np.power(linear, 1 / 2.4) - 0.055).astype(np.float32)
+
+
+def linear_of(colours: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Give linear colours, 0..1, of those in sRGB."""
+    return np.where(colours <= 0.04045, colours / 12.92, np.power((colours + 0.055) / 1.055, 2.4)).astype(np.float32)
+
+
+# ------------------------------------------------------------------------------------------------ checks
+def _looked_at(content: bytes, name: str, most_bytes: int) -> str:
+    """Give the kind of a mesh that may be parsed."""
+    kind = kind_of(content, name)
+    if len(content) > most_bytes:
+        raise BadMesh(f"The mesh {name} has {len(content)} bytes; at most {most_bytes} are taken.")
+    if kind == "dae":
+        _refuse_entities(content, name)
+    if kind == "glb":
+        _refuse_compressed(content, name)
+    return kind
+
+
+def _checked(vertices: Array, triangles: Triangles, name: str, most_triangles: int) -> Array:
+    """Give the vertices, those that no triangle has made finite."""
+    if not len(triangles):
+        raise BadMesh(f"The mesh {name} has no triangles.")
+    if len(triangles) > most_triangles:
+        raise BadMesh(f"The mesh {name} has {len(triangles)} triangles; at most {most_triangles} are taken.")
+    if triangles.min() < 0 or triangles.max() >= len(vertices):
+        raise BadMesh(f"The mesh {name} has triangles of vertices that it does not have.")
+    if not np.isfinite(vertices[np.unique(triangles)]).all():
+        raise BadMesh(f"The mesh {name} has vertices that are not finite numbers.")
+    return np.where(np.isfinite(vertices), vertices, 0.0)
+
+
+def _refuse_far(used: Array, name: str) -> None:
+    if np.abs(used).max() > _FARTHEST:
+        raise BadMesh(f"The mesh {name} reaches farther than {_FARTHEST:g} m; are its units right?")
+
+
 def _refuse_entities(content: bytes, name: str) -> None:
     """Refuse what makes an XML parser read other files or grow without bounds."""
     if b"\0" in content[:4096]:
@@ -73,8 +207,22 @@ def _refuse_entities(content: bytes, name: str) -> None:
         raise BadMesh(f"The mesh {name} has a document type, which is refused.")
 
 
-def _unit(content: bytes, name: str) -> float:
-    """Give the metres of a COLLADA file's unit."""
+def _refuse_compressed(content: bytes, name: str) -> None:
+    """Refuse glTF of which nothing could be read, by what it needs."""
+    try:
+        (length,) = struct.unpack_from("<I", content, 12)
+        required = json.loads(content[20 : 20 + length]).get("extensionsRequired", [])
+    except (struct.error, ValueError, AttributeError, RecursionError):
+        return  # the parser says what is wrong
+    packed = {"KHR_draco_mesh_compression", "EXT_meshopt_compression"} & {str(each) for each in required}
+    if packed:
+        raise BadMesh(f"The mesh {name} is compressed ({', '.join(sorted(packed))}), which is not read.")
+
+
+def _unit(content: bytes, kind: str, name: str) -> float:
+    """Give the metres of a COLLADA file's unit, 1 for other kinds."""
+    if kind != "dae":
+        return 1.0
     found = _UNIT.search(content)
     try:
         unit = float(found[1]) if found else 1.0
@@ -83,3 +231,12 @@ def _unit(content: bytes, name: str) -> float:
     if not 1e-6 <= unit <= 1e3:
         raise BadMesh(f"The mesh {name} has a unit that is none.")
     return unit
+
+
+def _turned(vertices: Array, content: bytes, kind: str) -> Array:
+    """Give vertices with z up; glTF has y up, and so has COLLADA that says nothing."""
+    if kind not in ("dae", "glb"):
+        return vertices
+    found = _UP.search(content) if kind == "dae" else None
+    axis = found[1].decode() if found else "Y"
+    return vertices if axis == "Z" else vertices @ _Z_FROM_UP[axis].T

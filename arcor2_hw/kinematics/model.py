@@ -198,7 +198,7 @@ class RobotModel:
             if 0.0 in what.scale:
                 raise ZeroLength(f"{where}: the mesh {what.reference} is scaled to nothing.")
             path = self._package.locate(what.reference, self._beside)
-            mesh = read_mesh(self._package.read(path, MAX_MESH), path, what.scale)
+            mesh = read_mesh(self._package.read(path, MAX_MESH), path, what.scale, upright=False)
             return mesh if use == "exact" else shapes.hull_of(mesh.vertices, f"{where}: the mesh {path}")
         made = {"box": shapes.Box, "cylinder": shapes.Cylinder, "sphere": shapes.Sphere, "capsule": shapes.Capsule}
         shape: Shape = made[what.kind](*what.sizes)

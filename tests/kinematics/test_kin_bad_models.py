@@ -190,11 +190,11 @@ def test_meshes_are_found_however_they_are_named() -> None:
 
 
 # ------------------------------------------------------------------------------------------------ meshes
-@pytest.mark.parametrize("kind", ["stl", "obj", "ply", "off", "dae"])
+@pytest.mark.parametrize("kind", ["stl", "obj", "ply", "off", "dae", "glb"])
 def test_a_cube_is_read_from_every_kind_and_scaled(kind: str) -> None:
     exported = CUBE.export(file_type=kind)
     content = exported if isinstance(exported, bytes) else exported.encode()
-    mesh = read_mesh(content, f"cube.{kind}", (0.001, 0.001, 0.001))
+    mesh = read_mesh(content, f"cube.{kind}", (0.001, 0.001, 0.001), upright=False)
     assert np.allclose(mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0), (0.001, 0.002, 0.003), atol=1e-9)
     assert len(mesh.triangles) == 12
     mirrored = read_mesh(content, f"cube.{kind}", (1.0, 1.0, -1.0))
@@ -208,10 +208,37 @@ def test_the_unit_of_a_collada_file_is_heeded() -> None:
         ('<unit name="inch" meter="0.0254"/>', 0.0254),
         ("<unit meter='1e-3' name='mm'></unit>", 1e-3),
     ):
-        mesh = read_mesh(exported.replace("<up_axis>", f"{unit}<up_axis>").encode(), "cube.dae")
+        mesh = read_mesh(exported.replace("<up_axis>", f"{unit}<up_axis>").encode(), "cube.dae", upright=False)
         assert np.allclose(np.ptp(mesh.vertices, axis=0), np.array((1.0, 2.0, 3.0)) * factor)
     with pytest.raises(BadMesh, match=r"cube\.dae has a unit"):
         read_mesh(exported.replace("<up_axis>", '<unit meter="0"/><up_axis>').encode(), "cube.dae")
+
+
+@pytest.mark.parametrize(("up", "size"), [("X", (2, 3, 1)), ("Y", (1, 3, 2)), ("Z", (1, 2, 3)), ("", (1, 3, 2))])
+def test_what_is_up_in_a_collada_file_comes_to_be_up(up: str, size: tuple[int, int, int]) -> None:
+    exported = CUBE.export(file_type="dae").decode()
+    assert "<up_axis>Y_UP</up_axis>" in exported
+    said = exported.replace("<up_axis>Y_UP</up_axis>", f"<up_axis>{up}_UP</up_axis>" if up else "")
+    mesh = read_mesh(said.encode(), "cube.dae")
+    assert np.allclose(np.ptp(mesh.vertices, axis=0), size)
+    assert trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False).volume == pytest.approx(6.0)
+
+
+def test_binary_gltf_has_y_up_and_is_known_by_its_first_bytes() -> None:
+    mesh = read_mesh(CUBE.export(file_type="glb"), "a cube without an ending")
+    assert np.allclose(np.ptp(mesh.vertices, axis=0), (1, 3, 2))
+
+
+def test_a_mesh_is_known_by_its_content_whatever_it_is_called() -> None:
+    assert len(read_mesh(CUBE_STL, "asset_1").triangles) == 12
+    assert len(read_mesh(CUBE.export(file_type="ply"), "cube.stl").triangles) == 12
+
+
+def test_compressed_gltf_says_that_it_is_that() -> None:
+    content = b'{"asset":{"version":"2.0"},"extensionsRequired":["KHR_draco_mesh_compression"]}'
+    head = struct.pack("<4sIIII", b"glTF", 2, 20 + len(content), len(content), 0x4E4F534A)
+    with pytest.raises(BadMesh, match=r"c\.glb is compressed \(KHR_draco_mesh_compression\)"):
+        read_mesh(head + content, "c.glb")
 
 
 TRIANGLE = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
@@ -284,7 +311,7 @@ def damaged(content: bytes, chance: random.Random) -> bytes:
     return bytes(out)
 
 
-@pytest.mark.parametrize("kind", ["urdf", "zip", "stl", "obj", "ply", "off", "dae"])
+@pytest.mark.parametrize("kind", ["urdf", "zip", "stl", "obj", "ply", "off", "dae", "glb"])
 def test_whatever_is_damaged_is_read_or_refused_but_nothing_else(kind: str) -> None:
     chance = random.Random(kind)
     refused = 0
