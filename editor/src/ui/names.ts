@@ -23,6 +23,11 @@ export function nameOf(state: State, id: string): string {
   return named?.name ?? "";
 }
 
+/** A sentence of the server with names in place of ids. */
+export function withNames(state: State, text: string): string {
+  return text.replace(/\b[a-z]{3}_[0-9a-f]{32}\b/g, (id) => nameOf(state, id) || id);
+}
+
 /** What is selected when the thing with this id is tapped. */
 export function selectionOf(state: State, id: string): Selection | null {
   const { doc } = state;

@@ -8,12 +8,13 @@ import type { Batch, Instance } from "../batches";
 import type { PuckItem } from "../items";
 import { Thing, type Context } from "../thing";
 
-/** m: radius of a puck, height of the first one above its point, and from one to the next. */
+/** m: radius of a puck, of START and END, height of the first one above its point, and from one to the next. */
 const RADIUS = 0.018;
+const BORDER = 0.03;
 const FIRST = 0.035;
 const NEXT = 0.006;
 /** Pixels: the least radius on the screen. */
-const LEAST = 13;
+const LEAST = 9;
 /** So much it grows at most; by steps, since lines between pucks are drawn anew with each. */
 const MOST = 4;
 const up = new Vector3();
@@ -30,7 +31,7 @@ export class PuckThing extends Thing<PuckItem> {
     this.item = item;
     const edge = item.role === "action";
     this.batch = context.batches.of(edge ? "puck" : "start and end", () => [
-      (edge ? new CylinderGeometry(RADIUS, RADIUS, 0.01, 24) : new CylinderGeometry(0.03, 0.03, 0.014, 6)).rotateX(Math.PI / 2),
+      (edge ? new CylinderGeometry(RADIUS, RADIUS, 0.01, 24) : new CylinderGeometry(BORDER, BORDER, 0.014, 6)).rotateX(Math.PI / 2),
       new MeshLambertMaterial(),
     ]);
     this.instance = { id: item.id, frame: this.root, offset: new Matrix4(), color: context.palette.point };
@@ -67,7 +68,7 @@ export class PuckThing extends Thing<PuckItem> {
   }
 
   override resized(): boolean {
-    const wanted = (LEAST * this.context.metresPerPixel(this.anchor(up))) / RADIUS;
+    const wanted = (LEAST * this.context.metresPerPixel(this.anchor(up))) / (this.item.role === "action" ? RADIUS : BORDER);
     const grown = Math.min(MOST, Math.max(1, 2 ** (Math.ceil(Math.log2(wanted) * 2) / 2)));
     if (grown === this.grown) return false;
     this.grown = grown;

@@ -6,17 +6,17 @@ import { now, tell } from "../../store/store";
 import { Icon } from "../kit/icons";
 import type { Box, Way } from "./graph";
 
-export type FlowNodeType = Node<{ box: Box; running: boolean; breakpoint: boolean; trouble: string; target: boolean; from: boolean }, "box">;
+export type FlowNodeType = Node<{ box: Box; running: boolean; breakpoint: boolean; paused: boolean; trouble: string; target: boolean; from: boolean }, "box">;
 
 export function FlowNode({ data }: NodeProps<FlowNodeType>) {
-  const { box, running, breakpoint, trouble, target, from } = data;
+  const { box, running, paused, breakpoint, trouble, target, from } = data;
   return (
     <div className={`flow-node ${box.kind}`} data-running={running} data-target={target} data-from={from}>
       {box.kind !== "start" && <Handle type="target" position={Position.Top} className="flow-into" isConnectableStart={false} aria-hidden />}
       <div className="flow-name">
         {breakpoint && <span className="breakpoint-dot" data-on="true" role="img" aria-label="pauses before it" />}
         {box.name}
-        {running && <span className="tag good">runs</span>}
+        {running && <span className="tag good">{paused ? "next" : "runs"}</span>}
         {trouble && (
           <span className="flow-trouble" role="img" aria-label={trouble} title={trouble}>
             <Icon name="warn" size={16} />

@@ -13,6 +13,8 @@ import { graphOf } from "./graph";
 import "../program/program.css";
 import "./flow.css";
 
+/** Below what lies over the view. */
+const WHOLE = { padding: { top: "70px", right: "16px", bottom: "16px", left: "70px" }, maxZoom: 1.1 } as const;
 const NODE_TYPES = { box: FlowNode };
 const COLOURS = { always: "var(--ink-2)", true: "var(--good)", false: "var(--warn)", value: "var(--accent)" } as const;
 const DASHES = { always: undefined, true: "14 4", false: "3 5", value: "9 6" } as const;
@@ -30,6 +32,7 @@ function Flow() {
   const types = useEditor((state) => state.types);
   const running = useEditor((state) => state.program.running);
   const executing = useEditor((state) => state.live.executing);
+  const paused = useEditor((state) => state.program.state === "paused");
   const breakpoints = useEditor((state) => state.breakpoints);
   const selected = useEditor((state) => state.ui.selection?.id ?? "");
   const connecting = useEditor((state) => state.ui.connecting);
@@ -51,6 +54,7 @@ function Flow() {
       data: {
         box,
         running: running.includes(box.id) || executing === box.id,
+        paused,
         breakpoint: box.id in breakpoints,
         trouble: problems.find((each) => each.id === box.id)?.text ?? "",
         target: connecting !== null && doc !== null && cannotLead(doc, connecting.from, box.id, connecting.item) === "",
@@ -82,7 +86,7 @@ function Flow() {
   // A graph that grew is seen whole again.
   const size = graph.boxes.length;
   useEffect(() => {
-    void fitView({ padding: 0.1, maxZoom: 1.1 });
+    void fitView(WHOLE);
   }, [size, fitView]);
 
   return (
@@ -98,7 +102,7 @@ function Flow() {
         minZoom={0.15}
         maxZoom={2}
         fitView
-        fitViewOptions={{ padding: 0.1, maxZoom: 1.1 }}
+        fitViewOptions={WHOLE}
         isValidConnection={({ source, target }) => doc !== null && cannotLead(doc, source, target) === ""}
         onConnect={({ source, target, sourceHandle }) => {
           const why = notEditable(now(), "AddLogicItem");

@@ -4,7 +4,9 @@ import { Graph, layout } from "@dagrejs/dagre";
 import { conditionWords, END, outgoing, placeOf, resultsOf, START } from "../../program/logic";
 import type { OpenDocument, State } from "../../store/state";
 
-export const NODE = { width: 230, height: 92 };
+const NODE = { width: 230, height: 64 };
+/** What the places add at which steps begin. */
+const WAYS = 22;
 const BORDER = { width: 132, height: 68 };
 
 /** A place at which a step begins: any way on, or one for a value of the result. */
@@ -53,13 +55,16 @@ export function graphOf(doc: OpenDocument, types: State["types"]): { boxes: Box[
       kind: "action" as const,
       name: action.name,
       detail: `${doc.objects[action.type.split("/")[0] ?? ""]?.name ?? "?"} at ${doc.points[action.pointId]?.name ?? "?"}`,
-      ways: waysOf(doc, types, action.id),
-      ...NODE,
+      ...sized(waysOf(doc, types, action.id)),
     })),
     { id: END, kind: "end", name: "End", detail: "", ways: [], ...BORDER },
   ];
   const places = placed(bare, lines);
   return { boxes: bare.map((box) => ({ ...box, ...(places.get(box.id) ?? { x: 0, y: 0 }) })), lines };
+}
+
+function sized(ways: Way[]): Pick<Box, "ways" | "width" | "height"> {
+  return { ways, width: NODE.width, height: NODE.height + (ways.length > 0 ? WAYS : 0) };
 }
 
 /** The ways on that are still free. */
@@ -82,7 +87,7 @@ export function waysOf(doc: OpenDocument, types: State["types"], id: string): Wa
 
 function placed(boxes: Omit<Box, "x" | "y">[], lines: Line[]): Map<string, { x: number; y: number }> {
   const graph = new Graph({ multigraph: true });
-  graph.setGraph({ rankdir: "TB", nodesep: 36, ranksep: 56, marginx: 20, marginy: 20 });
+  graph.setGraph({ rankdir: "TB", nodesep: 36, ranksep: 44, marginx: 20, marginy: 20 });
   graph.setDefaultEdgeLabel(() => ({}));
   for (const { id, width, height } of boxes) graph.setNode(id, { width, height });
   for (const { id, from, to, words } of lines) {

@@ -40,7 +40,7 @@ function One({ actionId, wanted, parameter }: { actionId: string; wanted: Parame
   if (!doc) return null;
   const results = usable(doc, types, actionId, type);
   const simple = (SIMPLE as readonly string[]).includes(type);
-  const constants = Object.values(doc.parameters).filter((each) => each.type === type);
+  const constants = Object.values(doc.parameters).filter((each) => each.type === type && each.name !== "scene_id" && each.name !== "project_id");
   const sources: Source[] = type === "image" ? ["link"] : ["value", ...(results.length > 0 || chosen === "link" ? (["link"] as const) : []), ...(simple ? (["project_parameter"] as const) : [])];
   const set = (of: Source, json: string) => setParameter(actionId, { name, type: of === "value" ? type : of, value: json });
   const label = words(name);

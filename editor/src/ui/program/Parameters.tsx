@@ -17,6 +17,7 @@ export function Parameters() {
     <>
       <p className="quiet small">A value that several actions share, and that is changed in one place.</p>
       {Object.values(parameters ?? {})
+        .filter((each) => !OWN.has(each.name))
         .sort((a, b) => a.name.localeCompare(b.name))
         .map((each) => (
           <One key={each.id} id={each.id} />
@@ -26,6 +27,9 @@ export function Parameters() {
     </>
   );
 }
+
+/** The server keeps these itself, for scripts. */
+const OWN = new Set(["scene_id", "project_id"]);
 
 function One({ id }: { id: string }) {
   const state = useEditor((each) => each);

@@ -5,7 +5,7 @@ import type { Problem } from "../../program/problems";
 import { theEngine } from "../../session/engine";
 import { now, select, setUi, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
-import { selectionOf } from "../names";
+import { selectionOf, withNames } from "../names";
 
 export function Problems({ problems }: { problems: Problem[] }) {
   const known = useEditor((state) => Object.values(state.doc?.objects ?? {}).every((each) => each.type in state.types.actions || !(each.type in state.types.byName)));
@@ -33,7 +33,7 @@ export function Problems({ problems }: { problems: Problem[] }) {
             <Icon name={each.level === "error" ? "warn" : "info"} />
             <span>
               <span className="hidden-but-read">{each.level === "error" ? "Must be cured: " : "Should be looked at: "}</span>
-              {each.text}
+              {withNames(now(), each.text)}
             </span>
           </AriaButton>
         </li>

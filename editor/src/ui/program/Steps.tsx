@@ -10,7 +10,7 @@ import type { OpenDocument } from "../../store/state";
 import { theEngine } from "../../session/engine";
 import { select, setUi, tell, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
-import { nameOf } from "../names";
+import { nameOf, withNames } from "../names";
 
 export function Steps({ problems }: { problems: Problem[] }) {
   const state = useEditor((each) => each);
@@ -53,7 +53,7 @@ export function Steps({ problems }: { problems: Problem[] }) {
               {running && <span className="tag good">runs now</span>}
               {problem && (
                 <span className={`tag ${problem.level === "error" ? "bad" : "warn"}`}>
-                  <Icon name="warn" size={14} /> {problem.text}
+                  <Icon name="warn" size={14} /> {withNames(state, problem.text)}
                 </span>
               )}
             </AriaButton>

@@ -4,7 +4,7 @@ import { theEngine } from "../../session/engine";
 import { now, select, setUi, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
-import { nameOf, selectionOf } from "../names";
+import { nameOf, selectionOf, withNames } from "../names";
 
 export function Exception() {
   const exception = useEditor((state) => state.program.exception);
@@ -22,7 +22,7 @@ export function Exception() {
       <p>
         <Icon name="warn" /> <strong>{name ? `It failed in ${name}` : "It failed"}</strong>
       </p>
-      <p>{exception.message}</p>
+      <p>{withNames(now(), exception.message)}</p>
       {name && (
         <Button icon="zoom" onPress={show}>
           Show {name}

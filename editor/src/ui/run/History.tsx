@@ -35,6 +35,7 @@ export function History() {
 
 function told(run: Run): string {
   const took = run.ended ? (Date.parse(run.ended) - Date.parse(run.started)) / 1000 : undefined;
+  if (run.end === "running") return run.start_paused ? "started paused" : "";
   const parts = [`${run.actions} ${run.actions === 1 ? "action" : "actions"}`];
   if (took !== undefined) parts.push(seconds(took));
   if (run.stopped_by) parts.push(`stopped by ${run.stopped_by}`);

@@ -32,7 +32,7 @@ export default function RunPanel() {
     <>
       <p className="run-state" role="status">
         <strong>{busy && !runs ? "Building…" : (STATES[program.state] ?? program.state)}</strong>
-        {program.running.length > 0 && <span> {program.running.map((id) => nameOf(state, id)).join(", ")}</span>}
+        {program.running.length > 0 && <span> {program.state === "paused" && "before "}{program.running.map((id) => nameOf(state, id)).join(", ")}</span>}
       </p>
       {runs ? (
         <div className="row">

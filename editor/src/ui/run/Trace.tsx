@@ -14,6 +14,7 @@ const SHOWN = 30;
 
 export function Trace({ onChoose }: { onChoose: (actionId: string) => void }) {
   const trace = useEditor((state) => state.program.trace);
+  const paused = useEditor((state) => state.program.state === "paused");
   const [all, setAll] = useState(false);
   const [open, setOpen] = useState(0);
   if (trace.length === 0) return null;
@@ -27,7 +28,7 @@ export function Trace({ onChoose }: { onChoose: (actionId: string) => void }) {
           <li key={entry.number} data-failed={entry.error !== undefined} data-running={entry.duration === undefined}>
             <AriaButton className="trace-row" aria-expanded={open === entry.number} onPress={() => setOpen(open === entry.number ? 0 : entry.number)}>
               <span className="trace-name">{entry.name || "an action"}</span>
-              <span className="quiet small">{entry.error !== undefined ? "failed" : entry.duration === undefined ? "runs now" : seconds(entry.duration)}</span>
+              <span className="quiet small">{entry.error !== undefined ? "failed" : entry.duration === undefined ? (paused ? "waits" : "runs now") : seconds(entry.duration)}</span>
             </AriaButton>
             {open === entry.number && <Detail entry={entry} onChoose={onChoose} />}
           </li>
