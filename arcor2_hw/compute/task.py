@@ -18,6 +18,7 @@ class Room(enum.StrEnum):
 
     KINEMATICS = "kinematics"
     CALIBRATION = "calibration"
+    MESHES = "meshes"
 
 
 class Task(Struct, Generic[R], frozen=True, tag=True):

@@ -2,5 +2,6 @@
 
 from arcor2_hw.compute.calibration_tasks import CalibrationTask
 from arcor2_hw.compute.kinematics_tasks import KinematicsTask
+from arcor2_hw.compute.preparing_tasks import PreparingTask
 
-AnyTask = CalibrationTask | KinematicsTask
+AnyTask = CalibrationTask | KinematicsTask | PreparingTask

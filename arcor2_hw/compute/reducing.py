@@ -1,0 +1,128 @@
+"""Fewer triangles of the same looks: corners joined, surfaces simplified by their quadric error; normals with creases."""
+
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from arcor2_hw.kinematics.meshes import Surface, linear_of
+from arcor2_hw.kinematics.shapes import Array, Triangles
+
+MOST: Final = 40_000
+"""Triangles of one mesh of half a metre or more; of a smaller one as many fewer as it is smaller."""
+FEWEST: Final = 4_000
+"""Triangles that a mesh of any size may have."""
+_FULL_SIZE: Final = 0.5
+"""m, from corner to corner of the box around it."""
+CREASE: Final = np.cos(np.radians(40.0))
+"""Triangles that meet at less than this angle look like one round surface."""
+_MANY: Final = 48
+"""Triangles around one vertex beyond which it is an end of something, as of a cone or a disc: no round surface."""
+
+
+class Drawn(NamedTuple):
+    """What a graphics card draws: positions (n, 3) in m, normals (n, 3) in 127ths, colours (n, 4) linear in 65535ths
+    or None, triangles (m, 3).
+    """
+
+    positions: NDArray[np.float32]
+    normals: NDArray[np.int8]
+    colours: NDArray[np.uint16] | None
+    triangles: NDArray[np.uint32]
+
+
+def budget(vertices: Array) -> int:
+    """Give how many triangles a mesh may have for its size."""
+    size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    return max(FEWEST, min(MOST, round(MOST * size / _FULL_SIZE)))
+
+
+def reduced(surface: Surface, most: int) -> Surface:
+    """Give a surface with its corners joined, and with some `most` triangles where it has more.
+
+    Empty where all that it has is without extent.
+    """
+    vertices, triangles, colours = _joined(surface)
+    if len(triangles) > most:
+        vertices, triangles, colours = _simplified(Surface(vertices, triangles, colours), most)
+    corners = vertices[triangles]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return Surface(vertices, triangles[area > 0.0], colours)
+
+
+def _joined(surface: Surface) -> Surface:
+    """Let triangles that meet share their vertices, where the colour is the same on both sides."""
+    used, inverse = np.unique(surface.triangles, return_inverse=True)
+    triangles = inverse.reshape(-1, 3)
+    told = np.ascontiguousarray(surface.vertices[used], dtype=np.float32) + np.float32(0.0)  # no minus zeros
+    if surface.colours is not None:
+        told = np.hstack((told, np.round(surface.colours[used] * 255.0).astype(np.float32)))
+    rows = np.ascontiguousarray(told).view(f"V{told.shape[1] * 4}").ravel()
+    _, first, joined = np.unique(rows, return_index=True, return_inverse=True)
+    triangles = joined[triangles].reshape(-1, 3)
+    a, b, c = triangles.T
+    triangles = triangles[(a != b) & (b != c) & (c != a)]
+    colours = None if surface.colours is None else surface.colours[used][first]
+    return Surface(surface.vertices[used][first], triangles, colours)
+
+
+def _simplified(surface: Surface, most: int) -> Surface:
+    import fast_simplification
+
+    # Around the middle, and of size 1: what simplifies is told of no units.
+    middle, size = surface.vertices.mean(axis=0), float(np.ptp(surface.vertices, axis=0).max())
+    points = np.ascontiguousarray((surface.vertices - middle) / size)
+    faces = np.ascontiguousarray(surface.triangles, dtype=np.int32)
+    vertices, triangles, collapses = fast_simplification.simplify(
+        points, faces, target_count=most, return_collapses=True
+    )
+    triangles = np.asarray(triangles, dtype=np.int64)
+    colours = None
+    if surface.colours is not None:
+        vertices, triangles, became = fast_simplification.replay_simplification(points, faces, collapses)
+        triangles = np.asarray(triangles, dtype=np.int64)
+        colours = np.full((len(vertices), 3), 0.75, dtype=np.float32)
+        kept = (became >= 0) & (became < len(vertices))
+        colours[became[kept]] = surface.colours[kept]
+    return Surface(np.asarray(vertices, dtype=np.float64) * size + middle, triangles, colours)
+
+
+# ------------------------------------------------------------------------------------------------ normals
+def drawn(surface: Surface) -> Drawn:
+    """Give a surface with normals: round where triangles meet at small angles, with edges where they do not."""
+    normals = np.round(_corner_normals(surface.vertices, surface.triangles) * 127.0).astype(np.int8)
+    corners = surface.triangles.ravel()
+    key = (corners.astype(np.int64) << 24) | (normals.astype(np.int64) & 0xFF) @ np.array((1 << 16, 1 << 8, 1))
+    _, first, index = np.unique(key, return_index=True, return_inverse=True)
+    at = corners[first]
+    colours = None
+    if surface.colours is not None:
+        colours = np.full((len(at), 4), 65535, dtype=np.uint16)
+        colours[:, :3] = np.round(linear_of(surface.colours[at]) * 65535.0)
+    return Drawn(
+        surface.vertices[at].astype(np.float32), normals[first], colours, index.reshape(-1, 3).astype(np.uint32)
+    )
+
+
+def _corner_normals(vertices: Array, triangles: Triangles) -> Array:
+    """Give the normal at each corner of each triangle, (3 m, 3): of the triangles around, by area, up to a crease."""
+    corners = vertices[triangles]
+    weighted = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    unit = weighted / np.linalg.norm(weighted, axis=1, keepdims=True)
+    order = np.argsort(triangles.ravel(), kind="stable")
+    counts = np.bincount(triangles.ravel())
+    counts = counts[counts > 0]
+    starts = np.cumsum(counts) - counts
+    # Corners in the order of their vertices, each with all corners of the same vertex.
+    around = np.repeat(np.where(counts > _MANY, 1, counts), counts)
+    begins = np.where(np.repeat(counts > _MANY, counts), np.arange(len(order)), np.repeat(starts, counts))
+    one = np.repeat(np.arange(len(order)), around)
+    other = np.arange(len(one)) - np.repeat(np.cumsum(around) - around, around) + np.repeat(begins, around)
+    face, beside = order[one] // 3, order[other] // 3
+    round_there = np.einsum("ij,ij->i", unit[face], unit[beside]) >= CREASE
+    one, beside = one[round_there], beside[round_there]
+    sums = np.stack([np.bincount(one, weighted[beside, axis], len(order)) for axis in range(3)], axis=1)
+    out = np.empty_like(sums)
+    out[order] = sums
+    length = np.linalg.norm(out, axis=1, keepdims=True)
+    return np.where(length > 0.0, out / np.where(length > 0.0, length, 1.0), np.repeat(unit, 3, axis=0))
