@@ -38,7 +38,10 @@ class Robot(GenericWithPose):
         self._move_lock = threading.Lock()
 
     def surround(self, surroundings: Surroundings) -> None:
-        """Take what tells of the things around the robot; called once, between `__init__` and `connect`."""
+        """Take what tells of the things around the robot; called once, between `__init__` and `connect`.
+
+        Control of nothing is taken then: what takes time to be read, such as a model, is read here.
+        """
         self._around = surroundings
 
     @property

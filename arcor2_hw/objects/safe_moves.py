@@ -5,6 +5,7 @@ What computes, Pinocchio and coal, comes with the extra `kinematics` and is impo
 
 import contextlib
 import dataclasses
+import logging
 import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -34,8 +35,12 @@ RESOLUTION: Final = 0.01
 """m that no point of the robot travels farther between two configurations that are looked at."""
 WITHIN: Final = 2.0
 """s that is searched for a way."""
+STANDS: Final = 0.01
+"""rad, or m, by which a joint may have moved since its way was planned."""
 TCP_RAMP: Final = 4.0
 """1/s: acceleration along a line, by the speed along it."""
+
+log = logging.getLogger(__name__)
 
 Stopped = Callable[[], bool]
 T = TypeVar("T")
@@ -53,6 +58,13 @@ class Way:
     speed: float
     line: bool
     _timed: "Callable[[float | None], Timed]" = dataclasses.field(repr=False)
+
+    def require_begin(self, name: str, now: Sequence[Joint]) -> None:
+        """Raise Refused unless the robot `name` still stands where the way begins: planning takes time."""
+        present = {joint.name: joint.value for joint in now}
+        for joint in self.waypoints[0]:
+            if abs(present[joint.name] - joint.value) > STANDS:
+                raise Refused(f"{name} was moved while its way was planned")
 
     def timed(self, tcp_speed: float | None = None) -> "Timed":
         """Give joint values and velocities by time, for a controller that is led by these: see `Timed.sampled`.
@@ -75,6 +87,19 @@ class SafeMoves:
         self._robot = robot
         self._settings = settings or (lambda: _fields(robot))
         self._here = threading.local()
+
+    def prepare(self) -> None:
+        """Import and read what is needed, on this thread; what cannot be is told to who needs it first.
+
+        To be called before control is taken of anything: for some tenths of a second nothing else of this process runs,
+        and no watchdog is fed.
+        """
+        try:
+            from arcor2_hw.kinematics import planning  # noqa: F401
+
+            self._world([], 0.0, alone=True)
+        except (ImportError, Arcor2Error) as error:
+            log.info("%s: no safe moves: %s", self._robot.name, error)
 
     # -------------------------------------------------------------------------------- kinematics
     def end_effectors(self) -> list[str]:
@@ -229,13 +254,15 @@ class SafeMoves:
         except (GoalInCollision, OnlyInCollision, StartInCollision):
             return ask(self._world(now, 0.0))
 
-    def _world(self, now: Sequence[Joint], margin: float) -> "CollisionWorld":
-        """Give the robot in its joints among what stands around it now."""
+    def _world(self, now: Sequence[Joint], margin: float, *, alone: bool = False) -> "CollisionWorld":
+        """Give the robot in its joints among what stands around it now, or `alone`."""
         from arcor2_hw.kinematics.world import CollisionWorld
 
         robot, tools = self._robot, self._tools()
         world = CollisionWorld(margin=margin)
         world.add_robot(robot.name, tools.model, robot.pose, self._q(now))
+        if alone:
+            return world
         for other, joints in robot.surroundings.robots():
             model = tools.other(other)
             if model is not None:
@@ -270,24 +297,23 @@ class SafeMoves:
             raise self._robot.KinematicsException(str(error), error.detail or error.code) from error
 
     def _tools(self) -> "_Tools":
-        """Give what the present thread computes with, made anew when the settings have changed."""
-        settings = dict(self._settings())
+        """Give what the present thread computes with, made anew when settings, or the model's file, have changed."""
+        settings, package = dict(self._settings()), _package(self._robot)
         found: _Tools | None = getattr(self._here, "tools", None)
-        if found is None or found.settings != settings:
-            found = self._here.tools = _Tools(self._robot, settings)
+        if found is None or found.made_of != (settings, package):
+            found = self._here.tools = _Tools(self._robot, settings, package)
         return found
 
 
 class _Tools:
     """Model, arms and meshes for one thread."""
 
-    def __init__(self, robot: Robot, settings: dict[str, object]) -> None:
-        self.settings = settings
+    def __init__(self, robot: Robot, settings: dict[str, object], package: Path | None) -> None:
+        self.made_of = settings, package
         self._surroundings: Surroundings = robot.surroundings
-        model = self._load(robot, settings)
-        if model is None:
+        if package is None:
             raise Refused(f"{robot.name} has no model (URDF) from which anything could be computed")
-        self.model = model
+        self.model = _load(robot, settings, package)
         self.model.name = robot.name
         self._arms: dict[str, Arm] = {}
         self._inverse: dict[str, InverseKinematics] = {}
@@ -311,7 +337,9 @@ class _Tools:
         settings = _fields(robot)
         known = self._others.get(robot.name)
         if known is None or known[0] != settings:
-            known = self._others[robot.name] = settings, self._load(robot, settings)
+            package = _package(robot)
+            model = None if package is None else _load(robot, settings, package)
+            known = self._others[robot.name] = settings, model
         return known[1]
 
     def shape(self, obstacle: Obstacle) -> Any:
@@ -331,36 +359,35 @@ class _Tools:
                 self._meshes[file] = read_mesh(opened.read(MAX_MESH + 1), model.asset_id)
         return shapes.of_model(model, self._meshes[file])
 
-    def _load(self, robot: Robot, settings: Mapping[str, object]) -> "RobotModel | None":
-        try:
-            from arcor2_hw.kinematics.model import RobotModel
-        except ImportError as error:
-            raise Refused(
-                f"{robot.name}: nothing can be computed here: install arcor2-hw[kinematics]", str(error)
-            ) from error
-        package = self._package(robot)
-        if package is None:
-            return None
-        try:
-            return RobotModel.load(package, settings)
-        except Arcor2Error as error:
-            raise type(error)(f"The model of {robot.name} cannot be used: {error}", error.detail) from error
 
-    def _package(self, robot: Robot) -> Path | None:
-        for base in type(robot).__mro__:
-            name: str | None = base.__dict__.get("urdf_package_name")
-            if name is None:
-                continue
-            uploaded = self._surroundings.asset(name)
-            if uploaded is not None and uploaded.is_file():
-                return uploaded
-            module = sys.modules.get(base.__module__)
-            beside = Path(module.__file__).parent / "urdf" if module is not None and module.__file__ else None
-            for path in () if beside is None else (beside / name.removesuffix(".zip"), beside / name):
-                if path.exists():
-                    return path
+def _load(robot: Robot, settings: Mapping[str, object], package: Path) -> "RobotModel":
+    try:
+        from arcor2_hw.kinematics.model import RobotModel
+    except ImportError as error:
+        raise Refused(
+            f"{robot.name}: nothing can be computed here: install arcor2-hw[kinematics]", str(error)
+        ) from error
+    try:
+        return RobotModel.load(package, settings)
+    except Arcor2Error as error:
+        raise type(error)(f"The model of {robot.name} cannot be used: {error}", error.detail) from error
+
+
+def _package(robot: Robot) -> Path | None:
+    """Give the file or folder with a robot's URDF: uploaded, or beside the class that names it."""
+    for base in type(robot).__mro__:
+        name: str | None = base.__dict__.get("urdf_package_name")
+        if name is None:
+            continue
+        uploaded = robot.surroundings.asset(name)
+        if uploaded is not None and uploaded.is_file():
+            return uploaded
+        module = sys.modules.get(base.__module__)
+        if module is None or not module.__file__:
             return None
-        return None
+        beside = Path(module.__file__).parent / "urdf"
+        return next((path for path in (beside / name.removesuffix(".zip"), beside / name) if path.exists()), None)
+    return None
 
 
 def _fields(robot: Robot) -> dict[str, object]:

@@ -12,6 +12,7 @@ from arcor2_hw.exceptions import Cancelled, InvalidData, NotFound, OutOfRange, R
 from arcor2_hw.objects.robot import Robot
 from arcor2_hw.objects.safe_moves import SafeMoves, Stopped, Way
 from arcor2_hw.objects.settings import Settings
+from arcor2_hw.objects.surroundings import Surroundings
 
 SLACK: Final = 1e-4
 """rad, or m, that a joint may be beyond its limit: what rounding adds to one that stands at it."""
@@ -32,6 +33,11 @@ class UrdfRobot(Robot):
         super().__init__(obj_id, name, pose, settings)
         self.safe_moves = SafeMoves(self)
         self._stops = 0
+
+    def surround(self, surroundings: Surroundings) -> None:
+        """Take what tells of the things around the robot, and read its model."""
+        super().surround(surroundings)
+        self.safe_moves.prepare()
 
     # -------------------------------------------------------------------------------- to be written for each robot
     @abc.abstractmethod
@@ -125,6 +131,7 @@ class UrdfRobot(Robot):
             way = plan(self.robot_joints(), lambda: self._stops != stops)
             if self._stops != stops:
                 raise Cancelled(f"a move of {self.name} was stopped before it began")
+            way.require_begin(self.name, self.robot_joints())
             self.follow(way)
 
     @contextlib.contextmanager

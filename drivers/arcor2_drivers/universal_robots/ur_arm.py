@@ -10,7 +10,7 @@ from typing import ClassVar, Final
 
 from arcor2_hw.data.device import LossReaction
 from arcor2_hw.data.geometry import Pose
-from arcor2_hw.data.robot import Control, Joint, Mode, MoveEnd, MoveResult
+from arcor2_hw.data.robot import Control, Mode, MoveEnd, MoveResult
 from arcor2_hw.exceptions import (
     Cancelled,
     DeviceError,
@@ -170,21 +170,6 @@ class UrArm(UrObserved):
         if self._teaching:
             raise Refused(f"{self.name} is in hand teaching mode")
 
-    def move_to_pose(
-        self, end_effector_id: str, target_pose: Pose, speed: float, safe: bool = True, linear: bool = True
-    ) -> None:
-        """Move the TCP to a pose in the world: in a line, or to the joints of the controller's own kinematics.
-
-        `safe` asks for a path without collisions: those are not known here, what checks them is the hub.
-        Raises KinematicsException, OutOfRange, Refused, NotInControl, SafetyStop, Cancelled, DeviceTimeout.
-        """
-        self._check_end_effector(end_effector_id)
-        self._move_pose(target_pose, linear, speed, 1.0, self._stops)
-
-    def move_to_joints(self, target_joints: list[Joint], speed: float, safe: bool = True) -> None:
-        """Move to joint values, all joints arriving together."""
-        self._move_joints(self._checked_joints(target_joints), speed, 1.0, self._stops)
-
     def _move_pose(self, target: Pose, linear: bool, speed: float, acceleration: float, stops: int) -> MoveResult:
         """Move; `stops` is the count of stops when the caller was called: one more since then, and nothing starts."""
         within(f"{self.name}: speed", speed, 0.001, 1.0)
@@ -196,21 +181,7 @@ class UrArm(UrObserved):
             q = self._solve(session, vector, list(start.q))
             if not linear:
                 return self._run_joints(session, start, q, speed, acceleration, stops)
-            tcp_speed = min(speed * self._ur.max_tcp_speed, self._tcp_speed_cap())
-            ramp = acceleration * self._ur.tcp_acceleration
-            here, there = from_vector(start.tcp), from_vector(vector)
-            distance = here.position.distance_to(there.position)
-            budget = linear_budget(distance, here.orientation.angle_to(there.orientation), tcp_speed, ramp)
-
-            return self._run(
-                session,
-                "a linear move",
-                ("moveL", vector, tcp_speed, ramp, True),
-                budget,
-                at_pose(vector),
-                tcp_speed / self._ur.max_tcp_speed,
-                stops,
-            )
+            return self._run_line(session, start, vector, speed, acceleration, stops)
 
     def _move_joints(self, q: list[float], speed: float, acceleration: float, stops: int) -> MoveResult:
         within(f"{self.name}: speed", speed, 0.001, 1.0)
@@ -218,6 +189,24 @@ class UrArm(UrObserved):
         with self._moving():
             session = self._controlled()
             return self._run_joints(session, self._observer.sample(), q, speed, acceleration, stops)
+
+    def _run_line(
+        self, session: ControlSession, start: Sample, vector: list[float], speed: float, acceleration: float, stops: int
+    ) -> MoveResult:
+        tcp_speed = min(speed * self._ur.max_tcp_speed, self._tcp_speed_cap())
+        ramp = acceleration * self._ur.tcp_acceleration
+        here, there = from_vector(start.tcp), from_vector(vector)
+        distance = here.position.distance_to(there.position)
+        budget = linear_budget(distance, here.orientation.angle_to(there.orientation), tcp_speed, ramp)
+        return self._run(
+            session,
+            "a linear move",
+            ("moveL", vector, tcp_speed, ramp, True),
+            budget,
+            at_pose(vector),
+            tcp_speed / self._ur.max_tcp_speed,
+            stops,
+        )
 
     def _run_joints(
         self, session: ControlSession, start: Sample, q: list[float], speed: float, acceleration: float, stops: int
@@ -354,29 +343,6 @@ class UrArm(UrObserved):
             time.sleep(POLL)
 
     # -------------------------------------------------------------------------------- kinematics of the controller
-    def inverse_kinematics(
-        self,
-        end_effector_id: str,
-        pose: Pose,
-        start_joints: list[Joint] | None = None,
-        avoid_collisions: bool = True,
-    ) -> list[Joint]:
-        """Give joints that reach a pose in the world, nearest to `start_joints`, by the controller's calibration.
-
-        Collisions are not known here. Raises KinematicsException when no joints reach it; needs control.
-        """
-        self._check_end_effector(end_effector_id)
-        near = self._checked_joints(start_joints) if start_joints else list(self._observer.sample().q)
-        q = self._solve(self._controlled(), self._controller_vector(pose), near)
-        return [Joint(name, value) for name, value in zip(JOINTS, q, strict=True)]
-
-    def forward_kinematics(self, end_effector_id: str, joints: list[Joint]) -> Pose:
-        """Give the TCP in the world for joints, by the controller's calibration; needs control."""
-        self._check_end_effector(end_effector_id)
-        q, tcp = self._checked_joints(joints), to_vector(self._tool.tcp)
-        vector = self._controlled().ask("forward kinematics", "getForwardKinematics", q, tcp)
-        return world_from_base(self._pose) * from_vector(vector)
-
     def _solve(self, session: ControlSession, vector: list[float], near: list[float]) -> list[float]:
         # Asked first: without a solution get_inverse_kin ends the control program with an error.
         q: list[float] = []

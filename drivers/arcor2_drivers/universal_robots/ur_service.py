@@ -16,7 +16,7 @@ from .observer import Sample
 from .program import Tool
 from .settings import within
 from .states import MODE_IDLE, MODE_RUNNING, safety_of
-from .ur_arm import UrArm
+from .ur_moves import UrMoving
 from .ur_observed import JOINTS
 
 POWER_WITHIN: Final = 20.0
@@ -31,7 +31,7 @@ MOST_INERTIA: Final = 133.0
 log = logging.getLogger(__name__)
 
 
-class UrServiced(UrArm):
+class UrServiced(UrMoving):
     """A Universal Robots arm and the people around it."""
 
     _ABSTRACT = True

@@ -1,0 +1,166 @@
+"""Safe moves of the UR: around what the scene says stands there, driven by the controller, or refused."""
+
+import itertools
+import math
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import arcor2_drivers
+from arcor2_drivers.universal_robots.ur5e import UR5e
+from arcor2_hw.data import object_type
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.robot import Joint
+from arcor2_hw.exceptions import Cancelled, NotInControl
+from arcor2_hw.kinematics.model import RobotModel
+from arcor2_hw.kinematics.shapes import Box
+from arcor2_hw.kinematics.world import CollisionWorld
+from arcor2_hw.objects import Robot
+from arcor2_hw.objects.surroundings import Obstacle
+
+from .conftest import HOME, Doing, FakeUr, moving
+
+URDF = Path(next(iter(arcor2_drivers.__path__))) / "universal_robots" / "urdf" / "ur5e"
+BESIDE = [1.6, *HOME[1:]]
+
+
+class Around:
+    """Boxes, edges along the axes of the world."""
+
+    def __init__(self) -> None:
+        self.boxes: dict[str, tuple[Position, tuple[float, float, float]]] = {}
+
+    def obstacles(self) -> list[Obstacle]:
+        return [Obstacle(name, object_type.Box(name, *sizes), Pose(at)) for name, (at, sizes) in self.boxes.items()]
+
+    def robots(self) -> list[tuple[Robot, list[Joint]]]:
+        return []
+
+    def asset(self, asset_id: str) -> Path | None:
+        return None
+
+
+@pytest.fixture
+def around(robot: UR5e) -> Around:
+    around = Around()
+    robot.surround(around)
+    return around
+
+
+def joints(robot: UR5e, values: list[float]) -> list[Joint]:
+    return [Joint(joint.name, value) for joint, value in zip(robot.robot_joints(), values, strict=True)]
+
+
+def between(robot: UR5e) -> Position:
+    """Give where the TCP would be halfway between HOME and BESIDE, by our model: straight there it passes it."""
+    model = RobotModel.load(URDF, {"tcp_z": 0.1}).arm("tcp")
+    return model.pose(np.array([0.8, *HOME[1:]])).position
+
+
+def world(around: Around) -> CollisionWorld:
+    found = CollisionWorld()
+    found.add_robot("ur", RobotModel.load(URDF, {"tcp_z": 0.1}), Pose())
+    for name, (at, sizes) in around.boxes.items():
+        found.put(name, Box(*sizes), Pose(at))
+    return found
+
+
+def driven(fake: FakeUr) -> list[list[float]]:
+    return [command["values"][:6] for command in fake.do("commands_taken") if command["code"] == 1]
+
+
+def test_a_joint_move_goes_around_and_only_where_it_was_looked_at(ready: UR5e, around: Around, fake: FakeUr) -> None:
+    at = between(ready)
+    around.boxes["post"] = Position(at.x, at.y, at.z - 0.05), (0.06, 0.06, 0.5)
+    seen: list[list[float]] = []
+    doing = Doing(ready.move_to_joints, joints(ready, BESIDE), 1.0)
+    while not doing.ended_at:
+        time.sleep(0.01)
+        seen.append(fake.truth()["q"])
+    doing.result()
+    assert np.allclose(fake.truth()["q"], BESIDE, atol=1e-3)
+    assert len(seen) > 20
+    free = world(around)
+    assert all(free.is_free("ur", np.array(q)) for q in seen)
+    # Straight, and unsafe, it goes through it.
+    straight = [np.array(HOME) + share * (np.array(BESIDE) - HOME) for share in np.linspace(0.0, 1.0, 200)]
+    assert not all(free.is_free("ur", q) for q in straight)
+    ready.move_to_joints(joints(ready, HOME), 1.0, safe=False)
+    assert np.allclose(fake.truth()["q"], HOME, atol=1e-3)
+
+
+def test_to_a_pose_by_a_configuration_that_is_free(ready: UR5e, around: Around, fake: FakeUr) -> None:
+    goal = [0.9, -1.0, 1.4, -1.9, -1.57, 0.0]
+    pose = ready.forward_kinematics("tcp", joints(ready, goal))
+    model = RobotModel.load(URDF)
+    elbow = Pose.from_matrix(model.link_poses(np.array(goal))["forearm_link"]).position
+    around.boxes["lamp"] = elbow, (0.1, 0.1, 0.1)
+    ready.move_to_pose("tcp", pose, 1.0, linear=False)
+    assert ready.get_end_effector_pose("tcp").position.distance_to(pose.position) < 1e-3
+    assert np.abs(np.array(fake.truth()["q"]) - goal).max() > 0.3
+    assert world(around).is_free("ur", np.array(fake.truth()["q"]))
+
+
+def test_inverse_kinematics_is_the_controllers_in_a_configuration_that_is_free(ready: UR5e, around: Around) -> None:
+    goal = [0.9, -1.0, 1.4, -1.9, -1.57, 0.0]
+    pose = ready.forward_kinematics("tcp", joints(ready, goal))
+    near = joints(ready, goal)
+    assert [j.value for j in ready.inverse_kinematics("tcp", pose, near)] == pytest.approx(goal, abs=1e-6)
+    elbow = Pose.from_matrix(RobotModel.load(URDF).link_poses(np.array(goal))["forearm_link"]).position
+    around.boxes["lamp"] = elbow, (0.1, 0.1, 0.1)
+    found = ready.inverse_kinematics("tcp", pose, near)
+    assert world(around).is_free("ur", np.array([joint.value for joint in found]))
+    assert ready.forward_kinematics("tcp", found).position.distance_to(pose.position) < 1e-6
+    blind = ready.inverse_kinematics("tcp", pose, near, avoid_collisions=False)
+    assert [joint.value for joint in blind] == pytest.approx(goal, abs=1e-6)
+    around.boxes["crate"] = pose.position, (0.2, 0.2, 0.2)
+    with pytest.raises(ready.KinematicsException, match=r"ur reaches the pose only in collision: ur/.* and "):
+        ready.inverse_kinematics("tcp", pose, near)
+
+
+def test_a_line_into_something_is_refused_and_nothing_moves(ready: UR5e, around: Around, fake: FakeUr) -> None:
+    here = ready.get_end_effector_pose("tcp")
+    there = Pose(here.position + Position(0.0, 0.25, 0.0), here.orientation)
+    around.boxes["post"] = here.position + Position(0.0, 0.17, 0.05), (0.03, 0.03, 0.3)
+    with pytest.raises(ready.KinematicsException, match=r"ur cannot go straight: 0\.\d+ m on its way .* and post"):
+        ready.move_to_pose("tcp", there, 1.0)
+    assert np.allclose(fake.truth()["q"], HOME, atol=1e-6)
+    del around.boxes["post"]
+    ready.move_to_pose("tcp", there, 1.0)
+    assert ready.get_end_effector_pose("tcp").position.distance_to(there.position) < 1e-3
+
+
+def test_a_stop_between_waypoints_ends_it(ready: UR5e, around: Around, fake: FakeUr) -> None:
+    at = between(ready)
+    around.boxes["post"] = Position(at.x, at.y, at.z - 0.05), (0.06, 0.06, 0.5)
+    doing = Doing(ready.move_to_joints, joints(ready, BESIDE), 0.3)
+    moving(fake)
+    ready.stop()
+    with pytest.raises(Cancelled):
+        doing.result(2.0)
+    q = fake.truth()["q"]
+    assert math.dist(q, BESIDE) > 0.3
+    assert not fake.truth()["moving"]
+    for a, b in itertools.pairwise([fake.truth()["q"] for _ in range(5)]):
+        assert a == b
+
+
+def test_the_tool_that_was_told_counts(ready: UR5e, around: Around) -> None:
+    pose = ready.get_end_effector_pose("tcp")
+    found = ready.safe_moves.forward("tcp", ready.robot_joints())
+    assert found.position.distance_to(pose.position) < 1e-4
+    ready.set_tool(Pose(Position(0.0, 0.05, 0.2)), 1.0, (0.0, 0.0, 0.05))
+    pose = ready.get_end_effector_pose("tcp")
+    found = ready.safe_moves.forward("tcp", ready.robot_joints())
+    assert found.position.distance_to(pose.position) < 1e-4
+
+
+def test_without_control_nothing_is_planned(robot: UR5e, around: Around) -> None:
+    for move in (
+        lambda: robot.move_to_joints(joints(robot, BESIDE), 0.5),
+        lambda: robot.move_to_pose("tcp", Pose(), 0.5),
+    ):
+        with pytest.raises(NotInControl):
+            move()
