@@ -2,6 +2,7 @@
 
 import { Refused } from "../protocol/errors";
 import { ask, sentence } from "./asking";
+import { endHolds } from "./holds";
 import { call, serves } from "../session/session";
 import { robotsOf } from "../session/streams";
 import type { State } from "../store/state";
@@ -30,6 +31,7 @@ export async function stopMotion(): Promise<void> {
     }
     if (state.live.executing) stops.push(call("CancelAction"));
   }
+  endHolds();
   const ended = await Promise.allSettled(stops);
   const failed = ended.filter((each) => each.status === "rejected");
   // A robot that stands is refused its stop: that is no failure. All else is.

@@ -18,7 +18,20 @@ const CLOSEST = 0.35;
 /** m/s. */
 const FLY_SPEED = 0.8;
 
-export type ViewName = "home" | "top" | "front" | "side";
+/** `side` is the right one. */
+export type ViewName = "home" | "top" | "front" | "side" | "back" | "left";
+
+/** Around what is looked at, or about the camera itself, which is moved by keys and by `hold`. */
+export type ViewMode = "orbit" | "fly";
+
+/** Where the camera is and what it looks at, in the world. */
+export interface Viewpoint {
+  position: [number, number, number];
+  target: [number, number, number];
+}
+
+/** m ahead of a camera that flies, around which it is turned: as good as itself. */
+const NOSE = 0.05;
 
 export class View {
   readonly camera = new PerspectiveCamera(50, 1, 0.01, 100);
@@ -72,6 +85,7 @@ export class View {
   /** Show all of a box, from the side from which it is seen now, as large as it can be. */
   fit(box: Box3): void {
     if (box.isEmpty()) return;
+    this.setMode("orbit");
     const centre = box.getCenter(new Vector3());
     const back = new Vector3().subVectors(this.camera.position, this.controls.target).normalize();
     const right = new Vector3().crossVectors(this.camera.up, back).normalize();
@@ -95,14 +109,43 @@ export class View {
     this.changed();
   }
 
+  get mode(): ViewMode {
+    return this.controls.enableZoom ? "orbit" : "fly";
+  }
+
+  /** Fly from where it is, or turn around what is in front. */
+  setMode(mode: ViewMode): void {
+    if (mode === this.mode) return;
+    const ahead = this.camera.getWorldDirection(new Vector3());
+    this.controls.enableZoom = this.controls.enablePan = mode === "orbit";
+    this.controls.minDistance = mode === "orbit" ? 0.05 : NOSE;
+    this.controls.target.copy(this.camera.position).addScaledVector(ahead, mode === "fly" ? NOSE : START.length());
+    this.controls.update();
+    this.changed();
+  }
+
+  /** Fly as long as it is held; `key` as of the keyboard: KeyW ahead, KeyE up, and so on. */
+  hold(key: string, down: boolean): void {
+    if (down && key in KEYS) this.pressed.add(key);
+    else this.pressed.delete(key);
+    this.changed();
+  }
+
+  get viewpoint(): Viewpoint {
+    return { position: this.camera.position.toArray(), target: this.controls.target.toArray() };
+  }
+
   /** Look from a side, at what is looked at now. */
   look(from: ViewName): void {
+    this.setMode("orbit");
     const distance = this.camera.position.distanceTo(this.controls.target);
     const direction = {
       home: new Vector3(1, -1, 0.75),
       top: new Vector3(0, -1e-3, 1),
       front: new Vector3(0, -1, 0.12),
       side: new Vector3(1, 0, 0.12),
+      back: new Vector3(0, 1, 0.12),
+      left: new Vector3(-1, 0, 0.12),
     }[from].normalize();
     this.camera.position.copy(this.controls.target).addScaledVector(direction, distance);
     this.controls.update();

@@ -7,6 +7,7 @@ import { setUi, useEditor } from "../../store/store";
 import { Waiting } from "../kit/kit";
 import { lazily } from "../kit/lazily";
 import { ConnectingBanner } from "../program/ConnectingBanner";
+import { RobotChip } from "../robot/RobotChip";
 import { RunBar } from "../run/RunBar";
 import { View3D } from "./View3D";
 import "../run/run.css";
@@ -44,6 +45,7 @@ export function Centre() {
             ))}
           </ToggleButtonGroup>
         )}
+        <RobotChip />
         <RunBar />
         <ConnectingBanner />
       </div>

@@ -3,24 +3,42 @@
  * It stops motion by software, and says that it is no emergency stop.
  */
 
-import { useState } from "react";
+import { useEffect, useRef, useState } from "react";
 import { stopMotion } from "../../commands/operation";
 import { useEditor } from "../../store/store";
 import { RUNNING } from "../../store/selectors";
+
+/** ms between two presses of Escape that belong together. */
+const TWICE = 700;
 
 export function StopMotion() {
   const live = useEditor((state) => state.live.state === "started" || state.live.state === "stopping" || RUNNING.has(state.program.state));
   const connected = useEditor((state) => state.connection.status === "ready");
   const [stopping, setStopping] = useState(false);
-  if (!live) return null;
   const stop = () => {
     setStopping(true);
     void stopMotion().finally(() => setTimeout(() => setStopping(false), 400));
   };
+  const latest = useRef(stop);
+  latest.current = stop;
+  useEffect(() => {
+    if (!live) return;
+    let before = -Infinity;
+    // Before any window or menu that is open takes the key for itself.
+    const key = (event: KeyboardEvent) => {
+      if (event.key !== "Escape" || event.repeat) return;
+      if (event.timeStamp - before < TWICE) latest.current();
+      before = event.timeStamp;
+    };
+    window.addEventListener("keydown", key, { capture: true });
+    return () => window.removeEventListener("keydown", key, { capture: true });
+  }, [live]);
+  if (!live) return null;
   return (
     <button
       type="button"
       className="stop"
+      aria-keyshortcuts="Escape"
       data-stopping={stopping}
       disabled={!connected}
       onPointerDown={(event) => {
@@ -40,7 +58,7 @@ export function StopMotion() {
       </svg>
       <span>
         <strong>{stopping ? "Stopping…" : "Stop motion"}</strong>
-        <small>{connected ? "no emergency stop" : "no connection: use the emergency stop"}</small>
+        <small>{connected ? <>no emergency stop<span className="stop-key"> · Esc twice</span></> : "no connection: use the emergency stop"}</small>
       </span>
     </button>
   );

@@ -10,10 +10,10 @@ import { tapTaken } from "../../session/taps";
 import { now, select, setUi, store, useEditor } from "../../store/store";
 import { telemetry } from "../../store/telemetry";
 import { ItemMaker } from "../../viewmodel/items";
-import { Button, Waiting } from "../kit/kit";
+import { Waiting } from "../kit/kit";
 import { persistently } from "../kit/lazily";
 import { selectionOf } from "../names";
-import { RobotChip } from "../robot/RobotChip";
+import { ViewControls } from "../view/ViewControls";
 import { useTheme } from "../settings/Settings";
 
 export function View3D() {
@@ -91,15 +91,7 @@ export function View3D() {
           The 3D view cannot be shown on this device: {failed} Lists and panels work without it.
         </p>
       )}
-      <RobotChip />
-      {engine && (
-        <div className="view-buttons">
-          <Button icon="zoom" aria-label="Show all" onPress={() => engine.focus()} />
-          <Button onPress={() => engine.view.look("top")}>Top</Button>
-          <Button onPress={() => engine.view.look("front")}>Front</Button>
-          <Button onPress={() => engine.view.look("side")}>Side</Button>
-        </div>
-      )}
+      {engine && <ViewControls engine={engine} />}
     </main>
   );
 }

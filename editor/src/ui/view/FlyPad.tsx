@@ -1,0 +1,46 @@
+/** Buttons that move a camera that flies, for who has no keyboard: as long as they are held. */
+
+import type { PointerEvent } from "react";
+import type { View } from "../../engine/camera";
+import { Button } from "../kit/kit";
+
+const KEYS: [string, string, string][] = [
+  ["KeyQ", "▽", "Down"],
+  ["KeyW", "↑", "Ahead"],
+  ["KeyE", "△", "Up"],
+  ["KeyA", "←", "To the left"],
+  ["KeyS", "↓", "Back"],
+  ["KeyD", "→", "To the right"],
+];
+
+export function FlyPad({ view, onDone }: { view: View; onDone: () => void }) {
+  const hold = (key: string, down: boolean) => (event: PointerEvent<HTMLButtonElement>) => {
+    if (down) event.currentTarget.setPointerCapture(event.pointerId);
+    view.hold(key, down);
+  };
+  return (
+    <div className="fly-pad" role="group" aria-label="Fly">
+      {KEYS.map(([key, sign, words]) => (
+        <button
+          key={key}
+          type="button"
+          className="button"
+          aria-label={words}
+          onPointerDown={hold(key, true)}
+          onPointerUp={hold(key, false)}
+          onPointerCancel={hold(key, false)}
+          onLostPointerCapture={hold(key, false)}
+          onKeyDown={(event) => (event.key === " " || event.key === "Enter") && view.hold(key, true)}
+          onKeyUp={() => view.hold(key, false)}
+          onBlur={() => view.hold(key, false)}
+          onContextMenu={(event) => event.preventDefault()}
+        >
+          {sign}
+        </button>
+      ))}
+      <Button className="fly-done" onPress={onDone}>
+        Done
+      </Button>
+    </div>
+  );
+}
