@@ -1,14 +1,30 @@
 /** Which screen is shown: to join, what there is, or the workplace that is open. */
 
-import { useState } from "react";
+import { Suspense, useState, useSyncExternalStore } from "react";
 import { useEditor } from "../store/store";
 import { Home } from "./home/Home";
 import { Join } from "./join/Join";
+import { Waiting } from "./kit/kit";
+import { lazily } from "./kit/lazily";
 import { LostConnection } from "./connection/LostConnection";
 import { useScreenSettings } from "./settings/Settings";
 import { Workplace } from "./workplace/Workplace";
 
+const Operator = lazily(() => import("./operator/Operator"));
+
+/** The part of the address behind the hash, which chooses between the editor and the operator's screen. */
+function useHash(): string {
+  return useSyncExternalStore(
+    (changed) => {
+      window.addEventListener("hashchange", changed);
+      return () => window.removeEventListener("hashchange", changed);
+    },
+    () => location.hash,
+  );
+}
+
 export function App() {
+  const hash = useHash();
   useScreenSettings();
   const status = useEditor((state) => state.connection.status);
   const open = useEditor((state) => state.doc !== null);
@@ -19,7 +35,15 @@ export function App() {
   if (!been) return <Join />;
   return (
     <>
-      {open ? <Workplace /> : <Home />}
+      {hash.startsWith("#/operator") ? (
+        <Suspense fallback={<Waiting>Preparing the screen…</Waiting>}>
+          <Operator kiosk={hash.includes("kiosk")} />
+        </Suspense>
+      ) : open ? (
+        <Workplace />
+      ) : (
+        <Home />
+      )}
       <LostConnection />
     </>
   );

@@ -36,6 +36,9 @@ export function Home() {
     <div className="home">
       <header className="bar">
         <h1>Workplace</h1>
+        <Button look="plain" icon="play" onPress={() => (location.hash = "#/operator")}>
+          Operator
+        </Button>
         <People />
         <Settings />
       </header>
