@@ -7,11 +7,12 @@ byte per axis, which the extension KHR_mesh_quantization allows.
 import json
 import struct
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from arcor2_hw.compute.reducing import Drawn
+if TYPE_CHECKING:
+    from arcor2_hw.compute.reducing import Drawn
 
 _FLOAT, _BYTE, _UINT16, _UINT32 = 5126, 5120, 5123, 5125
 _VERTICES, _INDICES = 34962, 34963
@@ -19,7 +20,7 @@ _Y_UP: Final = (-0.7071067811865476, 0.0, 0.0, 0.7071067811865476)
 """A quarter turn about x: from z up to y up."""
 
 
-def written(meshes: Mapping[str, Drawn], extras: Mapping[str, Any]) -> bytes:
+def written(meshes: Mapping[str, "Drawn"], extras: Mapping[str, Any]) -> bytes:
     """Give a file with a mesh of each name, and `extras` of the whole; the same is written the same."""
     content = _Content()
     told: dict[str, Any] = {
@@ -58,7 +59,7 @@ class _Content:
             "accessors": self._accessors,
         }
 
-    def primitive(self, mesh: Drawn) -> dict[str, Any]:
+    def primitive(self, mesh: "Drawn") -> dict[str, Any]:
         positions = np.ascontiguousarray(mesh.positions, dtype="<f4")
         bounds = {"min": positions.min(axis=0).tolist(), "max": positions.max(axis=0).tolist()}
         attributes = {"POSITION": self._add(positions, _FLOAT, "VEC3", _VERTICES, **bounds)}

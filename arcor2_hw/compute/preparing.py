@@ -3,9 +3,11 @@
 from pathlib import Path
 from typing import Any, Final
 
+from arcor2_hw.compute import glb
 from arcor2_hw.compute.desk import Desk
 from arcor2_hw.compute.preparing_tasks import PrepareAsset, Prepared
 from arcor2_hw.kinematics.errors import BadMesh, ModelError
+from arcor2_hw.kinematics.markup import parse_xml
 from arcor2_hw.kinematics.source import MAX_PACKAGE, Package
 
 MAX_SHOWN: Final = 256 * 1024 * 1024
@@ -36,7 +38,7 @@ def _read(task: PrepareAsset) -> bytes:
 
 
 def _mesh(content: bytes, name: str, desk: Desk) -> Prepared:
-    from arcor2_hw.compute import glb, reducing
+    from arcor2_hw.compute import reducing
 
     desk.progress(0.0, f"reading {name}")
     surface = _surface(content, name, upright=True)
@@ -57,8 +59,6 @@ def _surface(content: bytes, name: str, *, upright: bool) -> Any:
 
 def _robot(content: bytes, name: str, desk: Desk) -> Prepared:
     """Give the meshes of a robot by their paths, and the description itself with what it calls each of them."""
-    from arcor2_hw.kinematics.description import parse_xml
-
     desk.progress(0.0, f"reading {name}")
     package = Package.open(content, name)
     at, text = package.urdf()
@@ -79,17 +79,19 @@ def _robot(content: bytes, name: str, desk: Desk) -> Prepared:
             meshes[reference] = path
         except ModelError as error:
             problems[reference] = str(error)
+        except ModuleNotFoundError as error:  # the rest of the robot is shown all the same
+            problems[reference] = f"The mesh {reference} is not read: {error.name} is not installed."
     drawn, before, after = _drawn(surfaces, desk)
     for reference in [each for each, path in meshes.items() if path not in drawn]:
         problems[reference] = f"The mesh {meshes.pop(reference)} has only triangles without extent."
-    from arcor2_hw.compute import glb
-
     extras = {"urdf": text.decode(errors="replace"), "meshes": meshes, "problems": problems}
     return Prepared(glb.written(drawn, extras), after, before, list(dict.fromkeys(problems.values())))
 
 
 def _drawn(surfaces: dict[str, Any], desk: Desk) -> tuple[dict[str, Any], int, int]:
     """Give what is drawn of each surface, and how many triangles all were and are."""
+    if not surfaces:
+        return {}, 0, 0
     from arcor2_hw.compute import reducing
 
     budgets = {path: min(reducing.budget(one.vertices), len(one.triangles)) for path, one in surfaces.items()}

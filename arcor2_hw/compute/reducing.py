@@ -1,4 +1,4 @@
-"""Fewer triangles of the same looks: corners joined, surfaces simplified by their quadric error; normals with creases."""
+"""Fewer triangles of the same looks: corners joined, surfaces simplified by their quadric error, normals made."""
 
 from typing import Final, NamedTuple
 

@@ -16,18 +16,17 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal, TypeVar
-from xml.etree.ElementTree import Element, TreeBuilder
-from xml.parsers import expat
+from xml.etree.ElementTree import Element
 
 import numpy as np
 
 from arcor2_hw.kinematics.errors import JointLoop, ModelError, UnsafeDescription
+from arcor2_hw.kinematics.markup import parse_xml
 from arcor2_hw.kinematics.shapes import Array
 
 JointKind = Literal["revolute", "continuous", "prismatic", "fixed"]
 KINDS: Final[tuple[JointKind, ...]] = ("revolute", "continuous", "prismatic", "fixed")
 ORIGIN: Final = ("x", "y", "z", "rx", "ry", "rz")
-MAX_DEPTH: Final = 64
 MAX_PARTS: Final = 2000
 """Links of one description."""
 
@@ -124,44 +123,6 @@ class Description:
 
 
 _Part = TypeVar("_Part", Link, Joint)
-
-
-# ------------------------------------------------------------------------------------------------ XML
-def parse_xml(content: bytes, name: str) -> Element:
-    """Give the root of a document. Raises ModelError when it is none, UnsafeDescription for a document type.
-
-    Without document types there are no entities, so that nothing is fetched and nothing grows.
-    """
-    parser = expat.ParserCreate()
-    builder = TreeBuilder()
-    depth = 0
-
-    def refuse(*_: object) -> None:
-        raise UnsafeDescription(f"{name} has a document type or an entity, which is refused.")
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal depth
-        depth += 1
-        if depth > MAX_DEPTH:
-            raise UnsafeDescription(f"{name} is nested deeper than {MAX_DEPTH} elements.")
-        if tag.startswith("xacro:"):
-            raise ModelError(f"{name} is a xacro: expand it into a URDF first.")
-        builder.start(tag, attributes)
-
-    def end(tag: str) -> None:
-        nonlocal depth
-        depth -= 1
-        builder.end(tag)
-
-    parser.StartElementHandler = start
-    parser.EndElementHandler = end
-    parser.StartDoctypeDeclHandler = refuse
-    parser.EntityDeclHandler = refuse
-    try:
-        parser.Parse(content, True)
-        return builder.close()
-    except (expat.ExpatError, ValueError, AssertionError, LookupError) as error:
-        raise ModelError(f"{name} is no XML: {error}.") from error
 
 
 def describe(content: bytes, name: str) -> Description:

@@ -13,6 +13,7 @@ from litestar.handlers import HTTPRouteHandler
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.role import Role
 from arcor2_server.rest.answers import OPEN, ROLE
+from arcor2_server.rest.encodings import accepted_encodings
 
 FILES: Final = Path(__file__).with_name("editor_files")
 """Where the build puts the editor; absent in a checkout where it was not built."""
@@ -84,16 +85,6 @@ def page_policy(nonce: str) -> str:
     )
 
 
-def _accepted(request: Request[Any, Any, Any]) -> set[str]:
-    """Give the encodings that the browser takes."""
-    taken = set()
-    for part in request.headers.get("accept-encoding", "").lower().split(","):
-        name, _, quality = part.strip().partition(";")
-        if quality.replace(" ", "") not in ("q=0", "q=0.0", "q=0.00", "q=0.000"):
-            taken.add(name.strip())
-    return taken
-
-
 def editor_routes(directory: Path = FILES) -> list[HTTPRouteHandler]:
     """Make the routes of the page and of its files, which are read once. They ask for no token, and tell nothing."""
     files = read_files(directory)
@@ -119,7 +110,7 @@ def editor_routes(directory: Path = FILES) -> list[HTTPRouteHandler]:
         headers = _COMMON | {"Cache-Control": caching, "ETag": file.etag, "Vary": "Accept-Encoding"}
         if request.headers.get("if-none-match") == file.etag:
             return Response(b"", status_code=304, media_type=file.media_type, headers=headers)
-        accepted = _accepted(request)
+        accepted = accepted_encodings(request)
         encoding = next((each for each, _ in _ENCODINGS if each in accepted and each in file.content), "")
         if encoding:
             headers["Content-Encoding"] = encoding

@@ -11,6 +11,7 @@ from arcor2_server.compute import Compute
 from arcor2_server.edit_news import EditNews
 from arcor2_server.kept import KeptAnswers
 from arcor2_server.markers import Markers
+from arcor2_server.prepared import PreparedAssets
 from arcor2_server.presence import PresenceBoard
 from arcor2_server.previews import Previews
 from arcor2_server.reachability import ReachabilityBoard
@@ -49,7 +50,7 @@ class Services:
     collisions: what is in the way. type_news: object types that clients have to be told of. kept: encoded answers.
     runs: their history. tasks: work under way. previews: what is dragged. views: what clients show, by user and shared.
     breakpoints: the shared ones. presence: who looks at what. edit_news: what follows from edits.
-    reachability: what robots reach of the open project.
+    reachability: what robots reach of the open project. prepared: meshes and robots as clients show them.
     """
 
     settings: "ServerSettings"
@@ -81,12 +82,14 @@ class Services:
     presence: PresenceBoard = field(init=False)
     edit_news: EditNews = field(init=False)
     reachability: ReachabilityBoard = field(init=False)
+    prepared: PreparedAssets = field(init=False)
 
     def __post_init__(self) -> None:
         """Make what needs no more than these."""
         self.compute = Compute(self.settings.compute_idle)
         self.calibration = CalibrationService(self)
         self.calibration_records = Calibrations(self.storage)
+        self.prepared = PreparedAssets(self, self.settings.prepared_dir)
         self.markers = Markers(self.settings.markers_file, self.settings.markers)
         data = SharedData(self.storage)
         self.runs = Runs(self.hub)
@@ -105,6 +108,7 @@ class Services:
 
     async def close_shared(self) -> None:
         """End what `share` brought up."""
+        await self.prepared.close()
         await self.reachability.close()
         self.edit_news.close()
         self.presence.close()

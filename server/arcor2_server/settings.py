@@ -91,6 +91,11 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
         return self.data_dir / "assets"
 
     @property
+    def prepared_dir(self) -> Path:
+        """Give the directory of meshes as clients show them; it may be emptied at any time."""
+        return self.data_dir / "prepared"
+
+    @property
     def packages_dir(self) -> Path:
         """Give the directory of execution packages."""
         return self.data_dir / "packages"

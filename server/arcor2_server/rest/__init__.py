@@ -17,6 +17,7 @@ from arcor2_server.rest import (  # noqa: F401
     general,
     models,
     object_types,
+    prepared,
     projects,
     runs,
     scene,

@@ -22,6 +22,7 @@ from litestar.response import Stream
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
 from arcor2_server.rest.answers import OPEN, PERSON, ROLE, SERVICE, InternalError, Unsupported, refusal
+from arcor2_server.rest.encodings import accepted_encodings
 from arcor2_server.rest.naming import camelized, camelized_names, snake, snaked
 
 log = structlog.get_logger(__name__)
@@ -43,6 +44,17 @@ class Binary(msgspec.Struct, frozen=True):
     media_type: str
     filename: str
     size: int | None = None
+
+
+class Kept(msgspec.Struct, frozen=True):
+    """An answer that clients keep, and ask for again by its `etag`: `read(gzipped)` gives it, also compressed where
+    `gzipped` says so.
+    """
+
+    read: Callable[[bool], Awaitable[bytes]]
+    media_type: str
+    etag: str
+    gzipped: bool = False
 
 
 class Upload(msgspec.Struct):
@@ -118,7 +130,7 @@ def route(declared: Operation) -> HTTPRouteHandler:
         uploads: list[UploadFile] = []
         try:
             given = await _arguments(declared, request, uploads)
-            return await _response(declared, await declared.handler(**given))
+            return await _response(declared, request, await declared.handler(**given))
         except Arcor2Error as error:
             if error.detail:
                 log.info("request refused", path=declared.path, reason=str(error)[:1000], detail=error.detail[:1000])
@@ -269,7 +281,9 @@ def _as_file(part: Any, uploads: list[UploadFile]) -> UploadFile | None:
     return part if isinstance(part, UploadFile) else None
 
 
-async def _response(declared: Operation, given: Any) -> Response[Any]:
+async def _response(declared: Operation, request: Request[Any, Any, Any], given: Any) -> Response[Any]:
+    if isinstance(given, Kept):
+        return await _kept(request, given)
     if isinstance(given, Binary):
         # RFC 6266: the name in UTF-8, since it may be anything.
         headers = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(given.filename, safe='')}"}
@@ -284,6 +298,19 @@ async def _response(declared: Operation, given: Any) -> Response[Any]:
     if not declared.plain:
         content = await asyncio.to_thread(_renamed, content) if len(content) > BESIDE else _renamed(content)
     return Response(content, media_type=MediaType.JSON)
+
+
+async def _kept(request: Request[Any, Any, Any], given: Kept) -> Response[Any]:
+    gzipped = given.gzipped and "gzip" in accepted_encodings(request)
+    # Each encoding is a representation of its own, with a tag of its own.
+    etag = f'{given.etag[:-1]}.gz"' if gzipped else given.etag
+    headers = {"ETag": etag, "Cache-Control": "no-cache", "Vary": "Accept-Encoding"}
+    known = [each.strip().removeprefix("W/") for each in request.headers.get("if-none-match", "").split(",")]
+    if etag in known:
+        return Response(b"", status_code=304, media_type=given.media_type, headers=headers)
+    if gzipped:
+        headers["Content-Encoding"] = "gzip"
+    return Response(await given.read(gzipped), media_type=given.media_type, headers=headers)
 
 
 def _renamed(content: bytes) -> bytes:

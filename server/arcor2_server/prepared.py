@@ -1,0 +1,200 @@
+"""Meshes and robots as clients show them: made by the compute worker when somebody first asks, and kept on disk.
+
+What is kept is named by the hash of the asset's content and the version of its maker, so it never has to be asked
+whether it is still right. It may be deleted at any time.
+"""
+
+import asyncio
+import contextlib
+import gzip
+import os
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import structlog
+
+from arcor2_hw.compute.preparing_tasks import MAKER, PrepareAsset, Prepared
+from arcor2_hw.compute.world import KeptFile
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.editor import TaskKind
+from arcor2_hw.exceptions import Arcor2Error, InvalidData, StorageError
+from arcor2_server.storage.assets import Asset
+from arcor2_server.tasks import Task
+
+if TYPE_CHECKING:
+    from arcor2_server.services import Services
+
+log = structlog.get_logger(__name__)
+
+TOLD_AFTER: Final = 1.0
+"""Seconds after which those who watch tasks are told of one."""
+MOST_KEPT: Final = 1024 * 1024 * 1024
+"""Bytes on disk; beyond, what was asked for longest ago is dropped."""
+MOST_REFUSALS: Final = 1000
+_GZIP_LEVEL: Final = 6
+_WORTH: Final = 0.9
+"""A copy that is compressed is kept when it has less than this share of the bytes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """What is there of an asset for clients: the file, and a compressed copy where one pays. etag: of its content."""
+
+    etag: str
+    plain: Path
+    packed: Path | None
+
+
+class PreparedAssets:
+    """For use on one event loop. `directory` is made when it is needed."""
+
+    def __init__(self, services: "Services", directory: Path) -> None:
+        self._services = services
+        self._directory = directory
+        self._making: dict[str, asyncio.Task[Shown]] = {}
+        self._refusals: dict[str, Arcor2Error] = {}
+
+    async def get(self, key: str) -> Shown:
+        """Give an asset as clients show it; it is made once, however many ask.
+
+        NotFound; InvalidData and its kinds for what is no mesh or robot; ComputeStopped, ComputeTimeout, ComputeBusy,
+        NotInstalled; StorageError.
+        """
+        asset = self._services.assets.info(key)
+        name = _named(asset)
+        # The ending of the name may say what it is.
+        kept = f"{asset.digest}.{MAKER}{Path(name).suffix.lower() if Path(name).suffix[1:].isalnum() else ''}"
+        if (found := await asyncio.to_thread(self._find, kept)) is not None:
+            return found
+        if (refusal := self._refusals.get(kept)) is not None:
+            raise refusal.with_traceback(None)
+        making = self._making.get(kept)
+        if making is None:
+            making = asyncio.create_task(self._make(kept, key, name), name=f"preparing {key}")
+            self._making[kept] = making
+            making.add_done_callback(lambda done: self._made(kept, done))
+        return await asyncio.shield(making)
+
+    async def close(self) -> None:
+        """Give up what is being made."""
+        making = list(self._making.values())
+        for each in making:
+            each.cancel()
+        await asyncio.gather(*making, return_exceptions=True)
+
+    # ------------------------------------------------------------------------------------------------ inside
+    def _made(self, kept: str, done: asyncio.Task[Shown]) -> None:
+        self._making.pop(kept, None)
+        if not done.cancelled():
+            done.exception()  # who asked may have gone
+
+    async def _make(self, kept: str, key: str, name: str) -> Shown:
+        task = PrepareAsset(KeptFile(str(self._services.assets.file(key)), name))
+        try:
+            with _told(self._services, name) as told:
+                made = await self._services.compute.run(task, told=told)
+        except InvalidData as error:
+            if await asyncio.to_thread(Path(task.file.path).is_file):  # else it is the asset that went meanwhile
+                self._refusals[kept] = error
+            while len(self._refusals) > MOST_REFUSALS:
+                del self._refusals[next(iter(self._refusals))]
+            raise
+        log.info(
+            "mesh prepared", asset=key, triangles=made.triangles, before=made.before, size=len(made.content),
+            problems=made.problems,
+        )  # fmt: skip
+        try:
+            return await asyncio.to_thread(self._keep, kept, made)
+        except OSError as error:
+            text = f"cannot keep what was prepared in {self._directory}: {error.strerror}"
+            raise StorageError(text, detail=str(error)) from error
+
+    def _find(self, kept: str) -> Shown | None:
+        plain, packed = self._directory / f"{kept}.glb", self._directory / f"{kept}.glb.gz"
+        try:
+            os.utime(plain)  # asked for now
+        except OSError:
+            return None
+        return Shown(f'"{kept}"', plain, packed if packed.is_file() else None)
+
+    def _keep(self, kept: str, made: Prepared) -> Shown:
+        self._directory.mkdir(parents=True, exist_ok=True)
+        self._make_room(len(made.content))
+        packed = gzip.compress(made.content, _GZIP_LEVEL, mtime=0)
+        if len(packed) < _WORTH * len(made.content):
+            _write(self._directory / f"{kept}.glb.gz", packed)
+        _write(self._directory / f"{kept}.glb", made.content)
+        found = self._find(kept)
+        if found is None:
+            raise FileNotFoundError(2, "it is gone at once")
+        return found
+
+    def _make_room(self, needed: int) -> None:
+        """Drop what other makers made, and what was asked for longest ago where there is too much."""
+        files = []
+        for file in self._directory.iterdir():
+            if file.name.split(".")[1:2] != [str(MAKER)]:
+                file.unlink(missing_ok=True)
+            elif file.suffix == ".glb":
+                files.append((file.stat().st_mtime, file.stat().st_size, file))
+        total = needed + sum(size for _, size, _ in files)
+        for _, size, file in sorted(files):
+            if total <= MOST_KEPT:
+                break
+            file.unlink(missing_ok=True)
+            file.with_name(f"{file.name}.gz").unlink(missing_ok=True)
+            total -= size
+
+
+def _named(asset: Asset) -> str:
+    """Give an asset's name as a person knows it."""
+    return asset.id if isinstance(asset.file_name, Unset) or not asset.file_name else asset.file_name
+
+
+def _write(place: Path, content: bytes) -> None:
+    """Put a file in its place in one step. It is not flushed: half a file is never named, and a lost one made anew."""
+    descriptor, name = tempfile.mkstemp(dir=place.parent, prefix=f"half.{MAKER}.")
+    try:
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(content)
+        Path(name).replace(place)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+class _told(contextlib.AbstractContextManager[Callable[[float, str], None]]):  # noqa: N801 - reads as a function
+    """Tells of work as a task once it takes longer than a moment."""
+
+    def __init__(self, services: "Services", name: str) -> None:
+        self._tasks = services.tasks
+        self._name = name
+        self._task: Task | None = None
+        self._last: tuple[float, str] = (0.0, "")
+        self._later = asyncio.get_running_loop().call_later(TOLD_AFTER, self._begin)
+
+    def _begin(self) -> None:
+        self._task = self._tasks.begin(TaskKind.COMPUTATION, f"Preparing {self._name} for the editor")
+        self._task.at(*self._last)
+
+    def _at(self, share: float, message: str) -> None:
+        self._last = (share, message)
+        if self._task is not None:
+            self._task.at(share, message)
+
+    def __enter__(self) -> Callable[[float, str], None]:
+        return self._at
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
+        self._later.cancel()
+        if self._task is None:
+            return
+        if error is None:
+            self._task.finish()
+        elif isinstance(error, asyncio.CancelledError):
+            self._task.cancel()
+        else:
+            self._task.fail(str(error) if isinstance(error, Arcor2Error) else "An error inside the server.")
