@@ -7,6 +7,7 @@ import type { ComponentType } from "react";
 import type { Selection, State } from "../../store/state";
 import { programSections } from "../program/sections";
 import { pointSections } from "../points/sections";
+import { objectSections, settingsSections } from "../scene/sections";
 import { about } from "./sections/about";
 import { place } from "./sections/place";
 
@@ -17,4 +18,4 @@ export interface Section {
   Body: ComponentType<{ selection: Selection }>;
 }
 
-export const SECTIONS: readonly Section[] = [about, ...pointSections, ...programSections, place];
+export const SECTIONS: readonly Section[] = [about, ...pointSections, ...programSections, place, ...objectSections, ...settingsSections];

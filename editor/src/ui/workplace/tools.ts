@@ -9,6 +9,7 @@ import type { IconName } from "../kit/icons";
 import { points } from "../points/tool";
 import { program } from "../program/tool";
 import { run } from "../run/tool";
+import { add } from "../scene/tool";
 import { devices } from "./tools/devices";
 import { robot } from "./tools/robot";
 import { things } from "./tools/things";
@@ -24,4 +25,4 @@ export interface Tool {
   Panel: ComponentType;
 }
 
-export const TOOLS: readonly Tool[] = [things, robot, points, program, run, devices];
+export const TOOLS: readonly Tool[] = [things, add, robot, points, program, run, devices];

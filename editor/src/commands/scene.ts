@@ -1,0 +1,133 @@
+/** The objects of the open scene: add, name, copy, remove, their settings and shapes. Forms are given why something was refused. */
+
+import type { ObjectModel, ObjectTypeMeta, Parameter, Pose, SceneObject } from "../protocol/types";
+import { freeName } from "../program/naming";
+import { call } from "../session/session";
+import { uploadAsset } from "../session/assets";
+import { isRunning } from "../store/selectors";
+import type { State } from "../store/state";
+import { now, select, setUi, tell } from "../store/store";
+import { lifted } from "../transform/sizes";
+import { ORIGIN, plus, rotated } from "../viewmodel/frames";
+import { aimedPlace } from "./aimed";
+import { ask, barred, held, refusal } from "./asking";
+import { awaited } from "./program";
+
+/** Why objects cannot be added, removed or set up now; empty when they can. */
+export function notBuildable(state: State, request: Parameters<typeof barred>[1] = "AddObjectToScene"): string {
+  if (!state.doc) return "Nothing is open.";
+  if (state.doc.project) return "Objects belong to the scene: close the project, and open the scene.";
+  if (isRunning(state)) return "A program runs: stop it first.";
+  if (state.live.state !== "stopped") return "Go offline first: devices are set up while they are not in use.";
+  return barred(state, request);
+}
+
+/** A name for an object that no other object and no type has. */
+export function freeObjectName(base: string): string {
+  const { doc, types } = now();
+  const clean = base.replace(/\W/g, "_").replace(/^(\d)/, "_$1") || "object";
+  return freeName(clean, [...Object.values(doc?.objects ?? {}).map((each) => each.name), ...Object.keys(types.byName)]);
+}
+
+/** Where something new stands: on the surface in the middle of the view, upright. */
+export function newPlace(model?: ObjectModel): Pose {
+  const aimed = aimedPlace();
+  if (!aimed) return ORIGIN;
+  const into = rotated({ x: 0, y: 0, z: 1 }, aimed.orientation);
+  const out = { x: -into.x, y: -into.y, z: -into.z };
+  const fine = (value: number) => Math.round(value * 1e4) / 1e4;
+  const { x, y, z } = lifted(aimed.position, out, { pose: ORIGIN, model });
+  return { ...ORIGIN, position: { x: fine(x), y: fine(y), z: fine(z) } };
+}
+
+/** Wait for the new object, and take it in hand. */
+async function taken(name: string): Promise<void> {
+  const added = await awaited((state) => Object.values(state.doc?.objects ?? {}).find((each) => each.name === name));
+  select({ kind: "object", id: added.id });
+  setUi({ tool: "" });
+}
+
+export function addObject(type: ObjectTypeMeta, name: string, parameters: Parameter[]): Promise<string> {
+  const pose = type.has_pose ? { pose: newPlace(type.object_model) } : {};
+  return refusal(async () => {
+    await call("AddObjectToScene", { name, type: type.type, parameters, ...pose });
+    await taken(name);
+  });
+}
+
+export type ShapeKind = "box" | "cylinder" | "sphere";
+
+/** A shape of 10 cm by its kind; `id` is the name of its type. */
+export function shapeModel(kind: ShapeKind, id: string): ObjectModel {
+  const size = 0.1;
+  if (kind === "box") return { type: "Box", box: { id, size_x: size, size_y: size, size_z: size } };
+  if (kind === "cylinder") return { type: "Cylinder", cylinder: { id, radius: size / 2, height: size } };
+  return { type: "Sphere", sphere: { id, radius: size / 2 } };
+}
+
+/** Add a shape at once, with a name of its own: all else can be changed where it stands. */
+export async function addShape(kind: ShapeKind): Promise<void> {
+  const name = freeObjectName(kind);
+  const why = await addModel(name, shapeModel(kind, name));
+  if (why) tell("error", why);
+}
+
+function addModel(name: string, model: ObjectModel, pose = newPlace(model)): Promise<string> {
+  return refusal(async () => {
+    await call("AddVirtualCollisionObjectToScene", { name, pose, model });
+    await taken(name);
+  });
+}
+
+/** Upload a mesh and add an object of it. */
+export function addMesh(name: string, file: File): Promise<string> {
+  return refusal(async () => {
+    const asset = await uploadAsset(file);
+    const why = await addModel(name, { type: "Mesh", mesh: { id: name, asset_id: asset } });
+    if (why) throw new Error(why);
+  });
+}
+
+export const renameObject = (id: string, new_name: string): Promise<string> =>
+  refusal(() => held(id, () => call("RenameObject", { id, new_name })));
+
+/** A copy beside it; of a shape, with a shape of its own. */
+export async function duplicateObject({ name, type, pose, parameters }: SceneObject): Promise<void> {
+  const { types } = now();
+  const meta = types.byName[type];
+  const copy = freeObjectName(name.replace(/_\d+$/, ""));
+  const beside = pose && { ...pose, position: plus(pose.position, { x: 0.1, y: 0.1, z: 0 }) };
+  const own = meta?.base === "VirtualCollisionObject" && meta.object_model && beside;
+  const done = own
+    ? await ask("AddVirtualCollisionObjectToScene", { name: copy, pose: beside, model: named(meta.object_model as ObjectModel, copy) })
+    : await ask("AddObjectToScene", { name: copy, type, parameters, ...(beside ? { pose: beside } : {}) });
+  if (done) await taken(copy).catch(() => {}); // somebody took it away again
+}
+
+/** The same model under another type's name. */
+export function named(model: ObjectModel, id: string): ObjectModel {
+  const { type, box, cylinder, sphere, mesh } = model;
+  if (box) return { type, box: { ...box, id } };
+  if (cylinder) return { type, cylinder: { ...cylinder, id } };
+  if (sphere) return { type, sphere: { ...sphere, id } };
+  return { type, ...(mesh ? { mesh: { ...mesh, id } } : {}) };
+}
+
+/** Names of the projects that use an object. */
+export async function projectsUsing(id: string): Promise<string[]> {
+  const ids = await call("SceneObjectUsage", { id });
+  return ids.map((each) => now().lists.projects?.find((one) => one.id === each)?.name ?? each);
+}
+
+export const removeObject = (id: string, force = false) => ask("RemoveFromScene", { id, force });
+
+export const setParameters = (id: string, parameters: Parameter[]): Promise<string> =>
+  refusal(() => held(id, () => call("UpdateObjectParameters", { id, parameters })));
+
+/** Scenes in which a type is used, by name; and delete it. */
+export async function scenesUsing(type: string): Promise<string[]> {
+  const ids = await call("ObjectTypeUsage", { id: type });
+  return ids.map((each) => now().lists.scenes?.find((one) => one.id === each)?.name ?? each);
+}
+
+export const deleteType = (type: string): Promise<string> => refusal(() => call("DeleteObjectTypes", [type]));

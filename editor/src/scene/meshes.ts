@@ -1,0 +1,53 @@
+/** A mesh before it is uploaded: how large it is, and the same in m. A chunk of its own, with the loaders. */
+
+import type { BufferGeometry } from "three";
+import { loadMesh } from "../engine/loaders/mesh";
+
+export interface MeshFile {
+  file: File;
+  geometry: BufferGeometry;
+  triangles: number;
+  /** As the file says, in its own unit. */
+  size: [number, number, number];
+}
+
+/** Read a file; rejects with a sentence where it is no mesh. */
+export async function readMesh(file: File): Promise<MeshFile> {
+  let geometry: BufferGeometry;
+  try {
+    geometry = await loadMesh(await file.arrayBuffer(), file.name);
+  } catch (error) {
+    throw new Error(`${file.name} cannot be read as a mesh: ${error instanceof Error ? error.message : String(error)}`);
+  }
+  geometry.computeBoundingBox();
+  const box = geometry.boundingBox;
+  const count = (geometry.index?.count ?? geometry.getAttribute("position").count) / 3;
+  const size: [number, number, number] = box ? [box.max.x - box.min.x, box.max.y - box.min.y, box.max.z - box.min.z] : [0, 0, 0];
+  if (count < 1 || !size.every(Number.isFinite) || Math.max(...size) <= 0) throw new Error(`There is no surface in ${file.name}.`);
+  return { file, geometry, triangles: Math.floor(count), size };
+}
+
+/** The unit that makes it as large as things in a workplace are. */
+export function likelyUnit(size: readonly number[]): "m" | "mm" {
+  return Math.max(...size) > 5 ? "mm" : "m";
+}
+
+/** The mesh in m as a binary STL; the file itself where it is in m already. */
+export function inMetres({ file, geometry }: Pick<MeshFile, "file" | "geometry">, worth: number): File {
+  if (worth === 1) return file;
+  const flat = geometry.index ? geometry.toNonIndexed() : geometry;
+  const position = flat.getAttribute("position");
+  const triangles = Math.floor(position.count / 3);
+  const view = new DataView(new ArrayBuffer(84 + triangles * 50));
+  view.setUint32(80, triangles, true);
+  for (let n = 0; n < triangles; n++) {
+    const at = 84 + n * 50 + 12; // normals are left out: who reads works them out of the corners
+    for (let corner = 0; corner < 3; corner++) {
+      const from = n * 3 + corner;
+      [position.getX(from), position.getY(from), position.getZ(from)].forEach((value, axis) => {
+        view.setFloat32(at + corner * 12 + axis * 4, value * worth, true);
+      });
+    }
+  }
+  return new File([view.buffer], file.name.replace(/\.\w+$/, "") + ".stl", { type: "model/stl" });
+}

@@ -1,0 +1,68 @@
+/** Uploads a mesh as an object: how large it is stands there before, since many files do not say in which unit they are. */
+
+import { type FormEvent, useState } from "react";
+import { addMesh, freeObjectName } from "../../commands/scene";
+import type { MeshFile } from "../../scene/meshes";
+import { LENGTH_UNITS, type LengthUnit, show, WORTH } from "../../transform/amounts";
+import { OneOf } from "../kit/fields";
+import { Button, Field } from "../kit/kit";
+import { RefusedText, useAsking } from "../points/Doing";
+import { MeshPreview } from "./MeshPreview";
+
+export function AddMesh({ why, onBack }: { why: string; onBack: () => void }) {
+  const [mesh, setMesh] = useState<MeshFile | null>(null);
+  const [unit, setUnit] = useState<LengthUnit>("m");
+  const [name, setName] = useState("");
+  const [wrong, setWrong] = useState("");
+  const { refused, busy, ask } = useAsking();
+  const read = async (file: File | undefined) => {
+    setWrong("");
+    setMesh(null);
+    if (!file) return;
+    try {
+      const { readMesh, likelyUnit } = await import("../../scene/meshes");
+      const found = await readMesh(file);
+      setMesh(found);
+      setUnit(likelyUnit(found.size));
+      setName(freeObjectName(file.name.replace(/\.\w+$/, "")));
+    } catch (error) {
+      setWrong(error instanceof Error ? error.message : String(error));
+    }
+  };
+  const submit = (event: FormEvent) => {
+    event.preventDefault();
+    if (!mesh || why) return;
+    const upload = async () => {
+      const { inMetres } = await import("../../scene/meshes");
+      return addMesh(name.trim(), inMetres(mesh, WORTH[unit]));
+    };
+    void ask(upload());
+  };
+  return (
+    <form className="add-form" onSubmit={submit}>
+      <Button look="plain" onPress={onBack}>
+        ← All kinds
+      </Button>
+      <h3>Mesh</h3>
+      <div className="field">
+        <label htmlFor="mesh-file">File: STL, GLB, OBJ, PLY or DAE</label>
+        <input id="mesh-file" type="file" accept=".stl,.glb,.gltf,.obj,.ply,.dae" onChange={(event) => void read(event.target.files?.[0])} />
+      </div>
+      <RefusedText>{wrong}</RefusedText>
+      {mesh && (
+        <>
+          <MeshPreview geometry={mesh.geometry} />
+          <OneOf label="One unit of the file is" value={unit} choices={LENGTH_UNITS.map((each) => [each, `1 ${each}`] as const)} onChange={setUnit} />
+          <p className="small">
+            So it is {mesh.size.map((each) => show(each * WORTH[unit], "mm")).join(" × ")} mm. <span className="quiet">{mesh.triangles} triangles.</span>
+          </p>
+          <Field label="Name" value={name} onChange={setName} autoComplete="off" />
+          <RefusedText>{refused}</RefusedText>
+          <Button look="primary" icon="plus" type="submit" why={why} isDisabled={busy || !name.trim()}>
+            {busy ? "Uploading…" : "Upload and add"}
+          </Button>
+        </>
+      )}
+    </form>
+  );
+}

@@ -1,0 +1,42 @@
+/** A form made from the settings of a type. What is wrong is told where it is, before and after the server has seen it. */
+
+import { type FormEvent, useState } from "react";
+import { addObject, freeObjectName } from "../../commands/scene";
+import { words } from "../../program/naming";
+import type { ObjectTypeMeta } from "../../protocol/types";
+import { Button, Field } from "../kit/kit";
+import { RefusedText, useAsking } from "../points/Doing";
+import { missing, parametersOf, SettingsFields, type Values } from "./Settings";
+import { TypeUse } from "./TypeUse";
+
+export function AddObject({ type, why, onBack }: { type: ObjectTypeMeta; why: string; onBack: () => void }) {
+  const [name, setName] = useState(() => freeObjectName(type.type.replace(/([a-z])([A-Z])/g, "$1_$2").toLowerCase()));
+  const [values, setValues] = useState<Values>({});
+  const [tried, setTried] = useState(false);
+  const { refused, busy, ask } = useAsking();
+  const lacking = missing(type.settings, values);
+  const submit = (event: FormEvent) => {
+    event.preventDefault();
+    setTried(true);
+    if (why || lacking.length > 0) return;
+    void ask(addObject(type, name.trim(), parametersOf(type.settings, values)));
+  };
+  return (
+    <form className="add-form" onSubmit={submit}>
+      <Button look="plain" onPress={onBack}>
+        ← All kinds
+      </Button>
+      <h3>{type.type}</h3>
+      <p className="quiet small description">{type.description}</p>
+      {type.has_pose && <p className="quiet small">It is put where the middle of the view points, and can be moved then.</p>}
+      <Field label="Name" value={name} onChange={setName} autoComplete="off" />
+      <SettingsFields settings={type.settings} values={values} why="" onChange={setValues} />
+      {tried && lacking.length > 0 && <RefusedText>{`Still to be said: ${lacking.map(words).join(", ")}.`}</RefusedText>}
+      <RefusedText>{refused}</RefusedText>
+      <Button look="primary" icon="plus" type="submit" why={why} isDisabled={busy}>
+        {busy ? "Adding…" : "Add"}
+      </Button>
+      <TypeUse type={type} onDeleted={onBack} />
+    </form>
+  );
+}

@@ -1,0 +1,89 @@
+/** What can be added to the scene: shapes and meshes by one tap, devices by a form of their settings. */
+
+import { useState } from "react";
+import { Input, Label, SearchField } from "react-aria-components";
+import { addShape, notBuildable, type ShapeKind } from "../../commands/scene";
+import type { ObjectTypeMeta } from "../../protocol/types";
+import { tell, useEditor } from "../../store/store";
+import { Icon } from "../kit/icons";
+import { Button } from "../kit/kit";
+import { CATEGORY_ICONS } from "../program/categories";
+import { AddObject } from "./AddObject";
+import { AddMesh } from "./AddMesh";
+import "./scene.css";
+
+const SHAPES: readonly (readonly [ShapeKind, string])[] = [
+  ["box", "Box"],
+  ["cylinder", "Cylinder"],
+  ["sphere", "Sphere"],
+];
+
+export default function AddPanel() {
+  const why = useEditor((state) => notBuildable(state));
+  const types = useEditor((state) => state.types.byName);
+  const [chosen, setChosen] = useState("");
+  const [search, setSearch] = useState("");
+  const type = types[chosen];
+  if (type) return <AddObject type={type} why={why} onBack={() => setChosen("")} />;
+  if (chosen === "mesh") return <AddMesh why={why} onBack={() => setChosen("")} />;
+  const wanted = search.trim().toLowerCase();
+  const found = Object.values(types).filter((each) => isDevice(each) && `${each.type} ${each.category ?? ""} ${each.description}`.toLowerCase().includes(wanted));
+  const groups = new Map<string, ObjectTypeMeta[]>();
+  for (const each of found.sort((a, b) => a.type.localeCompare(b.type))) {
+    const group = each.category ?? "Other";
+    groups.set(group, [...(groups.get(group) ?? []), each]);
+  }
+  return (
+    <>
+      {why && <p className="small">{why}</p>}
+      <div className="shapes" role="group" aria-label="Shapes">
+        {SHAPES.map(([kind, label]) => (
+          <Button key={kind} icon="box" why={why} onPress={() => void addShape(kind)}>
+            {label}
+          </Button>
+        ))}
+        <Button icon="box" why={why} onPress={() => setChosen("mesh")}>
+          Mesh…
+        </Button>
+      </div>
+      <SearchField className="field" value={search} onChange={setSearch}>
+        <Label className="hidden-but-read">Search</Label>
+        <Input placeholder="Search devices" />
+      </SearchField>
+      {[...groups].sort(([a], [b]) => a.localeCompare(b)).map(([group, members]) => (
+        <section key={group} aria-label={group}>
+          <h3 className="quiet small">{group}</h3>
+          <ul className="kinds">
+            {members.map((each) => (
+              <li key={each.type}>
+                <button
+                  type="button"
+                  className="kind"
+                  aria-disabled={each.disabled || undefined}
+                  onClick={() => (each.disabled ? tell("info", `${each.type} cannot be used: ${each.problem ?? "nobody knows why"}`) : setChosen(each.type))}
+                >
+                  <Icon name={CATEGORY_ICONS[group] ?? "box"} />
+                  <span>
+                    <strong>{each.type}</strong>
+                    <span className={`small ${each.disabled ? "error" : "quiet"}`}>{each.disabled ? each.problem : first(each.description)}</span>
+                  </span>
+                </button>
+              </li>
+            ))}
+          </ul>
+        </section>
+      ))}
+      {found.length === 0 && <p className="quiet">No kind of device is called “{search.trim()}”.</p>}
+    </>
+  );
+}
+
+/** Abstract types cannot be added; shapes have buttons of their own, and each its own type. */
+function isDevice({ abstract, base, disabled, problem }: ObjectTypeMeta): boolean {
+  return base !== "VirtualCollisionObject" && (!abstract || (disabled && problem !== undefined));
+}
+
+/** The first sentence. */
+function first(text: string): string {
+  return text.split(/(?<=\.)\s/)[0] ?? "";
+}

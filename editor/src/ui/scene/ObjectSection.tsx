@@ -1,0 +1,89 @@
+/** The selected object as a thing of the scene: its name, copies, what needs it, and how it is seen. */
+
+import { useState } from "react";
+import { duplicateObject, notBuildable, projectsUsing, removeObject, renameObject } from "../../commands/scene";
+import { keepView } from "../../commands/viewstate";
+import { heldBy } from "../../store/selectors";
+import { now, useEditor } from "../../store/store";
+import { MoreOrLess, OnOff } from "../kit/fields";
+import { Button, Confirm } from "../kit/kit";
+import { NameField } from "../points/NameField";
+import type { Section } from "../workplace/sections";
+import { putAside } from "./seeing";
+import "./scene.css";
+
+const Body: Section["Body"] = ({ selection: { id } }) => {
+  const object = useEditor((state) => state.doc?.objects[id]);
+  const holder = useEditor((state) => heldBy(state, id));
+  const why = useEditor((state) => (heldBy(state, id) ? `${heldBy(state, id)} works on it.` : notBuildable(state, "RemoveFromScene")));
+  const cannotRename = useEditor((state) => (holder ? `${holder} works on it.` : state.doc?.project ? "Objects belong to the scene: close the project, and open the scene." : ""));
+  const [needing, setNeeding] = useState<string[] | null>(null);
+  if (!object) return null;
+  const remove = async () => {
+    const projects = await projectsUsing(id).catch(() => []);
+    // What nobody needs goes at once: undo brings it back.
+    if (projects.length === 0) await removeObject(id);
+    else setNeeding(projects);
+  };
+  return (
+    <>
+      <NameField label="Name of the object" name={object.name} why={cannotRename} onRename={(name) => renameObject(id, name)} />
+      <div className="tool-actions">
+        <Button icon="plus" why={why} onPress={() => void duplicateObject(object)}>
+          Duplicate
+        </Button>
+        <Button icon="close" why={why} onPress={() => void remove()}>
+          Remove
+        </Button>
+      </div>
+      <Seeing id={id} />
+      {needing && (
+        <Confirm title={`Remove ${object.name}?`} yes="Remove" onClose={() => setNeeding(null)} onYes={() => void removeObject(id, true)}>
+          <p>These projects use it, and lose its actions and points when the scene is saved:</p>
+          <ul>
+            {needing.map((each) => (
+              <li key={each}>{each}</li>
+            ))}
+          </ul>
+        </Confirm>
+      )}
+    </>
+  );
+};
+
+/** How the user sees it; the others see it as they like. */
+function Seeing({ id }: { id: string }) {
+  const aside = useEditor((state) => Array.isArray(state.view.user["blocklist"]) && state.view.user["blocklist"].includes(id));
+  const opacity = useEditor((state) => Number((state.view.user["opacity"] as Record<string, unknown> | undefined)?.[id] ?? 1));
+  const [now_, setNow] = useState<number | null>(null);
+  const put = (value: number) => {
+    const rest = { ...(now().view.user["opacity"] as Record<string, number> | undefined) };
+    if (value >= 1) delete rest[id];
+    else rest[id] = value;
+    keepView("user", { opacity: rest });
+  };
+  return (
+    <>
+      <OnOff isSelected={aside} onChange={(on) => putAside(id, on)}>
+        Hide it, and aim through it
+      </OnOff>
+      {!aside && (
+        <MoreOrLess
+          label="Seen through"
+          value={1 - (now_ ?? opacity)}
+          least={0}
+          most={0.95}
+          step={0.05}
+          words={(value) => `${Math.round(value * 100)} %`}
+          onChange={(value) => setNow(1 - value)}
+          onEnd={(value) => {
+            put(1 - value);
+            setNow(null);
+          }}
+        />
+      )}
+    </>
+  );
+}
+
+export default Body;

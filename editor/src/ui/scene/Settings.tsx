@@ -1,0 +1,55 @@
+/** Fields for the settings of an object: what has no default comes first, the rest below. */
+
+import type { Parameter, ParameterMeta } from "../../protocol/types";
+import { extraOf } from "../../program/values";
+import { words } from "../../program/naming";
+import { ValueField } from "../program/ValueField";
+
+/** JSON of each setting that is not left at its default. */
+export type Values = Record<string, string>;
+
+/** Values as the server takes them. */
+export function parametersOf(settings: ParameterMeta[], values: Values): Parameter[] {
+  return settings.flatMap(({ name, type }) => (values[name] === undefined ? [] : [{ name, type, value: values[name] }]));
+}
+
+/** Names of settings that nobody has said and that have no default. */
+export function missing(settings: ParameterMeta[], values: Values): string[] {
+  return settings.filter(({ name, default_value }) => default_value === undefined && (values[name] === undefined || values[name] === '""')).map(({ name }) => name);
+}
+
+export function SettingsFields({ settings, values, why, onChange }: { settings: ParameterMeta[]; values: Values; why: string; onChange: (values: Values) => void }) {
+  const needed = settings.filter((each) => each.default_value === undefined);
+  const others = settings.filter((each) => each.default_value !== undefined);
+  const field = (each: ParameterMeta) => (
+    <ValueField
+      key={each.name}
+      label={words(each.name)}
+      name={words(each.name)}
+      type={each.type}
+      json={values[each.name] ?? each.default_value}
+      extra={extraOf(each)}
+      hint={each.description}
+      why={why}
+      onSet={(json) => {
+        const next = { ...values, [each.name]: json };
+        if (json === each.default_value) delete next[each.name];
+        onChange(next);
+        return Promise.resolve("");
+      }}
+    />
+  );
+  return (
+    <>
+      {needed.map(field)}
+      {others.length > 0 && (
+        <details className="more-settings" open={needed.length === 0 && others.length <= 6}>
+          <summary>
+            {needed.length > 0 ? "Further settings" : "Settings"} <span className="tag">{others.length}</span>
+          </summary>
+          {others.map(field)}
+        </details>
+      )}
+    </>
+  );
+}

@@ -1,0 +1,49 @@
+/** The settings of the selected object: changed together, checked, and saved by one request. */
+
+import { useState } from "react";
+import { notBuildable, setParameters } from "../../commands/scene";
+import { heldBy } from "../../store/selectors";
+import { useEditor } from "../../store/store";
+import { Button } from "../kit/kit";
+import { RefusedText, useAsking } from "../points/Doing";
+import type { Section } from "../workplace/sections";
+import { missing, parametersOf, SettingsFields, type Values } from "./Settings";
+
+const Body: Section["Body"] = ({ selection: { id } }) => {
+  const object = useEditor((state) => state.doc?.objects[id]);
+  const settings = useEditor((state) => state.types.byName[object?.type ?? ""]?.settings);
+  const holder = useEditor((state) => heldBy(state, id));
+  const cannot = useEditor((state) => notBuildable(state, "UpdateObjectParameters"));
+  const overlaid = useEditor((state) => state.live.objects[id]?.overlaid);
+  const [draft, setDraft] = useState<Values | null>(null);
+  const { refused, busy, ask } = useAsking();
+  if (!object || !settings) return null;
+  const known: Values = Object.fromEntries(object.parameters.map((each) => [each.name, each.value]));
+  const values = draft ?? known;
+  const why = holder ? `${holder} works on it.` : cannot;
+  const lacking = missing(settings, values);
+  return (
+    <>
+      {why && <p className="quiet small">{why}</p>}
+      {overlaid && overlaid.length > 0 && <p className="small">From the server’s cell file: {overlaid.join(", ")}.</p>}
+      <SettingsFields key={id} settings={settings} values={values} why={why} onChange={setDraft} />
+      {lacking.length > 0 && <RefusedText>{`Still to be said: ${lacking.join(", ")}.`}</RefusedText>}
+      <RefusedText>{refused}</RefusedText>
+      {draft && (
+        <div className="actions">
+          <Button onPress={() => setDraft(null)}>Revert</Button>
+          <Button
+            look="primary"
+            why={why}
+            isDisabled={busy || lacking.length > 0}
+            onPress={() => void ask(setParameters(id, parametersOf(settings, draft))).then((done) => done && setDraft(null))}
+          >
+            Save the settings
+          </Button>
+        </div>
+      )}
+    </>
+  );
+};
+
+export default Body;

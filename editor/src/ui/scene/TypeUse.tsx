@@ -1,0 +1,44 @@
+/** Where a kind of object is used; one that was uploaded and is used nowhere can be deleted. */
+
+import { useEffect, useState } from "react";
+import { barred, whyNot } from "../../commands/asking";
+import { deleteType, scenesUsing } from "../../commands/scene";
+import type { ObjectTypeMeta } from "../../protocol/types";
+import { useEditor } from "../../store/store";
+import { Button, Confirm } from "../kit/kit";
+import { RefusedText, useAsking } from "../points/Doing";
+
+export function TypeUse({ type, onDeleted }: { type: ObjectTypeMeta; onDeleted: () => void }) {
+  const [scenes, setScenes] = useState<string[] | null>(null);
+  const [why, setWhy] = useState("…");
+  const [sure, setSure] = useState(false);
+  const cannot = useEditor((state) => barred(state, "DeleteObjectTypes"));
+  const { refused, ask } = useAsking();
+  useEffect(() => {
+    let here = true;
+    void scenesUsing(type.type).then((found) => here && setScenes(found), () => here && setScenes([]));
+    void whyNot("DeleteObjectTypes", [type.type]).then((found) => here && setWhy(found));
+    return () => {
+      here = false;
+    };
+  }, [type.type]);
+  if (!scenes) return null;
+  // What belongs to an installed driver is not for users to delete.
+  const installed = /built in|installed driver|does not exist|not deleted/.test(why) && scenes.length === 0 && type.modified === undefined;
+  return (
+    <div className="type-use">
+      <p className="quiet small">{scenes.length > 0 ? `Used in ${scenes.join(", ")}.` : "Not used in any saved scene."}</p>
+      {!installed && (
+        <Button why={cannot || why} onPress={() => setSure(true)}>
+          Delete this kind…
+        </Button>
+      )}
+      <RefusedText>{refused}</RefusedText>
+      {sure && (
+        <Confirm title={`Delete ${type.type}?`} yes="Delete" onClose={() => setSure(false)} onYes={() => void ask(deleteType(type.type)).then((done) => done && onDeleted())}>
+          <p>The kind goes, with its code. No scene uses it. This cannot be undone.</p>
+        </Confirm>
+      )}
+    </div>
+  );
+}

@@ -1,0 +1,22 @@
+/** Sections about objects of the scene; each is loaded when an object is selected first. */
+
+import { lazily } from "../kit/lazily";
+import type { Section } from "../workplace/sections";
+
+export const objectSections: readonly Section[] = [
+  {
+    id: "object",
+    title: "Object",
+    applies: ({ kind }) => kind === "object",
+    Body: lazily(() => import("./ObjectSection")),
+  },
+];
+
+export const settingsSections: readonly Section[] = [
+  {
+    id: "settings",
+    title: "Settings",
+    applies: ({ kind, id }, state) => kind === "object" && (state.types.byName[state.doc?.objects[id]?.type ?? ""]?.settings.length ?? 0) > 0,
+    Body: lazily(() => import("./SettingsSection")),
+  },
+];
