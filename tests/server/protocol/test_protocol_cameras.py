@@ -51,9 +51,19 @@ class Service:
         told: Told | None = None,
     ) -> CameraPose:
         await self._take(parameters, pictures, expected)
-        zeros = [[0.0] * 6] * 6
         return CameraPose(
-            FOUND, 0.75, 0.2, [], zeros, 0.001, 0.002, 0.5, "joint", len(pictures), Grade.GOOD, "It is well known."
+            pose=FOUND,
+            quality=0.75,
+            residual=0.2,
+            markers=[],
+            covariance=[[0.0] * 6] * 6,
+            position_deviation=0.001,
+            orientation_deviation=0.002,
+            blur=0.5,
+            method="joint",
+            pictures=len(pictures),
+            grade=Grade.GOOD,
+            verdict="It is well known.",
         )
 
     async def markers(self, parameters: CameraParameters, picture: bytes) -> list[MarkerCorners]:
@@ -66,9 +76,23 @@ class Service:
         if told is not None:
             told(0.5, "looking for the robot")
         await self._take(view, depth, model)
-        zeros = [[0.0] * 6] * 6
         return RobotPose(
-            FOUND, Grade.GOOD, "It is well known.", 0.9, 0.0, 0.001, 1000, zeros, 0.001, 0.01, 0.02, 0.01, 8, 8, 0.5
+            pose=FOUND,
+            grade=Grade.GOOD,
+            verdict="It is well known.",
+            fitness=0.9,
+            occluded=0.0,
+            uneven=0.001,
+            residual=0.001,
+            points=1000,
+            covariance=[[0.0] * 6] * 6,
+            position_deviation=0.001,
+            orientation_deviation=0.01,
+            moved=0.02,
+            turned=0.01,
+            starts=8,
+            agreed=8,
+            seconds=0.5,
         )
 
 
