@@ -31,6 +31,8 @@ MOST_GOALS: Final = 8
 SHORTCUTS: Final = 60
 IDLE: Final = 15
 """Shortcuts in a row that lead to nothing, after which no more are tried."""
+BEYOND: Final = 0.05
+"""rad, or m, that a joint may stand beyond its limit: a real one rests a little off, and has to get back."""
 _GIVEN: Final = 1e-9
 
 Stopped = Callable[[], bool]
@@ -72,7 +74,7 @@ class Planner:
 
         Raises InvalidData beyond a limit, GoalInCollision naming a pair, StartInCollision, NoPath, Cancelled.
         """
-        self._check(goal, "to")
+        self._check(goal, "to", 1e-4)
         if hit := self.sweep.hit(goal):
             raise GoalInCollision(f"{self.name} would be in collision there: {hit}.")
         return self.to_any(start, [goal], within=within, seed=seed, stopped=stopped)
@@ -87,7 +89,7 @@ class Planner:
         stopped: Stopped | None = None,
     ) -> list[Array]:
         """Give waypoints from `start` to one of `goals`, which are free; raises as `to_joints`."""
-        self._check(start, "from")
+        self._check(start, "from", BEYOND)
         if hit := self.sweep.hit(start):
             raise StartInCollision(f"{self.name} is in collision where it stands: {hit}.")
         goals = sorted(goals, key=lambda q: self._length([start, q]))[:MOST_GOALS]
@@ -106,13 +108,13 @@ class Planner:
         hit = f"; straight there it meets {between.what}" if between is not None else ""
         raise NoPath(f"{self.name} found no way free of collision within {within:g} s{hit}.")
 
-    def _check(self, q: Array, which: str) -> None:
+    def _check(self, q: Array, which: str, slack: float) -> None:
         if q.shape != (self.arm.dof,) or not np.isfinite(q).all():
             raise InvalidData(f"{self.name} needs {self.arm.dof} finite joint values to plan {which}.")
-        if not self.arm.within(q, 1e-4):
-            over = (q < self.arm.lower - 1e-4) | (q > self.arm.upper + 1e-4)
+        if not self.arm.within(q, slack):
+            over = (q < self.arm.lower - slack) | (q > self.arm.upper + slack)
             names = ", ".join(name for name, is_over in zip(self.arm.joint_names, over, strict=True) if is_over)
-            raise InvalidData(f"{names} of {self.name} would be beyond the limits.")
+            raise InvalidData(f"{self.name} cannot move {which} there: {names} would be beyond the limits.")
 
     def _length(self, way: Sequence[Array]) -> float:
         """Give the length of a way in joint values times their levers, m."""

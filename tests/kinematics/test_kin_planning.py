@@ -114,7 +114,7 @@ def test_refused_naming_why() -> None:
     far[0, 3] = 2.0
     with pytest.raises(OutOfReach):
         planner(world).to_pose(READY, far)
-    with pytest.raises(InvalidData, match=r"elbow_joint .* limits"):
+    with pytest.raises(InvalidData, match=r"to there: elbow_joint .* limits"):
         planner(world).to_joints(READY, READY + np.array((0.0, 0.0, 5.0, 0.0, 0.0, 0.0)))
     for nonsense in (np.full(6, np.nan), np.zeros(5)):
         with pytest.raises(InvalidData):
@@ -131,6 +131,16 @@ def test_no_way_is_refused_and_names_what_is_in_the_way() -> None:
             start, goal, within=0.3
         )
     assert time.monotonic() - began < 10.0
+
+
+def test_a_joint_that_stands_a_little_beyond_its_limit_gets_back() -> None:
+    model = RobotModel.load(kin_robots.TWO_AXIS)
+    world = world_of(model)
+    beyond = np.array((model.upper[0] + 0.01, 0.3))
+    way = planner(world).to_joints(beyond, np.array((1.0, 0.3)))
+    assert np.array_equal(way[0], beyond)
+    with pytest.raises(InvalidData, match="from there: joint_1"):
+        planner(world).to_joints(beyond + np.array((0.2, 0.0)), np.array((1.0, 0.3)))
 
 
 def test_it_can_be_stopped() -> None:

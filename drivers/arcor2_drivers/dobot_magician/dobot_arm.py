@@ -25,7 +25,7 @@ from arcor2_hw.exceptions import (
 from . import alarms
 from .dobot_observed import DobotObserved
 from .frames import Command
-from .kinematics import Joints, Tool
+from .kinematics import JOINTS, Joints, Tool
 from .observer import STANDING, Sample
 from .settings import DobotMagicianSettings, within
 
@@ -142,15 +142,46 @@ class DobotArm(DobotObserved):
     ) -> None:
         """Move the tool to a pose in the world, in a line or with all joints together.
 
-        `safe` asks for a path without collisions: those are not known here, what checks them is the hub.
+        With `safe` a line that meets something in the scene is refused; a joint move leads around it, standing at each
+        waypoint, or is refused.
         Raises KinematicsException, OutOfRange, Refused, NotInControl, DeviceFault, Cancelled, DeviceTimeout.
         """
+        stops = self._stops
         self._check_end_effector(end_effector_id)
-        self._move_pose(target_pose, LINE_TO_POSE if linear else JOINT_TO_POSE, speed, self._stops)
+        if not safe:
+            self._move_pose(target_pose, LINE_TO_POSE if linear else JOINT_TO_POSE, speed, stops)
+            return
+        within(f"{self._who}: speed", speed, SLOWEST, 1.0)
+        tool, q = self._solve(target_pose)
+        if not linear:
+            self._go_around(q, speed, stops)
+            return
+        with self._moving():
+            way = self.safe_moves.line(end_effector_id, self.robot_joints(), target_pose)
+            way.require_begin(self.name, self.robot_joints())
+            self._drive_tool(tool, q, LINE_TO_POSE, speed, stops)
 
     def move_to_joints(self, target_joints: list[Joint], speed: float, safe: bool = True) -> None:
-        """Move to joint values, all joints arriving together. Raises as `move_to_pose`, and InvalidData."""
-        self._move_joints(self._checked_joints(target_joints), speed, self._stops)
+        """Move to joint values, all joints arriving together; with `safe` around what stands in the way, or not at all.
+
+        Raises as `move_to_pose`, and InvalidData.
+        """
+        stops = self._stops
+        q = self._checked_joints(target_joints)
+        if safe:
+            within(f"{self._who}: speed", speed, SLOWEST, 1.0)
+            self._go_around(q, speed, stops)
+        else:
+            self._move_joints(q, speed, stops)
+
+    def _go_around(self, q: Joints, speed: float, stops: int) -> None:
+        """Plan a way and drive it, standing at each waypoint: as the checked way is straight in joint space."""
+        with self._moving():
+            goal = [Joint(name, value) for name, value in zip(JOINTS, q, strict=True)]
+            way = self.safe_moves.to_joints(self.robot_joints(), goal, speed, stopped=lambda: self._stops != stops)
+            way.require_begin(self.name, self.robot_joints())
+            for waypoint in way.waypoints[1:]:
+                self._drive_joints(self._checked_joints(waypoint), speed, stops)
 
     def home(self) -> None:
         """Reference the axes: the arm runs to its switches and back, some twenty seconds. Keep clear of it.
@@ -166,31 +197,35 @@ class DobotArm(DobotObserved):
         within(f"{self._who}: speed", speed, SLOWEST, 1.0)
         tool, q = self._solve(target)
         with self._moving():
-            start = self._observer.sample()
-            budget = max(self._joint_time(start.q, q, speed), self._line_time(start.tool, tool, speed))
-            if mode == JUMP:
-                budget += 2.0 * self._line_time(tool, tool._replace(z=tool.z + 0.5), speed)
+            return self._drive_tool(tool, q, mode, speed, stops)
 
-            def reached(sample: Sample) -> bool:
-                away = math.dist(sample.tool[:3], tool[:3])
-                return away < POSITION_REACHED and abs(sample.tool.r - tool.r) < ANGLE_REACHED
+    def _drive_tool(self, tool: Tool, q: Joints, mode: int, speed: float, stops: int) -> MoveResult:
+        start = self._observer.sample()
+        budget = max(self._joint_time(start.q, q, speed), self._line_time(start.tool, tool, speed))
+        if mode == JUMP:
+            budget += 2.0 * self._line_time(tool, tool._replace(z=tool.z + 0.5), speed)
 
-            what = "a linear move" if mode == LINE_TO_POSE else "a move"
-            numbers = (*(value * 1000.0 for value in tool[:3]), math.degrees(tool.r))
-            return self._run(what, speed, budget, reached, stops, Command.PTP, "B4f", mode, *numbers)
+        def reached(sample: Sample) -> bool:
+            away = math.dist(sample.tool[:3], tool[:3])
+            return away < POSITION_REACHED and abs(sample.tool.r - tool.r) < ANGLE_REACHED
+
+        what = "a linear move" if mode == LINE_TO_POSE else "a move"
+        numbers = (*(value * 1000.0 for value in tool[:3]), math.degrees(tool.r))
+        return self._run(what, speed, budget, reached, stops, Command.PTP, "B4f", mode, *numbers)
 
     def _move_joints(self, q: Joints, speed: float, stops: int) -> MoveResult:
         within(f"{self._who}: speed", speed, SLOWEST, 1.0)
         with self._moving():
-            budget = self._joint_time(self._observer.sample().q, q, speed)
+            return self._drive_joints(q, speed, stops)
 
-            def reached(sample: Sample) -> bool:
-                return max(abs(a - b) for a, b in zip(sample.q, q, strict=True)) < ANGLE_REACHED
+    def _drive_joints(self, q: Joints, speed: float, stops: int) -> MoveResult:
+        budget = self._joint_time(self._observer.sample().q, q, speed)
 
-            angles = map(math.degrees, q)
-            return self._run(
-                "a joint move", speed, budget, reached, stops, Command.PTP, "B4f", JOINT_TO_ANGLES, *angles
-            )
+        def reached(sample: Sample) -> bool:
+            return max(abs(a - b) for a, b in zip(sample.q, q, strict=True)) < ANGLE_REACHED
+
+        angles = map(math.degrees, q)
+        return self._run("a joint move", speed, budget, reached, stops, Command.PTP, "B4f", JOINT_TO_ANGLES, *angles)
 
     def _joint_time(self, start: Joints, end: Joints, speed: float) -> float:
         way = max(abs(a - b) for a, b in zip(start, end, strict=True))

@@ -8,6 +8,8 @@ from arcor2_hw.data.robot import Control, Joint, Mode, Power, ProgramState, Robo
 from arcor2_hw.exceptions import InvalidData, NotFound, OutOfRange, Refused
 from arcor2_hw.objects import Robot
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
+from arcor2_hw.objects.safe_moves import SafeMoves
+from arcor2_hw.objects.surroundings import Surroundings
 
 from . import alarms, kinematics
 from .frames import Command
@@ -32,6 +34,12 @@ class DobotObserved(Robot):
         self._observer = Observer(name, settings, self._drop_control)
         self._who = self._observer.who
         self._in_control = False
+        self.safe_moves = SafeMoves(self)
+
+    def surround(self, surroundings: Surroundings) -> None:
+        """Take what tells of the things around the arm, and read its model."""
+        super().surround(surroundings)
+        self.safe_moves.prepare()
 
     def _drop_control(self) -> None:
         self._in_control = False
@@ -173,13 +181,17 @@ class DobotObserved(Robot):
     ) -> list[Joint]:
         """Give the joints that reach a pose in the world; there is one solution at most.
 
-        Collisions are not known here. Raises KinematicsException saying what keeps it from being reached.
+        With `avoid_collisions` they are free of what stands in the scene. Raises KinematicsException saying what keeps
+        it from being reached.
         """
         self._check_end_effector(end_effector_id)
         if start_joints:
             self._checked_joints(start_joints)
         _, q = self._solve(pose)
-        return [Joint(name, value) for name, value in zip(JOINTS, q, strict=True)]
+        found = [Joint(name, value) for name, value in zip(JOINTS, q, strict=True)]
+        if avoid_collisions and (hit := self.safe_moves.contacts(found)):
+            raise self.KinematicsException(f"{self.name} reaches the pose only in collision: {hit[0]}")
+        return found
 
     def forward_kinematics(self, end_effector_id: str, joints: list[Joint]) -> Pose:
         """Give the tool in the world for joints. Raises InvalidData, KinematicsException beyond a limit."""

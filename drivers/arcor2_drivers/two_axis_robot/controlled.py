@@ -66,9 +66,10 @@ class TwoAxisControlled(TwoAxisObserved):
 
         Raises DeviceFault naming a hardware error, NotInControl while the arm moves, Refused naming what is missing.
         """
-        snapshot = self._observer.fresh()
         if self._ours:
             return
+        self.safe_moves.prepare()  # before the watchdog is armed: it is not fed meanwhile
+        snapshot = self._observer.fresh()
         self._check_faults(snapshot)
         if not snapshot.standing:
             raise NotInControl(f"{self.name} is moving, and not by us; wait until it stands")

@@ -10,6 +10,8 @@ from arcor2_hw.data.robot import Control, Joint, Mode, Power, ProgramState, Robo
 from arcor2_hw.exceptions import DeviceError, NotFound, OutOfRange, Refused
 from arcor2_hw.objects import Robot
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
+from arcor2_hw.objects.safe_moves import SafeMoves
+from arcor2_hw.objects.surroundings import Surroundings
 
 from . import kinematics
 from .observer import Observer, Snapshot
@@ -39,6 +41,12 @@ class TwoAxisObserved(Robot):
         self._limits = (settings.lower_1, settings.upper_1), (settings.lower_2, settings.upper_2)
         self._observer = Observer(name, settings, self._on_loss)
         self._since: dict[str, str] = {}
+        self.safe_moves = SafeMoves(self)
+
+    def surround(self, surroundings: Surroundings) -> None:
+        """Take what tells of the things around the arm, and read its model."""
+        super().surround(surroundings)
+        self.safe_moves.prepare()
 
     def _on_loss(self, error: DeviceError) -> None:
         """Note a loss; told on the observing thread."""
@@ -162,12 +170,20 @@ class TwoAxisObserved(Robot):
     ) -> list[Joint]:
         """Give the joints that reach a position, with the elbow on the side nearest to `start_joints`.
 
-        Two joints cannot choose the heading: it is what comes of the position. Collisions are not known here.
-        Raises KinematicsException out of reach, out of the plane or beyond the limits.
+        Two joints cannot choose the heading: it is what comes of the position. With `avoid_collisions` the elbow is on
+        the side on which the arm is free of what stands in the scene.
+        Raises KinematicsException out of reach, out of the plane, beyond the limits, or in collision on both sides.
         """
         self._check_end_effector(end_effector_id)
         seed = self._checked(start_joints) if start_joints else self._angles(self._observer.current())
-        return self._joints(self._solve(pose, seed))
+        return self._joints(self._free(pose, seed) if avoid_collisions else self._solve(pose, seed))
+
+    def _free(self, pose: Pose, seed: tuple[float, float]) -> tuple[float, float]:
+        """Give the joints for a position that are free, nearest to the seed."""
+        q = self._solve(pose, seed)
+        if not self.safe_moves.contacts(self._joints(q)):
+            return q
+        return self._checked(self.safe_moves.inverse(END_EFFECTOR, pose, self._joints(seed)))
 
     def _solve(self, pose: Pose, seed: tuple[float, float]) -> tuple[float, float]:
         local = self._pose.inverted() * pose

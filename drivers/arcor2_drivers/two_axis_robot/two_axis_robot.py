@@ -50,18 +50,36 @@ class TwoAxisRobot(TwoAxisControlled):
     ) -> None:
         """Move to a position in the world, joint by joint; a straight line is refused.
 
-        `safe` asks for a path without collisions: those are not known here, what checks them is the hub.
+        With `safe` around what stands in the scene, standing at each waypoint, or not at all.
         Raises KinematicsException, OutOfRange, Refused, NotInControl, DeviceFault, Cancelled, DeviceTimeout.
         """
         stops = self._stops
         self._check_end_effector(end_effector_id)
         if linear:
             raise Refused(f"{self.name} does not move in a straight line; ask for a joint move (linear=false)")
-        self._move_pose(target_pose, speed, 1.0, stops)
+        if safe:
+            self._go_around(self._free(target_pose, self._angles(self._observer.current())), speed, stops)
+        else:
+            self._move_pose(target_pose, speed, 1.0, stops)
 
     def move_to_joints(self, target_joints: list[Joint], speed: float, safe: bool = True) -> None:
-        """Move to joint values, both joints arriving together."""
-        self._move(self._checked(target_joints), speed, 1.0, self._stops)
+        """Move to joint values, both joints arriving together; with `safe` around what stands in the way."""
+        stops, q = self._stops, self._checked(target_joints)
+        if safe:
+            self._go_around(q, speed, stops)
+        else:
+            self._move(q, speed, 1.0, stops)
+
+    def _go_around(self, q: tuple[float, float], speed: float, stops: int) -> None:
+        """Plan a way and drive it, standing at each waypoint: as the checked way is straight in joint space."""
+        within(f"{self.name}: speed", speed, 0.001, 1.0)
+        with self._moving():
+            self._check_takes_goals()
+            now = self.robot_joints()
+            way = self.safe_moves.to_joints(now, self._joints(q), speed, stopped=lambda: self._stops != stops)
+            way.require_begin(self.name, self.robot_joints())
+            for waypoint in way.waypoints[1:]:
+                self._drive(self._checked(waypoint), speed, 1.0, stops)
 
     def jog(
         self,
@@ -168,40 +186,43 @@ class TwoAxisRobot(TwoAxisControlled):
         within(f"{self.name}: speed", speed, 0.001, 1.0)
         within(f"{self.name}: acceleration", acceleration, 0.01, 1.0)
         with self._moving():
-            self._check_takes_goals()
-            goals = self._ticks(q)
-            self._check_servo_limits(goals)
-            start = self._observer.fresh()
-            began = time.monotonic()
-            top, ramp = speed * self._axes.max_joint_speed, acceleration * self._axes.joint_acceleration
-            distances = [abs(goal - servo.position) * reg.TICK for goal, servo in zip(goals, start.servos, strict=True)]
-            longest = max(distances)
-            blocks, slowest = {}, 0.0
-            for number, goal, distance in zip(self._axes.ids, goals, distances, strict=True):
-                part = distance / longest if longest else 1.0
-                a, v = reg.profile(top * part, ramp * part)  # one shape for both, so that they arrive together
-                slowest = max(slowest, distance / (v * reg.VELOCITY) + v * reg.VELOCITY / (a * reg.ACCELERATION))
-                blocks[number] = b"".join(value.to_bytes(4, "little", signed=True) for value in (a, v, goal))
+            return self._drive(q, speed, acceleration, stops)
 
-            def command(bus: Bus) -> None:
-                if self._stops != stops or not self._ours:
-                    raise Cancelled(f"a move of {self.name} was stopped")
-                bus.sync_write(GOALS, blocks)
+    def _drive(self, q: tuple[float, float], speed: float, acceleration: float, stops: int) -> MoveResult:
+        self._check_takes_goals()
+        goals = self._ticks(q)
+        self._check_servo_limits(goals)
+        start = self._observer.fresh()
+        began = time.monotonic()
+        top, ramp = speed * self._axes.max_joint_speed, acceleration * self._axes.joint_acceleration
+        distances = [abs(goal - servo.position) * reg.TICK for goal, servo in zip(goals, start.servos, strict=True)]
+        longest = max(distances)
+        blocks, slowest = {}, 0.0
+        for number, goal, distance in zip(self._axes.ids, goals, distances, strict=True):
+            part = distance / longest if longest else 1.0
+            a, v = reg.profile(top * part, ramp * part)  # one shape for both, so that they arrive together
+            slowest = max(slowest, distance / (v * reg.VELOCITY) + v * reg.VELOCITY / (a * reg.ACCELERATION))
+            blocks[number] = b"".join(value.to_bytes(4, "little", signed=True) for value in (a, v, goal))
 
-            try:
-                self._observer.do(command)
-                self._check_taken(goals, stops)
-                self._wait_done(goals, 1.5 * slowest + 1.0, stops)
-            except Cancelled:
-                self._wait_rest(REST_WITHIN)
-                self._note(speed, began, MoveEnd.STOPPED)
-                raise
-            except (DeviceFault, NotInControl):
-                with contextlib.suppress(DeviceError):  # the servo that is well must not go on alone
-                    self._observer.do(self._brake, urgent=True)
-                self._note(speed, began, MoveEnd.SAFETY)
-                raise
-            return self._note(speed, began, MoveEnd.DONE)
+        def command(bus: Bus) -> None:
+            if self._stops != stops or not self._ours:
+                raise Cancelled(f"a move of {self.name} was stopped")
+            bus.sync_write(GOALS, blocks)
+
+        try:
+            self._observer.do(command)
+            self._check_taken(goals, stops)
+            self._wait_done(goals, 1.5 * slowest + 1.0, stops)
+        except Cancelled:
+            self._wait_rest(REST_WITHIN)
+            self._note(speed, began, MoveEnd.STOPPED)
+            raise
+        except (DeviceFault, NotInControl):
+            with contextlib.suppress(DeviceError):  # the servo that is well must not go on alone
+                self._observer.do(self._brake, urgent=True)
+            self._note(speed, began, MoveEnd.SAFETY)
+            raise
+        return self._note(speed, began, MoveEnd.DONE)
 
     def _check_servo_limits(self, goals: tuple[int, int]) -> None:
         for number, goal, setup in zip(self._axes.ids, goals, self._observer.setups, strict=True):

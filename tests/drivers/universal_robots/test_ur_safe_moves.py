@@ -10,36 +10,16 @@ import pytest
 
 import arcor2_drivers
 from arcor2_drivers.universal_robots.ur5e import UR5e
-from arcor2_hw.data import object_type
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import Cancelled, NotInControl
 from arcor2_hw.kinematics.model import RobotModel
-from arcor2_hw.kinematics.shapes import Box
-from arcor2_hw.kinematics.world import CollisionWorld
-from arcor2_hw.objects import Robot
-from arcor2_hw.objects.surroundings import Obstacle
+from tests.drivers.around import Around
 
 from .conftest import HOME, Doing, FakeUr, moving
 
 URDF = Path(next(iter(arcor2_drivers.__path__))) / "universal_robots" / "urdf" / "ur5e"
 BESIDE = [1.6, *HOME[1:]]
-
-
-class Around:
-    """Boxes, edges along the axes of the world."""
-
-    def __init__(self) -> None:
-        self.boxes: dict[str, tuple[Position, tuple[float, float, float]]] = {}
-
-    def obstacles(self) -> list[Obstacle]:
-        return [Obstacle(name, object_type.Box(name, *sizes), Pose(at)) for name, (at, sizes) in self.boxes.items()]
-
-    def robots(self) -> list[tuple[Robot, list[Joint]]]:
-        return []
-
-    def asset(self, asset_id: str) -> Path | None:
-        return None
 
 
 @pytest.fixture
@@ -59,16 +39,8 @@ def between(robot: UR5e) -> Position:
     return model.pose(np.array([0.8, *HOME[1:]])).position
 
 
-def world(around: Around) -> CollisionWorld:
-    found = CollisionWorld()
-    found.add_robot("ur", RobotModel.load(URDF, {"tcp_z": 0.1}), Pose())
-    for name, (at, sizes) in around.boxes.items():
-        found.put(name, Box(*sizes), Pose(at))
-    return found
-
-
-def driven(fake: FakeUr) -> list[list[float]]:
-    return [command["values"][:6] for command in fake.do("commands_taken") if command["code"] == 1]
+def touches(around: Around, *seen: list[float]) -> set[str]:
+    return around.touches(RobotModel.load(URDF, {"tcp_z": 0.1}), Pose(), seen)
 
 
 def test_a_joint_move_goes_around_and_only_where_it_was_looked_at(ready: UR5e, around: Around, fake: FakeUr) -> None:
@@ -82,11 +54,10 @@ def test_a_joint_move_goes_around_and_only_where_it_was_looked_at(ready: UR5e, a
     doing.result()
     assert np.allclose(fake.truth()["q"], BESIDE, atol=1e-3)
     assert len(seen) > 20
-    free = world(around)
-    assert all(free.is_free("ur", np.array(q)) for q in seen)
+    assert touches(around, *seen) == set()
     # Straight, and unsafe, it goes through it.
-    straight = [np.array(HOME) + share * (np.array(BESIDE) - HOME) for share in np.linspace(0.0, 1.0, 200)]
-    assert not all(free.is_free("ur", q) for q in straight)
+    straight = [list(np.array(HOME) + share * (np.array(BESIDE) - HOME)) for share in np.linspace(0.0, 1.0, 200)]
+    assert touches(around, *straight) == {"post"}
     ready.move_to_joints(joints(ready, HOME), 1.0, safe=False)
     assert np.allclose(fake.truth()["q"], HOME, atol=1e-3)
 
@@ -100,7 +71,7 @@ def test_to_a_pose_by_a_configuration_that_is_free(ready: UR5e, around: Around, 
     ready.move_to_pose("tcp", pose, 1.0, linear=False)
     assert ready.get_end_effector_pose("tcp").position.distance_to(pose.position) < 1e-3
     assert np.abs(np.array(fake.truth()["q"]) - goal).max() > 0.3
-    assert world(around).is_free("ur", np.array(fake.truth()["q"]))
+    assert touches(around, fake.truth()["q"]) == set()
 
 
 def test_inverse_kinematics_is_the_controllers_in_a_configuration_that_is_free(ready: UR5e, around: Around) -> None:
@@ -111,7 +82,7 @@ def test_inverse_kinematics_is_the_controllers_in_a_configuration_that_is_free(r
     elbow = Pose.from_matrix(RobotModel.load(URDF).link_poses(np.array(goal))["forearm_link"]).position
     around.boxes["lamp"] = elbow, (0.1, 0.1, 0.1)
     found = ready.inverse_kinematics("tcp", pose, near)
-    assert world(around).is_free("ur", np.array([joint.value for joint in found]))
+    assert touches(around, [joint.value for joint in found]) == set()
     assert ready.forward_kinematics("tcp", found).position.distance_to(pose.position) < 1e-6
     blind = ready.inverse_kinematics("tcp", pose, near, avoid_collisions=False)
     assert [joint.value for joint in blind] == pytest.approx(goal, abs=1e-6)

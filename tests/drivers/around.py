@@ -1,0 +1,38 @@
+"""Surroundings of a robot that a test says: boxes, edges along the axes of the world."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from arcor2_hw.data import object_type
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.robot import Joint
+from arcor2_hw.kinematics.model import RobotModel
+from arcor2_hw.kinematics.shapes import Box
+from arcor2_hw.kinematics.world import CollisionWorld
+from arcor2_hw.objects import Robot
+from arcor2_hw.objects.surroundings import Obstacle
+
+
+class Around:
+    def __init__(self) -> None:
+        self.boxes: dict[str, tuple[Position, tuple[float, float, float]]] = {}
+
+    def obstacles(self) -> list[Obstacle]:
+        return [Obstacle(name, object_type.Box(name, *sizes), Pose(at)) for name, (at, sizes) in self.boxes.items()]
+
+    def robots(self) -> list[tuple[Robot, list[Joint]]]:
+        return []
+
+    def asset(self, asset_id: str) -> Path | None:
+        return None
+
+    def touches(self, model: RobotModel, base: Pose, seen: Iterable[Iterable[float]]) -> set[str]:
+        """Name what the robot touches in joint values, by a world made here."""
+        world = CollisionWorld()
+        world.add_robot("arm", model, base)
+        for name, (at, sizes) in self.boxes.items():
+            world.put(name, Box(*sizes), Pose(at))
+        contacts = (world.contacts("arm", np.array([*q])) for q in seen)
+        return {contact.second for found in contacts for contact in found}

@@ -1,0 +1,104 @@
+"""Safe moves of the Dobot: around what the scene says stands there, one motion after the other, or refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import arcor2_drivers
+from arcor2_drivers.dobot_magician.dobot_magician import DobotMagician
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.robot import Joint
+from arcor2_hw.exceptions import Cancelled
+from arcor2_hw.kinematics.model import RobotModel
+from tests.drivers.around import Around
+from tests.drivers.doing import Doing
+from tests.fakes.conftest import FakeProcess
+
+from .conftest import BASE
+
+URDF = Path(next(iter(arcor2_drivers.__path__))) / "dobot_magician" / "urdf" / "dobot_magician"
+LEFT, RIGHT = (0.9, 0.6, 0.9, 0.0), (-0.9, 0.6, 0.9, 0.0)
+
+
+@pytest.fixture
+def around(arm: DobotMagician) -> Around:
+    around = Around()
+    arm.surround(around)
+    arm.move_to_joints(joints(LEFT), 1.0)
+    around.boxes["box"] = (BASE * Pose(Position(0.2, 0.0, -0.05))).position, (0.06, 0.06, 0.2)
+    return around
+
+
+def joints(values: tuple[float, ...]) -> list[Joint]:
+    return [Joint(f"joint_{number}", value) for number, value in enumerate(values, 1)]
+
+
+def values(arm: DobotMagician) -> list[float]:
+    return [joint.value for joint in arm.robot_joints()]
+
+
+def touches(around: Around, *seen: list[float]) -> set[str]:
+    return around.touches(RobotModel.load(URDF, {"tool_x": 0.0597, "tool_z": 0.0}), BASE, seen)
+
+
+def test_the_model_is_where_the_arm_says_it_is(arm: DobotMagician, around: Around) -> None:
+    told, found = arm.get_end_effector_pose("tcp"), arm.safe_moves.forward("tcp", arm.robot_joints())
+    assert told.position.distance_to(found.position) < 1e-5
+    assert told.orientation.angle_to(found.orientation) < 1e-4
+
+
+@pytest.mark.parametrize("to_pose", [False, True])
+def test_a_joint_move_goes_around(arm: DobotMagician, around: Around, to_pose: bool) -> None:
+    seen: list[list[float]] = []
+    goal = arm.forward_kinematics("tcp", joints(RIGHT))
+    if to_pose:
+        doing = Doing(arm.move_to_pose, "tcp", goal, 1.0, True, False)
+    else:
+        doing = Doing(arm.move_to_joints, joints(RIGHT), 1.0)
+    while not doing.ended_at:
+        sample = values(arm)
+        if not seen or sample != seen[-1]:
+            seen.append(sample)
+        arm._observer.after(arm._observer.sample().monotonic)
+    doing.result()
+    assert arm.get_end_effector_pose("tcp").position.distance_to(goal.position) < 1e-3
+    assert touches(around, *seen) == set()
+    straight = [list(np.array(LEFT) + share * (np.array(RIGHT) - LEFT)) for share in np.linspace(0.0, 1.0, 100)]
+    assert touches(around, *straight) == {"box"}
+
+
+def test_refused_and_nothing_moves(arm: DobotMagician, around: Around) -> None:
+    before = values(arm)
+    inside = around.boxes["box"][0] + Position(0.0, 0.0, 0.05)
+    pose = Pose(inside, arm.get_end_effector_pose("tcp").orientation)
+    for move in (
+        lambda: arm.move_to_pose("tcp", pose, 1.0, linear=False),
+        lambda: arm.move_to_pose("tcp", pose, 1.0),
+        lambda: arm.inverse_kinematics("tcp", pose),
+    ):
+        with pytest.raises(arm.KinematicsException, match=r"arm/\w+ and box"):
+            move()
+    assert values(arm) == pytest.approx(before, abs=1e-6)
+    assert arm.inverse_kinematics("tcp", pose, avoid_collisions=False)
+
+
+def test_a_line_past_it_is_driven(arm: DobotMagician, around: Around) -> None:
+    here = arm.get_end_effector_pose("tcp")
+    there = Pose(here.position + Position(0.0, 0.0, 0.03), here.orientation)
+    arm.move_to_pose("tcp", there, 1.0)
+    assert arm.get_end_effector_pose("tcp").position.distance_to(there.position) < 1e-3
+
+
+def test_a_stop_ends_it_and_nothing_follows(arm: DobotMagician, around: Around, fake: FakeProcess) -> None:
+    doing = Doing(arm.move_to_joints, joints(RIGHT), 0.2)
+    start = values(arm)
+    while values(arm) == pytest.approx(start, abs=0.01):
+        assert not doing.ended_at
+    arm.stop()
+    with pytest.raises(Cancelled):
+        doing.result(2.0)
+    at = values(arm)
+    assert abs(at[0] - RIGHT[0]) > 0.3
+    arm._observer.after(arm._observer.sample().monotonic)
+    assert values(arm) == pytest.approx(at, abs=1e-6)
