@@ -35,6 +35,8 @@ AT_LATEST: Final = 0.3
 """Seconds after which it is looked at although edits still come."""
 ANSWER_WITHIN: Final = 1.0
 """Seconds that a request waits for what is being worked out."""
+DESCRIBED_WITHIN: Final = 10.0
+"""Seconds that a request waits for what end effectors there are: a worker may have to come up for that."""
 PIECE: Final = 100
 """Poses of one question to the worker, between which others get their turn."""
 
@@ -64,6 +66,8 @@ class ReachabilityBoard:
         self._wake = asyncio.Event()
         self._idle = asyncio.Event()
         self._idle.set()
+        self._described = asyncio.Event()
+        """The rows are there."""
         self._working: asyncio.Task[None] | None = None
         services.session.on_change.append(lambda edit: self.look() if edit is not None else self._begin_anew())
         services.collisions.on_change.append(self.look)
@@ -81,11 +85,12 @@ class ReachabilityBoard:
             raise NotFound(f"The project has no orientation or joints {strange[0]!r}.")
         self._asked = True
         self.look()
-        try:
-            async with asyncio.timeout(ANSWER_WITHIN):
-                await self._idle.wait()
-        except TimeoutError:
-            log.debug("reachability is being worked out still")
+        for event, within in ((self._described, DESCRIBED_WITHIN), (self._idle, ANSWER_WITHIN)):
+            try:
+                async with asyncio.timeout(within):
+                    await event.wait()
+            except TimeoutError:
+                log.debug("reachability is being worked out still")
         rows = [row for row in self._rows.values() if row.robot in chosen and _is_asked(row, args)]
         return [self._told(row, self._of_interest(row, wanted)) for row in rows]
 
@@ -132,6 +137,8 @@ class ReachabilityBoard:
         self._rows.clear()
         self._effectors.clear()
         self._wake.clear()
+        self._described.set()  # who waits is told that there is nothing to wait for
+        self._described = asyncio.Event()
         self._idle.set()
 
     async def close(self) -> None:
@@ -164,22 +171,28 @@ class ReachabilityBoard:
         names = {robot.id for robot in standing}
         for key in [key for key in self._rows if key[0] not in names]:
             del self._rows[key]
+        problems = {robot.id: await self._described_robot(robot) for robot in standing}
+        self._described.set()
         poses = await self._poses()
         for robot in standing:
-            model = robot_model(services, robot)
-            if model is None:
-                continue
-            problem = ""
-            try:
-                await self._rows_of(robot, model)
-            except Arcor2Error as error:
-                problem = str(error)
-                if not any(row.robot == robot.id for row in self._rows.values()):
-                    self._rows[robot.id, ""] = _Row(robot.id, "")
+            problem = problems[robot.id]
             for row in [row for row in self._rows.values() if row.robot == robot.id]:
                 await self._judge(row, robot, poses | self._joints(row), problem)
             if self._wake.is_set():
                 return  # something changed meanwhile: what is known of the old state is of no use
+
+    async def _described_robot(self, robot: SceneObject) -> str:
+        """Bring the rows of a robot up to date; gives why its model cannot be used, empty when it can."""
+        model = robot_model(self._services, robot)
+        if model is None:
+            return ""
+        try:
+            await self._rows_of(robot, model)
+        except Arcor2Error as error:
+            if not any(row.robot == robot.id for row in self._rows.values()):
+                self._rows[robot.id, ""] = _Row(robot.id, "")
+            return str(error)
+        return ""
 
     async def _rows_of(self, robot: SceneObject, model: RobotModel) -> None:
         """Bring the rows of a robot up to date with the end effectors of its model."""
