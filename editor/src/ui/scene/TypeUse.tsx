@@ -23,8 +23,8 @@ export function TypeUse({ type, onDeleted }: { type: ObjectTypeMeta; onDeleted: 
     };
   }, [type.type]);
   if (!scenes) return null;
-  // What belongs to an installed driver is not for users to delete.
-  const installed = /built in|installed driver|does not exist|not deleted/.test(why) && scenes.length === 0 && type.modified === undefined;
+  // What belongs to an installed driver is not for users to delete; only what was uploaded has a date.
+  const installed = type.built_in || type.modified === undefined;
   return (
     <div className="type-use">
       <p className="quiet small">{scenes.length > 0 ? `Used in ${scenes.join(", ")}.` : "Not used in any saved scene."}</p>
