@@ -97,6 +97,13 @@ export function lean(): Plugin {
     name: "lean",
     apply: "build",
     enforce: "pre",
+    resolveId(source, importer) {
+      // The server reads meshes: the readers that come with that of URDF are never used.
+      return importer?.includes("/urdf-loader/") && /\/(STL|Collada)Loader\.js$/.test(source) ? "\0no-loaders" : null;
+    },
+    load(id) {
+      return id === "\0no-loaders" ? "export class STLLoader {}\nexport class ColladaLoader {}" : null;
+    },
     transform(code, id) {
       const part = /\/three\/src\/(.+)$/.exec(id)?.[1] ?? "";
       if (PARTS[part]) return PARTS[part];

@@ -26,7 +26,7 @@ import { labelsOf } from "./naming";
 import { DARK, LIGHT, type Palette } from "./palette";
 import { type Hit, onFloor, pick } from "./picking";
 import { worldPose } from "./poses";
-import type { Context, Thing } from "./thing";
+import { type Context, type Thing, trianglesOf } from "./thing";
 import { make } from "./things/make";
 import { type JointLimit, RobotThing } from "./things/robot";
 
@@ -37,6 +37,7 @@ export interface EngineOptions {
   labels: HTMLElement;
   telemetry: Telemetry;
   asset: Context["asset"];
+  trouble: Context["trouble"];
   quality: Quality;
   dark: boolean;
 }
@@ -50,6 +51,10 @@ export interface Probe {
   screen: { x: number; y: number } | null;
   visible: boolean;
   badge: string;
+  /** Why it is not shown as it looks; empty where it is. */
+  problem: string;
+  /** Triangles of its picture, without those of a ghost; 0 for what is drawn with others of its kind. */
+  triangles: number;
   joints?: Record<string, number>;
   ghost?: Record<string, number> | null;
   endEffectors?: Pose[];
@@ -107,6 +112,7 @@ export class Engine {
       palette: this.palette,
       batches: this.batches,
       asset: options.asset,
+      trouble: options.trouble,
       thing: (id) => this.things.get(id),
       metresPerPixel: (at) => (2 * this.view.camera.position.distanceTo(at) * Math.tan((this.view.camera.fov * Math.PI) / 360)) / this.height,
       invalidate: () => this.invalidate(),
@@ -230,6 +236,8 @@ export class Engine {
       screen: at.z > 1 ? null : { x: ((at.x + 1) / 2) * this.width, y: ((1 - at.y) / 2) * this.height },
       visible: thing.root.visible && at.z <= 1 && Math.abs(at.x) <= 1 && Math.abs(at.y) <= 1,
       badge: thing.badge(),
+      problem: thing.problem,
+      triangles: trianglesOf(thing.root, id),
     };
     if (thing instanceof RobotThing) {
       const { telemetry } = this.context;

@@ -1,6 +1,6 @@
 /** The picture of one item, and what it is given by the engine. */
 
-import { type Material, type Object3D, Vector3 } from "three";
+import { type Material, type Mesh, type Object3D, Vector3 } from "three";
 import type { Telemetry } from "../store/telemetry";
 import type { Batches } from "./batches";
 import type { Item } from "./items";
@@ -10,8 +10,10 @@ export interface Context {
   telemetry: Telemetry;
   palette: Palette;
   batches: Batches;
-  /** Read an asset of the server. */
-  asset: (id: string) => Promise<{ name: string; content: ArrayBuffer }>;
+  /** Read an asset of the server, ready to be shown. */
+  asset: (id: string) => Promise<ArrayBuffer>;
+  /** Tell people what cannot be shown, and why. */
+  trouble: (sentence: string) => void;
   /** The thing with an id, for what connects two. */
   thing: (id: string) => Thing | undefined;
   /** m in the world that one pixel is worth at a place. */
@@ -48,6 +50,11 @@ export abstract class Thing<I extends Item = Item> {
     return this.root.getWorldPosition(target);
   }
 
+  /** Why it is not shown as it looks; empty where it is. */
+  get problem(): string {
+    return "";
+  }
+
   /** A word beside the name, when something is to be told. */
   badge(): string {
     return "";
@@ -64,6 +71,17 @@ export function ownedBy(root: Object3D, id: string): void {
   root.traverse((each) => {
     each.userData["item"] = id;
   });
+}
+
+/** Count the triangles of an item's picture; not those of what hangs on it, nor of doubles. */
+export function trianglesOf(root: Object3D, id: string): number {
+  let count = 0;
+  root.traverse((each) => {
+    const mesh = each as Mesh;
+    if (!mesh.isMesh || each.userData["item"] !== id) return;
+    count += (mesh.geometry.index?.count ?? mesh.geometry.getAttribute("position").count) / 3;
+  });
+  return count;
 }
 
 /** Free what the graphics card holds of a tree; shared geometry and material are marked and stay. */

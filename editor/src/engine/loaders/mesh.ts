@@ -1,4 +1,4 @@
-/** Meshes of the kinds that people upload, as one geometry in m. A chunk of its own: most cells have none. */
+/** Meshes of the kinds that people upload, before they are: as one geometry, in the file's unit. A chunk of its own. */
 
 import { type BufferGeometry, type Group, LoadingManager, Matrix4, type Mesh, type Object3D } from "three";
 import { ColladaLoader } from "three/examples/jsm/loaders/ColladaLoader.js";

@@ -16,6 +16,7 @@ import {
   Vector3,
 } from "three";
 import type { ObjectItem, Shape } from "../items";
+import { readMesh } from "../loaders/glb";
 import { setPose } from "../poses";
 import { disposeTree, ownedBy, Thing, type Context } from "../thing";
 
@@ -28,6 +29,8 @@ export class ObjectThing extends Thing<ObjectItem> {
   /** Counts shapes, so that a mesh that comes late does not replace a newer one. */
   private loading = 0;
   private height = 0.05;
+  private coloured = false;
+  private reason = "";
 
   constructor(item: ObjectItem, context: Context) {
     super(context);
@@ -43,8 +46,10 @@ export class ObjectThing extends Thing<ObjectItem> {
       this.build(item.shape);
     }
     const { palette } = this.context;
-    const color = item.selected ? palette.selected : item.trouble ? palette.trouble : item.lockedBy ? palette.locked : palette.object;
-    this.material.color.copy(color);
+    const color = item.selected ? palette.selected : item.trouble || this.reason ? palette.trouble : item.lockedBy ? palette.locked : null;
+    // A mesh with colours of its own has these, until there is something to tell.
+    if (color || !this.coloured) this.material.color.copy(color ?? palette.object);
+    else this.material.color.setRGB(1, 1, 1);
     this.edges.color.copy(item.selected ? palette.selected : palette.gridStrong);
     this.material.transparent = item.faint > 0 || item.shape.kind === "none";
     this.material.opacity = 1 - item.faint;
@@ -57,7 +62,12 @@ export class ObjectThing extends Thing<ObjectItem> {
   }
 
   override badge(): string {
-    return this.item.lockedBy ? `locked by ${this.item.lockedBy}` : "";
+    if (this.item.lockedBy) return `locked by ${this.item.lockedBy}`;
+    return this.reason && "its mesh cannot be shown";
+  }
+
+  override get problem(): string {
+    return this.reason;
   }
 
   override dispose(): void {
@@ -69,6 +79,7 @@ export class ObjectThing extends Thing<ObjectItem> {
 
   private build(shape: Shape): void {
     const mine = ++this.loading;
+    this.reason = "";
     for (const child of [...this.root.children]) {
       // Items that hang on this one stay.
       if (child.userData["item"] !== this.item.id) continue;
@@ -95,18 +106,24 @@ export class ObjectThing extends Thing<ObjectItem> {
 
   private async load(asset: string, mine: number): Promise<void> {
     try {
-      const [{ loadMesh }, file] = await Promise.all([import("../loaders/mesh"), this.context.asset(asset)]);
-      const geometry = await loadMesh(file.content, file.name || asset);
+      const geometry = readMesh(await this.context.asset(asset));
       if (mine === this.loading) this.show(geometry);
       else geometry.dispose();
     } catch (error) {
       if (mine !== this.loading) return;
-      console.warn(`the mesh ${asset} of ${this.item.name} cannot be shown:`, error);
-      this.show(new OctahedronGeometry(0.03));
+      this.reason = error instanceof Error ? error.message : String(error);
+      this.context.trouble(`${this.item.name} is shown without its shape. ${this.reason}`);
+      this.show(new OctahedronGeometry(0.06));
     }
   }
 
   private show(geometry: BufferGeometry): void {
+    const coloured = geometry.hasAttribute("color");
+    if (coloured !== this.coloured) {
+      this.coloured = this.material.vertexColors = coloured;
+      this.material.needsUpdate = true;
+    }
+    this.update(this.item);
     const mesh = new Mesh(geometry, this.material);
     mesh.castShadow = mesh.receiveShadow = true;
     geometry.computeBoundingBox();

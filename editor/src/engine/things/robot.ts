@@ -40,6 +40,9 @@ export class RobotThing extends Thing<RobotItem> {
   private readonly tips = new Map<string, Object3D>();
   private readonly shown = new Map<string, number>();
   private readonly material = new MeshLambertMaterial();
+  /** Of surfaces that have colours of their own. */
+  private readonly coloured = new MeshLambertMaterial({ vertexColors: true });
+  private reason = "";
   private readonly ghost = new GhostRobot(this.root);
   private urdf: string | null = null;
   private stale = false;
@@ -124,7 +127,12 @@ export class RobotThing extends Thing<RobotItem> {
 
   override badge(): string {
     if (this.item.lockedBy) return `locked by ${this.item.lockedBy}`;
-    return this.stale ? "not heard of: shown where it was" : "";
+    if (this.stale) return "not heard of: shown where it was";
+    return this.reason && "cannot be shown as it looks";
+  }
+
+  override get problem(): string {
+    return this.reason;
   }
 
   override dispose(): void {
@@ -132,16 +140,22 @@ export class RobotThing extends Thing<RobotItem> {
     this.ghost.dispose();
     super.dispose();
     this.material.dispose();
+    this.coloured.dispose();
   }
 
   private paint(): void {
     const { palette } = this.context;
     const { selected, trouble, faint } = this.item;
-    this.material.color.copy(selected ? palette.selected : trouble ? palette.trouble : this.stale ? palette.locked : palette.robot);
+    const told = selected ? palette.selected : trouble ? palette.trouble : this.stale ? palette.locked : null;
+    this.material.color.copy(told ?? palette.robot);
+    if (told) this.coloured.color.copy(told);
+    else this.coloured.color.setRGB(1, 1, 1);
     // Where its joints are is not known: what is shown is only where it stands.
     const vague = this.stale || (this.robot !== null && this.shown.size === 0);
-    this.material.transparent = faint > 0 || vague;
-    this.material.opacity = (1 - faint) * (vague ? 0.5 : 1);
+    for (const material of [this.material, this.coloured]) {
+      material.transparent = faint > 0 || vague;
+      material.opacity = (1 - faint) * (vague ? 0.5 : 1);
+    }
   }
 
   private placeTips(): void {
@@ -173,15 +187,20 @@ export class RobotThing extends Thing<RobotItem> {
   private async load(asset: string): Promise<void> {
     const current = () => this.urdf === asset;
     let robot: URDFRobot | null = null;
+    let reason = "";
     if (asset) {
       try {
-        const [{ loadRobot }, file] = await Promise.all([import("../loaders/urdf"), this.context.asset(asset)]);
-        robot = await loadRobot(file.content, this.material);
+        const [{ loadRobot }, content] = await Promise.all([import("../loaders/urdf"), this.context.asset(asset)]);
+        const loaded = loadRobot(content, { plain: this.material, coloured: this.coloured });
+        robot = loaded.robot;
+        reason = loaded.problems.join(" ");
       } catch (error) {
-        console.warn(`the model ${asset} of ${this.item.name} cannot be shown:`, error);
+        reason = error instanceof Error ? error.message : String(error);
       }
     }
     if (!current()) return;
+    this.reason = reason;
+    if (reason) this.context.trouble(`${this.item.name} is shown ${robot ? "in part" : "without its shape"}. ${reason}`);
     for (const child of [...this.body.children]) {
       child.removeFromParent();
       disposeTree(child);

@@ -3,11 +3,11 @@
 import { useEffect, useRef, useState } from "react";
 import type { Engine, Quality } from "../../engine/engine";
 import { endStep } from "../../commands/program";
-import { readAsset } from "../../session/assets";
 import { dragPucks } from "../../session/puckDrag";
+import { readShown } from "../../session/shown";
 import { setEngine } from "../../session/engine";
 import { tapTaken } from "../../session/taps";
-import { now, select, setUi, store, useEditor } from "../../store/store";
+import { now, select, setUi, store, tell, useEditor } from "../../store/store";
 import { telemetry } from "../../store/telemetry";
 import { ItemMaker } from "../../viewmodel/items";
 import { Waiting } from "../kit/kit";
@@ -29,11 +29,16 @@ export function View3D() {
     let ended = false;
     let made: Engine | null = null;
     const maker = new ItemMaker();
+    const told = new Set<string>();
+    const once = (sentence: string) => {
+      if (!told.has(sentence)) tell("error", sentence);
+      told.add(sentence);
+    };
     let stop = () => {};
     const begin = async () => {
       const { Engine } = await persistently(() => import("../../engine/engine"));
       if (ended || !canvas.current || !labels.current) return;
-      made = new Engine({ canvas: canvas.current, labels: labels.current, telemetry, asset: readAsset, quality: chosen(quality), dark: themeAtStart.current === "dark" });
+      made = new Engine({ canvas: canvas.current, labels: labels.current, telemetry, asset: readShown, trouble: once, quality: chosen(quality), dark: themeAtStart.current === "dark" });
       const shown = made;
       shown.onTap = (hits, floor) => {
         if (tapTaken(hits, floor)) return;

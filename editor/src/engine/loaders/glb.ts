@@ -1,0 +1,73 @@
+/** Reads the binary glTF that the server makes of meshes and robots (docs/protocol.md): no other, and nothing else of it. */
+
+import { BufferAttribute, BufferGeometry } from "three";
+
+/** Of a robot: its URDF, the mesh of each file that it names, and why others are not there. */
+export interface RobotExtras {
+  urdf: string;
+  meshes: Record<string, string>;
+  problems: Record<string, string>;
+}
+
+export interface Shown {
+  /** By their names, in m, z up. */
+  meshes: Map<string, BufferGeometry>;
+  extras: Partial<RobotExtras>;
+}
+
+interface Accessor {
+  bufferView: number;
+  componentType: 5120 | 5123 | 5125 | 5126;
+  count: number;
+  type: "SCALAR" | "VEC3" | "VEC4";
+  normalized?: boolean;
+}
+
+interface Told {
+  scenes: { extras?: Partial<RobotExtras> }[];
+  meshes?: { name: string; primitives: { attributes: Record<string, number>; indices: number }[] }[];
+  accessors?: Accessor[];
+  bufferViews?: { byteOffset: number; byteLength: number; byteStride?: number }[];
+}
+
+const ARRAYS = { 5120: Int8Array, 5123: Uint16Array, 5125: Uint32Array, 5126: Float32Array };
+const SIZES = { SCALAR: 1, VEC3: 3, VEC4: 4 };
+const NAMES = { POSITION: "position", NORMAL: "normal", COLOR_0: "color" } as const;
+
+/** Read a file; throws for what is none. The geometries hold the file's own memory. */
+export function readGlb(content: ArrayBuffer): Shown {
+  const head = new DataView(content);
+  if (content.byteLength < 20 || head.getUint32(0, true) !== 0x46546c67) throw new Error("what the server gave is no binary glTF");
+  const length = head.getUint32(12, true);
+  const told = JSON.parse(new TextDecoder().decode(new Uint8Array(content, 20, length))) as Told;
+  const start = 20 + length + 8;
+
+  const attribute = (number: number): BufferAttribute => {
+    const { bufferView, componentType, count, type, normalized } = told.accessors?.[number] as Accessor;
+    const { byteOffset, byteStride } = told.bufferViews?.[bufferView] as { byteOffset: number; byteStride?: number };
+    const kind = ARRAYS[componentType];
+    // What is padded is taken with its padding: shaders pass over what they do not ask for.
+    const size = byteStride ? byteStride / kind.BYTES_PER_ELEMENT : SIZES[type];
+    return new BufferAttribute(new kind(content, start + byteOffset, count * size), size, normalized);
+  };
+
+  const meshes = new Map<string, BufferGeometry>();
+  for (const { name, primitives } of told.meshes ?? []) {
+    const [primitive] = primitives;
+    if (!primitive) continue;
+    const geometry = new BufferGeometry();
+    for (const [key, its] of Object.entries(NAMES)) {
+      const number = primitive.attributes[key];
+      if (number !== undefined) geometry.setAttribute(its, attribute(number));
+    }
+    meshes.set(name, geometry.setIndex(attribute(primitive.indices)));
+  }
+  return { meshes, extras: told.scenes[0]?.extras ?? {} };
+}
+
+/** The one mesh of an asset that is no robot. */
+export function readMesh(content: ArrayBuffer): BufferGeometry {
+  const [mesh] = readGlb(content).meshes.values();
+  if (!mesh) throw new Error("there is no surface in it");
+  return mesh;
+}
