@@ -1,5 +1,5 @@
 # Two commands: `make run` and `make test`. Both do all the set-up; the second time they start at once.
-.PHONY: run test bench bench-long lint types layers check lock clean
+.PHONY: run test bench bench-long bench-editor lint types layers check lock clean
 .DEFAULT_GOAL := run
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
@@ -28,6 +28,10 @@ bench: .make/dev
 # Every transport lost and back 300 times instead of 18, which takes half an hour.
 bench-long: .make/dev
 	$(BIN)/python -m benchmarks --long recovery $(ARGS)
+
+# What the editor needs to load, to draw and to hear of others, in Chromium with software rendering.
+bench-editor: .make/dev .make/editor .make/browser
+	$(BIN)/python -m benchmarks.editor $(ARGS)
 
 check: lint types layers
 

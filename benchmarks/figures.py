@@ -91,6 +91,16 @@ GOALS: Final[dict[str, tuple[str, str]]] = {
     "kinematics_check_1000_us": ("µs", "<= 100"),
     "kinematics_reach_3000_s": ("s", "<= 1"),
     "kinematics_reach_moved_ms": ("ms", "<= 200"),
+    "editor_size_kb": ("kB", "<= 260"),
+    "editor_paint_s": ("s", "<= 1.5"),
+    "editor_usable_s": ("s", "<= 2"),
+    "editor_robot_s": ("s", "<= 3"),
+    "editor_frames_per_s": ("frames/s", ">= 25"),
+    "editor_event_to_pixels_ms": ("ms", "<= 50"),
+    "editor_idle_frames": ("frames", "<= 0"),
+    "editor_stop_ms": ("ms", "<= 100"),
+    "editor_edit_ms": ("ms", "<= 150"),
+    "editor_back_s": ("s", "<= 2"),
 }
 
 

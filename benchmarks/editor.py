@@ -1,0 +1,206 @@
+"""`make bench-editor`: the editor in headless Chromium with software rendering at `q=low`, real server, fakes.
+
+What is measured is told where it is measured; the goals are those of `benchmarks/figures.py`. A page that reports an
+error measures nothing.
+"""
+
+import asyncio
+import json
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any, Final
+from urllib.parse import urlsplit
+
+from playwright.async_api import Browser
+
+from arcor2_hw.client import Client, RequestFailed
+from arcor2_hw.data import rpc
+from arcor2_hw.data.events import SceneStateEnum
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.project import Project
+from arcor2_server.editor import FILES
+from benchmarks.figures import Figure, Report, median, percentile
+from tests.e2e.harness import Cell, running_cell, scene_state, until
+from tests.editor.screen import Screen, running_browser, screen_of
+from tests.editor.test_editor_size import needed
+
+LOADS: Final = 7
+POINTS: Final = 100
+MOVING_S: Final = 8.0
+IDLE_S: Final = 5.0
+EDITS: Final = 60
+STOPS: Final = 10
+RESTARTS: Final = 3
+SLOW: Final = 0.05
+"""Fraction of the robot's speed."""
+_INSIDE: Final = Path(__file__).with_suffix(".js").read_text()
+
+
+def size(report: Report) -> None:
+    """Measure what a tablet loads until it shows the workplace, compressed with gzip."""
+    manifest = json.loads((FILES / ".vite" / "manifest.json").read_text())
+    files = needed(manifest, "index.html", "src/engine/engine.ts")
+    total = sum((FILES / f"{name}.gz").stat().st_size for name in files)
+    report.add(Figure("editor_size_kb", total / 1e3, len(files), "files of shell and 3D"))
+
+
+async def _inside(screen: Screen) -> dict[str, Any]:
+    found: dict[str, Any] = await screen.page.evaluate("() => window.__bench")
+    return found
+
+
+async def loading(report: Report, browser: Browser, cell: Cell) -> None:
+    """Load the page anew, without a cache, while the project is open: how soon there is what."""
+    paints, items, robots = [], [], []
+    for number in range(LOADS):
+        async with screen_of(browser, cell.url) as screen:
+            await screen.page.add_init_script(f"localStorage.setItem('arcor2-hw.name', 'bench {number}')")
+            await screen.page.add_init_script(_INSIDE)
+            await screen.page.goto(f"{screen.url}/?q=low")
+            await screen.until("() => window.__bench.robot > 0")
+            paint = "() => performance.getEntriesByName('first-contentful-paint')[0].startTime"
+            paints.append(float(await screen.page.evaluate(paint)))
+            seen = await _inside(screen)
+            items.append(seen["items"])
+            robots.append(seen["robot"])
+    for name, samples in (("paint", paints), ("usable", items), ("robot", robots)):
+        note = f"from the address to it; worst {max(samples):.0f} ms"
+        report.add(Figure(f"editor_{name}_s", median(samples) / 1e3, len(samples), note))
+
+
+async def _move(client: Client, robot: str, height: float) -> None:
+    (tool,) = await client.call("GetEndEffectors", rpc.GetEndEffectorsArgs(robot))
+    at: Pose = await client.call("GetEndEffectorPose", rpc.GetEndEffectorPoseArgs(robot, tool))
+    to = Position(at.position.x, at.position.y, at.position.z + height)
+    await client.call("MoveToPose", rpc.MoveToPoseArgs(robot, tool, SLOW, to, at.orientation, safe=False))
+
+
+async def _at_rest(cell: Cell) -> bool:
+    return not (await cell.tell("robot", "truth"))["moving"]
+
+
+async def drawing(report: Report, screen: Screen, client: Client, cell: Cell, robot: str) -> None:
+    """Frames while the robot moves slowly, from an event of it to pixels, and frames while it stands."""
+    await _move(client, robot, -0.2)
+    await until(lambda: _not(_at_rest(cell)), "it moves")
+    await asyncio.sleep(0.5)
+    await screen.page.evaluate("() => { window.__bench.joints = []; }")
+    begin, frames = time.perf_counter(), await screen.frames()
+    await asyncio.sleep(MOVING_S)
+    rate = (await screen.frames() - frames) / (time.perf_counter() - begin)
+    assert not await _at_rest(cell), "it did not move all the time"
+    joints = (await _inside(screen))["joints"]
+    report.add(Figure("editor_frames_per_s", rate, round(rate * MOVING_S), f"one robot moves, {POINTS} points"))
+    note = f"p50 {median(joints):.0f} ms, {len(joints) / MOVING_S:.0f} events/s"
+    report.add(Figure("editor_event_to_pixels_ms", percentile(joints, 95), len(joints), f"p95; {note}"))
+    await client.call("StopRobot", rpc.StopRobotArgs(robot))
+    await until(lambda: _at_rest(cell), "it rests")
+    await asyncio.sleep(2)
+    frames = await screen.frames()
+    await asyncio.sleep(IDLE_S)
+    report.add(Figure("editor_idle_frames", await screen.frames() - frames, 1, f"in {IDLE_S:g} s"))
+
+
+async def _not(answer: Any) -> bool:
+    return not await answer
+
+
+async def stopping(report: Report, screen: Screen, client: Client, cell: Cell, robot: str) -> None:
+    """From the finger on Stop motion to the stopping command at the robot's controller, which stamps it."""
+    took = []
+    button = screen.page.get_by_role("button", name="Stop motion")
+    note_time = "window.__tap = performance.timeOrigin + performance.now();"
+    await screen.page.evaluate(f"() => addEventListener('pointerdown', () => {{ {note_time} }}, true)")
+    for number in range(STOPS):
+        await _move(client, robot, 0.1 if number % 2 else -0.1)
+        await until(lambda: _not(_at_rest(cell)), "it moves")
+        offset = time.time() - time.monotonic()
+        await button.click()
+        await until(lambda: _at_rest(cell), "it rests")
+        truth = await cell.tell("robot", "truth")
+        tapped = await screen.page.evaluate("() => window.__tap") / 1e3
+        took.append((truth["last_stop"]["t"] + offset - tapped) * 1e3)
+    note = f"median {median(took):.0f} ms; at the controller, past server and driver"
+    report.add(Figure("editor_stop_ms", max(took), len(took), f"worst; {note}"))
+
+
+async def editing(report: Report, browser: Browser, one: Screen, cell: Cell, project: Project) -> None:
+    """From a tap on one screen to the event of it on another."""
+    point = project.action_points[0]
+    async with screen_of(browser, cell.url, "small tablet") as two:
+        await two.page.add_init_script(_INSIDE)
+        await two.join("looks on")
+        await two.item(point.id)
+        await one.press("Things")
+        await one.page.get_by_role("option", name=f"{point.name} Action point").click()
+        took = []
+        for number in range(EDITS):
+            before = len((await _inside(two))["edits"])
+            way = "less" if number % 2 else "more"
+            await one.page.get_by_role("button", name=f"Z 1 cm {way}").click()
+            tapped = (await _inside(one))["taps"][-1]
+            await two.until("before => window.__bench.edits.length > before", before)
+            took.append((await _inside(two))["edits"][before] - tapped)
+            await asyncio.sleep(0.05)
+        note = f"p50 {median(took):.0f} ms; with its lock, kept in the journal"
+        report.add(Figure("editor_edit_ms", percentile(took, 95), len(took), f"p95; {note}"))
+
+
+async def returning(report: Report, screen: Screen, cell: Cell) -> None:
+    """From `ready` of a server that was killed to the page that can edit again, in place."""
+    took = []
+    port = urlsplit(cell.url).port
+    assert port is not None
+    screen.expected_errors = ("WebSocket connection to", "ERR_CONNECTION_REFUSED")
+    for _ in range(RESTARTS):
+        await cell.kill("server")
+        await screen.sees("No connection to the server.")
+        await cell.start_server(port)
+        begin = time.perf_counter()
+        await screen.until("() => !document.querySelector('.lost')")
+        took.append(time.perf_counter() - begin)
+    note = f"worst; median {median(took):.2f} s after it is ready"
+    report.add(Figure("editor_back_s", max(took), len(took), note))
+
+
+async def measure(report: Report, directory: Path) -> None:
+    """Measure everything."""
+    size(report)
+    async with running_cell(directory) as cell, running_browser() as browser:
+        client = await cell.client("colleague")
+        scene, project = await cell.open(client)
+        robot = next(each.id for each in scene.objects if each.name == "robot")
+        for number in range(POINTS - len(project.action_points)):
+            place = Position(-0.4 + 0.08 * (number % 10), -0.4 + 0.08 * (number // 10), 0.05)
+            await client.call("AddActionPoint", rpc.AddActionPointArgs(f"p{number}", place))
+        await client.call("StartScene")
+        await scene_state(client, SceneStateEnum.STARTED, 30)
+        await loading(report, browser, cell)
+        async with screen_of(browser, cell.url) as screen:
+            await screen.page.add_init_script(_INSIDE)
+            await screen.join("Eva")
+            await screen.until("id => window.__engine?.item(id)?.endEffectors.length > 0", robot)
+            await drawing(report, screen, client, cell, robot)
+            await stopping(report, screen, client, cell, robot)
+            await editing(report, browser, screen, cell, project)
+            await returning(report, screen, cell)
+
+
+async def main() -> int:
+    """Measure and print; tells whether something could not be measured."""
+    report = Report()
+    broken = False
+    with tempfile.TemporaryDirectory(prefix="arcor2-hw-bench-", ignore_cleanup_errors=True) as name:
+        try:
+            await measure(report, Path(name))
+        except (AssertionError, RequestFailed) as error:
+            broken = True
+            sys.stderr.write(f"not measured to the end: {error}\n")
+    report.table()
+    return int(broken)
+
+
+if __name__ == "__main__":
+    sys.exit(asyncio.run(main()))
