@@ -24,7 +24,7 @@ from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound
 from arcor2_server import compute as compute_module
 from arcor2_server import compute_process
 from arcor2_server.compute import Compute
-from arcor2_server.compute_process import error_of
+from arcor2_server.compute_process import ComputeProcess, error_of
 
 KNOWN = [Position(0, 0, 0), Position(1, 0, 0), Position(0, 1, 0), Position(1, 1, 0)]
 
@@ -250,6 +250,17 @@ async def test_closing_ends_it_whatever_it_does() -> None:
             await each
     with pytest.raises(ComputeStopped):
         await compute.run(question())
+
+
+async def test_one_whose_server_is_gone_goes_too() -> None:
+    process = await ComputeProcess.start(Room.CALIBRATION)
+    try:
+        await process.ask(question(), 10.0, None, None)
+        process._writer.transport.abort()  # as when the server was killed
+        async with asyncio.timeout(20):
+            assert await process.process.wait() == 0
+    finally:
+        await process.close()
 
 
 def test_tasks_name_what_they_are_and_who_runs_them() -> None:

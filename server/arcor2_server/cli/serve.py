@@ -160,7 +160,6 @@ def _markers(given: Path | None, path: Path | None, cell: Cell | None) -> Calibr
     return configuration_of(yaml_of(path.read_bytes(), str(path))["calibration"], f"{path}: calibration")
 
 
-
 def check_access(settings: ServerSettings) -> None:
     """Refuse to be reached by other machines while nobody needs a token. CannotServe, StorageError."""
     if is_loopback(settings.host) or settings.insecure or TokenFile(settings.data_dir).all():
