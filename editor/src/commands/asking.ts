@@ -32,14 +32,46 @@ export async function whyNot<N extends keyof Requests>(request: N, args?: Reques
   }
 }
 
+/** What this tablet has locked, and for how many at once: the last one gives the lock back. */
+const locked = new Map<string, { times: number; taken: Promise<unknown> }>();
+
+/** Take an item's write lock, unless this tablet has it already; gives what gives it back. Rejects when it is refused. */
+async function take(id: string, tree: boolean): Promise<() => Promise<void>> {
+  const key = tree ? `${id}/tree` : id;
+  const mine = locked.get(key) ?? { times: 0, taken: call("WriteLock", { object_id: id, lock_tree: tree }) };
+  locked.set(key, mine);
+  mine.times++;
+  const last = () => {
+    mine.times--;
+    if (mine.times > 0) return false;
+    if (locked.get(key) === mine) locked.delete(key);
+    return true;
+  };
+  try {
+    await mine.taken;
+  } catch (error) {
+    last();
+    throw error;
+  }
+  return async () => {
+    // Some requests unlock by themselves: then there is nothing to give back.
+    if (last()) await call("WriteUnlock", { object_id: id }).catch(() => {});
+  };
+}
+
 /** Do something while holding an item's write lock, which is given back in any case unless the request does that. */
 export async function holding<T>(id: string, work: () => Promise<T | undefined>, tree = false): Promise<T | undefined> {
-  if (!(await ask("WriteLock", { object_id: id, lock_tree: tree }))) return undefined;
+  let giveBack: () => Promise<void>;
+  try {
+    giveBack = await take(id, tree);
+  } catch (error) {
+    tell(error instanceof ConnectionLost ? "warn" : "error", sentence(error));
+    return undefined;
+  }
   try {
     return await work();
   } finally {
-    // Some requests unlock by themselves: then there is nothing to give back.
-    await call("WriteUnlock", { object_id: id }).catch(() => {});
+    await giveBack();
   }
 }
 
@@ -55,11 +87,11 @@ export async function refusal(work: () => Promise<unknown>): Promise<string> {
 
 /** As `holding`, but rejects with what was refused instead of telling it: for `refusal`. */
 export async function held<T>(id: string, work: () => Promise<T>, tree = false): Promise<T> {
-  await call("WriteLock", { object_id: id, lock_tree: tree });
+  const giveBack = await take(id, tree);
   try {
     return await work();
   } finally {
-    await call("WriteUnlock", { object_id: id }).catch(() => {});
+    await giveBack();
   }
 }
 

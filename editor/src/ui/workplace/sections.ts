@@ -5,6 +5,7 @@
 
 import type { ComponentType } from "react";
 import type { Selection, State } from "../../store/state";
+import { calibrateSections } from "../calibrate/sections";
 import { programSections } from "../program/sections";
 import { pointSections } from "../points/sections";
 import { objectSections, settingsSections } from "../scene/sections";
@@ -18,4 +19,4 @@ export interface Section {
   Body: ComponentType<{ selection: Selection }>;
 }
 
-export const SECTIONS: readonly Section[] = [about, ...pointSections, ...programSections, place, ...objectSections, ...settingsSections];
+export const SECTIONS: readonly Section[] = [about, ...pointSections, ...programSections, place, ...objectSections, ...calibrateSections, ...settingsSections];

@@ -1,0 +1,112 @@
+/** Where things stand, found out by robots and cameras. Each gives why it was refused, empty when it was done or begun. */
+
+import type { Pivot, Pose, Position } from "../protocol/types";
+import { refusedWith } from "../session/assets";
+import { remembered } from "../session/memory";
+import { call } from "../session/session";
+import type { State } from "../store/state";
+import { store } from "../store/store";
+import { held, refusal } from "./asking";
+import { type Chosen, robotArg } from "./robot";
+
+/** Whether a type is, or comes from, another. */
+export function derivesFrom(state: State, type: string, base: string): boolean {
+  for (let name: string | undefined = type, left = 20; name && left > 0; left--) {
+    if (name === base) return true;
+    name = state.types.byName[name]?.base;
+  }
+  return false;
+}
+
+/** Put an object where the robot's tool points; `pivot` is which of its places is touched. */
+export const placeByRobot = (id: string, chosen: Chosen, pivot: Pivot) => refusal(() => call("UpdateObjectPoseUsingRobot", { id, robot: robotArg(chosen), pivot }));
+
+// ------------------------------------------------------------------------------------------------ aiming
+/** An aiming that is under way: it holds the object and the robot until it is over. */
+export interface Aiming {
+  /** Take the tool's place for a focus point; gives those that are done. */
+  add: (index: number) => Promise<number[]>;
+  /** Put the object where its points were found. */
+  done: () => Promise<void>;
+  cancel: () => Promise<void>;
+}
+
+/** Begin; rejects with why it was refused. `onLost` is called when it ends by itself. */
+export function beginAiming(id: string, chosen: Chosen, onLost: () => void): Promise<Aiming> {
+  return new Promise((resolve, reject) => {
+    held(id, () =>
+      held(chosen.robotId, async () => {
+        await call("ObjectAimingStart", { object_id: id, robot: robotArg(chosen) });
+        await new Promise<void>((over) => {
+          // The server forgets it with the connection, and when the scene goes offline.
+          const stop = store.subscribe((state) => {
+            if (state.connection.status === "ready" && state.live.state === "started") return;
+            stop();
+            onLost();
+            over();
+          });
+          resolve({
+            add: async (point_idx) => (await call("ObjectAimingAddPoint", { point_idx })).finished_indexes,
+            done: async () => {
+              await call("ObjectAimingDone");
+              stop();
+              over();
+            },
+            cancel: () =>
+              call("ObjectAimingCancel")
+                .catch(() => {}) // the connection or the scene is gone, and it with them
+                .then(() => {
+                  stop();
+                  over();
+                }),
+          });
+        });
+      }),
+    ).catch(reject);
+  });
+}
+
+// ------------------------------------------------------------------------------------------------ cameras
+export const calibrateCamera = (id: string) => refusal(() => held(id, () => call("CalibrateCamera", { id }, { deadline: 30 })));
+
+export const calibrateRobot = (robot_id: string, camera_id: string, move_to_calibration_pose: boolean) =>
+  refusal(() => held(robot_id, () => call("CalibrateRobot", { robot_id, camera_id, move_to_calibration_pose }, { deadline: 30 })));
+
+/** Take a picture; a JPEG, whose bytes come as one character each. Rejects with why it was refused. */
+export async function takePicture(id: string): Promise<Blob> {
+  const text = await held(id, () => call("CameraColorImage", { id }, { deadline: 20 }));
+  return new Blob([Uint8Array.from(text, (each) => each.charCodeAt(0))], { type: "image/jpeg" });
+}
+
+// ------------------------------------------------------------------------------------------------ records and touching
+export interface CalibrationRecord {
+  id: string;
+  date: string;
+  person: string;
+  verdict: string;
+  residual?: number;
+  residual_unit?: string;
+}
+
+async function rest<T>(path: string, options: RequestInit = {}): Promise<T> {
+  const token = remembered("token");
+  const headers: Record<string, string> = { "Content-Type": "application/json", ...(token ? { Authorization: `Bearer ${token}` } : {}) };
+  const response = await fetch(path, { ...options, headers });
+  if (!response.ok) throw new Error(await refusedWith(response, "The server refuses it"));
+  return (await response.json()) as T;
+}
+
+/** The newest records of an object. */
+export const recordsOf = (object: string) => rest<CalibrationRecord[]>(`/api/calibrations?object_id=${encodeURIComponent(object)}&limit=3`);
+
+export interface TouchedFrame {
+  pose: Pose;
+  grade: string;
+  verdict: string;
+}
+
+/** The frame of three touched points: its origin, one on its x axis, one in its xy plane. */
+export const frameByAxes = (origin: Position, on_x: Position, in_plane: Position[], record: { object_id: string; object_name: string }) =>
+  rest<TouchedFrame>("/api/calibration/touch/frame-by-axes", { method: "PUT", body: JSON.stringify({ origin, on_x, in_plane, record }) });
+
+export const placeAt = (object_id: string, pose: Pose) => refusal(() => held(object_id, () => call("UpdateObjectPose", { object_id, pose })));

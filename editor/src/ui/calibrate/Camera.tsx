@@ -1,0 +1,78 @@
+/** What a camera sees, and where it stands by the markers that it sees. */
+
+import { useEffect, useState } from "react";
+import { sentence } from "../../commands/asking";
+import { calibrateCamera, takePicture } from "../../commands/calibrate";
+import { notReady } from "../../commands/robot";
+import { useEditor } from "../../store/store";
+import { OnOff } from "../kit/fields";
+import { Button } from "../kit/kit";
+import { RefusedText, useAsking } from "../points/Doing";
+import { useWhyNot } from "../points/editing";
+import type { Section } from "../workplace/sections";
+import { Records } from "./Records";
+import "./calibrate.css";
+
+/** s between two pictures that follow each other. */
+const PAUSE = 0.5;
+
+const Camera: Section["Body"] = ({ selection: { id } }) => {
+  const why = useWhyNot(id, "CalibrateCamera");
+  const offline = useEditor((state) => notReady(state, { robotId: id, armId: "", effector: "" }, "CameraColorImage"));
+  const [picture, setPicture] = useState("");
+  const [follow, setFollow] = useState(false);
+  const [failed, setFailed] = useState("");
+  const { refused, busy, ask } = useAsking();
+  useEffect(() => () => URL.revokeObjectURL(picture), [picture]);
+  useEffect(() => {
+    setPicture("");
+    setFollow(false);
+    setFailed("");
+  }, [id]);
+  const take = async () => {
+    try {
+      setPicture(URL.createObjectURL(await takePicture(id)));
+      setFailed("");
+      return true;
+    } catch (error) {
+      setFailed(sentence(error));
+      return false;
+    }
+  };
+  useEffect(() => {
+    if (!follow || offline) return;
+    let over = false;
+    const again = async () => {
+      while (!over) {
+        if (!document.hidden && !(await take())) break;
+        await new Promise((resolve) => setTimeout(resolve, PAUSE * 1000));
+      }
+      if (!over) setFollow(false);
+    };
+    void again();
+    return () => {
+      over = true;
+    };
+  }, [follow, offline, id]);
+  return (
+    <>
+      {picture && <img className="camera-picture" src={picture} alt="What the camera sees" />}
+      <div className="actions start">
+        <Button why={offline} onPress={() => void take()}>
+          Take a picture
+        </Button>
+        <OnOff isSelected={follow} onChange={(on) => (offline ? setFailed(offline) : setFollow(on))}>
+          Keep taking
+        </OnOff>
+      </div>
+      <RefusedText>{failed}</RefusedText>
+      <Button icon="point" why={why || offline} isDisabled={busy} onPress={() => void ask(calibrateCamera(id))}>
+        Find where it stands by markers
+      </Button>
+      <RefusedText>{refused}</RefusedText>
+      <Records id={id} />
+    </>
+  );
+};
+
+export default Camera;

@@ -1,0 +1,92 @@
+/** Where an object stands, shown by the robot: one touch with a straight tool, or three points of its frame. */
+
+import { useState } from "react";
+import { frameByAxes, placeAt, placeByRobot } from "../../commands/calibrate";
+import { refusal } from "../../commands/asking";
+import { chosenRobot, effectorPose, notReady } from "../../commands/robot";
+import type { Pivot, Position } from "../../protocol/types";
+import { now, useEditor } from "../../store/store";
+import { OneOf } from "../kit/fields";
+import { Icon } from "../kit/icons";
+import { Button } from "../kit/kit";
+import { nameOf } from "../names";
+import { RefusedText, useAsking } from "../points/Doing";
+import { useWhyNot } from "../points/editing";
+import { RobotChooser } from "../robot/RobotChooser";
+import "../points/points.css";
+import "../robot/robot.css";
+import type { Section } from "../workplace/sections";
+
+const PIVOTS: readonly (readonly [Pivot, string])[] = [
+  ["top", "Its top"],
+  ["middle", "Its middle"],
+  ["bottom", "Its bottom"],
+];
+
+const PlaceByRobot: Section["Body"] = ({ selection: { id } }) => {
+  const chosen = useEditor(chosenRobot);
+  const why = useWhyNot(id, "UpdateObjectPoseUsingRobot");
+  const noRobot = useEditor((state) => notReady(state, chosen, "UpdateObjectPoseUsingRobot"));
+  const [pivot, setPivot] = useState<Pivot>("top");
+  const { refused, busy, ask } = useAsking();
+  return (
+    <>
+      <RobotChooser />
+      <OneOf label="The tool touches" value={pivot} choices={PIVOTS} onChange={setPivot} />
+      <Button icon="robot" why={why || noRobot} isDisabled={busy} onPress={() => chosen && void ask(placeByRobot(id, chosen, pivot))}>
+        It stands where the tool is
+      </Button>
+      <RefusedText>{refused}</RefusedText>
+      <ThreePoints key={id} id={id} why={why || noRobot} />
+    </>
+  );
+};
+
+export default PlaceByRobot;
+
+const STEPS = ["Origin", "On its x axis", "In its xy plane"] as const;
+
+function ThreePoints({ id, why }: { id: string; why: string }) {
+  const chosen = useEditor(chosenRobot);
+  const [touched, setTouched] = useState<(Position | undefined)[]>([]);
+  const [verdict, setVerdict] = useState("");
+  const { refused, busy, ask } = useAsking();
+  const touch = (step: number) => {
+    const pose = chosen && effectorPose(chosen);
+    if (!pose) return;
+    setVerdict("");
+    setTouched((before) => STEPS.map((_, n) => (n === step ? pose.position : before[n])));
+  };
+  const [origin, onX, inPlane] = touched;
+  const place = () =>
+    refusal(async () => {
+      if (!origin || !onX || !inPlane) return;
+      const found = await frameByAxes(origin, onX, [inPlane], { object_id: id, object_name: nameOf(now(), id) });
+      const refusedPose = await placeAt(id, found.pose);
+      if (refusedPose) throw new Error(refusedPose);
+      setVerdict(found.verdict);
+      setTouched([]);
+    });
+  return (
+    <details className="by-numbers">
+      <summary>By three points of its frame</summary>
+      <div className="actions start">
+        {STEPS.map((words, n) => (
+          <Button key={words} why={why} onPress={() => touch(n)}>
+            {touched[n] && <Icon name="check" size={16} />}
+            {words}
+          </Button>
+        ))}
+      </div>
+      <Button look="primary" why={why || (origin && onX && inPlane ? "" : "Touch all three points first.")} isDisabled={busy} onPress={() => void ask(place())}>
+        Put it there
+      </Button>
+      {verdict && (
+        <p className="small" role="status">
+          {verdict}
+        </p>
+      )}
+      <RefusedText>{refused}</RefusedText>
+    </details>
+  );
+}

@@ -1,0 +1,47 @@
+/** How the calibrations of a thing went: the verdicts, newest first; what is under way is told as it goes. */
+
+import { useEffect, useState } from "react";
+import { type CalibrationRecord, recordsOf } from "../../commands/calibrate";
+import { useEditor } from "../../store/store";
+import { nameOf } from "../names";
+import "./calibrate.css";
+
+export function Records({ id }: { id: string }) {
+  const name = useEditor((state) => nameOf(state, id));
+  const task = useEditor((state) => Object.values(state.tasks).find((each) => each.kind === "calibration" && each.title.includes(name)));
+  const [records, setRecords] = useState<CalibrationRecord[]>([]);
+  const state = task?.state ?? "";
+  useEffect(() => {
+    let over = false;
+    recordsOf(id).then(
+      (found) => over || setRecords(found),
+      () => over || setRecords([]), // an older server keeps none
+    );
+    return () => {
+      over = true;
+    };
+  }, [id, state]);
+  return (
+    <>
+      {task && (
+        <p className={`small ${state === "failed" ? "error" : ""}`} role="status">
+          {state === "running" ? "Under way: " : state === "failed" ? "It failed: " : ""}
+          {task.message}
+        </p>
+      )}
+      {records.length > 0 && (
+        <ul className="records" aria-label="How it was calibrated">
+          {records.map((each) => (
+            <li key={each.id}>
+              <span>{each.verdict}</span>
+              <span className="quiet small">
+                {new Date(each.date).toLocaleString()} · {each.person}
+                {each.residual !== undefined && ` · ${each.residual.toFixed(2)} ${each.residual_unit ?? ""}`}
+              </span>
+            </li>
+          ))}
+        </ul>
+      )}
+    </>
+  );
+}

@@ -1,0 +1,40 @@
+/** Where a robot stands, by a depth camera that sees it. */
+
+import { useState } from "react";
+import { calibrateRobot, derivesFrom } from "../../commands/calibrate";
+import { notReady } from "../../commands/robot";
+import { useEditor } from "../../store/store";
+import { OnOff, Pick } from "../kit/fields";
+import { Button } from "../kit/kit";
+import { nameOf } from "../names";
+import { RefusedText, useAsking } from "../points/Doing";
+import { useWhyNot } from "../points/editing";
+import type { Section } from "../workplace/sections";
+import { Records } from "./Records";
+
+const RobotByCamera: Section["Body"] = ({ selection: { id } }) => {
+  const cameras = useEditor((state) => Object.values(state.doc?.objects ?? {}).filter((each) => derivesFrom(state, each.type, "Camera")).map((each) => each.id).join("\n"));
+  const names = useEditor((state) => cameras.split("\n").map((each) => nameOf(state, each)).join("\n")).split("\n");
+  const why = useWhyNot(id, "CalibrateRobot");
+  const offline = useEditor((state) => notReady(state, { robotId: id, armId: "", effector: "" }, "CalibrateRobot"));
+  const ids = cameras ? cameras.split("\n") : [];
+  const [wanted, setWanted] = useState("");
+  const [moves, setMoves] = useState(false);
+  const { refused, busy, ask } = useAsking();
+  const camera = ids.includes(wanted) ? wanted : (ids[0] ?? "");
+  return (
+    <>
+      {ids.length > 1 && <Pick label="Camera" value={camera} choices={ids.map((each, n) => [each, names[n] ?? ""] as const)} onChange={setWanted} />}
+      <OnOff isSelected={moves} onChange={setMoves}>
+        Let it move to where it is seen well
+      </OnOff>
+      <Button icon="robot" why={why || offline || (camera ? "" : "There is no camera in this scene.")} isDisabled={busy} onPress={() => void ask(calibrateRobot(id, camera, moves))}>
+        {camera ? `Find where it stands by ${names[ids.indexOf(camera)] ?? "the camera"}` : "Find where it stands"}
+      </Button>
+      <RefusedText>{refused}</RefusedText>
+      <Records id={id} />
+    </>
+  );
+};
+
+export default RobotByCamera;

@@ -1,0 +1,42 @@
+/** What the panel shows of objects whose place a robot or a camera can tell: in a scene, where objects are placed. */
+
+import { derivesFrom } from "../../commands/calibrate";
+import type { SceneObject } from "../../protocol/types";
+import type { Selection, State } from "../../store/state";
+import { lazily } from "../kit/lazily";
+import type { Section } from "../workplace/sections";
+
+/** For objects of a scene that is open by itself. */
+const inScene = (wanted: (state: State, object: SceneObject) => boolean) => (selection: Selection, state: State) => {
+  const object = state.doc?.objects[selection.id];
+  return object !== undefined && state.doc?.project === null && wanted(state, object);
+};
+
+const isRobot = (state: State, { type }: SceneObject) => type in state.types.robots;
+const isCamera = (state: State, { type }: SceneObject) => derivesFrom(state, type, "Camera");
+const hasRobots = (state: State) => Object.values(state.doc?.objects ?? {}).some((each) => isRobot(state, each));
+
+export const calibrateSections: readonly Section[] = [
+  {
+    id: "camera",
+    title: "Camera",
+    applies: ({ id }, state) => {
+      const object = state.doc?.objects[id];
+      return object !== undefined && isCamera(state, object);
+    },
+    Body: lazily(() => import("./Camera")),
+  },
+  { id: "robot-by-camera", title: "Calibration", applies: inScene(isRobot), Body: lazily(() => import("./RobotByCamera")) },
+  {
+    id: "aim",
+    title: "Aim at it",
+    applies: inScene((state, { type, pose }) => pose !== undefined && hasRobots(state) && (state.types.byName[type]?.object_model?.mesh?.focus_points?.length ?? 0) > 0),
+    Body: lazily(() => import("./AimWizard")),
+  },
+  {
+    id: "place-by-robot",
+    title: "Place by the robot",
+    applies: inScene((state, object) => object.pose !== undefined && hasRobots(state) && !isRobot(state, object)),
+    Body: lazily(() => import("./PlaceByRobot")),
+  },
+];
