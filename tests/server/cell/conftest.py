@@ -28,6 +28,7 @@ from arcor2_server.rpc.registry import HANDLERS, Context
 from arcor2_server.services import Services
 from arcor2_server.session import Session
 from arcor2_server.settings import ServerSettings
+from arcor2_server.storage import AssetStore
 from tests.runtime.conftest import type_code
 
 PATIENCE = 15.0
@@ -134,9 +135,8 @@ async def running_server(data_dir: Path) -> AsyncIterator[Server]:
     settings = ServerSettings(data_dir=data_dir, streaming_period=0.05)
     hub, locks, types = Hub(), Locks(2, 0.05), Types()
     none: Any = None
-    given: dict[str, Any] = dict.fromkeys(
-        ("access", "users", "storage", "assets", "session", "cell", "execution", "build"), none
-    )
+    given: dict[str, Any] = dict.fromkeys(("access", "users", "storage", "session", "cell", "execution", "build"), none)
+    given["assets"] = await AssetStore.open(settings.assets_dir)
     services = Services(settings=settings, hub=hub, locks=locks, types=types, **given)  # type: ignore[arg-type]
     services.session = Session(services)
     await services.session.open()
