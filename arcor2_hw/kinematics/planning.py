@@ -102,6 +102,7 @@ class Planner:
             if way is None:
                 break
             way = search.shortened(way, resolution)
+            way[0], way[-1] = start, _nearest(goals, way[-1])  # as they were given, not as rounding has them
             if all(self.sweep.is_free_between(a, b) for a, b in itertools.pairwise(way)):
                 return way
         between = self.sweep.first_hit([start, goals[0]])
@@ -119,6 +120,10 @@ class Planner:
     def _length(self, way: Sequence[Array]) -> float:
         """Give the length of a way in joint values times their levers, m."""
         return float(sum(np.linalg.norm((b - a) * self._scale) for a, b in itertools.pairwise(way)))
+
+
+def _nearest(given: Sequence[Array], q: Array) -> Array:
+    return min(given, key=lambda each: float(np.abs(each - q).max()))
 
 
 class _Tree:
