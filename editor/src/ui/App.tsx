@@ -7,6 +7,7 @@ import { Join } from "./join/Join";
 import { Waiting } from "./kit/kit";
 import { lazily } from "./kit/lazily";
 import { LostConnection } from "./connection/LostConnection";
+import { Overlays } from "./search/Overlays";
 import { useScreenSettings } from "./settings/Settings";
 import { Workplace } from "./workplace/Workplace";
 
@@ -45,6 +46,7 @@ export function App() {
         <Home />
       )}
       <LostConnection />
+      <Overlays />
     </>
   );
 }

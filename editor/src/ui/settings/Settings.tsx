@@ -6,6 +6,7 @@ import type { Ui } from "../../store/state";
 import { setUi, useEditor } from "../../store/store";
 import { leave } from "../../session/session";
 import { type Choice, More } from "../kit/kit";
+import { openOverlay } from "../search/Overlays";
 
 const THEMES: Record<Ui["theme"], string> = { system: "Colours as the device has them", light: "Light", dark: "Dark" };
 const dark = window.matchMedia("(prefers-color-scheme: dark)");
@@ -36,6 +37,7 @@ export function Settings() {
   const { theme, leftHanded } = useEditor((state) => state.ui);
   const user = useEditor((state) => state.connection.user);
   const choices: Choice[] = [
+    { id: "find", label: "Find a command or a thing ( / )", icon: "search", act: () => openOverlay("search") },
     ...(Object.keys(THEMES) as Ui["theme"][]).map((each) => ({
       id: each,
       label: THEMES[each],
@@ -53,6 +55,7 @@ export function Settings() {
         remember("hand", leftHanded ? "" : "left");
       },
     },
+    { id: "about", label: "About, and keys ( ? )", icon: "info", act: () => openOverlay("about") },
     { id: "leave", label: `Leave (you are ${user})`, icon: "close", act: leave },
   ];
   return <More label="Settings" icon="settings" choices={choices} />;

@@ -1,0 +1,49 @@
+/** One field that finds every command and every thing by its name; a chunk of its own. */
+
+import { useMemo, useState } from "react";
+import { Autocomplete, Input, Label, ListBox, ListBoxItem, SearchField } from "react-aria-components";
+import { tell, useEditor } from "../../store/store";
+import { Window } from "../kit/dialogs";
+import { entriesOf } from "./entries";
+import { found } from "./found";
+import "./search.css";
+
+/** What was used last, while the page is open. */
+let recent: string[] = [];
+const REMEMBERED = 5;
+
+export default function Palette({ onClose }: { onClose: () => void }) {
+  const state = useEditor((each) => each);
+  const [search, setSearch] = useState("");
+  const entries = useMemo(() => entriesOf(state), [state]);
+  const shown = found(entries, search, recent);
+  const choose = (id: string) => {
+    const entry = entries.find((each) => each.id === id);
+    if (!entry) return;
+    onClose();
+    if (entry.why) {
+      tell("info", `${entry.words}: ${entry.why}`);
+      return;
+    }
+    recent = [id, ...recent.filter((each) => each !== id)].slice(0, REMEMBERED);
+    entry.act();
+  };
+  return (
+    <Window title="Find a command or a thing" onClose={onClose}>
+      <Autocomplete inputValue={search} onInputChange={setSearch}>
+        <SearchField className="field" autoFocus aria-label="Find">
+          <Label className="hidden-but-read">Find</Label>
+          <Input placeholder="Type a part of its name" />
+        </SearchField>
+        <ListBox aria-label="Found" className="found" items={shown} selectionMode="none" onAction={(key) => choose(String(key))} renderEmptyState={() => <p className="quiet">Nothing is called that.</p>}>
+          {(entry) => (
+            <ListBoxItem id={entry.id} textValue={entry.words} className="found-entry">
+              <span>{entry.words}</span>
+              <span className="quiet small">{entry.why || entry.detail}</span>
+            </ListBoxItem>
+          )}
+        </ListBox>
+      </Autocomplete>
+    </Window>
+  );
+}

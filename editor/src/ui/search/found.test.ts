@@ -1,0 +1,24 @@
+/** What the search finds, and in which order. */
+
+import { expect, test } from "vitest";
+import { type Entry, found } from "./found";
+
+const entry = (id: string, words: string, detail = "command"): Entry => ({ id, words, detail, why: "", act: () => {} });
+const ALL = [entry("undo", "Undo the move of pick"), entry("pick", "pick", "action"), entry("robot", "arm_left", "UR5e"), entry("go", "Go online")];
+const ids = (search: string, recent: string[] = []) => found(ALL, search, recent).map((each) => each.id);
+
+test("what begins with the words comes first, every word must fit, also in what kind it is", () => {
+  expect(ids("pick")).toEqual(["pick", "undo"]);
+  expect(ids("ur5")).toEqual(["robot"]);
+  expect(ids("ONLINE go")).toEqual(["go"]);
+  expect(ids("pick online")).toEqual([]);
+});
+
+test("where nothing is typed, what was used last comes first, and what is gone is not shown", () => {
+  expect(ids(" ", ["go", "deleted"])).toEqual(["go", "undo", "pick", "robot"]);
+});
+
+test("a large cell does not make a list without end", () => {
+  const many = Array.from({ length: 500 }, (_, number) => entry(`${number}`, `point ${number}`));
+  expect(found(many, "point", []).length).toBeLessThan(50);
+});
