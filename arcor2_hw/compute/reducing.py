@@ -16,6 +16,9 @@ _FULL_SIZE: Final = 0.5
 """m, from corner to corner of the box around it."""
 CREASE: Final = np.cos(np.radians(40.0))
 """Triangles that meet at less than this angle look like one round surface."""
+_CAREFUL: Final = 3.0
+_HASTY: Final = 7.0
+"""How much is put up with to come to fewer triangles: of the former shapes are better, the latter always gets there."""
 _MANY: Final = 48
 """Triangles around one vertex beyond which it is an end of something, as of a cone or a disc: no round surface."""
 
@@ -73,9 +76,12 @@ def _simplified(surface: Surface, most: int) -> Surface:
     middle, size = surface.vertices.mean(axis=0), float(np.ptp(surface.vertices, axis=0).max())
     points = np.ascontiguousarray((surface.vertices - middle) / size)
     faces = np.ascontiguousarray(surface.triangles, dtype=np.int32)
-    vertices, triangles, collapses = fast_simplification.simplify(
-        points, faces, target_count=most, return_collapses=True
-    )
+    for haste in (_CAREFUL, _HASTY):
+        vertices, triangles, collapses = fast_simplification.simplify(
+            points, faces, target_count=most, return_collapses=True, agg=haste
+        )
+        if len(triangles) <= most:
+            break
     triangles = np.asarray(triangles, dtype=np.int64)
     colours = None
     if surface.colours is not None:

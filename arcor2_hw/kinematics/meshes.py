@@ -123,7 +123,9 @@ def _parse_coloured(content: bytes, kind: str, name: str) -> tuple[Array, Triang
         return vertices, triangles, None
     plain = np.full(3, 0.75, dtype=np.float32)
     colours = [np.broadcast_to(plain if given is None else given, (len(at), 3)) for at, _, given in parts]
-    return vertices, triangles, np.concatenate(colours)
+    together = np.concatenate(colours)
+    # Programs that know of no colours write black: one thing that is all black says nothing.
+    return vertices, triangles, together if together.any() else None
 
 
 def _part(mesh: Any, *, linear: bool) -> tuple[Array, Triangles, NDArray[np.float32] | None]:
