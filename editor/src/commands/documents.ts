@@ -2,7 +2,8 @@
 
 import { call } from "../session/session";
 import { now } from "../store/store";
-import { ask, holding } from "./asking";
+import { ask, held, refusal } from "./asking";
+import { keepThumbnail } from "./thumbnail";
 
 export const openScene = (id: string) => ask("OpenScene", { id });
 export const openProject = (id: string) => ask("OpenProject", { id });
@@ -10,8 +11,10 @@ export const newScene = (name: string, description = "") => ask("NewScene", { na
 export const newProject = (scene_id: string, name: string, description = "", has_logic = true) =>
   ask("NewProject", { scene_id, name, description, has_logic });
 
-export function save() {
-  return now().doc?.project ? ask("SaveProject") : ask("SaveScene");
+export async function save() {
+  const saved = await (now().doc?.project ? ask("SaveProject") : ask("SaveScene"));
+  if (saved) void keepThumbnail().catch(() => {}); // a tile without a picture is no harm
+  return saved;
 }
 
 /** Close what is open; `force` throws unsaved changes away. */
@@ -23,20 +26,25 @@ export const duplicateScene = (source_id: string, target_name: string) => ask("C
 export const duplicateProject = (source_id: string, target_name: string) =>
   ask("CopyProject", { source_id, target_name });
 
-export const renameScene = (id: string, new_name: string) => holding(id, () => ask("RenameScene", { id, new_name }));
-export const renameProject = (project_id: string, new_name: string) =>
-  holding(project_id, () => ask("RenameProject", { project_id, new_name }));
-export const renamePackage = (package_id: string, new_name: string) => ask("RenamePackage", { package_id, new_name });
+/** For fields on the tiles: they tell by themselves why it was refused. */
+export const describe = (kind: "scene" | "project", id: string, new_description: string): Promise<string> =>
+  refusal(() => (kind === "scene" ? call("UpdateSceneDescription", { scene_id: id, new_description }) : call("UpdateProjectDescription", { project_id: id, new_description })));
+export const rename = (kind: "scene" | "project" | "package", id: string, new_name: string): Promise<string> =>
+  refusal(() =>
+    kind === "package"
+      ? call("RenamePackage", { package_id: id, new_name })
+      : held(id, () => (kind === "scene" ? call("RenameScene", { id, new_name }) : call("RenameProject", { project_id: id, new_name }))),
+  );
 
 export const deleteScene = (id: string) => ask("DeleteScene", { id });
 export const deleteProject = (id: string) => ask("DeleteProject", { id });
 export const deletePackage = (id: string) => ask("DeletePackage", { id });
 
-/** Names of the projects that need a scene. */
-export async function projectsOf(sceneId: string): Promise<string[]> {
+/** The projects that need a scene. */
+export async function projectsOf(sceneId: string): Promise<{ id: string; name: string }[]> {
   const ids = await call("ProjectsWithScene", { id: sceneId });
   const projects = now().lists.projects ?? [];
-  return ids.map((id) => projects.find((each) => each.id === id)?.name ?? id);
+  return ids.map((id) => ({ id, name: projects.find((each) => each.id === id)?.name ?? id }));
 }
 
 export const undo = () => ask("Undo");

@@ -1,104 +1,165 @@
 /** One scene, project or package, with what can be done to it. */
 
 import { useState } from "react";
-import { ask, barred } from "../../commands/asking";
+import { barred } from "../../commands/asking";
 import * as documents from "../../commands/documents";
+import { downloadPackage } from "../../commands/packages";
+import { runPackage } from "../../commands/run";
+import { keepGeneral } from "../../commands/viewstate";
+import { count, type Entry } from "../../home/entries";
 import type { Requests } from "../../protocol/types";
-import { now, useEditor } from "../../store/store";
+import { isRunning } from "../../store/selectors";
+import { now, tell, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
-import { AskName, Button, type Choice, Confirm, More } from "../kit/kit";
+import { AskName, Button, type Choice, More } from "../kit/kit";
 import { ago } from "../times";
+import { Deleting } from "./Deleting";
+import { Inline } from "./Inline";
+import { starsOf } from "./stars";
+import { Thumbnail } from "./Thumbnail";
 
-export interface Entry {
-  kind: "scene" | "project" | "package";
-  id: string;
-  name: string;
-  description: string;
-  detail: string;
-  /** When it was changed or built, RFC 3339. */
-  time: string;
-  problems: string[];
-}
-
-const DO: Record<Entry["kind"], Partial<Record<"open" | "copy" | "rename" | "remove", keyof Requests>>> = {
-  scene: { open: "OpenScene", copy: "CopyScene", rename: "RenameScene", remove: "DeleteScene" },
-  project: { open: "OpenProject", copy: "CopyProject", rename: "RenameProject", remove: "DeleteProject" },
+type Doing = "open" | "copy" | "rename" | "describe" | "remove";
+const DO: Record<Entry["kind"], Partial<Record<Doing, keyof Requests>>> = {
+  scene: { open: "OpenScene", copy: "CopyScene", rename: "RenameScene", describe: "UpdateSceneDescription", remove: "DeleteScene" },
+  project: { open: "OpenProject", copy: "CopyProject", rename: "RenameProject", describe: "UpdateProjectDescription", remove: "DeleteProject" },
   package: { open: "RunPackage", rename: "RenamePackage", remove: "DeletePackage" },
 };
 
-export function Card({ entry, marked }: { entry: Entry; marked: boolean }) {
+interface CardProps {
+  entry: Entry;
+  marked: boolean;
+  /** Names of its kind. */
+  taken: string[];
+  /** Show what belongs to it. */
+  onRelated: (kind: Entry["kind"], search: string) => void;
+  /** Begin a project on this scene. */
+  onProject: (scene: string) => void;
+}
+
+export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) {
   const { kind, id, name, problems } = entry;
-  const [asking, setAsking] = useState<"" | "copy" | "rename" | "remove">("");
-  const [needing, setNeeding] = useState<string[]>([]);
+  const [doing, setDoing] = useState<"" | "copy" | "rename" | "describe" | "remove">("");
   const connection = useEditor((state) => state.connection);
   const owner = useEditor((state) => state.locks[id]);
-  const why = (what: keyof (typeof DO)["scene"]) => {
+  const starred = useEditor((state) => starsOf(state).has(id));
+  const running = useEditor(isRunning);
+  const why = (what: Doing) => {
     const request = DO[kind][what];
+    if (owner && owner !== connection.user && what !== "open" && what !== "copy") return `${owner} works on it.`;
     return request ? barred({ ...now(), connection }, request) : "";
   };
-  const open = () => (kind === "scene" ? documents.openScene(id) : kind === "project" ? documents.openProject(id) : ask("RunPackage", { id }));
+  const whyOpen = why("open") || (running ? "A program runs: stop it first." : "");
+  const open = (paused = false) => void (kind === "scene" ? documents.openScene(id) : kind === "project" ? documents.openProject(id) : runPackage(id, paused));
+  const star = () => {
+    const others = [...starsOf(now())].filter((each) => each !== id);
+    keepGeneral({ stars: starred ? others : [...others, id] });
+  };
+  const close = () => setDoing("");
   const choices: Choice[] = [
-    ...(kind === "package" ? [] : [{ id: "copy", label: "Duplicate…", not: why("copy"), act: () => setAsking("copy") }]),
-    { id: "rename", label: "Rename…", not: owner && owner !== connection.user ? `${owner} holds it` : why("rename"), act: () => setAsking("rename") },
-    {
-      id: "remove",
-      label: "Delete…",
-      not: why("remove"),
-      act: () => {
-        if (kind === "scene") void documents.projectsOf(id).then(setNeeding, () => setNeeding([]));
-        setAsking("remove");
-      },
-    },
+    ...(kind === "scene" ? [{ id: "project", label: "New project on it…", not: barred({ ...now(), connection }, "NewProject"), act: () => onProject(id) }] : []),
+    ...(kind === "package" ? [{ id: "paused", label: "Run, paused at the start", not: whyOpen, act: () => open(true) }] : []),
+    ...(kind === "package"
+      ? [{ id: "download", label: "Download", act: () => void downloadPackage(id, name).then((wrong) => wrong && tell("error", wrong)) }]
+      : [
+          { id: "copy", label: "Duplicate…", not: why("copy"), act: () => setDoing("copy") },
+          { id: "describe", label: "Describe…", not: why("describe"), act: () => setDoing("describe") },
+        ]),
+    { id: "rename", label: "Rename…", not: why("rename"), act: () => setDoing("rename") },
+    { id: "remove", label: "Delete…", not: why("remove"), act: () => setDoing("remove") },
   ];
-  const close = () => setAsking("");
   return (
     <li className="card" data-marked={marked} data-id={id}>
+      {kind !== "package" && <Thumbnail id={id} time={entry.time} />}
       <div className="card-text">
-        <h2>{name}</h2>
+        <div className="card-name">
+          {doing === "rename" ? (
+            <Inline label={`New name of ${name}`} value={name} taken={taken} onSave={(to) => documents.rename(kind, id, to)} onClose={close} />
+          ) : (
+            <h2>{name}</h2>
+          )}
+          <Button look="plain" className="star" aria-pressed={starred} aria-label={starred ? `Take the star of ${name} away` : `Give ${name} a star`} onPress={star}>
+            <span aria-hidden="true">{starred ? "★" : "☆"}</span>
+          </Button>
+        </div>
         <p className="quiet small">
-          {entry.detail}
+          {detail(entry)}
           {entry.time && ` · ${kind === "package" ? "built" : "changed"} ${ago(entry.time)}`}
         </p>
-        {entry.description && <p className="small description">{entry.description}</p>}
-        {problems.length > 0 && (
-          <details className="problems">
-            <summary>
-              <span className="tag bad">
-                <Icon name="warn" size={16} /> {problems.length === 1 ? "1 problem" : `${problems.length} problems`}
-              </span>
-            </summary>
-            <ul>
-              {problems.map((each) => (
-                <li key={each}>{each}</li>
-              ))}
-            </ul>
-          </details>
+        {owner && owner !== connection.user && (
+          <p className="tag warn">
+            <Icon name="lock" size={16} /> {owner} works on it
+          </p>
         )}
+        {doing === "describe" && kind !== "package" ? (
+          <Inline label={`Description of ${name}`} value={entry.description} many onSave={(to) => documents.describe(kind, id, to)} onClose={close} />
+        ) : (
+          entry.description && <p className="small description">{entry.description}</p>
+        )}
+        {problems.length > 0 && <Problems entry={entry} whyOpen={whyOpen} />}
       </div>
       <div className="card-actions">
-        <Button look="primary" icon={kind === "package" ? "play" : undefined} isDisabled={why("open") !== ""} onPress={() => void open()} aria-label={`${kind === "package" ? "Run" : "Open"} ${name}`}>
+        <Button look="primary" icon={kind === "package" ? "play" : undefined} why={whyOpen} onPress={() => open()} aria-label={`${kind === "package" ? "Run" : "Open"} ${name}`}>
           {kind === "package" ? "Run" : "Open"}
         </Button>
+        <Related entry={entry} onRelated={onRelated} />
         <More label={`More about ${name}`} choices={choices} />
       </div>
-      {asking === "rename" && <AskName title={`Rename ${name}`} initial={name} yes="Rename" onClose={close} onYes={(to) => void (kind === "scene" ? documents.renameScene(id, to) : kind === "project" ? documents.renameProject(id, to) : documents.renamePackage(id, to))} />}
-      {asking === "copy" && <AskName title={`Duplicate ${name}`} initial={`${name} copy`} yes="Duplicate" onClose={close} onYes={(to) => void (kind === "scene" ? documents.duplicateScene(id, to) : documents.duplicateProject(id, to))} />}
-      {asking === "remove" && (
-        <Confirm title={`Delete ${name}?`} yes="Delete" onClose={close} onYes={() => void (kind === "scene" ? documents.deleteScene(id) : kind === "project" ? documents.deleteProject(id) : documents.deletePackage(id))}>
-          {needing.length > 0 ? (
-            <>
-              <p>These projects are on this scene, and have to be deleted first:</p>
-              <ul>
-                {needing.map((each) => (
-                  <li key={each}>{each}</li>
-                ))}
-              </ul>
-            </>
-          ) : (
-            <p>This cannot be undone.</p>
-          )}
-        </Confirm>
+      {doing === "copy" && (
+        <AskName title={`Duplicate ${name}`} initial={`${name} copy`} taken={taken} yes="Duplicate" onClose={close} onYes={(to) => void (kind === "scene" ? documents.duplicateScene(id, to) : documents.duplicateProject(id, to))} />
       )}
+      {doing === "remove" && <Deleting entry={entry} onClose={close} />}
     </li>
+  );
+}
+
+function detail({ kind, from, projects, executed }: Entry): string {
+  if (kind === "scene") return count(projects ?? 0, "project");
+  if (kind === "project") return `on ${from?.name ?? "a scene that is gone"}`;
+  return [from && `from ${from.name}`, executed ? `has run ${ago(executed)}` : "has not run yet"].filter(Boolean).join(" · ");
+}
+
+/** What it belongs to, or what belongs to it. */
+function Related({ entry: { kind, name, from, projects }, onRelated }: { entry: Entry; onRelated: CardProps["onRelated"] }) {
+  if (kind === "scene") {
+    return projects ? (
+      <Button look="plain" aria-label={`Projects on ${name}`} onPress={() => onRelated("project", name)}>
+        Projects
+      </Button>
+    ) : null;
+  }
+  if (!from || from.gone) return null;
+  const to = kind === "project" ? ("scene" as const) : ("project" as const);
+  return (
+    <Button look="plain" aria-label={`${to === "scene" ? "Scene" : "Project"} of ${name}`} onPress={() => onRelated(to, from.name)}>
+      {to === "scene" ? "Scene" : "Project"}
+    </Button>
+  );
+}
+
+/** All that is wrong with it, and the way to mend it: where it is edited. */
+function Problems({ entry: { kind, id, name, problems, from }, whyOpen }: { entry: Entry; whyOpen: string }) {
+  return (
+    <details className="problems">
+      <summary>
+        <span className="tag bad">
+          <Icon name="warn" size={16} /> {count(problems.length, "problem")}
+        </span>
+      </summary>
+      <ul>
+        {problems.map((each) => (
+          <li key={each}>{each}</li>
+        ))}
+      </ul>
+      {kind === "project" && from && !from.gone && (
+        <Button why={whyOpen} aria-label={`Open the scene of ${name} to mend it`} onPress={() => void documents.openScene(from.id)}>
+          Open its scene
+        </Button>
+      )}
+      {kind === "scene" && (
+        <Button why={whyOpen} aria-label={`Open ${name} to mend it`} onPress={() => void documents.openScene(id)}>
+          Open to mend it
+        </Button>
+      )}
+    </details>
   );
 }

@@ -4,14 +4,18 @@ import { useState } from "react";
 import { Input, Label, SearchField, ToggleButton, ToggleButtonGroup } from "react-aria-components";
 import * as documents from "../../commands/documents";
 import { barred } from "../../commands/asking";
-import { type State } from "../../store/state";
+import { keepGeneral } from "../../commands/viewstate";
+import { chosen, entriesOf, type Entry, type Sort, SORTS } from "../../home/entries";
+import type { State } from "../../store/state";
 import { useEditor } from "../../store/store";
 import { AskName, Button, Waiting } from "../kit/kit";
 import { People } from "../people/People";
 import { Settings } from "../settings/Settings";
 import { Notices } from "../notices/Notices";
 import { NewProject } from "./NewProject";
-import { Card, type Entry } from "./Card";
+import { Card } from "./Card";
+import { starsOf } from "./stars";
+import { UploadPackage } from "./UploadPackage";
 import "./home.css";
 
 const TABS = ["projects", "scenes", "packages"] as const;
@@ -22,16 +26,24 @@ const EMPTY: Record<TabName, string> = {
   scenes: "No scene yet. A scene says which devices stand in the workplace, and where.",
   packages: "No package yet. A package is a project that was built, ready to be run.",
 };
+const KINDS: Record<TabName, Entry["kind"]> = { projects: "project", scenes: "scene", packages: "package" };
+const TAB_OF: Record<Entry["kind"], TabName> = { project: "projects", scene: "scenes", package: "packages" };
 const SHOWN: Record<State["lists"]["shown"], TabName> = { ProjectsList: "projects", ScenesList: "scenes", PackagesList: "packages" };
 
 export function Home() {
   const lists = useEditor((state) => state.lists);
-  const noProject = useEditor((state) => barred(state, "NewProject"));
+  const noRight = useEditor((state) => barred(state, "NewProject"));
   const noScene = useEditor((state) => barred(state, "NewScene"));
   const [tab, setTab] = useState<TabName>(SHOWN[lists.shown]);
   const [search, setSearch] = useState("");
   const [asking, setAsking] = useState<"" | "scene" | "project">("");
-  const entries = { projects: ofProjects(lists), scenes: ofScenes(lists), packages: ofPackages(lists) };
+  const [scene, setScene] = useState("");
+  const [onlyStars, setOnlyStars] = useState(false);
+  const stars = useEditor(starsOf);
+  const sort = useEditor(sortOf);
+  const entries = Object.fromEntries(TABS.map((each) => [each, entriesOf(lists, KINDS[each])])) as Record<TabName, Entry[] | null>;
+  const here = entries[tab];
+  const noProject = noRight || (lists.scenes?.length ? "" : "Make a scene first: a project is a program for a scene.");
   return (
     <div className="home">
       <header className="bar">
@@ -62,8 +74,21 @@ export function Home() {
             <Label className="hidden-but-read">Search</Label>
             <Input placeholder="Search by name or description" />
           </SearchField>
+          <div className="field sorting">
+            <label htmlFor="sort">Sort by</label>
+            <select id="sort" value={sort} onChange={(event) => keepGeneral({ sort: event.target.value })}>
+              {SORTS.map(([each, words]) => (
+                <option key={each} value={each}>
+                  {words}
+                </option>
+              ))}
+            </select>
+          </div>
+          <Button aria-pressed={onlyStars} aria-label="Only what has a star" onPress={() => setOnlyStars(!onlyStars)}>
+            <span aria-hidden="true">{onlyStars ? "★" : "☆"}</span>
+          </Button>
           {tab === "scenes" && (
-            <Button look="primary" icon="plus" isDisabled={noScene !== ""} onPress={() => setAsking("scene")}>
+            <Button look="primary" icon="plus" why={noScene} onPress={() => setAsking("scene")}>
               New scene
             </Button>
           )}
@@ -71,85 +96,71 @@ export function Home() {
             <Button
               look="primary"
               icon="plus"
-              isDisabled={noProject !== "" || !lists.scenes?.length}
-              onPress={() => setAsking("project")}
+              why={noProject}
+              onPress={() => {
+                setScene("");
+                setAsking("project");
+              }}
             >
               New project
             </Button>
           )}
+          {tab === "packages" && <UploadPackage />}
         </div>
         <section aria-label={TITLES[tab]}>
-          <Cards entries={entries[tab]} search={search} empty={EMPTY[tab]} highlight={lists.highlight} />
+          <Cards
+            entries={here}
+            found={chosen(here ?? [], search, sort, onlyStars ? stars : null)}
+            search={search}
+            empty={EMPTY[tab]}
+            highlight={lists.highlight}
+            onRelated={(kind, name) => {
+              setTab(TAB_OF[kind]);
+              setSearch(name);
+              setOnlyStars(false);
+            }}
+            onProject={(id) => {
+              setScene(id);
+              setAsking("project");
+            }}
+          />
         </section>
       </main>
       <Notices />
       {asking === "scene" && (
         <AskName title="New scene" yes="Make and open" taken={lists.scenes?.map((each) => each.name) ?? []} onYes={(name) => void documents.newScene(name)} onClose={() => setAsking("")} />
       )}
-      {asking === "project" && <NewProject onClose={() => setAsking("")} />}
+      {asking === "project" && <NewProject initial={scene} onClose={() => setAsking("")} />}
     </div>
   );
 }
 
-function Cards({ entries, search, empty, highlight }: { entries: Entry[] | null; search: string; empty: string; highlight: string }) {
+/** As the user sorts on every tablet. */
+function sortOf(state: State): Sort {
+  const kept = state.view.general["sort"];
+  return SORTS.find(([each]) => each === kept)?.[0] ?? "changed";
+}
+
+interface ListProps {
+  entries: Entry[] | null;
+  found: Entry[];
+  search: string;
+  empty: string;
+  highlight: string;
+  onRelated: (kind: Entry["kind"], search: string) => void;
+  onProject: (scene: string) => void;
+}
+
+function Cards({ entries, found, search, empty, highlight, onRelated, onProject }: ListProps) {
   if (entries === null) return <Waiting>Reading the list…</Waiting>;
   if (entries.length === 0) return <p className="empty quiet">{empty}</p>;
-  const wanted = search.trim().toLowerCase();
-  const found = entries.filter((each) => `${each.name} ${each.detail} ${each.description}`.toLowerCase().includes(wanted));
-  if (found.length === 0) return <p className="empty quiet">Nothing is called “{search.trim()}”.</p>;
+  if (found.length === 0) return <p className="empty quiet">{search.trim() ? `Nothing is called “${search.trim()}”.` : "Nothing has a star. Tap the star of a tile to find it here."}</p>;
+  const taken = entries.map((each) => each.name);
   return (
     <ul className="cards">
-      {found
-        .sort((a, b) => b.time.localeCompare(a.time))
-        .map((each) => (
-          <Card key={each.id} entry={each} marked={each.id === highlight} />
-        ))}
+      {found.map((each) => (
+        <Card key={each.id} entry={each} marked={each.id === highlight} taken={taken} onRelated={onRelated} onProject={onProject} />
+      ))}
     </ul>
   );
-}
-
-function ofScenes({ scenes, projects }: State["lists"]): Entry[] | null {
-  return (
-    scenes?.map((scene) => ({
-      kind: "scene",
-      id: scene.id,
-      name: scene.name,
-      description: scene.description ?? "",
-      detail: count(projects?.filter((each) => each.scene_id === scene.id).length ?? 0, "project"),
-      time: scene.modified ?? "",
-      problems: scene.problems ?? [],
-    })) ?? null
-  );
-}
-
-function ofProjects({ projects, scenes }: State["lists"]): Entry[] | null {
-  return (
-    projects?.map((project) => ({
-      kind: "project",
-      id: project.id,
-      name: project.name,
-      description: project.description,
-      detail: `on ${scenes?.find((each) => each.id === project.scene_id)?.name ?? "a scene that is gone"}`,
-      time: project.modified ?? "",
-      problems: project.problems ?? [],
-    })) ?? null
-  );
-}
-
-function ofPackages({ packages }: State["lists"]): Entry[] | null {
-  return (
-    packages?.map((each) => ({
-      kind: "package",
-      id: each.id,
-      name: each.package_meta.name,
-      description: each.project_meta ? `from ${each.project_meta.name}` : "",
-      detail: each.package_meta.executed ? "has run" : "has not run yet",
-      time: each.package_meta.built,
-      problems: [],
-    })) ?? null
-  );
-}
-
-export function count(number: number, word: string): string {
-  return `${number} ${word}${number === 1 ? "" : "s"}`;
 }

@@ -5,11 +5,11 @@ import * as documents from "../../commands/documents";
 import { useEditor } from "../../store/store";
 import { AskName } from "../kit/kit";
 
-export function NewProject({ onClose }: { onClose: () => void }) {
+export function NewProject({ initial = "", onClose }: { initial?: string; onClose: () => void }) {
   const scenes = useEditor((state) => state.lists.scenes) ?? [];
   const projects = useEditor((state) => state.lists.projects) ?? [];
   const newest = [...scenes].sort((a, b) => (b.modified ?? "").localeCompare(a.modified ?? ""))[0];
-  const [scene, setScene] = useState(newest?.id ?? "");
+  const [scene, setScene] = useState(initial || (newest?.id ?? ""));
   const [logic, setLogic] = useState(true);
   return (
     <AskName title="New project" yes="Make and open" taken={projects.map((each) => each.name)} onYes={(name) => void documents.newProject(scene, name, "", logic)} onClose={onClose}>

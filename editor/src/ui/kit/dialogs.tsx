@@ -16,6 +16,8 @@ export interface ConfirmProps {
   children: ReactNode;
   /** What the button says that does it. */
   yes: string;
+  /** Why it cannot be done now, as a sentence. */
+  not?: string;
   onYes: () => void;
   onClose: () => void;
 }
@@ -49,7 +51,7 @@ export function Window({ title, onClose, children, role = "dialog" }: WindowProp
 }
 
 /** Asks before something that cannot be taken back. */
-export function Confirm({ title, children, yes, onYes, onClose }: ConfirmProps) {
+export function Confirm({ title, children, yes, not = "", onYes, onClose }: ConfirmProps) {
   return (
     <Window title={title} onClose={onClose} role="alertdialog">
       <div>{children}</div>
@@ -59,6 +61,7 @@ export function Confirm({ title, children, yes, onYes, onClose }: ConfirmProps) 
         </Button>
         <Button
           look="danger"
+          why={not}
           onPress={() => {
             onClose();
             onYes();

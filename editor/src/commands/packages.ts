@@ -1,0 +1,38 @@
+/** Packages as files: taken to the server, and fetched from it. */
+
+import { refusedWith } from "../session/assets";
+import { remembered } from "../session/memory";
+import { now } from "../store/store";
+import { refusal } from "./asking";
+
+const headers = (): HeadersInit => {
+  const token = remembered("token");
+  return token ? { Authorization: `Bearer ${token}` } : {};
+};
+
+/** Take a package in under a new id; gives why not. */
+export function uploadPackage(file: File): Promise<string> {
+  return refusal(async () => {
+    const base = file.name.replace(/\.zip$/i, "").replace(/[^\w-]+/g, "_") || "package";
+    const taken = new Set(now().lists.packages?.map((each) => each.id));
+    let id = base;
+    for (let number = 2; taken.has(id); number++) id = `${base}_${number}`;
+    const body = new FormData();
+    body.append("executionPackage", file);
+    const response = await fetch(`/packages/${encodeURIComponent(id)}`, { method: "POST", body, headers: headers() });
+    if (!response.ok) throw new Error(await refusedWith(response, `The server does not take ${file.name}`));
+  });
+}
+
+/** Save a package as a file of this device; gives why not. */
+export function downloadPackage(id: string, name: string): Promise<string> {
+  return refusal(async () => {
+    const response = await fetch(`/packages/${encodeURIComponent(id)}`, { headers: headers() });
+    if (!response.ok) throw new Error(await refusedWith(response, `The server does not give ${name}`));
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(await response.blob());
+    link.download = `${name.replace(/[^\w-]+/g, "_")}.zip`;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+  });
+}

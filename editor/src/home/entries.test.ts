@@ -1,0 +1,39 @@
+import { describe, expect, it } from "vitest";
+import type { Lists } from "../store/state";
+import { chosen, entriesOf } from "./entries";
+
+const scene = (id: string, name: string, modified: string) => ({ id, name, created: "2026-01-01T00:00:00Z", modified, description: "" });
+const LISTS: Lists = {
+  scenes: [scene("s1", "cell 10", "2026-03-01T00:00:00Z"), scene("s2", "cell 2", "2026-04-01T00:00:00Z")],
+  projects: [
+    { id: "p1", name: "sort", scene_id: "s1", description: "boards", has_logic: true, problems: ["no end"] },
+    { id: "p2", name: "lost", scene_id: "gone", description: "", has_logic: true },
+  ],
+  packages: [{ id: "k1", package_meta: { name: "sort 1", built: "2026-04-02T00:00:00Z" }, project_meta: { id: "p9", name: "old", description: "", modified: "2026-04-01T00:00:00Z" } }],
+  shown: "ProjectsList",
+  highlight: "",
+};
+
+describe("the lists of the home screen", () => {
+  it("tell what belongs to what, and what is gone", () => {
+    expect(entriesOf(LISTS, "scene")?.map((each) => each.projects)).toEqual([1, 0]);
+    expect(entriesOf(LISTS, "project")?.map((each) => each.from)).toEqual([
+      { id: "s1", name: "cell 10", gone: false },
+      { id: "gone", name: "a scene that is gone", gone: true },
+    ]);
+    expect(entriesOf(LISTS, "package")?.[0]).toMatchObject({ executed: "", from: { name: "old", gone: true } });
+    expect(entriesOf({ ...LISTS, scenes: null }, "scene")).toBeNull();
+  });
+
+  it("are sorted as people sort, and searched by name, description and where they belong", () => {
+    const scenes = entriesOf(LISTS, "scene") ?? [];
+    expect(chosen(scenes, "", "name", null).map((each) => each.name)).toEqual(["cell 2", "cell 10"]);
+    expect(chosen(scenes, "", "name down", null).map((each) => each.name)).toEqual(["cell 10", "cell 2"]);
+    expect(chosen(scenes, "", "changed", null).map((each) => each.id)).toEqual(["s2", "s1"]);
+    expect(chosen(scenes, "", "oldest", null).map((each) => each.id)).toEqual(["s1", "s2"]);
+    const projects = entriesOf(LISTS, "project") ?? [];
+    expect(chosen(projects, "BOARD", "name", null).map((each) => each.id)).toEqual(["p1"]);
+    expect(chosen(projects, "cell 10", "name", null).map((each) => each.id)).toEqual(["p1"]);
+    expect(chosen(projects, "", "name", new Set(["p2"])).map((each) => each.id)).toEqual(["p2"]);
+  });
+});

@@ -1,0 +1,100 @@
+/** What the home screen lists, as one kind of thing: pure. */
+
+import type { Lists } from "../store/state";
+
+export interface Entry {
+  kind: "scene" | "project" | "package";
+  id: string;
+  name: string;
+  description: string;
+  /** When it was changed or built, and made; RFC 3339, empty where nobody knows. */
+  time: string;
+  created: string;
+  problems: string[];
+  /** Of a project its scene, of a package its project. */
+  from?: { id: string; name: string; gone: boolean };
+  /** Of a scene: how many projects are on it. */
+  projects?: number;
+  /** Of a package: when it has run last; empty: never. */
+  executed?: string;
+}
+
+export type Sort = "changed" | "created" | "name" | "name down" | "oldest";
+export const SORTS: readonly (readonly [Sort, string])[] = [
+  ["changed", "changed last"],
+  ["oldest", "changed first"],
+  ["created", "made last"],
+  ["name", "name, A to Z"],
+  ["name down", "name, Z to A"],
+];
+
+export function entriesOf(lists: Lists, kind: Entry["kind"]): Entry[] | null {
+  const { scenes, projects, packages } = lists;
+  switch (kind) {
+    case "scene":
+      return (
+        scenes?.map((scene) => ({
+          kind,
+          id: scene.id,
+          name: scene.name,
+          description: scene.description ?? "",
+          time: scene.modified ?? "",
+          created: scene.created ?? "",
+          problems: scene.problems ?? [],
+          projects: projects?.filter((each) => each.scene_id === scene.id).length ?? 0,
+        })) ?? null
+      );
+    case "project":
+      return (
+        projects?.map((project) => ({
+          kind,
+          id: project.id,
+          name: project.name,
+          description: project.description,
+          time: project.modified ?? "",
+          created: project.created ?? "",
+          problems: project.problems ?? [],
+          from: from(project.scene_id, scenes),
+        })) ?? null
+      );
+    case "package":
+      return (
+        packages?.map(({ id, package_meta: meta, project_meta: project }) => ({
+          kind,
+          id,
+          name: meta.name,
+          description: project?.description ?? "",
+          time: meta.built,
+          created: meta.built,
+          problems: [],
+          executed: meta.executed ?? "",
+          ...(project ? { from: { id: project.id, name: project.name, gone: !projects?.some((each) => each.id === project.id) } } : {}),
+        })) ?? null
+      );
+  }
+}
+
+function from(id: string, of: { id: string; name: string }[] | null): Entry["from"] {
+  const found = of?.find((each) => each.id === id);
+  return { id, name: found?.name ?? "a scene that is gone", gone: found === undefined };
+}
+
+/** Those that are looked for, sorted; starred ones are not before others unless asked for alone. */
+export function chosen(entries: Entry[], search: string, sort: Sort, stars: ReadonlySet<string> | null): Entry[] {
+  const wanted = search.trim().toLowerCase();
+  const found = entries.filter(
+    (each) => (!stars || stars.has(each.id)) && `${each.name} ${each.description} ${each.from?.name ?? ""}`.toLowerCase().includes(wanted),
+  );
+  const by: Record<Sort, (a: Entry, b: Entry) => number> = {
+    changed: (a, b) => b.time.localeCompare(a.time),
+    oldest: (a, b) => a.time.localeCompare(b.time),
+    created: (a, b) => b.created.localeCompare(a.created),
+    name: (a, b) => a.name.localeCompare(b.name, "en", { numeric: true }),
+    "name down": (a, b) => b.name.localeCompare(a.name, "en", { numeric: true }),
+  };
+  return found.sort(by[sort]);
+}
+
+export function count(number: number, word: string): string {
+  return `${number} ${word}${number === 1 ? "" : "s"}`;
+}

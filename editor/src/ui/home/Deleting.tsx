@@ -1,0 +1,42 @@
+/** Asks before something is deleted for good; what needs it is listed, and can be opened from here. */
+
+import { useEffect, useState } from "react";
+import * as documents from "../../commands/documents";
+import type { Entry } from "../../home/entries";
+import { Button, Confirm } from "../kit/kit";
+
+const DELETE = { scene: documents.deleteScene, project: documents.deleteProject, package: documents.deletePackage };
+
+export function Deleting({ entry: { kind, id, name }, onClose }: { entry: Entry; onClose: () => void }) {
+  const [needing, setNeeding] = useState<{ id: string; name: string }[]>([]);
+  useEffect(() => {
+    if (kind === "scene") documents.projectsOf(id).then(setNeeding, () => {});
+  }, [kind, id]);
+  return (
+    <Confirm title={`Delete ${name}?`} yes="Delete" not={needing.length > 0 ? "Its projects have to be deleted first." : ""} onClose={onClose} onYes={() => void DELETE[kind](id)}>
+      {needing.length > 0 ? (
+        <>
+          <p>These projects are on this scene, and have to be deleted first:</p>
+          <ul className="needing">
+            {needing.map((each) => (
+              <li key={each.id}>
+                <span>{each.name}</span>
+                <Button
+                  aria-label={`Open ${each.name}`}
+                  onPress={() => {
+                    onClose();
+                    void documents.openProject(each.id);
+                  }}
+                >
+                  Open
+                </Button>
+              </li>
+            ))}
+          </ul>
+        </>
+      ) : (
+        <p>{kind === "package" ? "The project that it was built from stays." : "This cannot be undone."}</p>
+      )}
+    </Confirm>
+  );
+}

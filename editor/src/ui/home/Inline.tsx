@@ -1,0 +1,51 @@
+/** A name or description that is written where it stands: Enter keeps it, Escape leaves it. */
+
+import { type FormEvent, useState } from "react";
+import { Button } from "../kit/kit";
+import { RefusedText, useAsking } from "../points/Doing";
+
+interface InlineProps {
+  label: string;
+  value: string;
+  /** Names that there are already. */
+  taken?: string[];
+  many?: boolean;
+  onSave: (value: string) => Promise<string>;
+  onClose: () => void;
+}
+
+export function Inline({ label, value, taken = [], many = false, onSave, onClose }: InlineProps) {
+  const [text, setText] = useState(value);
+  const { refused, busy, ask } = useAsking();
+  const clean = text.trim();
+  const problem = clean !== value && taken.includes(clean) ? "There is one of that name." : "";
+  const save = (event?: FormEvent) => {
+    event?.preventDefault();
+    if (clean === value) return onClose();
+    if (problem || (!many && !clean)) return;
+    void ask(onSave(clean)).then((done) => done && onClose());
+  };
+  const shared = {
+    "aria-label": label,
+    "aria-invalid": (problem || refused) !== "" || undefined,
+    value: text,
+    autoFocus: true,
+    autoComplete: "off",
+    onKeyDown: (event: { key: string; ctrlKey: boolean }) => {
+      if (event.key === "Escape") onClose();
+      if (many && event.key === "Enter" && event.ctrlKey) save();
+    },
+  };
+  return (
+    <form className="field inline" onSubmit={save}>
+      {many ? <textarea rows={3} {...shared} onChange={(event) => setText(event.target.value)} /> : <input {...shared} onFocus={(event) => event.target.select()} onChange={(event) => setText(event.target.value)} />}
+      <RefusedText>{problem || refused}</RefusedText>
+      <div className="actions">
+        <Button onPress={onClose}>Cancel</Button>
+        <Button look="primary" type="submit" isDisabled={busy || problem !== "" || (!many && !clean)}>
+          Keep
+        </Button>
+      </div>
+    </form>
+  );
+}

@@ -1,0 +1,39 @@
+/** Takes a package from a file of this device. */
+
+import { useRef, useState } from "react";
+import { barred } from "../../commands/asking";
+import { uploadPackage } from "../../commands/packages";
+import { tell, useEditor } from "../../store/store";
+import { Button } from "../kit/kit";
+
+export function UploadPackage() {
+  const input = useRef<HTMLInputElement>(null);
+  const [busy, setBusy] = useState(false);
+  const why = useEditor((state) => barred(state, "UploadPackage"));
+  const take = async (file: File | undefined) => {
+    if (!file) return;
+    setBusy(true);
+    const wrong = await uploadPackage(file);
+    setBusy(false);
+    tell(wrong ? "error" : "info", wrong || `${file.name} is taken in.`);
+  };
+  return (
+    <>
+      <Button icon="plus" why={why} isDisabled={busy} onPress={() => input.current?.click()}>
+        {busy ? "Uploading…" : "Upload a package"}
+      </Button>
+      <input
+        ref={input}
+        type="file"
+        accept=".zip"
+        className="hidden-but-read"
+        tabIndex={-1}
+        aria-hidden="true"
+        onChange={(event) => {
+          void take(event.target.files?.[0]);
+          event.target.value = ""; // the same file can be taken again
+        }}
+      />
+    </>
+  );
+}
