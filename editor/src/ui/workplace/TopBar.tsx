@@ -9,6 +9,7 @@ import { tell, useEditor } from "../../store/store";
 import { Button, Confirm } from "../kit/kit";
 import { People } from "../people/People";
 import { Settings } from "../settings/Settings";
+import { useUndoKeys } from "./useUndoKeys";
 
 export function TopBar() {
   const doc = useEditor((state) => state.doc);
@@ -18,6 +19,7 @@ export function TopBar() {
   const cannotSave = useEditor((state) => barred(state, state.doc?.project ? "SaveProject" : "SaveScene"));
   const cannotUndo = useEditor((state) => barred(state, "Undo"));
   const [asking, setAsking] = useState(false);
+  useUndoKeys();
   if (!doc) return null;
   const { unsaved } = doc;
   return (
@@ -43,8 +45,8 @@ export function TopBar() {
       <Button icon="save" className="word-on-wide" isDisabled={!unsaved || running || cannotSave !== ""} onPress={() => void documents.save()} aria-label="Save">
         <span>Save</span>
       </Button>
-      <Button look="plain" icon="undo" aria-label={history?.undo ? `Undo ${history.undo.text}` : "Nothing to undo"} isDisabled={!history?.undo || cannotUndo !== ""} onPress={() => void documents.undo()} />
-      <Button look="plain" icon="redo" aria-label={history?.redo ? `Redo ${history.redo.text}` : "Nothing to redo"} isDisabled={!history?.redo || cannotUndo !== ""} onPress={() => void documents.redo()} />
+      <Button look="plain" icon="undo" aria-label={history?.undo ? `Undo ${history.undo.text}` : "Undo"} why={cannotUndo || (history?.undo ? "" : "There is nothing to undo.")} onPress={() => void documents.undo()} />
+      <Button look="plain" icon="redo" aria-label={history?.redo ? `Redo ${history.redo.text}` : "Redo"} why={cannotUndo || (history?.redo ? "" : "There is nothing to redo.")} onPress={() => void documents.redo()} />
       <LiveSwitch />
       <People />
       <Settings />

@@ -1,0 +1,34 @@
+/** Ctrl+Z and Shift+Ctrl+Z (Ctrl+Y): the server's undo and redo. In a field they undo what is typed there. */
+
+import { useEffect } from "react";
+import { barred } from "../../commands/asking";
+import * as documents from "../../commands/documents";
+import { now, tell } from "../../store/store";
+
+export function useUndoKeys(): void {
+  useEffect(() => {
+    const key = (event: KeyboardEvent) => {
+      const wanted = undoOrRedo(event);
+      if (!wanted || event.repeat || isWriting(event.target) || document.querySelector(".overlay")) return;
+      event.preventDefault();
+      const state = now();
+      const step = state.history?.[wanted];
+      const why = barred(state, wanted === "undo" ? "Undo" : "Redo") || (step ? "" : `There is nothing to ${wanted}.`);
+      if (why) tell("info", why);
+      else void (wanted === "undo" ? documents.undo() : documents.redo());
+    };
+    window.addEventListener("keydown", key);
+    return () => window.removeEventListener("keydown", key);
+  }, []);
+}
+
+export function undoOrRedo({ key, ctrlKey, metaKey, shiftKey, altKey }: Pick<KeyboardEvent, "key" | "ctrlKey" | "metaKey" | "shiftKey" | "altKey">): "undo" | "redo" | null {
+  if (!(ctrlKey || metaKey) || altKey) return null;
+  const letter = key.toLowerCase();
+  if (letter === "z") return shiftKey ? "redo" : "undo";
+  return letter === "y" && !shiftKey ? "redo" : null;
+}
+
+function isWriting(target: EventTarget | null): boolean {
+  return target instanceof HTMLElement && (target.isContentEditable || target.matches("input:not([type=checkbox], [type=radio], [type=range]), textarea, select"));
+}
