@@ -47,7 +47,7 @@ def _mesh(content: bytes, name: str, desk: Desk) -> Prepared:
     if not len(small.triangles):
         raise BadMesh(f"The mesh {name} has only triangles without extent.")
     desk.progress(0.8, f"normals of {name}")
-    made = glb.written({name: reducing.drawn(small)}, {})
+    made = glb.written({"mesh": reducing.drawn(small)}, {})
     return Prepared(made, len(small.triangles), len(surface.triangles))
 
 

@@ -55,7 +55,7 @@ class PreparedAssets:
         self._services = services
         self._directory = directory
         self._making: dict[str, asyncio.Task[Shown]] = {}
-        self._refusals: dict[str, Arcor2Error] = {}
+        self._refusals: dict[tuple[str, str], Arcor2Error] = {}
 
     async def get(self, key: str) -> Shown:
         """Give an asset as clients show it; it is made once, however many ask.
@@ -69,7 +69,7 @@ class PreparedAssets:
         kept = f"{asset.digest}.{MAKER}{Path(name).suffix.lower() if Path(name).suffix[1:].isalnum() else ''}"
         if (found := await asyncio.to_thread(self._find, kept)) is not None:
             return found
-        if (refusal := self._refusals.get(kept)) is not None:
+        if (refusal := self._refusals.get((kept, name))) is not None:
             raise refusal.with_traceback(None)
         making = self._making.get(kept)
         if making is None:
@@ -98,7 +98,7 @@ class PreparedAssets:
                 made = await self._services.compute.run(task, told=told)
         except InvalidData as error:
             if await asyncio.to_thread(Path(task.file.path).is_file):  # else it is the asset that went meanwhile
-                self._refusals[kept] = error
+                self._refusals[kept, name] = error
             while len(self._refusals) > MOST_REFUSALS:
                 del self._refusals[next(iter(self._refusals))]
             raise

@@ -1,0 +1,194 @@
+"""Meshes made ready to be shown, over REST: made once, kept, told of, refused by name."""
+
+import asyncio
+import contextlib
+import os
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+import pytest_asyncio
+import trimesh
+
+from arcor2_hw.compute.preparing_tasks import MAKER, PrepareAsset
+from arcor2_hw.compute.task import ComputeStopped
+from arcor2_hw.compute.world import KeptFile
+from arcor2_hw.data.editor import TaskKind
+from arcor2_hw.exceptions import InvalidData
+from arcor2_server import prepared as prepared_module
+from arcor2_server.services import Services
+from arcor2_server.tasks import Task
+from tests.server.rest.asking import granted, refused
+
+pytestmark = pytest.mark.asyncio(loop_scope="module")
+
+BALL = trimesh.creation.icosphere(subdivisions=5, radius=0.05).export(file_type="stl")
+assert isinstance(BALL, bytes)
+SHOWN = "/api/assets/{}/shown"
+
+
+@pytest_asyncio.fixture(autouse=True, scope="module", loop_scope="module")
+async def worker(services: Services) -> None:
+    """The worker for meshes is up before the tests."""
+    with contextlib.suppress(InvalidData):
+        await services.compute.run(PrepareAsset(KeptFile("/nonexistent", "none.stl")))
+
+
+@pytest.fixture
+def runs(services: Services, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Names of what the worker is asked to prepare."""
+    asked: list[str] = []
+    run = services.compute.run
+
+    async def counted(task: Any, **more: Any) -> Any:
+        if isinstance(task, PrepareAsset):
+            asked.append(task.file.name)
+        return await run(task, **more)
+
+    monkeypatch.setattr(services.compute, "run", counted)
+    return asked
+
+
+async def put(http: httpx.AsyncClient, key: str, content: bytes, name: str = "", **query: Any) -> None:
+    files = {"assetData": (name or key, content)}
+    granted(await http.post("/assets", params={"id": key, **query}, files=files))
+
+
+def no_digest(content: bytes, mark: bytes) -> bytes:
+    """The same mesh, other bytes: what stands in the header of a binary STL counts for nothing."""
+    return mark.ljust(80) + content[80:]
+
+
+async def test_five_who_ask_at_once_are_given_one_and_it_is_kept(
+    http: httpx.AsyncClient, services: Services, runs: list[str]
+) -> None:
+    await put(http, "ball.stl", BALL)
+    answers = await asyncio.gather(*(http.get(SHOWN.format("ball.stl")) for _ in range(5)))
+    assert [answer.status_code for answer in answers] == [200] * 5
+    assert len({answer.content for answer in answers}) == 1
+    assert runs == ["ball.stl"]
+    content = answers[0].content
+    assert content.startswith(b"glTF")
+    assert len(content) < 0.4 * len(BALL)
+    assert answers[0].headers["content-type"] == "model/gltf-binary"
+    assert (await http.get(SHOWN.format("ball.stl"))).content == content
+    # The same under another name is not made again; nor by a server that starts anew.
+    await put(http, "same.stl", BALL)
+    assert (await http.get(SHOWN.format("same.stl"))).content == content
+    anew = prepared_module.PreparedAssets(services, services.settings.prepared_dir)
+    assert (await anew.get("ball.stl")).plain.read_bytes() == content
+    assert runs == ["ball.stl"]
+
+
+async def test_who_has_it_is_told_so_and_it_comes_compressed_to_who_takes_that(http: httpx.AsyncClient) -> None:
+    await put(http, "tagged.stl", no_digest(BALL, b"tagged"))
+    plain = await http.get(SHOWN.format("tagged.stl"), headers={"Accept-Encoding": "identity"})
+    packed = await http.get(SHOWN.format("tagged.stl"))
+    assert packed.headers["content-encoding"] == "gzip"
+    assert "content-encoding" not in plain.headers
+    assert int(packed.headers["content-length"]) < 0.9 * int(plain.headers["content-length"])
+    assert packed.content == plain.content
+    assert packed.headers["etag"] != plain.headers["etag"]
+    known = {"If-None-Match": f'"other", W/{packed.headers["etag"]}'}
+    again = await http.get(SHOWN.format("tagged.stl"), headers=known)
+    assert (again.status_code, again.content) == (304, b"")
+    # Another mesh under the same id is another answer.
+    await put(http, "tagged.stl", no_digest(BALL, b"newer"), upsert=True)
+    assert (await http.get(SHOWN.format("tagged.stl"), headers=known)).status_code == 200
+
+
+async def test_a_broken_mesh_is_refused_by_name_and_looked_at_once(http: httpx.AsyncClient, runs: list[str]) -> None:
+    await put(http, "asset_1", b"solid nothing", "bracket.stl")
+    for _ in range(2):
+        refused(await http.get(SHOWN.format("asset_1")), 400, "Argument", "bracket.stl")
+    assert runs == ["bracket.stl"]
+    await put(http, "asset_1", no_digest(BALL, b"mended"), "bracket.stl", upsert=True)
+    assert (await http.get(SHOWN.format("asset_1"))).status_code == 200
+    refused(await http.get(SHOWN.format("asset_2")), 404, "NotFound", "asset_2")
+
+
+async def test_what_takes_long_is_told_as_a_task(
+    http: httpx.AsyncClient, services: Services, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    began: list[str] = []
+    begin = services.tasks.begin
+
+    def noted(kind: TaskKind, title: str) -> Task:
+        began.append(title)
+        return begin(kind, title)
+
+    monkeypatch.setattr(services.tasks, "begin", noted)
+    await put(http, "quick.stl", no_digest(BALL, b"quick"), "quick one.stl")
+    monkeypatch.setattr(prepared_module, "TOLD_AFTER", 60.0)
+    await http.get(SHOWN.format("quick.stl"))
+    assert began == []
+    monkeypatch.setattr(prepared_module, "TOLD_AFTER", 0.0)
+    await put(http, "slow.stl", no_digest(BALL, b"slow"), "slow one.stl")
+    await http.get(SHOWN.format("slow.stl"))
+    assert began == ["Preparing slow one.stl for the editor"]
+    assert services.tasks.under_way() == []
+
+
+async def test_a_worker_that_dies_costs_one_answer_and_is_no_fault_of_the_mesh(
+    http: httpx.AsyncClient, services: Services, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    await put(http, "unlucky.stl", no_digest(BALL, b"unlucky"))
+    with monkeypatch.context() as patched:
+
+        async def stopped(*_: Any, **__: Any) -> None:
+            raise ComputeStopped("The compute worker ended by SIGKILL while it worked on a mesh for the editor.")
+
+        patched.setattr(services.compute, "run", stopped)
+        refused(await http.get(SHOWN.format("unlucky.stl")), 503, "General", "SIGKILL")
+    assert (await http.get(SHOWN.format("unlucky.stl"))).status_code == 200
+
+
+async def test_who_leaves_does_not_spoil_it_for_others(
+    http: httpx.AsyncClient, services: Services, runs: list[str]
+) -> None:
+    await put(http, "shared.stl", no_digest(BALL, b"shared"))
+    leaver = asyncio.create_task(services.prepared.get("shared.stl"))
+    stayer = asyncio.create_task(services.prepared.get("shared.stl"))
+    while not runs:
+        await asyncio.sleep(0.001)
+    leaver.cancel()
+    assert (await stayer).plain.is_file()
+    assert runs == ["shared.stl"]
+
+
+async def test_what_older_makers_made_and_what_nobody_asks_for_goes(
+    http: httpx.AsyncClient, services: Services, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder: Path = services.settings.prepared_dir
+    await put(http, "first.stl", no_digest(BALL, b"first"))
+    first = await services.prepared.get("first.stl")
+    old = folder / f"{'0' * 64}.{MAKER - 1}.stl.glb"
+    old.write_bytes(b"glTF")
+    os.utime(first.plain, (1, 1))
+    kept = {file for file in folder.glob("*.glb") if file not in (first.plain, old)}
+    room = sum(file.stat().st_size for file in (*kept, first.plain))
+    monkeypatch.setattr(prepared_module, "MOST_KEPT", room + 1000)
+    await put(http, "second.stl", no_digest(BALL, b"second"))
+    second = await services.prepared.get("second.stl")
+    assert set(folder.glob("*.glb")) == kept | {second.plain}
+    assert first.packed is not None
+    assert not first.packed.exists()
+    # It comes back when it is asked for.
+    assert (await services.prepared.get("first.stl")).plain.is_file()
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def robots(services: Services) -> AsyncIterator[list[str]]:
+    yield sorted(
+        {str(robot.urdf_package_filename) for robot in services.types.robot_metas() if robot.urdf_package_filename}
+    )
+
+
+async def test_every_robot_of_an_installed_driver_can_be_shown(http: httpx.AsyncClient, robots: list[str]) -> None:
+    assert "ur5e.zip" in robots
+    for name in robots:
+        answer = await http.get(SHOWN.format(name))
+        assert answer.status_code == 200, answer.text
+        assert b'"problems":{}' in answer.content
