@@ -1,6 +1,6 @@
 /** Joints kept at a point: their values within the limits, taken over from the robot, or computed anew when the point moved. */
 
-import { renameJoints, setJoints, setJointsToRobot, solveJoints } from "../../commands/points";
+import { removeJoints, renameJoints, setJoints, setJointsToRobot, solveJoints } from "../../commands/points";
 import { notReady } from "../../commands/robot";
 import { select, useEditor } from "../../store/store";
 import { Amount } from "../kit/fields";
@@ -12,6 +12,7 @@ import { RefusedText, useAsking } from "./Doing";
 import { useWhyNot } from "./editing";
 import { NameField } from "./NameField";
 import { ReachAnswers } from "./Reach";
+import { Remove } from "./Remove";
 import "./points.css";
 import "../robot/robot.css";
 
@@ -69,6 +70,7 @@ const JointsSection: Section["Body"] = ({ selection: { id } }) => {
       </div>
       <RefusedText>{refused}</RefusedText>
       <ReachAnswers id={id} />
+      <Remove key={`remove ${id}`} name={kept.name} why={why} along="" onRemove={() => removeJoints(id)} />
     </>
   );
 };

@@ -1,6 +1,6 @@
 /** An orientation: its name, its angles, which robots get there, and the robot's own taken over. */
 
-import { renameOrientation, turnOrientation, turnOrientationToRobot } from "../../commands/points";
+import { removeOrientation, renameOrientation, turnOrientation, turnOrientationToRobot } from "../../commands/points";
 import { chosenRobot, notReady } from "../../commands/robot";
 import { select, useEditor } from "../../store/store";
 import { fromRollPitchYaw } from "../../viewmodel/frames";
@@ -13,6 +13,7 @@ import { RefusedText, useAsking } from "./Doing";
 import { useWhyNot } from "./editing";
 import { NameField } from "./NameField";
 import { ReachAnswers } from "./Reach";
+import { Remove } from "./Remove";
 import "./points.css";
 
 const OrientationSection: Section["Body"] = ({ selection: { id } }) => {
@@ -52,6 +53,7 @@ const OrientationSection: Section["Body"] = ({ selection: { id } }) => {
       </Button>
       <RefusedText>{refused}</RefusedText>
       <ReachAnswers id={id} />
+      <Remove key={`remove ${id}`} name={one.name} why={why} along="" onRemove={() => removeOrientation(id)} />
     </>
   );
 };

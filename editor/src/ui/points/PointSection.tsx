@@ -2,7 +2,7 @@
 
 import { useState } from "react";
 import { holdHandTeaching } from "../../commands/holds";
-import { movePointToRobot, possibleParents, renamePoint, setParent } from "../../commands/points";
+import { movePointToRobot, possibleParents, removePoint, renamePoint, setParent } from "../../commands/points";
 import { chosenRobot, featuresOf, notReady } from "../../commands/robot";
 import { keepView } from "../../commands/viewstate";
 import { useEditor } from "../../store/store";
@@ -14,6 +14,7 @@ import type { Section } from "../workplace/sections";
 import { RefusedText, useAsking } from "./Doing";
 import { useWhyNot } from "./editing";
 import { NameField } from "./NameField";
+import { Remove } from "./Remove";
 import "./points.css";
 
 const PointSection: Section["Body"] = ({ selection: { id } }) => {
@@ -52,6 +53,19 @@ const PointSection: Section["Body"] = ({ selection: { id } }) => {
 };
 
 export default PointSection;
+
+/** What hangs on a point goes with it; what uses it keeps it there, and the server says so. */
+export const RemovePoint: Section["Body"] = ({ selection: { id } }) => {
+  const doc = useEditor((state) => state.doc);
+  const why = useWhyNot(id, "RemoveActionPoint");
+  if (!doc?.points[id]) return null;
+  const count = (of: Record<string, { pointId: string }>, one: string, several: string) => {
+    const found = Object.values(of).filter((each) => each.pointId === id).length;
+    return found === 0 ? [] : [found === 1 ? `1 ${one}` : `${found} ${several}`];
+  };
+  const along = [...count(doc.actions, "action", "actions"), ...count(doc.orientations, "orientation", "orientations"), ...count(doc.joints, "set of joints", "sets of joints")];
+  return <Remove key={id} name={doc.points[id].name} why={why} along={along.join(", ")} onRemove={() => removePoint(id)} />;
+};
 
 /** What people write down about a point; all see it. The protocol has no request for a point's description. */
 function Note({ id }: { id: string }) {

@@ -17,4 +17,5 @@ export const pointSections: readonly Section[] = [
   { id: "orientations", title: "Orientations", applies: of("point"), Body: lazily(() => import("./TaughtSection").then((module) => ({ default: module.Orientations }))) },
   { id: "joints-list", title: "Joints", applies: of("point"), Body: lazily(() => import("./TaughtSection").then((module) => ({ default: module.JointsList }))) },
   { id: "copies", title: "Copies", applies: of("point"), Body: lazily(() => import("./CopiesSection")) },
+  { id: "remove-point", title: "Remove", applies: of("point"), Body: lazily(() => import("./PointSection").then((module) => ({ default: module.RemovePoint }))) },
 ];
