@@ -92,7 +92,7 @@ WIRES: Final = {
 
 
 NO_SENSE: Final = {
-    Base.ROBOT: "a robot needs its model: see docs/how-to/add-a-robot.md, and start from the robot that is most like yours "
+    Base.ROBOT: "a robot needs its model: see docs/how-to/add-a-robot.md, and start from the one most like yours "
     "(drivers/arcor2_drivers/dobot_magician, universal_robots)",
     Base.CAMERA: "a camera is reached by its maker's library, not by a bus: start from drivers/arcor2_drivers/oak_d",
 }
