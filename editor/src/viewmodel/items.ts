@@ -63,12 +63,14 @@ export class ItemMaker {
         return { ...base, kind: "object", shape: shapeOf(type && model ? { ...type, object_model: model } : type) };
       });
     }
+    const size = pointSize(state);
     for (const point of Object.values(doc.points)) {
       const preview = (drafted(draft, point) ?? state.previews[point.id])?.position;
       const breakpoint = point.id in state.breakpoints;
-      add(point.id, [point, preview, breakpoint, ...tell(point.id)], () => ({
+      add(point.id, [point, size, preview, breakpoint, ...tell(point.id)], () => ({
         ...common(point.id, point.name),
         kind: "point",
+        size,
         parent: point.parent,
         position: preview ?? point.position,
         breakpoint,
@@ -142,6 +144,12 @@ export class ItemMaker {
       }));
     }
   }
+}
+
+/** How large points are drawn, of what they are by themselves: as the user wants it on all his tablets. */
+export function pointSize(state: State): number {
+  const kept = state.view.general["point_size"];
+  return typeof kept === "number" ? Math.min(4, Math.max(0.5, kept)) : 1;
 }
 
 function ghostOf({ joints, problem }: Ghost): RobotItem["ghost"] {

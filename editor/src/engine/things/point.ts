@@ -36,7 +36,7 @@ export class PointThing extends Thing<PointItem> {
         : item.lockedBy
           ? palette.locked
           : palette.point;
-    const size = item.faint >= 1 ? 0 : item.selected ? 1.4 : 1;
+    const size = item.faint >= 1 ? 0 : item.size * (item.selected ? 1.4 : 1);
     this.instance.offset.makeScale(size, size, size);
   }
 

@@ -2,19 +2,20 @@
 
 import { useState } from "react";
 import { createPortal } from "react-dom";
-import { aimedPlace } from "../../commands/aimed";
+import { against, aimedPlace } from "../../commands/aimed";
 import { barred } from "../../commands/asking";
 import { addPoint, addPointFromRobot } from "../../commands/points";
 import { chosenRobot, notReady } from "../../commands/robot";
+import { keepGeneral } from "../../commands/viewstate";
 import type { Position } from "../../protocol/types";
 import { theEngine } from "../../session/engine";
 import { isRunning } from "../../store/selectors";
 import { now, setUi, tell, useEditor } from "../../store/store";
 import { composed, ORIGIN, worldOf } from "../../viewmodel/frames";
-import { Amount, OnOff, OneOf } from "../kit/fields";
+import { pointSize } from "../../viewmodel/items";
+import { Amount, MoreOrLess, OnOff, OneOf } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { nameOf } from "../names";
-import { against } from "../../commands/aimed";
 import { usePlaceTap } from "../robot/usePlaceTap";
 import { RefusedText, useAsking } from "./Doing";
 import { PointTree } from "./PointTree";
@@ -40,6 +41,7 @@ export default function PointsPanel() {
   const [tapping, setTapping] = useState(false);
   const [standing, setStanding] = useState(true);
   const [typed, setTyped] = useState<Position>(ORIGIN.position);
+  const size = useEditor(pointSize);
   const { refused, busy, ask } = useAsking();
   const parent = candidate && on === "parent" ? candidate : "";
   const added = (work: Promise<string>) =>
@@ -97,6 +99,7 @@ export default function PointsPanel() {
       </details>
       <RefusedText>{refused}</RefusedText>
       <PointTree />
+      <MoreOrLess label="Size of points in the view" value={size} least={0.5} most={4} step={0.25} words={(value) => `${Math.round(value * 100)} %`} onChange={(next) => keepGeneral({ point_size: next })} />
     </>
   );
 }
