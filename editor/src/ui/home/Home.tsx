@@ -48,8 +48,8 @@ export function Home() {
     <div className="home">
       <header className="bar">
         <h1>Workplace</h1>
-        <Button look="plain" icon="play" onPress={() => (location.hash = "#/operator")}>
-          Operator
+        <Button look="plain" icon="play" aria-label="Operator" className="to-operator" onPress={() => (location.hash = "#/operator")}>
+          <span>Operator</span>
         </Button>
         <People />
         <Settings />
