@@ -1,0 +1,166 @@
+"""Uploaded meshes and robots appear in the 3D view; what cannot be shown says why. In Chromium, on the real server."""
+
+import io
+import zipfile
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import httpx
+import numpy as np
+import pytest
+import pytest_asyncio
+import trimesh
+from playwright.async_api import Browser
+
+from arcor2_hw.data import rpc
+from arcor2_hw.data.geometry import Pose, Position
+from tests.e2e.harness import Cell
+from tests.editor.screen import screen_of
+
+pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(180)]
+
+OBJECT = '''
+from arcor2_hw.objects import CollisionObject
+
+
+class {name}(CollisionObject):
+    """Something of a shape."""
+
+    _ABSTRACT = False
+'''
+ROBOT = '''
+from arcor2_hw.objects import Robot
+
+
+class {name}(Robot):
+    """An arm of one joint."""
+
+    _ABSTRACT = False
+    urdf_package_name = "{asset}"
+
+    def get_end_effectors_ids(self): return set()
+    def get_end_effector_pose(self, end_effector): ...
+    def robot_joints(self, include_gripper=False): return []
+    def grippers(self): return set()
+    def suctions(self): return set()
+'''
+URDF = """<robot name="turner">
+  <link name="base"><visual><geometry><mesh filename="package://turner/meshes/base.stl"/></geometry></visual></link>
+  <link name="arm">
+    <visual><origin xyz="0.2 0 0.1"/><geometry><mesh filename="meshes/arm.dae" scale="1 1 2"/></geometry></visual>
+    <visual><geometry><mesh filename="meshes/cover.stl"/></geometry></visual>
+  </link>
+  <joint name="turn" type="revolute"><parent link="base"/><child link="arm"/><origin xyz="0 0 0.2"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+</robot>"""
+VISE_TRIANGLES = 13_856
+"""Of the 20,480 that are uploaded: what a thing of 0.17 m may have."""
+
+
+def exported(mesh: trimesh.Trimesh, kind: str) -> bytes:
+    made = mesh.export(file_type=kind)
+    return made if isinstance(made, bytes) else str(made).encode()
+
+
+def vise() -> bytes:
+    """A ball, blue above."""
+    ball = trimesh.creation.icosphere(subdivisions=5, radius=0.05)
+    above = ball.triangles_center[:, 2:] > 0
+    colours = np.where(above, [[30, 60, 200, 255]], [[230, 230, 230, 255]]).astype(np.uint8)
+    ball.visual = trimesh.visual.ColorVisuals(ball, face_colors=colours)
+    return exported(ball, "ply")
+
+
+def turner() -> bytes:
+    arm = exported(trimesh.creation.box((400.0, 60.0, 30.0)), "dae").decode()
+    arm = arm.replace("<up_axis>", '<unit meter="0.001"/><up_axis>')
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("turner/turner.urdf", URDF)
+        archive.writestr("turner/meshes/base.stl", exported(trimesh.creation.cylinder(0.08, 0.2, sections=48), "stl"))
+        archive.writestr("turner/meshes/arm.dae", arm)
+        archive.writestr("turner/meshes/cover.stl", b"solid but not really")
+    return out.getvalue()
+
+
+@dataclass
+class Place:
+    cell: Cell
+    ids: dict[str, str]
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def place(tmp_path_factory: pytest.TempPathFactory, built_editor: Path) -> AsyncIterator[Place]:
+    """A scene of meshes that were uploaded: three that can be shown and one that cannot, and robots likewise."""
+    cell = Cell(tmp_path_factory.mktemp("cell"))
+    try:
+        await cell.start_server()
+        client = await cell.client("maker")
+        async with httpx.AsyncClient(base_url=cell.url.replace("ws", "http", 1)) as http:
+            stl = exported(trimesh.creation.box((0.2, 0.1, 0.05)), "stl")
+            for key, content in {
+                "vise.ply": vise(), "block.stl": stl, "broken.stl": b"solid nothing",
+                "turner.zip": turner(), "ruin.zip": b"PK\3\4 but no archive",
+            }.items():  # fmt: skip
+                sent = await http.post("/assets", params={"id": key}, files={"assetData": (key, content)})
+                assert sent.status_code == 200, sent.text
+            for name, asset in {"Vise": "vise.ply", "Block": "block.stl", "Broken": "broken.stl"}.items():
+                sent = await http.put("/models/mesh", json={"id": name, "assetId": asset})
+                assert sent.status_code == 200, sent.text
+                model = {"id": name, "type": "Mesh"}
+                source = {"id": name, "name": name, "source": OBJECT.format(name=name), "model": model}
+                sent = await http.put("/object-types", json=source)
+                assert sent.status_code == 200, sent.text
+            for name, asset in {"Turner": "turner.zip", "Ruin": "ruin.zip"}.items():
+                source = {"id": name, "name": name, "source": ROBOT.format(name=name, asset=asset)}
+                sent = await http.put("/object-types", json=source)
+                assert sent.status_code == 200, sent.text
+        await client.call("NewScene", rpc.NewSceneArgs("meshes"))
+        ids = {}
+        for number, kind in enumerate(("Vise", "Block", "Broken", "Turner", "Ruin")):
+            pose = Pose(Position(0.45 * number - 0.9, 0.0, 0.1 if number < 3 else 0.0))
+            await client.call("AddObjectToScene", rpc.AddObjectToSceneArgs(kind.lower(), kind, pose))
+            ids[kind] = (await client.next_event("SceneObjectChanged", timeout=10)).data.id
+        yield Place(cell, ids)
+    finally:
+        await cell.stop()
+
+
+async def test_meshes_appear_as_they_were_uploaded(browser: Browser, place: Place) -> None:
+    async with screen_of(browser, place.cell.url) as screen:
+        # The browser's own words for the two answers that refuse.
+        screen.expected_errors = ("the server responded with a status of 400",)
+        await screen.join("Eva")
+        shown = "([id, count]) => window.__engine?.item(id)?.triangles === count"
+        await screen.until(shown, [place.ids["Vise"], VISE_TRIANGLES])
+        await screen.until(shown, [place.ids["Block"], 12])
+        # A cylinder and a box; the third mesh is broken, and what is whole is shown all the same.
+        turner_mesh = (
+            "id => window.__engine.item(id).problem.includes('cover.stl') && window.__engine.item(id).triangles"
+        )
+        assert await screen.until(turner_mesh, place.ids["Turner"]) == 4 * 48 + 12
+        assert (await screen.item(place.ids["Turner"]))["joints"] == {"turn": 0}
+        for name in ("Vise", "Block"):
+            item = await screen.item(place.ids[name])
+            assert (item["problem"], item["visible"]) == ("", True)
+        await screen.settle()
+        await screen.picture("meshes")
+
+
+async def test_what_cannot_be_shown_stands_there_with_its_reason(browser: Browser, place: Place) -> None:
+    async with screen_of(browser, place.cell.url) as screen:
+        screen.expected_errors = ("the server responded with a status of 400",)
+        await screen.join("Eva")
+        for name, words, badge in (
+            ("Broken", "The mesh broken.stl has no triangles", "its mesh cannot be shown"),
+            ("Ruin", "ruin.zip is no zip archive", "cannot be shown as it looks"),
+        ):
+            await screen.until("id => window.__engine?.item(id)?.problem", place.ids[name])
+            item = await screen.item(place.ids[name])
+            assert words in item["problem"]
+            assert item["badge"] == badge
+            assert item["triangles"] > 0, "something stands for it"
+        await screen.sees("broken is shown without its shape. The mesh broken.stl has no triangles")
+        await screen.sees("ruin is shown without its shape.")
+        await screen.sees("turner is shown in part. ")
