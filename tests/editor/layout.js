@@ -9,13 +9,23 @@
       style.display !== "none" &&
       box.width > 1 &&
       box.height > 1 &&
-      !element.closest(".hidden-but-read")
+      !element.closest(".hidden-but-read") &&
+      !onlyRead(element)
     );
   };
+  // What is there for screen readers alone.
+  const onlyRead = (element) => {
+    for (let each = element; each; each = each.parentElement) {
+      if (getComputedStyle(each).clipPath.startsWith("inset(50%")) return true;
+    }
+    return false;
+  };
+  // Below a window nothing can be touched.
+  const scope = [...document.querySelectorAll(".overlay")].at(-1) ?? document;
   const name = (element) =>
     (element.getAttribute("aria-label") || element.textContent || element.tagName).trim().slice(0, 40);
   const touched = [
-    ...document.querySelectorAll(
+    ...scope.querySelectorAll(
       "button, input, select, textarea, a[href], [role=tab], [role=option], [role=menuitem], summary",
     ),
   ].filter((element) => shown(element) && !element.closest("[aria-hidden=true]"));

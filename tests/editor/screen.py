@@ -31,6 +31,14 @@ SMALLEST: Final = 44
 """CSS pixels of the smaller side of what is touched."""
 
 _LAYOUT: Final = Path(__file__).with_name("layout.js").read_text()
+_AXE: Final = Path(__file__).resolve().parents[2] / "editor" / "node_modules" / "axe-core" / "axe.min.js"
+_RULES: Final = """async () => {
+  const tags = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"];
+  const { violations } = await axe.run(document, { runOnly: tags, resultTypes: ["violations"] });
+  const grave = violations.filter((each) => each.impact === "serious" || each.impact === "critical");
+  return grave.flatMap((each) => each.nodes.map((node) => `${each.id}: ${node.html.slice(0, 160)} ${
+    node.any[0]?.message ?? each.help}`));
+}"""
 
 
 def chromium() -> str:
@@ -98,8 +106,14 @@ class Screen:
         await self.page.mouse.click(box["x"] + at["x"], box["y"] + at["y"])
 
     async def settle(self) -> None:
-        """Let the page lay itself out and draw."""
-        await self.page.evaluate("() => new Promise((done) => setTimeout(() => requestAnimationFrame(done), 60))")
+        """Let the page lay itself out and draw, and colours that change have changed."""
+        await self.page.evaluate(
+            """async () => {
+                await new Promise((done) => setTimeout(() => requestAnimationFrame(done), 60));
+                const ends = (each) => each.effect.getComputedTiming().endTime !== Infinity;
+                await Promise.allSettled(document.getAnimations().filter(ends).map((each) => each.finished));
+            }"""
+        )
 
     async def frames(self) -> int:
         return int(await self.page.evaluate("window.__engine.frames"))
@@ -107,6 +121,12 @@ class Screen:
     async def faults(self) -> list[str]:
         """What is too small, off the screen, covered or overlapping."""
         return list(await self.page.evaluate(_LAYOUT, SMALLEST))
+
+    async def barriers(self) -> list[str]:
+        """What axe calls serious or critical for somebody who sees, hears or moves otherwise (WCAG 2.2, A and AA)."""
+        if not await self.page.evaluate("() => 'axe' in window"):
+            await self.page.evaluate(_AXE.read_text())
+        return list(await self.page.evaluate(_RULES))
 
     async def picture(self, name: str) -> None:
         if PICTURES:

@@ -1,0 +1,132 @@
+"""Several people at once: what each of them sees ends as what the server has, whoever edits what and takes it back."""
+
+import asyncio
+import math
+import random
+from typing import Any
+
+import pytest
+from playwright.async_api import Browser
+
+from arcor2_hw.client import Client
+from arcor2_hw.data import rpc
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.events import ChangeType
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.project import Project
+from arcor2_hw.data.scene import Scene
+from tests.e2e.harness import Cell, until
+from tests.editor.screen import Screen, screen_of
+
+pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(120)]
+
+EDITS = 10
+"""Of each of the two at a screen, and of the third who edits by requests."""
+SEED = 20
+
+DRAWN = """() => Object.fromEntries(__engine.ids().map((id) => [id, __engine.item(id)])
+  .filter(([, item]) => item.kind === "point").map(([id, { name, pose }]) => [id, [name, pose.position]]))"""
+
+
+async def edits_at_a_screen(screen: Screen, seed: int) -> None:
+    """Moves the selected point, and takes that back, as fast as the page takes it."""
+    chance = random.Random(seed)
+    panel = screen.page.get_by_role("complementary")
+    for _ in range(EDITS):
+        axis, way = chance.choice("XYZ"), chance.choice(("more", "less"))
+        await panel.get_by_role("button", name=f"{axis} 1 cm {way}").click()
+        back = screen.page.get_by_role("button", name="Undo ")
+        if chance.random() < 0.3 and await back.is_enabled():
+            await back.click()
+
+
+async def _added(client: Client, name: str) -> str:
+    while True:
+        event = await client.next_event("ActionPointChanged", timeout=10)
+        if event.change_type is ChangeType.ADD and event.data.name == name:
+            found: str = event.data.id
+            return found
+
+
+async def edits_by_requests(client: Client, seed: int) -> None:
+    """Adds points, renames them and removes some."""
+    chance = random.Random(seed)
+    own: list[str] = []
+    for number in range(EDITS):
+        what = chance.choice(("add", "add", "rename", "remove")) if own else "add"
+        if what == "add":
+            place = Position(chance.random() / 2, chance.random() / 2, 0.2)
+            await client.call("AddActionPoint", rpc.AddActionPointArgs(f"third_{number}", place))
+            own.append(await _added(client, f"third_{number}"))
+            continue
+        point = chance.choice(own)
+        # Nobody else touches these: each request is granted, and gives the lock back by itself.
+        await client.call("WriteLock", rpc.WriteLockArgs(point))
+        if what == "rename":
+            await client.call("RenameActionPoint", rpc.RenameActionPointArgs(point, f"renamed_{number}"))
+        else:
+            await client.call("RemoveActionPoint", rpc.IdArgs(point))
+            own.remove(point)
+
+
+def places(scene: Scene, project: Project) -> dict[str, tuple[str, tuple[float, float, float]]]:
+    """Names and places in the world of all points, as the documents say."""
+    frames = {each.id: each.pose for each in scene.objects if isinstance(each.pose, Pose)}
+    points = {each.id: each for each in project.action_points}
+
+    def world(parent: str | Unset | None) -> Pose:
+        if not parent:
+            return Pose()
+        if parent in points:
+            return world(points[parent].parent) * Pose(points[parent].position)
+        return frames[parent]
+
+    found = {}
+    for each in project.action_points:
+        at = (world(each.parent) * Pose(each.position)).position
+        found[each.id] = (each.name, (at.x, at.y, at.z))
+    return found
+
+
+def same(drawn: dict[str, Any], wanted: dict[str, tuple[str, tuple[float, float, float]]]) -> bool:
+    return drawn.keys() == wanted.keys() and all(
+        drawn[point][0] == name and math.dist(drawn[point][1].values(), at) < 1e-6
+        for point, (name, at) in wanted.items()
+    )
+
+
+async def test_two_who_edit_the_same_point_and_a_third_see_the_same_in_the_end(cell: Cell, browser: Browser) -> None:
+    client = await cell.client("third")
+    scene, project = await cell.open(client)
+    point = project.action_points[0]
+    async with screen_of(browser, cell.url) as one, screen_of(browser, cell.url, "small tablet") as two:
+        for screen, name in ((one, "Eva"), (two, "Adam")):
+            await screen.join(name)
+            await screen.item(point.id)
+            await screen.press("Things")
+            await screen.page.get_by_role("option", name=f"{point.name} Action point").click()
+        await one.page.get_by_role("img", name=f"Adam, at {point.name}").wait_for()
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(edits_at_a_screen(one, SEED))
+            tasks.create_task(edits_at_a_screen(two, SEED + 1))
+            tasks.create_task(edits_by_requests(client, SEED + 2))
+
+        async def opened() -> Project:
+            """What the server tells somebody who has just come."""
+            async with Client(cell.url, "late", reconnect=False) as late:
+                told = (await late.next_event("OpenProject", timeout=10)).data.project
+                assert isinstance(told, Project)
+                return told
+
+        async def agree() -> bool:
+            now = places(scene, await opened())
+            return all([same(await screen.page.evaluate(DRAWN), now) for screen in (one, two)])
+
+        await until(agree, "both draw what the server has", 15)
+        # Something has happened, and nothing that was held is left held.
+        assert len((await opened()).action_points) > len(project.action_points)
+        await client.call("WriteLock", rpc.WriteLockArgs(point.id))
+        await one.until("id => __engine.item(id).badge === 'locked by third'", point.id)
+        # Who is barred is told by whom, at once.
+        await one.page.get_by_role("complementary").get_by_text("third").first.wait_for()
+        await client.call("WriteUnlock", rpc.WriteUnlockArgs(point.id))
