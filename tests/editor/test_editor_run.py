@@ -1,0 +1,119 @@
+"""A program is run from Chromium on the real server: breakpoints, steps, what went wrong, others who come meanwhile."""
+
+from collections.abc import AsyncIterator
+from typing import Any
+
+import pytest
+import pytest_asyncio
+from playwright.async_api import Browser, expect
+
+from arcor2_hw.data.package import PackageStateEnum
+from arcor2_hw.data.project import ActionParameter
+from tests.e2e.harness import Cell
+from tests.editor.programming import Work, at_work
+from tests.editor.screen import screen_of
+
+pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(240)]
+
+BEGUN = 60_000
+"""ms until a program that was started is there: it is built, and its host started, on a busy machine."""
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def work(cell: Cell, browser: Browser) -> AsyncIterator[Work]:
+    async with at_work(cell, browser) as open_project:
+        yield open_project
+
+
+async def state(work: Work, wanted: PackageStateEnum) -> None:
+    await work.told("PackageState", lambda event: event.data.state is wanted)
+
+
+async def test_runs_to_an_action_in_two_taps_steps_and_tells_where_it_failed(work: Work, browser: Browser) -> None:
+    """U-08. The reader has no code in front of it: scanning fails, which is what somebody has to understand."""
+    screen, page = work.screen, work.screen.page
+    scan = work.action("scan").id
+    await work.select("scan")
+    looked_from = await page.evaluate("__engine.view.camera.position.toArray()")
+    work.taps = 1  # what selected it
+    await work.tap_button("Run to here", work.panel)
+    assert work.taps <= 2
+    bar = page.get_by_role("group", name="The program")
+    await bar.get_by_text("before scan").wait_for(timeout=BEGUN)
+    await state(work, PackageStateEnum.PAUSED)
+    assert (await work.told("BreakpointsChanged")).data.ids == [scan]
+    assert await page.evaluate("__engine.view.camera.position.toArray()") == looked_from, "the view stays where it was"
+    await work.tool("Run")
+    trace = work.panel.get_by_role("region", name="What it has done")
+    await trace.get_by_role("button", name="more_boards").click()
+    # What went in, and what came out.
+    await expect(trace).to_contain_text("times")
+    await expect(trace).to_contain_text("boards_left")
+    await expect(trace.get_by_role("button", name="scan")).to_contain_text("waits")
+    await screen.picture("run paused")
+
+    # Somebody who comes now sees all of it.
+    async with screen_of(browser, work.cell.url) as other:
+        await other.join("Bert")
+        await other.page.get_by_role("group", name="The program").get_by_text("before scan").wait_for()
+        await other.page.get_by_role("navigation").get_by_role("button", name="Run", exact=True).click()
+        seen = other.page.get_by_role("complementary")
+        await seen.get_by_role("button", name="more_boards").wait_for()
+        await seen.get_by_role("button", name="Do not pause at scan").wait_for()
+        # The breakpoint is everybody's.
+        await seen.get_by_role("button", name="Do not pause at scan").click()
+        assert (await work.told("BreakpointsChanged")).data.ids == []
+    await expect(work.panel.get_by_role("button", name="Do not pause at scan")).to_have_count(0)
+
+    await work.tap_button("One action", bar)
+    fault = work.panel.get_by_role("alert").filter(has_text="It failed in scan")
+    await fault.wait_for()
+    await expect(fault).to_contain_text("no code was read")
+    await state(work, PackageStateEnum.STOPPED)
+    await screen.sees("failed")
+    assert await page.evaluate("__engine.view.camera.position.toArray()") == looked_from
+    await screen.picture("run failed")
+    # It stays, and leads to the action.
+    await work.tap_button("Show scan", fault)
+    await work.panel.get_by_role("heading", name="scan", exact=True).wait_for()
+
+
+async def test_stop_acts_at_once_and_the_project_can_be_edited_again(work: Work) -> None:
+    page = work.screen.page
+    await work.tool("Run")
+    await work.tap_button("Run paused", work.panel)
+    bar = page.get_by_role("group", name="The program")
+    await bar.get_by_role("button", name="Stop", exact=True).wait_for(timeout=BEGUN)
+    await bar.get_by_text("before more_boards").wait_for()
+    # Meanwhile it is not edited, and says why.
+    await work.select("test")
+    await work.panel.get_by_role("button", name="Duplicate").click(force=True)
+    await work.screen.sees("The program runs: stop it first.")
+    await work.tap_button("Stop", bar)
+    assert await page.get_by_role("alertdialog").count() == 0, "nobody is asked"
+    await state(work, PackageStateEnum.STOPPED)
+    await bar.wait_for(state="hidden")
+    await work.panel.get_by_role("heading", name="test", exact=True).wait_for()
+    await expect(work.panel.get_by_role("button", name="Duplicate", exact=True)).to_be_enabled()
+
+
+async def test_one_action_is_tried_with_its_result_and_another_is_cancelled(work: Work) -> None:
+    page = work.screen.page
+    await work.screen.press("Go online")
+    await page.get_by_role("button", name="Stop motion").wait_for()
+    present = await work.add("look_for_board", "tester/board_present", "fixture", "is_there")
+    await work.select("look_for_board")
+    await work.tap_button("Try it", work.panel)
+    result: Any = (await work.told("ActionResult")).data
+    assert (result.action_id, result.results) == (present, ["false"])
+    outcome = work.panel.get_by_role("status").filter(has_text="Done")
+    await expect(outcome).to_contain_text("is_there")
+    await expect(outcome).to_contain_text("no")
+    long = await work.add("wait_long", "flow/wait", "fixture", seconds=ActionParameter("seconds", "double", "30.0"))
+    await work.select("wait_long")
+    await work.tap_button("Try it", work.panel)
+    await work.tap_button("Cancel", work.panel)
+    await work.told("ActionCancelled")
+    ended: Any = (await work.told("ActionResult", lambda event: event.data.action_id == long)).data
+    assert ended.error
+    await work.panel.get_by_role("button", name="Try it").wait_for()
