@@ -1,5 +1,9 @@
 """Coming in: by a name that is free, with a token where one is asked for, and in the role that it gives."""
 
+import asyncio
+import hashlib
+import re
+import ssl
 from collections.abc import AsyncIterator
 from pathlib import Path
 
@@ -79,3 +83,33 @@ async def test_a_name_that_somebody_has_is_refused_with_the_reason(server: Serve
         await home(two)
         await one.page.get_by_role("img", name="Berta").wait_for()
         assert await one.page.get_by_role("img", name="Adam (you)").is_visible()
+
+
+async def test_over_tls_with_a_certificate_made_here_whose_fingerprint_is_told(
+    tmp_path: Path, built_editor: Path, browser: Browser
+) -> None:
+    """What a tablet on the network gets, but for the address."""
+    data_dir = tmp_path / "data"
+    key = TokenFile(data_dir).add("tablet", Role.TECHNICIAN)[1]
+    async with running(data_dir, "--self-signed") as server:
+        assert server.url.startswith("wss://")
+        address = server.url.replace("wss", "https", 1)
+        context = await browser.new_context(ignore_https_errors=True, service_workers="block")
+        try:
+            screen = Screen(await context.new_page(), address)
+            await screen.page.goto(f"{address}/?token={key}&q=low")
+            assert await screen.page.evaluate("window.isSecureContext")
+            await screen.page.get_by_label("Your name").fill("Tess")
+            await screen.press("Join")
+            await home(screen)
+            await screen.page.keyboard.press("?")
+            about = screen.page.get_by_role("dialog", name="About")
+            await about.get_by_text(address.rstrip("/")).wait_for()
+            assert screen.unexpected() == []
+        finally:
+            await context.close()
+        # The one that a browser shows of the certificate is the one that the server told.
+        host, _, port = address.removeprefix("https://").rstrip("/").rpartition(":")
+        seen = ssl.PEM_cert_to_DER_cert(await asyncio.to_thread(ssl.get_server_certificate, (host, int(port))))
+        told = re.sub(r"[^0-9A-F]", "", server.log.read_text().upper())
+        assert hashlib.sha256(seen).hexdigest().upper() in told
