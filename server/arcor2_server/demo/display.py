@@ -100,7 +100,8 @@ class Display:
 
     def serving(self, url: str) -> None:
         """Say that the server goes on."""
-        self._out(Text(f"serving at {url} until Ctrl-C"))
+        page = url.replace("ws", "http", 1)
+        self._out(Text(f"serving at {url} until Ctrl-C; the editor: {page} in a browser"))
 
     def save_picture(self, file: Path) -> None:
         """Write what stood in the terminal when the last board was done, and how it ended, to an SVG file."""
