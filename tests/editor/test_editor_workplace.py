@@ -11,12 +11,11 @@ from playwright.async_api import Browser
 
 from arcor2_hw.client import Client
 from arcor2_hw.data import rpc
-from arcor2_hw.data.events import SceneStateEnum
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
-from tests.e2e.harness import Cell, scene_state, until
-from tests.editor.screen import VIEWPORTS, Screen, screen_of
+from tests.e2e.harness import Cell, until
+from tests.editor.screen import Screen, screen_of
 
 pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(180)]
 
@@ -137,7 +136,7 @@ async def test_stop_motion_ends_a_motion_of_somebody_else(closed: Place, browser
         await opened_and_online(screen, place)
         start = await tcp(screen, place.robot)
         arguments = await goal(client, place.robot, 0.2)
-        await client.call("MoveToPose", rpc.MoveToPoseArgs(*_slowly(arguments), safe=False))
+        await client.call("MoveToPose", _slowly(arguments))
         await screen.until(
             "([id, z]) => window.__engine.item(id).endEffectors[0].position.z < z - 0.005",
             [place.robot, start["position"]["z"]],
@@ -152,8 +151,8 @@ async def test_stop_motion_ends_a_motion_of_somebody_else(closed: Place, browser
         assert rest.position.z > start["position"]["z"] - 0.15, "it went on to the end"
 
 
-def _slowly(arguments: rpc.MoveToPoseArgs) -> tuple[Any, ...]:
-    return arguments.robot_id, arguments.end_effector_id, SLOW, arguments.position, arguments.orientation
+def _slowly(to: rpc.MoveToPoseArgs) -> rpc.MoveToPoseArgs:
+    return rpc.MoveToPoseArgs(to.robot_id, to.end_effector_id, SLOW, to.position, to.orientation, safe=False)
 
 
 async def test_an_edit_of_somebody_else_is_seen_and_a_tap_selects(closed: Place, browser: Browser) -> None:
@@ -176,45 +175,3 @@ async def test_an_edit_of_somebody_else_is_seen_and_a_tap_selects(closed: Place,
         await panel.get_by_role("heading", name=place.project.action_points[0].name).wait_for()
         await client.call("WriteUnlock", rpc.WriteUnlockArgs(new))
         await screen.until("id => window.__engine.item(id).badge === ''", new)
-
-
-async def test_nothing_is_too_small_covered_or_off_the_screen(closed: Place, browser: Browser) -> None:
-    found: dict[str, list[str]] = {}
-
-    async def look(screen: Screen, what: str) -> None:
-        """In every size, light and dark."""
-        for number, (name, size) in enumerate(VIEWPORTS.items()):
-            dark = number % 2 == 1
-            await screen.page.emulate_media(color_scheme="dark" if dark else "light")
-            await screen.page.set_viewport_size(size)  # type: ignore[arg-type]
-            await screen.settle()
-            if faults := await screen.faults():
-                found[f"{what}, {name}"] = faults
-            await screen.picture(f"{what} {name}{' dark' if dark else ''}")
-
-    async with screen_of(browser, closed.cell.url, touch=True) as screen:
-        await screen.page.goto(f"{screen.url}/?q=low")
-        await screen.page.get_by_label("Your name").wait_for()
-        await look(screen, "join")
-        await screen.join("Eva")
-        await screen.sees("on PCB testing")
-        await look(screen, "home")
-        await screen.press(f"Open {closed.project.name}")
-        await screen.item(closed.robot)
-        await look(screen, "workplace")
-        tools = screen.page.get_by_role("navigation").get_by_role("button")
-        await tools.filter(has_text="Things").click()
-        await look(screen, "things")
-        await screen.press("Go online")
-        await screen.page.get_by_role("button", name="Stop motion").wait_for()
-        await tools.filter(has_text="Devices").click()
-        await look(screen, "online")
-        await screen.press("Settings")
-        await screen.page.get_by_role("menuitem", name="Controls for the left hand").click()
-        await look(screen, "left hand")
-        await screen.page.set_viewport_size(VIEWPORTS["phone"])  # type: ignore[arg-type]
-        await screen.press("Make the panel larger")
-        await screen.settle()
-        assert await screen.faults() == []
-        await scene_state(closed.client, SceneStateEnum.STARTED)
-    assert found == {}
