@@ -6,24 +6,19 @@ What computes, Pinocchio and coal, comes with the extra `kinematics` and is impo
 import contextlib
 import dataclasses
 import logging
-import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
 from arcor2_hw.data.geometry import Pose
-from arcor2_hw.data.object_type import Mesh
 from arcor2_hw.data.robot import Joint
-from arcor2_hw.exceptions import Arcor2Error, KinematicsError, Refused
+from arcor2_hw.exceptions import Arcor2Error, KinematicsError, NotFound, Refused
 from arcor2_hw.objects.robot import Robot
-from arcor2_hw.objects.surroundings import Obstacle, Surroundings
+from arcor2_hw.objects.robot_tools import RobotTools, package_of, settings_of
 
 if TYPE_CHECKING:
     from arcor2_hw.kinematics.arm import Arm
-    from arcor2_hw.kinematics.inverse import InverseKinematics
-    from arcor2_hw.kinematics.model import RobotModel
-    from arcor2_hw.kinematics.shapes import Array, TriangleMesh
+    from arcor2_hw.kinematics.shapes import Array
     from arcor2_hw.kinematics.sweep import Sweep
     from arcor2_hw.kinematics.timing import Timed
     from arcor2_hw.kinematics.world import CollisionWorld
@@ -75,6 +70,13 @@ class Way:
         return self._timed(tcp_speed)
 
 
+class Held(NamedTuple):
+    """That an object moves with a link, and where it is in that link's frame."""
+
+    link: str
+    in_link: Pose
+
+
 class SafeMoves:
     """Answers for one robot. It may be asked on several threads; each has what it computes with.
 
@@ -85,8 +87,10 @@ class SafeMoves:
 
     def __init__(self, robot: Robot, settings: Callable[[], Mapping[str, object]] | None = None) -> None:
         self._robot = robot
-        self._settings = settings or (lambda: _fields(robot))
+        self._settings = settings or (lambda: settings_of(robot))
         self._here = threading.local()
+        self.held: dict[str, Held] = {}
+        """What the robot holds, by the names of the objects."""
 
     def prepare(self) -> None:
         """Import and read what is needed, on this thread; what cannot be is told to who needs it first.
@@ -219,6 +223,31 @@ class SafeMoves:
         with self._named():
             return [str(contact) for contact in self._world(joints, 0.0).contacts(self._robot.name, self._q(joints))]
 
+    # -------------------------------------------------------------------------------- what is held
+    def hold(self, name: str, link: str, joints: Sequence[Joint]) -> None:
+        """Let an object of the scene move with a link, from where both are now on: a part that was taken.
+
+        It is led past what is around from then on, and may touch that link. `joints`: where the robot stands. Raises
+        NotFound for an object that is no obstacle, or a link that is not there.
+        """
+        obstacle = next((each for each in self._robot.surroundings.obstacles() if each.name == name), None)
+        if obstacle is None:
+            raise NotFound(f"{self._robot.name} cannot hold {name}: it is no collision object of the scene")
+        self.held[name] = Held(link, self._link_pose(link, joints).inverted() * obstacle.pose)
+
+    def release(self, name: str, joints: Sequence[Joint]) -> Pose:
+        """Let go of an object where it is now; gives where, to be told to the object. Raises NotFound."""
+        if name not in self.held:
+            raise NotFound(f"{self._robot.name} does not hold {name}")
+        held = self.held.pop(name)
+        return self._link_pose(held.link, joints) * held.in_link
+
+    def _link_pose(self, link: str, joints: Sequence[Joint]) -> Pose:
+        frames = self._tools().model.link_poses(self._q(joints))
+        if link not in frames:
+            raise NotFound(f"{self._robot.name} has no link {link!r}; there are {', '.join(frames)}")
+        return self._robot.pose * Pose.from_matrix(frames[link])
+
     # -------------------------------------------------------------------------------- inside
     def _way(self, arm: "Arm", points: "list[Array]", speed: float, *, line: bool = False) -> Way:
         def timed(tcp_speed: float | None) -> "Timed":
@@ -263,12 +292,23 @@ class SafeMoves:
         world.add_robot(robot.name, tools.model, robot.pose, self._q(now))
         if alone:
             return world
+        held = {name: (robot.name, one) for name, one in self.held.items()}
         for other, joints in robot.surroundings.robots():
             model = tools.other(other)
             if model is not None:
                 world.add_robot(other.name, model, other.pose, model.values(joints, model.neutral()))
+                moves = getattr(other, "safe_moves", None)
+                if isinstance(moves, SafeMoves):
+                    held |= {name: (other.name, one) for name, one in moves.held.items()}
         for obstacle in robot.surroundings.obstacles():
-            world.put(obstacle.name, tools.shape(obstacle), obstacle.pose)
+            holder, one = held.get(obstacle.name, ("", None))
+            pose = obstacle.pose
+            if one is not None:
+                standing = world.robot(holder)
+                pose = Pose.from_matrix(standing.link_frames(standing.q)[one.link]) * one.in_link
+            world.put(obstacle.name, tools.shape(obstacle), pose)
+            if one is not None:
+                world.attach(obstacle.name, holder, one.link)
         return world
 
     def _q(self, joints: Sequence[Joint]) -> "Array":
@@ -296,103 +336,10 @@ class SafeMoves:
                 raise
             raise self._robot.KinematicsException(str(error), error.detail or error.code) from error
 
-    def _tools(self) -> "_Tools":
+    def _tools(self) -> RobotTools:
         """Give what the present thread computes with, made anew when settings, or the model's file, have changed."""
-        settings, package = dict(self._settings()), _package(self._robot)
-        found: _Tools | None = getattr(self._here, "tools", None)
+        settings, package = dict(self._settings()), package_of(self._robot)
+        found: RobotTools | None = getattr(self._here, "tools", None)
         if found is None or found.made_of != (settings, package):
-            found = self._here.tools = _Tools(self._robot, settings, package)
+            found = self._here.tools = RobotTools(self._robot, settings, package)
         return found
-
-
-class _Tools:
-    """Model, arms and meshes for one thread."""
-
-    def __init__(self, robot: Robot, settings: dict[str, object], package: Path | None) -> None:
-        self.made_of = settings, package
-        self._surroundings: Surroundings = robot.surroundings
-        if package is None:
-            raise Refused(f"{robot.name} has no model (URDF) from which anything could be computed")
-        self.model = _load(robot, settings, package)
-        self.model.name = robot.name
-        self._arms: dict[str, Arm] = {}
-        self._inverse: dict[str, InverseKinematics] = {}
-        self._others: dict[str, tuple[dict[str, object], RobotModel | None]] = {}
-        self._meshes: dict[Path, TriangleMesh] = {}
-
-    def arm(self, end_effector: str) -> "Arm":
-        if end_effector not in self._arms:
-            self._arms[end_effector] = self.model.arm(end_effector)
-        return self._arms[end_effector]
-
-    def inverse(self, end_effector: str) -> "InverseKinematics":
-        from arcor2_hw.kinematics.inverse import InverseKinematics
-
-        if end_effector not in self._inverse:
-            self._inverse[end_effector] = InverseKinematics(self.arm(end_effector))
-        return self._inverse[end_effector]
-
-    def other(self, robot: Robot) -> "RobotModel | None":
-        """Give the model of another robot, None when it has none."""
-        settings = _fields(robot)
-        known = self._others.get(robot.name)
-        if known is None or known[0] != settings:
-            package = _package(robot)
-            model = None if package is None else _load(robot, settings, package)
-            known = self._others[robot.name] = settings, model
-        return known[1]
-
-    def shape(self, obstacle: Obstacle) -> Any:
-        """Give the shape of an obstacle. Raises Refused for a mesh that is not known here, BadMesh."""
-        from arcor2_hw.kinematics import shapes
-        from arcor2_hw.kinematics.meshes import read_mesh
-        from arcor2_hw.kinematics.source import MAX_MESH
-
-        model = obstacle.model
-        if not isinstance(model, Mesh):
-            return shapes.of_model(model)
-        file = self._surroundings.asset(model.asset_id)
-        if file is None or not file.is_file():
-            raise Refused(f"the mesh of {obstacle.name} is not known here, so no way can be looked at for collisions")
-        if file not in self._meshes:
-            with file.open("rb") as opened:
-                self._meshes[file] = read_mesh(opened.read(MAX_MESH + 1), model.asset_id)
-        return shapes.of_model(model, self._meshes[file])
-
-
-def _load(robot: Robot, settings: Mapping[str, object], package: Path) -> "RobotModel":
-    try:
-        from arcor2_hw.kinematics.model import RobotModel
-    except ImportError as error:
-        raise Refused(
-            f"{robot.name}: nothing can be computed here: install arcor2-hw[kinematics]", str(error)
-        ) from error
-    try:
-        return RobotModel.load(package, settings)
-    except Arcor2Error as error:
-        raise type(error)(f"The model of {robot.name} cannot be used: {error}", error.detail) from error
-
-
-def _package(robot: Robot) -> Path | None:
-    """Give the file or folder with a robot's URDF: uploaded, or beside the class that names it."""
-    for base in type(robot).__mro__:
-        name: str | None = base.__dict__.get("urdf_package_name")
-        if name is None:
-            continue
-        uploaded = robot.surroundings.asset(name)
-        if uploaded is not None and uploaded.is_file():
-            return uploaded
-        module = sys.modules.get(base.__module__)
-        if module is None or not module.__file__:
-            return None
-        beside = Path(module.__file__).parent / "urdf"
-        return next((path for path in (beside / name.removesuffix(".zip"), beside / name) if path.exists()), None)
-    return None
-
-
-def _fields(robot: Robot) -> dict[str, object]:
-    """Give the settings of an object by name."""
-    settings = robot.__dict__.get("_settings")
-    if settings is None or not dataclasses.is_dataclass(settings):
-        return {}
-    return {field.name: getattr(settings, field.name) for field in dataclasses.fields(settings)}

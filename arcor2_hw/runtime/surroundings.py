@@ -18,7 +18,7 @@ class SceneSurroundings:
     """The things around one robot of a scene.
 
     Collision objects that count now, each with the model of its type, where it stands now; robots with one arm, as they
-    stand now. Not known are objects that never came up, what robots hold, and robots with several arms.
+    stand now. Not known are objects that never came up, and robots with several arms.
     """
 
     def __init__(self, robot: str, devices: Iterable[Device], assets: Mapping[str, str]) -> None:

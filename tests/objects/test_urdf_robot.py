@@ -280,6 +280,50 @@ def test_refused_naming_why(arm: Any, around: Around) -> None:
     assert len(arm.ways) == 1
 
 
+def test_what_it_holds_goes_with_it_and_is_led_past(folder: Path, arm: Any, around: Around) -> None:
+    middle = BASE.inverted() * arm.forward_kinematics("tcp", joints((1.2, *READY[1:])))
+    around.box("bin", middle.position + Position(0.0, 0.0, -0.3), 0.06, 0.06, 0.1)
+    goal = joints((2.4, *READY[1:]))
+    arm.move_to_joints(goal, 0.5)
+    assert len(arm.ways[-1].waypoints) == 2
+    arm.now = joints(READY)
+    tip = BASE.inverted() * arm.get_end_effector_pose("tcp")
+    around.box("rod", tip.position + Position(0.0, 0.0, -0.15), 0.03, 0.03, 0.28)
+    arm.safe_moves.hold("rod", "tcp", arm.now)
+    arm.move_to_joints(goal, 0.5)
+    way = arm.ways[-1].waypoints
+    assert len(way) > 2
+    # The rod by a world of the test's own.
+    world = CollisionWorld()
+    world.add_robot("arm", RobotModel.load(URDF), BASE, np.array(READY))
+    for name in ("rod", "bin"):
+        thing = next(each for each in around.things if each.name == name)
+        assert isinstance(thing.model, object_type.Box)
+        world.put(name, Box(thing.model.size_x, thing.model.size_y, thing.model.size_z), thing.pose)
+    world.attach("rod", "arm", "tcp")
+    for a, b in itertools.pairwise(values(waypoint) for waypoint in way):
+        for share in np.linspace(0.0, 1.0, 2 + int(np.abs(b - a).max() / 0.005)):
+            assert world.is_free("arm", a + share * (b - a))
+    # What is held by another robot is in the way, where that has it now.
+    second = made(folder, around, "second", BASE * Pose(Position(0.0, 1.9, 0.0)))
+    around.others = [(arm, arm.now)]
+    rod = arm.safe_moves.forward("tcp", arm.now) * Pose(Position(0.0, 0.0, 0.15))
+    second.surround(around)
+    world.set_joints("arm", values(arm.now))
+    assert world.pose("rod").position.distance_to(rod.position) < 0.01
+    assert any("rod" in pair for pair in second.safe_moves._world(second.now, 0.0).ids())
+    assert second.safe_moves._world(second.now, 0.0).pose("rod").position.distance_to(rod.position) < 0.01
+    # Let go, it is where it was let go.
+    at = arm.safe_moves.release("rod", arm.now)
+    assert at.position.distance_to(rod.position) < 0.01
+    with pytest.raises(NotFound, match="does not hold rod"):
+        arm.safe_moves.release("rod", arm.now)
+    with pytest.raises(NotFound, match="no collision object"):
+        arm.safe_moves.hold("nothing", "tcp", arm.now)
+    with pytest.raises(NotFound, match="no link 'claw'"):
+        arm.safe_moves.hold("bin", "claw", arm.now)
+
+
 def test_another_robot_is_in_the_way_as_it_stands(folder: Path, arm: Any, around: Around) -> None:
     beside = BASE * Pose(Position(0.75, 0.0, 0.0), Orientation.from_rotation_vector(0.0, 0.0, np.pi))
     second = made(folder, Around(), "second", beside)

@@ -1,0 +1,120 @@
+"""What one thread computes with for a robot: the models of its URDF and of others', chains, meshes.
+
+Pinocchio and coal come with the extra `kinematics` and are imported on first use.
+"""
+
+import dataclasses
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from arcor2_hw.data.object_type import Mesh
+from arcor2_hw.exceptions import Arcor2Error, Refused
+from arcor2_hw.objects.robot import Robot
+from arcor2_hw.objects.surroundings import Obstacle, Surroundings
+
+if TYPE_CHECKING:
+    from arcor2_hw.kinematics.arm import Arm
+    from arcor2_hw.kinematics.inverse import InverseKinematics
+    from arcor2_hw.kinematics.model import RobotModel
+    from arcor2_hw.kinematics.shapes import TriangleMesh
+
+
+class RobotTools:
+    """Model, arms and meshes of a robot, and models of others.
+
+    made_of: settings and package, by which it is seen whether it still holds. Raises Refused without a package or the
+    extra `kinematics`, ModelError for a model that is not right.
+    """
+
+    def __init__(self, robot: Robot, settings: dict[str, object], package: Path | None) -> None:
+        self.made_of = settings, package
+        self._surroundings: Surroundings = robot.surroundings
+        if package is None:
+            raise Refused(f"{robot.name} has no model (URDF) from which anything could be computed")
+        self.model = _load(robot, settings, package)
+        self.model.name = robot.name
+        self._arms: dict[str, Arm] = {}
+        self._inverse: dict[str, InverseKinematics] = {}
+        self._others: dict[str, tuple[dict[str, object], RobotModel | None]] = {}
+        self._meshes: dict[Path, TriangleMesh] = {}
+
+    def arm(self, end_effector: str) -> "Arm":
+        """Give the chain to an end effector. Raises NotFound."""
+        if end_effector not in self._arms:
+            self._arms[end_effector] = self.model.arm(end_effector)
+        return self._arms[end_effector]
+
+    def inverse(self, end_effector: str) -> "InverseKinematics":
+        """Give what finds joints for it. Raises NotFound."""
+        from arcor2_hw.kinematics.inverse import InverseKinematics
+
+        if end_effector not in self._inverse:
+            self._inverse[end_effector] = InverseKinematics(self.arm(end_effector))
+        return self._inverse[end_effector]
+
+    def other(self, robot: Robot) -> "RobotModel | None":
+        """Give the model of another robot, None when it has none."""
+        settings = settings_of(robot)
+        known = self._others.get(robot.name)
+        if known is None or known[0] != settings:
+            package = package_of(robot)
+            model = None if package is None else _load(robot, settings, package)
+            known = self._others[robot.name] = settings, model
+        return known[1]
+
+    def shape(self, obstacle: Obstacle) -> Any:
+        """Give the shape of an obstacle. Raises Refused for a mesh that is not known here, BadMesh."""
+        from arcor2_hw.kinematics import shapes
+        from arcor2_hw.kinematics.meshes import read_mesh
+        from arcor2_hw.kinematics.source import MAX_MESH
+
+        model = obstacle.model
+        if not isinstance(model, Mesh):
+            return shapes.of_model(model)
+        file = self._surroundings.asset(model.asset_id)
+        if file is None or not file.is_file():
+            raise Refused(f"the mesh of {obstacle.name} is not known here, so no way can be looked at for collisions")
+        if file not in self._meshes:
+            with file.open("rb") as opened:
+                self._meshes[file] = read_mesh(opened.read(MAX_MESH + 1), model.asset_id)
+        return shapes.of_model(model, self._meshes[file])
+
+
+def _load(robot: Robot, settings: Mapping[str, object], package: Path) -> "RobotModel":
+    try:
+        from arcor2_hw.kinematics.model import RobotModel
+    except ImportError as error:
+        raise Refused(
+            f"{robot.name}: nothing can be computed here: install arcor2-hw[kinematics]", str(error)
+        ) from error
+    try:
+        return RobotModel.load(package, settings)
+    except Arcor2Error as error:
+        raise type(error)(f"The model of {robot.name} cannot be used: {error}", error.detail) from error
+
+
+def package_of(robot: Robot) -> Path | None:
+    """Give the file or folder with a robot's URDF: uploaded, or beside the class that names it."""
+    for base in type(robot).__mro__:
+        name: str | None = base.__dict__.get("urdf_package_name")
+        if name is None:
+            continue
+        uploaded = robot.surroundings.asset(name)
+        if uploaded is not None and uploaded.is_file():
+            return uploaded
+        module = sys.modules.get(base.__module__)
+        if module is None or not module.__file__:
+            return None
+        beside = Path(module.__file__).parent / "urdf"
+        return next((path for path in (beside / name.removesuffix(".zip"), beside / name) if path.exists()), None)
+    return None
+
+
+def settings_of(robot: Robot) -> dict[str, object]:
+    """Give the settings of an object by name."""
+    settings = robot.__dict__.get("_settings")
+    if settings is None or not dataclasses.is_dataclass(settings):
+        return {}
+    return {field.name: getattr(settings, field.name) for field in dataclasses.fields(settings)}
