@@ -19,7 +19,11 @@ _METHODS = {
     "inverse_kinematics": "inverse_kinematics",
     "hand_teaching": "set_hand_teaching_mode",
 }
-_OURS = {"jog": ("jog",), "acknowledge_stop": ("acknowledge_protective_stop", "restart_safety")}
+_OURS = {
+    "jog": ("jog",),
+    "acknowledge_stop": ("acknowledge_protective_stop", "restart_safety"),
+    "kinematic_calibration": ("kinematic_calibration",),
+}
 """Beside the protocol: left out where a type does not have it."""
 
 

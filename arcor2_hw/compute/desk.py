@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import msgspec
 
 from arcor2_hw.compute.world import RobotModel, Thing
+from arcor2_hw.data.robot import KinematicCalibration
 
 if TYPE_CHECKING:
     from arcor2_hw.compute.standing_world import StandingWorld
@@ -52,15 +53,31 @@ class Desk:
         return world
 
     def robot(self, wanted: RobotModel) -> "model.RobotModel":
-        """Give a robot's model as it stands in itself, read once. Raises ModelError and its kinds."""
+        """Give a robot's model as it stands in itself, read once. Raises ModelError and its kinds.
+
+        With a calibration: also where that is one of another arm.
+        """
         from arcor2_hw.kinematics.model import RobotModel as Model
 
-        key = msgspec.msgpack.encode((wanted.urdf.path, wanted.settings))
+        key = msgspec.msgpack.encode((wanted.urdf.path, wanted.settings, wanted.calibration))
         found = self._models.pop(key, None)
         if found is None:
             settings: dict[str, Any] = wanted.settings
             found = Model.load(Path(wanted.urdf.path), settings, name=wanted.urdf.name)
+            if wanted.calibration is not None:
+                found = _calibrated(found, wanted.calibration)
         self._models[key] = found
         while len(self._models) > MODELS:
             self._models.popitem(last=False)
         return found
+
+
+def _calibrated(nominal: "model.RobotModel", calibration: KinematicCalibration) -> "model.RobotModel":
+    """Give the model of the very arm. Raises ModelError when the calibration is none of it."""
+    from arcor2_hw.kinematics.dh import calibrated, rows_of
+    from arcor2_hw.kinematics.errors import ModelError
+
+    if not nominal.end_effectors:
+        raise ModelError(f"{nominal.name} has no end effector, and so no arm that a calibration could be of.")
+    # Those of one arm share its joints.
+    return calibrated(nominal, next(iter(nominal.end_effectors)), rows_of(calibration))

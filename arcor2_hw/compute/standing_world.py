@@ -200,4 +200,5 @@ def _same_robot(old: Thing | None, new: Thing | None) -> bool:
     """Tell whether a robot is the same but for where it stands and its joints."""
     if not isinstance(old, StandingRobot) or not isinstance(new, StandingRobot):
         return False
-    return old.model.urdf == new.model.urdf and old.model.settings == new.model.settings
+    one, other = old.model, new.model
+    return (one.urdf, one.settings, one.calibration) == (other.urdf, other.settings, other.calibration)

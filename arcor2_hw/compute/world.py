@@ -7,7 +7,7 @@ from msgspec import Struct, field
 
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import Box, Cylinder, Sphere
-from arcor2_hw.data.robot import Joint
+from arcor2_hw.data.robot import Joint, KinematicCalibration
 
 MAX_BODIES: Final = 100_000
 """Bodies of one world."""
@@ -70,12 +70,14 @@ class RobotModel(Struct, frozen=True):
     """A robot's model: its URDF, or a package of it, and where its root link stands in the world.
 
     settings: those of its object, by name, which the description may follow. called: as people know this one.
+    calibration: what its controller told of the very arm, which takes the place of nominal kinematics.
     """
 
     urdf: KeptFile
     base: Pose = field(default_factory=Pose)
     settings: dict[str, Any] = field(default_factory=dict)
     called: str = ""
+    calibration: KinematicCalibration | None = None
 
 
 class StandingRobot(Struct, frozen=True, tag="robot"):

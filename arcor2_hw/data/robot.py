@@ -24,7 +24,7 @@ class RobotType(enum.StrEnum):
 
 
 class RobotFeatures(Data, frozen=True):
-    """Which optional methods a robot type implements; the last two are ours, beside the protocol."""
+    """Which optional methods a robot type implements; the last three are ours, beside the protocol."""
 
     move_to_pose: bool = False
     move_to_joints: bool = False
@@ -34,6 +34,7 @@ class RobotFeatures(Data, frozen=True):
     hand_teaching: bool = False
     jog: bool | Unset = UNSET
     acknowledge_stop: bool | Unset = UNSET
+    kinematic_calibration: bool | Unset = UNSET
 
 
 class RobotMeta(Data, frozen=True):

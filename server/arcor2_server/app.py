@@ -90,6 +90,7 @@ async def running_services(settings: ServerSettings) -> AsyncIterator[Services]:
             build=cast("BuildService", None),
         )
         services.markers.load()
+        services.arm_calibrations.load()
         stack.push_async_callback(services.compute.close)
         services.session = Session(services)
         await services.session.open()

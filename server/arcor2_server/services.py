@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from arcor2_server.aiming import Aiming
+from arcor2_server.arm_calibrations import ArmCalibrations
 from arcor2_server.breakpoints import SharedBreakpoints
 from arcor2_server.calibration import Calibration, CalibrationService, RunningCalibrations
 from arcor2_server.collisions import CollisionWorld
@@ -51,6 +52,7 @@ class Services:
     runs: their history. tasks: work under way. previews: what is dragged. views: what clients show, by user and shared.
     breakpoints: the shared ones. presence: who looks at what. edit_news: what follows from edits.
     reachability: what robots reach of the open project. prepared: meshes and robots as clients show them.
+    arm_calibrations: what controllers told of their very arms.
     """
 
     settings: "ServerSettings"
@@ -83,12 +85,14 @@ class Services:
     edit_news: EditNews = field(init=False)
     reachability: ReachabilityBoard = field(init=False)
     prepared: PreparedAssets = field(init=False)
+    arm_calibrations: ArmCalibrations = field(init=False)
 
     def __post_init__(self) -> None:
         """Make what needs no more than these."""
         self.compute = Compute(self.settings.compute_idle)
         self.calibration = CalibrationService(self)
         self.calibration_records = Calibrations(self.storage)
+        self.arm_calibrations = ArmCalibrations(self, self.settings.arm_calibrations_file)
         self.prepared = PreparedAssets(self, self.settings.prepared_dir)
         self.markers = Markers(self.settings.markers_file, self.settings.markers)
         data = SharedData(self.storage)
@@ -109,6 +113,7 @@ class Services:
     async def close_shared(self) -> None:
         """End what `share` brought up."""
         await self.prepared.close()
+        await self.arm_calibrations.close()
         await self.reachability.close()
         self.edit_news.close()
         self.presence.close()

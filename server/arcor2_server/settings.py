@@ -91,6 +91,11 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
         return self.data_dir / "assets"
 
     @property
+    def arm_calibrations_file(self) -> Path:
+        """Give the file in which calibrations are kept that controllers told of their arms."""
+        return self.data_dir / "arm-calibrations.json"
+
+    @property
     def prepared_dir(self) -> Path:
         """Give the directory of meshes as clients show them; it may be emptied at any time."""
         return self.data_dir / "prepared"

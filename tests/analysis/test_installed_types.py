@@ -141,5 +141,7 @@ def test_what_can_be_jogged_and_acknowledged_is_known_of_the_robots_that_are_ins
     assert features["UR5e"] is not None
     assert features["UR5e"].features.jog is True
     assert features["UR5e"].features.acknowledge_stop is True
+    assert features["UR5e"].features.kinematic_calibration is True
     assert features["YuMi"] is not None
     assert features["YuMi"].features.acknowledge_stop is True
+    assert features["YuMi"].features.kinematic_calibration is UNSET

@@ -1212,7 +1212,7 @@ export interface RobotEefData {
 /** Values of RegisterEnum in RegisterForRobotEvent. */
 export type RobotEventKind = "eef_pose" | "joints";
 
-/** Which optional methods a robot type implements; the last two are ours, beside the protocol. */
+/** Which optional methods a robot type implements; the last three are ours, beside the protocol. */
 export interface RobotFeatures {
   move_to_pose: boolean;
   move_to_joints: boolean;
@@ -1222,6 +1222,7 @@ export interface RobotFeatures {
   hand_teaching: boolean;
   jog?: boolean;
   acknowledge_stop?: boolean;
+  kinematic_calibration?: boolean;
 }
 
 /**

@@ -103,6 +103,7 @@ class OnlineCell:
     def _one_connected(self) -> None:
         if self.state is SceneStateEnum.STARTING:
             self.task.connected(self.board.states())
+        self._services.arm_calibrations.look()
 
     def _tell(self, state: SceneStateEnum, message: str = "") -> None:
         self.state = state
@@ -110,6 +111,7 @@ class OnlineCell:
         self.task.entered(state, "" if scene is None else scene.name, message)
         log.info("scene", state=state.value, reason=message)
         self._services.hub.broadcast(make_event("SceneState", SceneStateData(state, message or UNSET)))
+        self._services.arm_calibrations.look()
 
     # -------------------------------------------------------------------------------- going online
     async def begin_start(self, *, dry_run: bool = False, keep_going: bool = False) -> None:

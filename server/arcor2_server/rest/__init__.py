@@ -15,6 +15,7 @@ from arcor2_server.rest import (  # noqa: F401
     documents,
     execution,
     general,
+    kinematics,
     models,
     object_types,
     prepared,

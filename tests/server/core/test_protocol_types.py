@@ -22,7 +22,7 @@ ADDED = {
     "ObjectTypeMeta": {"category", "icon"},
     "ObjectAction": {"category", "icon"},
     "RobotEef.Data": {"time_ms"},
-    "RobotFeatures": {"jog", "acknowledge_stop"},
+    "RobotFeatures": {"jog", "acknowledge_stop", "kinematic_calibration"},
     "RobotJoints.Data": {"time_ms"},
     "ProjectException.Data": {"action_id"},
     "RunPackage.Request.Args": {"shared_breakpoints"},

@@ -128,7 +128,7 @@ export class RobotThing extends Thing<RobotItem> {
   override badge(): string {
     if (this.item.lockedBy) return `locked by ${this.item.lockedBy}`;
     if (this.stale) return "not heard of: shown where it was";
-    return this.reason && "cannot be shown as it looks";
+    return this.reason && (this.robot ? "shown in part" : "cannot be shown as it looks");
   }
 
   override get problem(): string {

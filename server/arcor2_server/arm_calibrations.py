@@ -1,0 +1,212 @@
+"""What controllers tell of their very arms, kept: kinematics computed here are then those of the arm, also offline.
+
+Read whenever a robot that can tell it gets connected in a scene that is online. Kept for the object of the scene and
+for where its device is: another address may be that of another arm, of which nothing is known until it is read.
+"""
+
+import asyncio
+import enum
+import hashlib
+import os
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import msgspec
+import structlog
+
+from arcor2_hw.compute.kinematics_tasks import DescribeRobot
+from arcor2_hw.compute.world import RobotModel
+from arcor2_hw.data.base import Data, Timestamp, now
+from arcor2_hw.data.device import Connection
+from arcor2_hw.data.events import NotificationData, NotificationLevel
+from arcor2_hw.data.robot import KinematicCalibration
+from arcor2_hw.data.scene import SceneObject
+from arcor2_hw.exceptions import Arcor2Error, InvalidData, StorageError
+from arcor2_server.robot_models import model_of_type, settings_of
+from arcor2_server.rpc.registry import make_event
+
+if TYPE_CHECKING:
+    from arcor2_server.services import Services
+
+log = structlog.get_logger(__name__)
+
+MOST: Final = 1000
+"""Calibrations that are kept; beyond, those that were read longest ago go."""
+_THERE: Final = (Connection.ONLINE, Connection.BACK)
+
+
+class ArmCalibration(Data, frozen=True):
+    """What a controller told of the arm of an object: when, and why it is not used, empty where it is.
+
+    device: stands for where the device is, by the object's settings.
+    """
+
+    object_id: str
+    name: str
+    device: str
+    read: Timestamp
+    calibration: KinematicCalibration
+    refused: str = ""
+
+
+class InForce(enum.StrEnum):
+    """With which kinematics a robot's are computed here."""
+
+    NONE = "none"
+    """It has no model."""
+    NOMINAL = "nominal"
+    """As its type is made: the tip may be off by millimetres."""
+    MEASURED = "measured"
+    """As its controller told of the very arm."""
+
+
+class ArmCalibrations:
+    """For use on one event loop."""
+
+    def __init__(self, services: "Services", path: Path) -> None:
+        self._services = services
+        self._path = path
+        self._kept: dict[str, ArmCalibration] = {}
+        """By the object's id."""
+        self._asked: set[str] = set()
+        """Robots that were asked since they were connected."""
+        self._reading: set[asyncio.Task[None]] = set()
+        self._writing = asyncio.Lock()
+
+    def load(self) -> None:
+        """Read what was kept. StorageError naming the file when that is damaged."""
+        try:
+            kept = msgspec.json.decode(self._path.read_bytes(), type=list[ArmCalibration])
+        except FileNotFoundError:
+            return
+        except (OSError, msgspec.DecodeError) as error:
+            raise StorageError(f"The calibrations in {self._path} cannot be read: {error}") from error
+        self._kept = {each.object_id: each for each in kept}
+
+    def kept(self, robot: SceneObject) -> ArmCalibration | None:
+        """Give what was told of a robot's arm, used or not; None when nothing was."""
+        found = self._kept.get(robot.id)
+        return found if found is not None and found.device == self._device(robot) else None
+
+    def in_force(self, robot: SceneObject) -> KinematicCalibration | None:
+        """Give the calibration with which kinematics of a robot are computed; None: they are nominal."""
+        found = self.kept(robot)
+        return None if found is None or found.refused else found.calibration
+
+    def look(self) -> None:
+        """Ask the robots that got connected since; called when a connection, or the state of the scene, changed."""
+        services = self._services
+        if not services.cell.online:
+            self._asked.clear()
+            return
+        there = {state.object_id for state in services.cell.object_states() if state.state in _THERE}
+        self._asked &= there
+        for robot in services.session.require_scene().objects:
+            if robot.id in there - self._asked and self._can_tell(robot):
+                self._asked.add(robot.id)
+                task = asyncio.create_task(self._read(robot), name=f"kinematics of {robot.name}")
+                self._reading.add(task)
+                task.add_done_callback(self._reading.discard)
+
+    async def settled(self) -> None:
+        """Wait until those who were asked have told."""
+        while self._reading:
+            await asyncio.wait(self._reading)
+
+    async def close(self) -> None:
+        """End with the server."""
+        reading = list(self._reading)
+        for task in reading:
+            task.cancel()
+        await asyncio.gather(*reading, return_exceptions=True)
+
+    # ------------------------------------------------------------------------------------------------ inside
+    def _can_tell(self, robot: SceneObject) -> bool:
+        types = self._services.types
+        if not types.derives_from(robot.type, "Robot") or model_of_type(self._services, robot.type) is None:
+            return False
+        meta = types.robot_meta(robot.type)
+        return meta.features.kinematic_calibration is True and not meta.multi_arm
+
+    def _device(self, robot: SceneObject) -> str:
+        """Give what stands for where a robot's device is: its settings that are texts or whole numbers."""
+        settings = settings_of(self._services, robot)
+        cell = self._services.settings.cell
+        here = None if cell is None else cell.device(robot.name)
+        if here is not None and here.type == robot.type:
+            settings |= here.settings
+        where = {key: value for key, value in settings.items() if type(value) in (str, int)}
+        told = msgspec.json.encode((robot.type, where), order="sorted")
+        return hashlib.sha256(told).hexdigest()[:32]
+
+    async def _read(self, robot: SceneObject) -> None:
+        services = self._services
+        try:
+            calibration = await services.cell.ask(KinematicCalibration, robot.id, "kinematic_calibration")
+        except Arcor2Error as error:
+            if services.cell.online:
+                log.warning("kinematics not told", robot=robot.name, reason=str(error))
+                used = "those that it told before" if self.in_force(robot) else "nominal ones"
+                self._tell(robot, f"its controller does not tell its calibration, kinematics are {used}. {error}")
+            return
+        before = self.kept(robot)
+        refused = await self._refused(robot, calibration)
+        found = ArmCalibration(robot.id, robot.name, self._device(robot), now(), calibration, refused)
+        same = before is not None and (before.calibration, before.refused) == (calibration, refused)
+        self._kept.pop(robot.id, None)
+        self._kept[robot.id] = found
+        while len(self._kept) > MOST:
+            del self._kept[next(iter(self._kept))]
+        log.info("kinematics read", robot=robot.name, checksum=calibration.checksum, refused=refused, same=same)
+        await self._save()
+        if same:
+            return
+        if refused:
+            self._tell(robot, f"the calibration in its controller is not used, kinematics are nominal. {refused}")
+        else:
+            self._tell(robot, "kinematics are from now on those of the calibration in its controller.", bad=False)
+        services.reachability.look()
+
+    async def _refused(self, robot: SceneObject, calibration: KinematicCalibration) -> str:
+        """Tell why a calibration cannot be used, empty when it can."""
+        file = model_of_type(self._services, robot.type)
+        if file is None:
+            return f"{robot.name} has no model (URDF)."
+        settings = settings_of(self._services, robot)
+        try:
+            await self._services.compute.run(
+                DescribeRobot(RobotModel(file, settings=settings, calibration=calibration))
+            )
+        except InvalidData as error:
+            return str(error)
+        except Arcor2Error as error:  # whoever computes with it will be told
+            log.warning("calibration not looked at", robot=robot.name, reason=str(error))
+        return ""
+
+    def _tell(self, robot: SceneObject, what: str, *, bad: bool = True) -> None:
+        """Tell everybody which kinematics of a robot are in force, and why."""
+        level = NotificationLevel.WARN if bad else NotificationLevel.INFO
+        self._services.hub.broadcast(make_event("Notification", NotificationData(f"{robot.name}: {what}", level)))
+
+    async def _save(self) -> None:
+        async with self._writing:
+            content = msgspec.json.format(msgspec.json.encode(list(self._kept.values())))
+            try:
+                await asyncio.to_thread(_write, self._path, content)
+            except OSError as error:
+                log.error("calibrations not kept", file=str(self._path), reason=str(error))
+
+
+def _write(path: Path, content: Any) -> None:
+    """Put a file in its place in one step: a crash leaves the old one or the new one."""
+    descriptor, name = tempfile.mkstemp(dir=path.parent)
+    try:
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        Path(name).replace(path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise

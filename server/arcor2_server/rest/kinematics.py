@@ -1,0 +1,37 @@
+"""Which kinematics of a robot are in force, over REST (docs/protocol.md)."""
+
+from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
+from arcor2_hw.data.role import Role
+from arcor2_server.arm_calibrations import InForce
+from arcor2_server.rest.general import SERVER
+from arcor2_server.rest.operations import operation
+from arcor2_server.robot_models import model_of_type
+from arcor2_server.services import Services
+
+
+class RobotKinematics(Data, frozen=True):
+    """What a robot's kinematics are computed with here, offline too. read, checksum: of what its controller told.
+
+    refused: why that is not used.
+    """
+
+    object_id: str
+    name: str
+    in_force: InForce
+    read: Timestamp | Unset = UNSET
+    checksum: str | Unset = UNSET
+    refused: str | Unset = UNSET
+
+
+@operation("GET", "/api/robots/{object_id}/kinematics", SERVER, Role.OPERATOR, plain=True)
+async def robot_kinematics(services: Services, object_id: str) -> RobotKinematics:
+    """Tell with which kinematics those of a robot of the open scene are computed, and since when."""
+    robot = services.cell.robot(object_id)
+    if model_of_type(services, robot.type) is None:
+        return RobotKinematics(robot.id, robot.name, InForce.NONE)
+    kept = services.arm_calibrations.kept(robot)
+    if kept is None:
+        return RobotKinematics(robot.id, robot.name, InForce.NOMINAL)
+    state = InForce.NOMINAL if kept.refused else InForce.MEASURED
+    checksum, refused = kept.calibration.checksum, kept.refused or UNSET
+    return RobotKinematics(robot.id, robot.name, state, kept.read, checksum, refused)

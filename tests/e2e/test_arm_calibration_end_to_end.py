@@ -1,0 +1,156 @@
+"""What a controller tells of its very arm is kept and used, also offline and after a restart; and people are told."""
+
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import httpx
+import msgspec
+import numpy as np
+import pytest
+import pytest_asyncio
+
+import arcor2_drivers
+from arcor2_hw.client import Client
+from arcor2_hw.data import rpc
+from arcor2_hw.data.events import SceneStateEnum
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.parameter import Parameter
+from arcor2_hw.data.robot import Joint
+from arcor2_hw.kinematics.dh import DhRow, calibrated
+from arcor2_hw.kinematics.model import RobotModel
+from tests.e2e.harness import Cell, scene_state
+
+pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(120)]
+
+MODEL = RobotModel.load(Path(next(iter(arcor2_drivers.__path__))) / "universal_robots" / "urdf" / "ur5e")
+Q = (0.4, -1.3, 1.1, 0.2, -0.7, 2.0)
+NOMINAL_D = (0.1625, 0.0, 0.0, 0.1333, 0.0997, 0.0996)
+NOMINAL_A = (0.0, -0.425, -0.3922, 0.0, 0.0, 0.0)
+NOMINAL_ALPHA = (np.pi / 2, 0.0, 0.0, np.pi / 2, -np.pi / 2, 0.0)
+DELTAS = np.random.default_rng(7).uniform(-1e-3, 1e-3, (4, 6))
+"""What the calibration of the arm adds to theta, a, d and alpha."""
+
+
+def tip(deltas: Any = None) -> Position:
+    """Where the tip is with the joints Q: nominally, or of an arm that differs by so much."""
+    model = MODEL
+    if deltas is not None:
+        theta, a, d, alpha = deltas
+        rows = zip(theta, NOMINAL_D + d, NOMINAL_A + a, NOMINAL_ALPHA + alpha, strict=True)
+        model = calibrated(MODEL, "tcp", [DhRow(*map(float, row)) for row in rows])
+    return model.arm("tcp").pose(np.array(Q)).position
+
+
+@dataclass
+class Place:
+    cell: Cell
+    client: Client
+    robot: str
+
+    async def told(self) -> dict[str, Any]:
+        async with httpx.AsyncClient(base_url=self.cell.url.replace("ws", "http", 1)) as http:
+            answer = await http.get(f"/api/robots/{self.robot}/kinematics")
+            assert answer.status_code == 200, answer.text
+            found: dict[str, Any] = answer.json()
+            return found
+
+    async def forward(self) -> Position:
+        """Where the tip is by what is computed offline."""
+        names = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
+        joints = [Joint(f"{name}_joint", value) for name, value in zip(names, Q, strict=True)]
+        args = rpc.ForwardKinematicsArgs(self.robot, "tcp", joints)
+        pose: Pose = await self.client.call("ForwardKinematics", args)
+        return pose.position
+
+    async def go_online(self) -> str:
+        """Start the scene and stop it again; gives what people were told of the robot's kinematics meanwhile."""
+        await self.client.call("StartScene")
+        await scene_state(self.client, SceneStateEnum.STARTED)
+        message: str = (await self.client.next_event("Notification", timeout=20)).data.message
+        await self.go_offline()
+        return message
+
+    async def go_offline(self) -> None:
+        await self.client.call("StopScene")
+        await scene_state(self.client, SceneStateEnum.STOPPED)
+
+    async def set_host(self, host: str) -> None:
+        parameters = [Parameter("host", "string", msgspec.json.encode(host).decode())]
+        await self.client.call("WriteLock", rpc.WriteLockArgs(self.robot))
+        await self.client.call("UpdateObjectParameters", rpc.UpdateObjectParametersArgs(self.robot, parameters))
+        await self.client.call("WriteUnlock", rpc.WriteUnlockArgs(self.robot))
+
+
+@pytest_asyncio.fixture(loop_scope="module")
+async def place(tmp_path: Path) -> AsyncIterator[Place]:
+    """A server of each test's own, since one ends it."""
+    cell = Cell(tmp_path)
+    try:
+        await cell.start_robot()
+        await cell.tell("robot", "calibration", deltas=DELTAS.tolist())
+        await cell.start_server()
+        client = await cell.client("alice")
+        await client.call("NewScene", rpc.NewSceneArgs("arm"))
+        parameters = [Parameter("host", "string", msgspec.json.encode(cell.robot_host).decode())]
+        await client.call("AddObjectToScene", rpc.AddObjectToSceneArgs("arm", "UR5e", Pose(), parameters))
+        robot = (await client.next_event("SceneObjectChanged", timeout=10)).data.id
+        yield Place(cell, client, robot)
+    finally:
+        await cell.stop()
+
+
+async def test_what_the_controller_tells_is_in_force_from_then_on_also_offline_and_after_a_restart(
+    place: Place,
+) -> None:
+    told = await place.told()
+    assert (told["in_force"], "read" in told) == ("nominal", False)
+    assert (await place.forward()).distance_to(tip()) < 1e-6
+    assert tip().distance_to(tip(DELTAS)) > 1e-3, "else nothing would be tested"
+
+    message = await place.go_online()
+    assert message.startswith("arm: kinematics are from now on those of the calibration in its controller")
+    told = await place.told()
+    assert told["in_force"] == "measured"
+    assert len(told["checksum"].split("-")) == 6
+    assert told["read"]
+    assert (await place.forward()).distance_to(tip(DELTAS)) < 1e-6
+
+    await place.client.call("SaveScene")
+    port = int(place.cell.url.rpartition(":")[2].rstrip("/"))
+    await place.cell.kill("server")
+    await place.cell.start_server(port)
+    place.client = await place.cell.client("bob")
+    assert (await place.forward()).distance_to(tip(DELTAS)) < 1e-6
+
+    # It is not that of whatever has another address.
+    await place.set_host("127.99.0.7")
+    assert (await place.told())["in_force"] == "nominal"
+    assert (await place.forward()).distance_to(tip()) < 1e-6
+    await place.set_host(place.cell.robot_host)
+    assert (await place.told())["in_force"] == "measured"
+
+
+async def test_what_is_of_another_arm_is_not_used_and_what_is_not_told_leaves_what_was(place: Place) -> None:
+    await place.go_online()
+    assert (await place.told())["in_force"] == "measured"
+    await place.cell.tell("robot", "calibration", deltas=DELTAS.tolist(), told=False)
+    message = await place.go_online()
+    assert "does not tell its calibration, kinematics are those that it told before" in message
+    assert place.cell.robot_host in message
+    assert (await place.forward()).distance_to(tip(DELTAS)) < 1e-6
+
+    strange = DELTAS.copy()
+    strange[2, 0] += 0.2
+    await place.cell.tell("robot", "calibration", deltas=strange.tolist())
+    message = await place.go_online()
+    assert "arm: the calibration in its controller is not used, kinematics are nominal." in message
+    told = await place.told()
+    assert told["in_force"] == "nominal"
+    assert "50 mm" in told["refused"]
+    assert (await place.forward()).distance_to(tip()) < 1e-6
+
+    await place.cell.tell("robot", "calibration", deltas=DELTAS.tolist())
+    await place.go_online()
+    assert (await place.forward()).distance_to(tip(DELTAS)) < 1e-6
