@@ -1,0 +1,286 @@
+"""The robot in hand: stepped, held, shown as a ghost, moved, stopped, in Chromium on the fake arm."""
+
+import asyncio
+import contextlib
+import math
+import re
+import time
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+import pytest_asyncio
+from playwright.async_api import Browser, Locator, expect
+
+from arcor2_hw.client import Client
+from arcor2_hw.client.errors import LockedByOther
+from arcor2_hw.data import rpc
+from arcor2_hw.data.events import SceneStateEnum
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.project import Project
+from arcor2_hw.data.scene import Scene
+from arcor2_hw.exceptions import DeviceTimeout
+from tests.e2e.harness import Cell, scene_state, until
+from tests.editor.screen import Screen, screen_of
+
+pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(180)]
+
+AT_REST = 1e-4
+"""m between two looks at an arm that stands."""
+
+
+@dataclass
+class Place:
+    """The project is open and the scene online; Eva sits at the screen."""
+
+    client: Client
+    scene: Scene
+    project: Project
+    robot: str
+    screen: Screen
+
+    async def tool(self) -> Position:
+        """Where the tool is, as the screen has it: a robot that somebody holds answers nobody else."""
+        at: dict[str, float] = (await self.screen.item(self.robot))["endEffectors"][0]["position"]
+        return Position(**at)
+
+    async def stands(self) -> Position:
+        """Where the tool is once it does not move any more."""
+
+        async def rest() -> Position | None:
+            before = await self.tool()
+            await asyncio.sleep(0.4)  # several reports
+            after = await self.tool()
+            return after if math.dist(tuple(before), tuple(after)) < AT_REST else None
+
+        position: Position = await until(rest, "the arm stands", 15)
+        return position
+
+    async def robot_panel(self, way: str) -> None:
+        page = self.screen.page
+        if not await page.get_by_role("complementary", name="Robot").count():
+            await page.get_by_role("button", name=re.compile("^Robot in hand")).click()
+        await self.choose("How to move it", way)
+
+    async def choose(self, group: str, what: str) -> None:
+        await self.screen.page.get_by_role("radiogroup", name=group).get_by_role("radio", name=what, exact=True).click()
+
+    def button(self, name: str) -> Locator:
+        return self.screen.page.get_by_role("button", name=name, exact=True)
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def place(cell: Cell, browser: Browser) -> AsyncIterator[Place]:
+    client = await cell.client("colleague")
+    scene, project = await cell.open(client)
+    robot = next(each.id for each in scene.objects if each.name == "robot")
+    async with screen_of(browser, cell.url) as screen:
+        await screen.join("Eva")
+        await screen.item(robot)
+        await client.call("StartSceneKeepGoing")
+        await scene_state(client, SceneStateEnum.STARTED, 60)
+        await screen.page.get_by_role("button", name="Stop motion").wait_for()
+        await screen.until("id => window.__engine?.item(id)?.endEffectors?.length > 0", robot)
+        # The first motion takes control, and the controller takes over the tool of the settings.
+        here: Pose = await client.call("GetEndEffectorPose", rpc.GetEndEffectorPoseArgs(robot, "tcp"))
+        await client.call(
+            "MoveToPose", rpc.MoveToPoseArgs(robot, "tcp", 0.5, here.position, here.orientation, safe=False)
+        )
+        await _motion_over(client)
+        yield Place(client, scene, project, robot, screen)
+
+
+async def _move(client: Client, robot: str, to: Pose, speed: float) -> None:
+    await client.call("MoveToPose", rpc.MoveToPoseArgs(robot, "tcp", speed, to.position, to.orientation, safe=False))
+
+
+async def _motion_over(client: Client) -> str:
+    """How the motion that was begun last ended."""
+    while True:
+        event = await client.next_event("RobotMoveToPose", timeout=15)
+        if (phase := event.data.move_event_type.value) != "start":
+            return str(phase)
+
+
+async def _forget_events(client: Client) -> None:
+    """What was told until now is not waited for."""
+    with contextlib.suppress(DeviceTimeout):
+        while True:
+            await client.next_event(timeout=0.05)
+
+
+async def test_a_press_is_a_step_and_the_panel_tells_how_it_ended(place: Place) -> None:
+    before = await place.stands()
+    await place.robot_panel("Tool")
+    await place.button("Move along −Z").click()
+    await place.screen.sees("Reached.")
+    after = await place.stands()
+    assert after.z - before.z == pytest.approx(-0.01, abs=5e-4)
+    # In the frame of the tool, which points down, plus z is the same way.
+    await place.choose("Axes of", "Tool")
+    await place.button("Move along +Z").click()
+    await until(_lower(place, after.z - 0.009), "the tool went down")
+    await place.choose("Axes of", "World")
+
+
+def _lower(place: Place, z: float) -> Any:
+    async def look() -> bool:
+        return bool((await place.tool()).z < z)
+
+    return look
+
+
+async def test_held_it_moves_and_let_go_it_stands(place: Place) -> None:
+    before = await place.stands()
+    await place.robot_panel("Tool")
+    await place.choose("A press", "Hold to move")
+    hold = place.button("Move along +Z, as long as it is held")
+    await hold.hover()
+    await place.screen.page.mouse.down()
+    await until(_higher(place, before.z + 0.01), "the tool goes up")
+    await expect(hold).to_have_attribute("data-held", "true")
+    await place.screen.page.mouse.up()
+    await expect(hold).to_have_attribute("data-held", "false")
+    rest = await place.stands()
+    assert rest.z - before.z < 0.15
+    # The robot was given back: somebody else may have it.
+    assert await until(lambda: _free(place), "the robot is given back")
+
+
+async def _free(place: Place) -> bool:
+    with contextlib.suppress(LockedByOther):
+        await place.client.call("WriteLock", rpc.WriteLockArgs(place.robot))
+        await place.client.call("WriteUnlock", rpc.WriteUnlockArgs(place.robot))
+        return True
+    return False
+
+
+def _higher(place: Place, z: float) -> Any:
+    async def look() -> bool:
+        return bool((await place.tool()).z > z)
+
+    return look
+
+
+@pytest.mark.parametrize("taken", ["blur", "hidden", "key up"])
+async def test_what_takes_the_hand_away_ends_a_hold(place: Place, taken: str) -> None:
+    page = place.screen.page
+    before = await place.stands()
+    await place.robot_panel("Tool")
+    await place.choose("A press", "Hold to move")
+    hold = place.button("Move along −Z, as long as it is held")
+    await hold.focus()
+    await page.keyboard.down(" ")
+    await until(_lower(place, before.z - 0.005), "the tool goes down")
+    if taken == "blur":
+        await page.evaluate("window.dispatchEvent(new Event('blur'))")
+    elif taken == "hidden":
+        await page.evaluate("document.dispatchEvent(new Event('visibilitychange'))")
+    else:
+        await page.keyboard.up(" ")
+    await expect(hold).to_have_attribute("data-held", "false")
+    if taken != "key up":
+        await page.keyboard.up(" ")
+    rest = await place.stands()
+    assert before.z - rest.z < 0.15
+
+
+async def test_a_joint_is_moved_within_its_limits(place: Place) -> None:
+    await place.stands()
+    await place.robot_panel("Joints")
+    await place.choose("A press", "Step")
+    page = place.screen.page
+    field = page.get_by_label(re.compile("^wrist 3 joint to"))
+    await field.fill("+9000")
+    await field.press("Enter")
+    await place.screen.sees("From -360.0 to 360.0 °.")
+    await field.press("Escape")
+    name = "wrist_3_joint"
+    before = {
+        each.name: each.value for each in await place.client.call("GetRobotJoints", rpc.GetRobotJointsArgs(place.robot))
+    }
+    await place.button("wrist 3 joint up").click()
+
+    async def turned() -> bool:
+        joints = await place.client.call("GetRobotJoints", rpc.GetRobotJointsArgs(place.robot))
+        value = next(each.value for each in joints if each.name == name)
+        return abs(value - before[name] - math.radians(5)) < 1e-3
+
+    await until(turned, "the wrist turned by five degrees", 15)
+
+
+async def test_a_goal_is_shown_by_a_ghost_and_told_in_words_before_the_robot_moves(place: Place) -> None:
+    page = place.screen.page
+    before = await place.stands()
+    await place.robot_panel("Go to")
+    await page.get_by_label("Z mm").fill("+=30")
+    await page.keyboard.press("Enter")
+    await place.screen.sees("It can go there: the ghost shows how.")
+    ghost = await place.screen.until("id => window.__engine.item(id).ghost", place.robot)
+    real = (await place.screen.item(place.robot))["joints"]
+    assert max(abs(ghost[name] - real[name]) for name in real) > 0.01, "the ghost stands where the robot is"
+    assert math.dist(tuple(await place.tool()), tuple(before)) < AT_REST
+    await place.button("Move there").click()
+    await until(_higher(place, before.z + 0.029), "it went there", 15)
+    # Out of reach: no ghost, no motion, and the reason.
+    await page.get_by_label("X mm").fill("3000")
+    await page.keyboard.press("Enter")
+    answer = page.locator("p.error[role=status]")
+    await expect(answer).to_be_visible()
+    assert len((await answer.inner_text()).split()) > 3
+    await page.get_by_label("X mm").fill("400")
+    await page.keyboard.press("Enter")
+    await place.robot_panel("Tool")
+    await place.screen.until("id => window.__engine.item(id).ghost === null", place.robot)
+
+
+@pytest.mark.parametrize("by", ["tap", "keys"])
+async def test_stop_reaches_the_robot_in_mid_move(place: Place, by: str) -> None:
+    page, client = place.screen.page, place.client
+    start = await place.stands()
+    up = start.z < 0.4
+    await _forget_events(client)
+    target = await place.client.call("GetEndEffectorPose", rpc.GetEndEffectorPoseArgs(place.robot, "tcp"))
+    target.position.z += 0.2 if up else -0.2
+    await client.call(
+        "MoveToPose", rpc.MoveToPoseArgs(place.robot, "tcp", 0.05, target.position, target.orientation, safe=False)
+    )
+    await until((_higher if up else _lower)(place, start.z + (0.005 if up else -0.005)), "it moves")
+    # From the press in the page to the request on the wire.
+    await page.evaluate(
+        """() => {
+            const send = WebSocket.prototype.send;
+            window.pressed = window.asked = 0;
+            const press = () => (window.pressed = performance.now());
+            for (const kind of ['pointerdown', 'keydown']) addEventListener(kind, press, { capture: true });
+            WebSocket.prototype.send = function (text) {
+                if (text.includes('StopRobot')) window.asked = performance.now();
+                return send.call(this, text);
+            };
+        }"""
+    )
+    if by == "tap":
+        await page.get_by_role("button", name="Stop motion").click()
+    else:
+        await page.keyboard.press("Escape")
+        await page.keyboard.press("Escape")
+    begun = time.monotonic()
+    await place.screen.until("() => window.asked > 0")
+    assert await page.evaluate("window.asked - window.pressed") < 50
+    assert await _motion_over(client) == "failed"
+    assert time.monotonic() - begun < 5
+    rest = await place.stands()
+    assert abs(rest.z - start.z) < 0.15, "it went on to the end"
+
+
+async def test_the_arm_is_free_as_long_as_it_is_held(place: Place) -> None:
+    page = place.screen.page
+    await place.stands()
+    await place.robot_panel("By hand")
+    await place.screen.sees("The arm is stiff")
+    await place.button("Hold, and move the arm by hand").hover()
+    await page.mouse.down()
+    await place.screen.sees("The arm is free")
+    await page.mouse.up()
+    await place.screen.sees("The arm is stiff")
