@@ -36,6 +36,7 @@ export function App() {
   if (!been) return <Join />;
   return (
     <>
+      <LostConnection />
       {hash.startsWith("#/operator") ? (
         <Suspense fallback={<Waiting>Preparing the screen…</Waiting>}>
           <Operator kiosk={hash.includes("kiosk")} />
@@ -45,7 +46,6 @@ export function App() {
       ) : (
         <Home />
       )}
-      <LostConnection />
       <Overlays />
     </>
   );

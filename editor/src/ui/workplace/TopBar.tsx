@@ -75,9 +75,9 @@ function LiveSwitch() {
       aria-pressed={live === "started"}
       isDisabled={busy || running || cannot !== ""}
       onPress={() => void (live === "stopped" ? goOnline() : goOffline())}
-      aria-label={live === "started" ? "Online. Press to go offline" : WORDS[live]}
+      aria-label={`${running ? "Program runs" : WORDS[live]}${wrong > 0 ? ` ${wrong} in trouble` : ""}${live === "started" && !running ? ". Press to go offline" : ""}`}
     >
-      <span>{running ? "Program runs" : WORDS[live]}</span>
+      <span>{running ? "Program runs" : WORDS[live]}</span>{" "}
       {wrong > 0 && <span className="tag bad">{wrong} in trouble</span>}
     </Button>
   );
