@@ -1,38 +1,26 @@
-/** The picture of a workplace as it was when it was saved last; asked for when the tile is seen. */
+/** The picture of a workplace as it was when it was saved last; asked for when the tile is seen, and anew when it was saved. */
 
-import { useEffect, useRef, useState } from "react";
-import { call, serves } from "../../session/session";
+import { useEffect, useRef } from "react";
+import { readThumbnail, useThumbnails } from "../../commands/thumbnail";
 
-/** What was asked for, by document and when that was saved. */
-const known = new Map<string, string>();
+/** When the document was saved of which the picture was asked for. */
+const asked = new Map<string, string>();
 
 export function Thumbnail({ id, time }: { id: string; time: string }) {
-  const key = `${id} ${time}`;
-  const [picture, setPicture] = useState(known.get(key) ?? "");
+  const picture = useThumbnails((all) => all[id]) ?? "";
   const place = useRef<HTMLDivElement>(null);
   useEffect(() => {
     const element = place.current;
-    if (!element || known.has(key) || !serves("GetViewState")) return;
-    let here = true;
+    if (!element || asked.get(id) === time) return;
     const watch = new IntersectionObserver((seen) => {
       if (!seen.some((each) => each.isIntersecting)) return;
       watch.disconnect();
-      call("GetViewState", { scope: "shared", document: id }).then(
-        ({ values }) => {
-          const { thumbnail } = values as { thumbnail?: unknown };
-          const found = typeof thumbnail === "string" && thumbnail.startsWith("data:image/") ? thumbnail : "";
-          known.set(key, found);
-          if (here) setPicture(found);
-        },
-        () => {}, // the tile stays without one
-      );
+      asked.set(id, time);
+      readThumbnail(id).catch(() => asked.delete(id)); // the tile stays without one, or with the old one
     });
     watch.observe(element);
-    return () => {
-      here = false;
-      watch.disconnect();
-    };
-  }, [id, key]);
+    return () => watch.disconnect();
+  }, [id, time]);
   return (
     <div ref={place} className="thumbnail" data-empty={picture === ""}>
       {picture && <img src={picture} alt="" />}
