@@ -40,7 +40,8 @@ async function ofDocument(document: string, project: boolean, still: () => boole
   if (!project) return;
   if (serves("GetBreakpoints")) {
     void ask(
-      call("GetBreakpoints").then(({ ids }) => ({ breakpoints: Object.fromEntries(ids.map((id) => [id, true as const])) })),
+      // By its id: while its program runs it is not open.
+      call("GetBreakpoints", { project_id: document }).then(({ ids }) => ({ breakpoints: Object.fromEntries(ids.map((id) => [id, true as const])) })),
     );
   }
   if (serves("Reachability")) {

@@ -88,6 +88,7 @@ export class ItemMaker {
       }));
     }
     this.pucks(state, doc, add, common, tell);
+    if (state.view.user["hide_steps"] === true && state.ui.connecting === null) return found;
     for (const item of Object.values(doc.logic)) {
       add(item.id, [item, ...tell(item.id)], () => link(item, common(item.id, "")));
     }

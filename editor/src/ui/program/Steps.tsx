@@ -2,6 +2,7 @@
 
 import { useMemo } from "react";
 import { Button as AriaButton, ToggleButton } from "react-aria-components";
+import { keepView } from "../../commands/viewstate";
 import { breakAt } from "../../commands/run";
 import { barred } from "../../commands/asking";
 import { conditionWords, incoming, outgoing, placeOf, START } from "../../program/logic";
@@ -20,47 +21,53 @@ export function Steps({ problems }: { problems: Problem[] }) {
   if (!doc) return null;
   if (order.length === 0) return <p className="quiet">No action yet. Add the first one under “Add”.</p>;
   return (
-    <ol className="steps">
-      {order.map((id) => {
-        const action = doc.actions[id];
-        if (!action) return null;
-        const problem = problems.find((each) => each.id === id);
-        const after = incoming(doc, id).map((item) => conditionWords(doc, types, item)).filter(Boolean);
-        const running = program.running.includes(id) || state.live.executing === id;
-        return (
-          <li key={id} data-running={running} data-selected={state.ui.selection?.id === id}>
-            <ToggleButton
-              className="breakpoint"
-              aria-label={`Pause before ${action.name}`}
-              isSelected={id in breakpoints}
-              onChange={(on) => (cannot ? tell("info", cannot) : void breakAt(id, on))}
-            >
-              <span className="breakpoint-dot" aria-hidden="true" />
-            </ToggleButton>
-            <AriaButton
-              className="step"
-              onPress={() => {
-                select({ kind: "action", id });
-                setUi({ tool: "" });
-                theEngine()?.focus(id);
-              }}
-            >
-              <span className="step-name">{action.name}</span>
-              <span className="quiet small">
-                {nameOf(state, action.type.split("/")[0] ?? "")} at {nameOf(state, action.pointId)}
-                {after.length > 0 && ` · when ${after.join(", ")}`}
-              </span>
-              {running && <span className="tag good">runs now</span>}
-              {problem && (
-                <span className={`tag ${problem.level === "error" ? "bad" : "warn"}`}>
-                  <Icon name="warn" size={14} /> {withNames(state, problem.text)}
+    <>
+      <label className="check">
+        <input type="checkbox" checked={state.view.user["hide_steps"] !== true} onChange={(event) => keepView("user", { hide_steps: event.target.checked ? null : true })} />
+        <span>Steps are drawn in the 3D view</span>
+      </label>
+      <ol className="steps">
+        {order.map((id) => {
+          const action = doc.actions[id];
+          if (!action) return null;
+          const problem = problems.find((each) => each.id === id);
+          const after = incoming(doc, id).map((item) => conditionWords(doc, types, item)).filter(Boolean);
+          const running = program.running.includes(id) || state.live.executing === id;
+          return (
+            <li key={id} data-running={running} data-selected={state.ui.selection?.id === id}>
+              <ToggleButton
+                className="breakpoint"
+                aria-label={`Pause before ${action.name}`}
+                isSelected={id in breakpoints}
+                onChange={(on) => (cannot ? tell("info", cannot) : void breakAt(id, on))}
+              >
+                <span className="breakpoint-dot" aria-hidden="true" />
+              </ToggleButton>
+              <AriaButton
+                className="step"
+                onPress={() => {
+                  select({ kind: "action", id });
+                  setUi({ tool: "" });
+                  theEngine()?.focus(id);
+                }}
+              >
+                <span className="step-name">{action.name}</span>
+                <span className="quiet small">
+                  {nameOf(state, action.type.split("/")[0] ?? "")} at {nameOf(state, action.pointId)}
+                  {after.length > 0 && ` · when ${after.join(", ")}`}
                 </span>
-              )}
-            </AriaButton>
-          </li>
-        );
-      })}
-    </ol>
+                {running && <span className="tag good">runs now</span>}
+                {problem && (
+                  <span className={`tag ${problem.level === "error" ? "bad" : "warn"}`}>
+                    <Icon name="warn" size={14} /> {withNames(state, problem.text)}
+                  </span>
+                )}
+              </AriaButton>
+            </li>
+          );
+        })}
+      </ol>
+    </>
   );
 }
 
