@@ -13,7 +13,7 @@ from arcor2_hw.kinematics.source import MAX_PACKAGE, Package
 MAX_SHOWN: Final = 256 * 1024 * 1024
 """Bytes of a mesh file that is only shown: it may be larger than one that things collide with."""
 MAX_TRIANGLES: Final = 3_000_000
-MOST_OF_ROBOT: Final = 80_000
+MOST_OF_ROBOT: Final = 40_000
 """Triangles of all meshes of a robot."""
 
 

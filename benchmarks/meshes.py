@@ -1,0 +1,100 @@
+"""What meshes made ready to be shown cost and save: a robot of 124,000 triangles, from files to what browsers load."""
+
+import io
+import time
+import zipfile
+from collections.abc import AsyncIterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Final
+
+import numpy as np
+import trimesh
+
+from arcor2_hw.compute.preparing_tasks import PrepareAsset
+from arcor2_hw.compute.world import KeptFile
+from arcor2_server.app import running_services
+from arcor2_server.compute import Compute
+from arcor2_server.settings import ServerSettings
+from benchmarks.figures import Figure, Report, median
+
+LINKS: Final = 7
+ROUNDS: Final = 5
+AGAIN: Final = 100
+
+
+async def run(report: Report) -> None:
+    """Measure all of them."""
+    with TemporaryDirectory() as folder:
+        for figure in await preparing(Path(folder)):
+            report.add(figure)
+        report.add(await again(Path(folder)))
+
+
+def link(number: int) -> trimesh.Trimesh:
+    """Give a link as CAD programs write them: a tube with grooves, far finer than anybody sees."""
+    mesh = trimesh.creation.capsule(height=0.3 - 0.03 * number, radius=0.07 - 0.005 * number, count=[92, 96])
+    around = np.arctan2(mesh.vertices[:, 1], mesh.vertices[:, 0])
+    mesh.vertices *= 1.0 + 0.02 * np.sin(40.0 * mesh.vertices[:, 2:]) * np.cos(3.0 * around)[:, None]
+    return mesh
+
+
+def robot() -> tuple[bytes, int, int]:
+    """Give a package of seven links, half of them COLLADA and half STL; the bytes of its meshes, and triangles."""
+    links, size, triangles = "", 0, 0
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        for number in range(LINKS):
+            mesh, kind = link(number), ("dae", "stl")[number % 2]
+            content = mesh.export(file_type=kind)
+            content = content if isinstance(content, bytes) else str(content).encode()
+            archive.writestr(f"arm/link_{number}.{kind}", content)
+            visual = f'<visual><geometry><mesh filename="link_{number}.{kind}"/></geometry></visual>'
+            links += f'<link name="link_{number}">{visual}</link>'
+            size, triangles = size + len(content), triangles + len(mesh.faces)
+        archive.writestr("arm/arm.urdf", f'<robot name="arm">{links}</robot>')
+    return packed.getvalue(), size, triangles
+
+
+async def preparing(folder: Path) -> list[Figure]:
+    """Time the making, by a worker that runs."""
+    content, size, triangles = robot()
+    (folder / "arm.zip").write_bytes(content)
+    task = PrepareAsset(KeptFile(str(folder / "arm.zip"), "arm.zip"))
+    compute = Compute(idle=60.0)
+    taken = []
+    try:
+        made = await compute.run(task)
+        for _ in range(ROUNDS):
+            began = time.perf_counter()
+            made = await compute.run(task)
+            taken.append(time.perf_counter() - began)
+    finally:
+        await compute.close()
+    assert not made.problems, made.problems
+    assert made.before == triangles
+    note = f"{LINKS} meshes, {triangles} triangles, {size / 1e6:.1f} MB"
+    return [
+        Figure("meshes_robot_triangles", made.triangles, 1, note),
+        Figure("meshes_robot_mb", len(made.content) / 1e6, 1, note),
+        Figure("meshes_robot_s", median(taken), len(taken), note),
+    ]
+
+
+async def again(folder: Path) -> Figure:
+    """Time what is asked for the second time, from the disk."""
+    taken = []
+    (folder / "data").mkdir()
+    async with running_services(ServerSettings(data_dir=folder / "data")) as services:
+
+        async def pieces() -> AsyncIterator[bytes]:
+            yield (folder / "arm.zip").read_bytes()
+
+        await services.assets.put(pieces(), "arm.zip")
+        await services.prepared.get("arm.zip")
+        for _ in range(AGAIN):
+            began = time.perf_counter()
+            shown = await services.prepared.get("arm.zip")
+            (shown.packed or shown.plain).read_bytes()
+            taken.append(1e3 * (time.perf_counter() - began))
+    return Figure("meshes_again_ms", median(taken), len(taken), "the compressed file, read")
