@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
 from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.object_type import Models
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import Arcor2Error, KinematicsError, NotFound, Refused
 from arcor2_hw.objects.robot import Robot
@@ -70,6 +71,14 @@ class Way:
         return self._timed(tcp_speed)
 
 
+class Tool(NamedTuple):
+    """What stands for the shape of a tool: the link that it sits on, and where in that link's frame."""
+
+    link: str
+    shape: Models
+    in_link: Pose
+
+
 class Held(NamedTuple):
     """That an object moves with a link, and where it is in that link's frame."""
 
@@ -82,11 +91,18 @@ class SafeMoves:
 
     Its URDF is the package that the type's `urdf_package_name` names: in `urdf/` beside the module of the class that
     does, unless one of that name was uploaded. Joints that the robot tells beside those of the URDF, a gripper's, are
-    passed over. `settings` gives what the URDF follows, by name; left out, the settings of the object.
+    passed over. `settings` gives what the URDF follows, by name; left out, the settings of the object. `tool` gives the
+    shape of a tool that the URDF does not have.
     """
 
-    def __init__(self, robot: Robot, settings: Callable[[], Mapping[str, object]] | None = None) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        settings: Callable[[], Mapping[str, object]] | None = None,
+        tool: Callable[[], Tool | None] = lambda: None,
+    ) -> None:
         self._robot = robot
+        self.tool = tool
         self._settings = settings or (lambda: settings_of(robot))
         self._here = threading.local()
         self.held: dict[str, Held] = {}
@@ -290,6 +306,7 @@ class SafeMoves:
         robot, tools = self._robot, self._tools()
         world = CollisionWorld(margin=margin)
         world.add_robot(robot.name, tools.model, robot.pose, self._q(now))
+        _put_tool(world, robot.name, self.tool())
         if alone:
             return world
         held = {name: (robot.name, one) for name, one in self.held.items()}
@@ -299,6 +316,7 @@ class SafeMoves:
                 world.add_robot(other.name, model, other.pose, model.values(joints, model.neutral()))
                 moves = getattr(other, "safe_moves", None)
                 if isinstance(moves, SafeMoves):
+                    _put_tool(world, other.name, moves.tool())
                     held |= {name: (other.name, one) for name, one in moves.held.items()}
         for obstacle in robot.surroundings.obstacles():
             holder, one = held.get(obstacle.name, ("", None))
@@ -343,3 +361,13 @@ class SafeMoves:
         if found is None or found.made_of != (settings, package):
             found = self._here.tools = RobotTools(self._robot, settings, package)
         return found
+
+
+def _put_tool(world: "CollisionWorld", robot: str, tool: Tool | None) -> None:
+    if tool is not None:
+        from arcor2_hw.kinematics.shapes import of_model
+
+        name, standing = f"tool of {robot}", world.robot(robot)
+        at = Pose.from_matrix(standing.link_frames(standing.q)[tool.link]) * tool.in_link
+        world.put(name, of_model(tool.shape), at)
+        world.attach(name, robot, tool.link)

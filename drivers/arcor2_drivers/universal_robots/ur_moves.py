@@ -1,8 +1,12 @@
 """UrMoving: moves to joints and poses, safe ones around what stands in the scene; the controller's kinematics."""
 
-from arcor2_hw.data.geometry import Pose
+import math
+from typing import Final
+
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.object_type import Cylinder
 from arcor2_hw.data.robot import Joint, MoveResult
-from arcor2_hw.objects.safe_moves import SafeMoves
+from arcor2_hw.objects.safe_moves import SafeMoves, Tool
 from arcor2_hw.objects.surroundings import Surroundings
 
 from .frames import from_vector, to_vector, world_from_base
@@ -10,19 +14,40 @@ from .settings import UrSettings, within
 from .ur_arm import UrArm
 from .ur_observed import JOINTS
 
+FLANGE: Final = "flange"
+ROD_RADIUS: Final = 0.015
+SHORT_OF_TCP: Final = 0.01
+"""m by which the rod that stands for a tool ends before the TCP, which touches what is worked on."""
+
 
 class UrMoving(UrArm):
     """A Universal Robots arm that is told where to go.
 
-    What stands around it is known from the scene; of the arm itself its model is known, nominal and with the tool's
-    centre point, but without the tool's shape.
+    What stands around it is known from the scene; of the arm itself its model is known, nominal, and the tool's centre
+    point: a rod stands for the tool.
     """
 
     _ABSTRACT = True
 
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: UrSettings) -> None:
         super().__init__(obj_id, name, pose, settings)
-        self.safe_moves = SafeMoves(self, self._model_settings)
+        self.safe_moves = SafeMoves(self, self._model_settings, self._rod)
+
+    def _rod(self) -> Tool | None:
+        """Give a rod from the flange to short of the TCP, which stands for the tool: of that only the TCP is known."""
+        way = self._tool.tcp.position
+        length = math.hypot(*way) - SHORT_OF_TCP
+        if length < SHORT_OF_TCP:
+            return None
+        x, y, z = (value / math.hypot(*way) for value in way)
+        # From the z axis to the way, about the axis across both.
+        angle, across = math.atan2(math.hypot(x, y), z), math.hypot(x, y)
+        turn = (
+            (-y / across * angle, x / across * angle, 0.0) if across > 1e-9 else (0.0 if z > 0.0 else math.pi, 0.0, 0.0)
+        )
+        middle = Position(*(length / 2.0 * value for value in (x, y, z)))
+        rod = Cylinder("tool", ROD_RADIUS, length)
+        return Tool(FLANGE, rod, Pose(middle, Orientation.from_rotation_vector(*turn)))
 
     def surround(self, surroundings: Surroundings) -> None:
         """Take what tells of the things around the arm, and read its model."""

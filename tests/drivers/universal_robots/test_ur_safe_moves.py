@@ -128,6 +128,19 @@ def test_the_tool_that_was_told_counts(ready: UR5e, around: Around) -> None:
     assert found.position.distance_to(pose.position) < 1e-4
 
 
+@pytest.mark.parametrize("tcp", [(0.0, 0.0, 0.2), (0.12, 0.05, 0.1), (0.0, -0.15, -0.05)])
+def test_the_tool_does_not_go_through_things(robot: UR5e, around: Around, tcp: tuple[float, float, float]) -> None:
+    robot._tool = robot._tool._replace(tcp=Pose(Position(*tcp)))
+    flange = Pose(Position(*(-value for value in tcp)))
+    at = robot.safe_moves.forward("tcp", robot.robot_joints())
+    base = (at * flange).position
+    for share, hit in ((0.3, True), (0.9, True), (1.15, False)):
+        point = Position(*(a + share * (b - a) for a, b in zip(base, at.position, strict=True)))
+        around.boxes["chip"] = point, (0.004, 0.004, 0.004)
+        found = robot.safe_moves.contacts(robot.robot_joints())
+        assert any("tool of ur and chip" in pair for pair in found) is hit, (share, found)
+
+
 def test_without_control_nothing_is_planned(robot: UR5e, around: Around) -> None:
     for move in (
         lambda: robot.move_to_joints(joints(robot, BESIDE), 0.5),
