@@ -25,7 +25,7 @@ VIEWPORTS: Final = {
 }
 PICTURES: Final = os.environ.get("ARCOR2_HW_PICTURES")
 """Directory into which `Screen.picture` writes, for somebody who wants to look; none: nowhere."""
-SEEN_WITHIN: Final = 15.0
+SEEN_WITHIN: Final = 30.0
 """Seconds for something to be on the screen: software rendering on a busy machine is slow."""
 SMALLEST: Final = 44
 """CSS pixels of the smaller side of what is touched."""
@@ -161,7 +161,12 @@ async def screen_of(
         if text_scale != 1.0:
             scaled = f"document.documentElement.style.fontSize = '{100 * text_scale}%'"
             await screen.page.add_init_script(f"document.addEventListener('DOMContentLoaded', () => {{ {scaled} }})")
-        yield screen
+        try:
+            yield screen
+        except BaseException:
+            with contextlib.suppress(Error):
+                await screen.picture("failed")
+            raise
         assert not (told := screen.unexpected()), f"the page told errors: {told}"
     finally:
         with contextlib.suppress(Error):  # the browser is gone, which the test has told
