@@ -1,15 +1,14 @@
-/** Reads assets of the server: meshes, models of robots. */
+/** Assets of the server: meshes, models of robots. */
 
 import { remembered } from "./memory";
 
-/** Give an asset and its file name; rejects with a sentence. */
-export async function readAsset(id: string): Promise<{ name: string; content: ArrayBuffer }> {
+/** Give an asset as the server makes it ready to be shown, binary glTF; rejects with the server's sentence. */
+export async function readShown(id: string): Promise<ArrayBuffer> {
   const token = remembered("token");
   const headers: HeadersInit = token ? { Authorization: `Bearer ${token}` } : {};
-  const response = await fetch(`/assets/${encodeURIComponent(id)}/data`, { headers });
-  if (!response.ok) throw new Error(`The server does not give the asset ${id} (${response.status}).`);
-  const name = /filename\*=UTF-8''([^;]+)/.exec(response.headers.get("Content-Disposition") ?? "")?.[1];
-  return { name: name ? decodeURIComponent(name) : id, content: await response.arrayBuffer() };
+  const response = await fetch(`/api/assets/${encodeURIComponent(id)}/shown`, { headers });
+  if (!response.ok) throw new Error(await refusedWith(response, `The server does not give the mesh ${id}`));
+  return response.arrayBuffer();
 }
 
 /** Take a file to the server as a new asset; gives its id. Rejects with a sentence. */

@@ -8,6 +8,7 @@ import { nameOf } from "../names";
 import { GoTab } from "./GoTab";
 import { HandTab } from "./HandTab";
 import { JointsTab } from "./JointsTab";
+import { Kinematics } from "./Kinematics";
 import { MannerFields } from "./MannerFields";
 import { RobotChooser } from "./RobotChooser";
 import { Status } from "./Status";
@@ -38,6 +39,7 @@ export default function RobotPanel() {
           {chosen.effector && <span className="quiet"> · {chosen.effector}</span>}
         </h3>
         {why && <p className="quiet small">{why}</p>}
+        <Kinematics robotId={chosen.robotId} />
       </div>
       <RobotChooser />
       {!why && <Status chosen={chosen} />}

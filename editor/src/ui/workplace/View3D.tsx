@@ -4,7 +4,7 @@ import { useEffect, useRef, useState } from "react";
 import type { Engine, Quality } from "../../engine/engine";
 import { endStep } from "../../commands/program";
 import { dragPucks } from "../../session/puckDrag";
-import { readShown } from "../../session/shown";
+import { readShown } from "../../session/assets";
 import { setEngine } from "../../session/engine";
 import { tapTaken } from "../../session/taps";
 import { now, select, setUi, store, tell, useEditor } from "../../store/store";

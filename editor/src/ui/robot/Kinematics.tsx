@@ -1,0 +1,29 @@
+/** Whether poses of a robot are computed with what its controller told of the very arm, or as its type is made. */
+
+import { useEffect, useState } from "react";
+import { featuresOf } from "../../commands/robot";
+import { readKinematics, type RobotKinematics } from "../../session/kinematics";
+import { useEditor } from "../../store/store";
+import { ago } from "../times";
+
+export function Kinematics({ robotId }: { robotId: string }) {
+  const tells = useEditor((state) => featuresOf(state, robotId)?.kinematic_calibration ?? false);
+  // Another calibration comes into force while the robot is there, which a notification tells of.
+  const told = useEditor((state) => state.notices.at(-1)?.id);
+  const scene = useEditor((state) => state.live.state);
+  const [found, setFound] = useState<RobotKinematics | null>(null);
+  useEffect(() => {
+    if (!tells) return;
+    const ended = new AbortController();
+    readKinematics(robotId, ended.signal).then(setFound, () => setFound(null));
+    return () => ended.abort();
+  }, [robotId, tells, told, scene]);
+  if (!tells || found?.object_id !== robotId) return null;
+  return <p className="quiet small">{sentence(found)}</p>;
+}
+
+function sentence({ in_force: force, read, refused }: RobotKinematics): string {
+  if (force === "measured") return `Computed with this arm's own calibration, read ${read ? ago(read) : "before"}.`;
+  if (refused) return `Computed as arms of this type are. The calibration in its controller is not used: ${refused}`;
+  return "Computed as arms of this type are, off by some millimetres: its own calibration is read when it is online.";
+}
