@@ -5,17 +5,22 @@ import { barred } from "../../commands/asking";
 import * as documents from "../../commands/documents";
 import { now, tell } from "../../store/store";
 
+/** ms after a step in which the news of what can be undone next may still be on the way. */
+const NEWS = 1000;
+
 export function useUndoKeys(): void {
   useEffect(() => {
+    let last = -Infinity;
     const key = (event: KeyboardEvent) => {
       const wanted = undoOrRedo(event);
       if (!wanted || event.repeat || isWriting(event.target) || document.querySelector(".overlay")) return;
       event.preventDefault();
       const state = now();
       const step = state.history?.[wanted];
-      const why = barred(state, wanted === "undo" ? "Undo" : "Redo") || (step ? "" : `There is nothing to ${wanted}.`);
-      if (why) tell("info", why);
-      else void (wanted === "undo" ? documents.undo() : documents.redo());
+      const why = barred(state, wanted === "undo" ? "Undo" : "Redo") || (step || event.timeStamp - last < NEWS ? "" : `There is nothing to ${wanted}.`);
+      if (why) return tell("info", why);
+      last = event.timeStamp;
+      void (wanted === "undo" ? documents.undo() : documents.redo());
     };
     window.addEventListener("keydown", key);
     return () => window.removeEventListener("keydown", key);
