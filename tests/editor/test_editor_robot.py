@@ -205,7 +205,7 @@ async def test_a_joint_is_moved_within_its_limits(place: Place) -> None:
     async def turned() -> bool:
         joints = await place.client.call("GetRobotJoints", rpc.GetRobotJointsArgs(place.robot))
         value = next(each.value for each in joints if each.name == name)
-        return abs(value - before[name] - math.radians(5)) < 1e-3
+        return bool(abs(value - before[name] - math.radians(5)) < 1e-3)
 
     await until(turned, "the wrist turned by five degrees", 15)
 

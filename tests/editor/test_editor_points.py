@@ -1,0 +1,217 @@
+"""Points: added by one tap from the robot, on a surface, by numbers; hung, taught, reached; in Chromium."""
+
+import contextlib
+import math
+import re
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+import pytest_asyncio
+from playwright.async_api import Browser, Locator, expect
+
+from arcor2_hw.client import Client
+from arcor2_hw.client.errors import RequestFailed
+from arcor2_hw.data import rpc
+from arcor2_hw.data.events import SceneStateEnum
+from arcor2_hw.data.project import ActionPoint, Project
+from arcor2_hw.data.scene import Scene
+from tests.e2e.harness import Cell, scene_state, until
+from tests.editor.screen import Screen, screen_of
+
+pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(180)]
+
+
+@dataclass
+class Place:
+    """The project is open and the scene online; Eva sits at the screen."""
+
+    client: Client
+    scene: Scene
+    project: Project
+    robot: str
+    screen: Screen
+
+    async def saved(self) -> Project:
+        """The project as the server has it."""
+        with contextlib.suppress(RequestFailed):  # nothing to save, or somebody is about to change something
+            await self.client.call("SaveProject")
+        project: Project = await self.client.call("GetProject", rpc.IdArgs(self.project.id))
+        return project
+
+    async def point(self, name: str, wanted: Callable[[ActionPoint], bool] = lambda _: True) -> ActionPoint:
+        """A point as the server has it, once it is as wanted."""
+
+        async def look() -> ActionPoint | None:
+            found = next((each for each in (await self.saved()).action_points if each.name == name), None)
+            return found if found is not None and wanted(found) else None
+
+        point: ActionPoint = await until(look, f"the point {name} is as wanted", 15)
+        return point
+
+    def button(self, name: str) -> Locator:
+        return self.screen.page.get_by_role("button", name=name, exact=True)
+
+    async def tool(self, name: str) -> None:
+        rail = self.screen.page.get_by_role("navigation").get_by_role("button").filter(has_text=name)
+        if await rail.get_attribute("aria-pressed") != "true":
+            await rail.click()
+
+    async def select(self, name: str) -> None:
+        """Choose a thing in the list, which the keyboard can do as well."""
+        await self.tool("Things")
+        page = self.screen.page
+        await page.get_by_role("option").filter(has=page.get_by_text(name, exact=True)).first.click()
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def place(cell: Cell, browser: Browser) -> AsyncIterator[Place]:
+    client = await cell.client("colleague")
+    scene, project = await cell.open(client)
+    robot = next(each.id for each in scene.objects if each.name == "robot")
+    async with screen_of(browser, cell.url) as screen:
+        await screen.join("Eva")
+        await screen.item(robot)
+        await client.call("StartSceneKeepGoing")
+        await scene_state(client, SceneStateEnum.STARTED, 60)
+        await screen.until("id => window.__engine?.item(id)?.endEffectors?.length > 0", robot)
+        yield Place(client, scene, project, robot, screen)
+
+
+async def test_one_tap_keeps_where_the_robot_is(place: Place) -> None:
+    before = {each.id for each in place.project.action_points}
+    tool = (await place.screen.item(place.robot))["endEffectors"][0]
+    await place.button("Keep the robot's place as a point").click()  # the only one
+    point = await place.point("point", lambda each: len(each.orientations) == len(each.robot_joints) == 1)
+    assert point.id not in before
+    assert math.dist(tuple(point.position), tuple(tool["position"].values())) < 1e-3
+    # It is selected, and its name can be changed where it stands.
+    name = place.screen.page.get_by_label("Name of the point")
+    await name.fill("home place")
+    await name.press("Enter")
+    await place.point("home_place")
+    # Undone by one tap, which says what it does.
+    await place.screen.page.get_by_role("button", name=re.compile("^Undo ")).click()
+    await place.point("point")
+    # A name that is taken is refused where it was typed.
+    await name.fill("feeder")
+    await name.press("Enter")
+    await expect(place.screen.page.get_by_role("complementary").get_by_role("alert")).to_be_visible()
+    await name.press("Escape")
+
+
+async def test_a_tap_on_a_surface_adds_a_point_on_what_is_selected(place: Place) -> None:
+    page, screen = place.screen.page, place.screen
+    table = next(each for each in place.scene.objects if each.name == "table")
+    tester = next(each for each in place.scene.objects if each.name == "tester")
+    await place.select("tester")
+    await place.tool("Points")
+    await place.button("Where I tap").click()
+    await page.evaluate("() => __engine.view.set([0.6, -0.5, 1.2], [0.6, -0.4, 0])")
+    await screen.settle()
+    spot = await page.evaluate(
+        """id => {
+            const { width, height } = document.querySelector('.view canvas').getBoundingClientRect();
+            for (let x = width * 0.3; x < width * 0.8; x += 15)
+                for (let y = height * 0.3; y < height * 0.8; y += 15)
+                    if (__engine.pick(x, y, 16)[0]?.id === id && __engine.pick(x, y, 16).length === 1) return { x, y };
+        }""",
+        table.id,
+    )
+    box = await page.locator(".view canvas").bounding_box()
+    assert box is not None
+    assert spot is not None
+    await page.mouse.click(box["x"] + spot["x"], box["y"] + spot["y"])
+    point = await place.point("point_2", lambda each: len(each.orientations) == 1)
+    assert point.parent == tester.id
+    drawn = (await screen.item(point.id))["pose"]["position"]
+    surface = table.pose.position.z + 0.01  # type: ignore[union-attr]
+    assert drawn["z"] == pytest.approx(surface, abs=1e-4)
+    assert math.hypot(drawn["x"] - 0.6, drawn["y"] + 0.4) < 0.5
+
+
+async def test_a_point_by_numbers_hangs_in_the_world_and_goes_to_a_parent_without_moving(place: Place) -> None:
+    page = place.screen.page
+    await place.button("Close the panel").click()
+    await place.tool("Points")
+    await page.get_by_text("By numbers").click()
+    for axis, value in (("X", "400"), ("Y", "-100"), ("Z", "+250")):
+        await page.get_by_label(f"{axis} mm").fill(value)
+        await page.keyboard.press("Enter")
+    await place.button("Add the point").click()
+    point = await place.point("point_3")
+    assert tuple(point.position) == pytest.approx((0.4, -0.1, 0.25))
+    tester = next(each for each in place.scene.objects if each.name == "tester")
+    await page.get_by_label("Hangs").select_option("on tester")
+    hung = await place.point("point_3", lambda each: each.parent == tester.id)
+    assert tuple(hung.position) == pytest.approx((-0.1, -0.25, 0.2))  # relative to its parent now
+    drawn = (await place.screen.item(point.id))["pose"]["position"]
+    assert tuple(drawn.values()) == pytest.approx((0.4, -0.1, 0.25))
+
+
+async def test_orientations_are_added_turned_and_told_whether_they_are_reached(place: Place) -> None:
+    page = place.screen.page
+    point = await place.point("point_3")
+    await place.screen.until("id => window.__engine.item(id)", point.id)
+    await page.get_by_role("button", name="Add an orientation").click()
+    await page.get_by_role("menuitem", name="Tool straight down").click()
+    added = await place.point("point_3", lambda each: len(each.orientations) == 1)
+    orientation = added.orientations[0]
+    await page.get_by_role("button", name=re.compile("^down")).first.click()
+    answer = page.locator(".reaches li", has_text="robot · tcp")
+    await expect(answer).to_contain_text("reaches it", timeout=30_000)
+    assert await page.evaluate("id => __engine.item(id).kind", orientation.id) == "orientation"
+    yaw = page.get_by_label("Yaw °")
+    await yaw.fill("90")
+    await yaw.press("Enter")
+    await place.point("point_3", lambda each: abs(_yaw(each.orientations[0].orientation) - math.pi / 2) < 1e-6)
+    # Moved out of reach, it is told with the reason.
+    await place.client.call("WriteLock", rpc.WriteLockArgs(point.id, lock_tree=True))
+    far = (await place.point("point_3")).position
+    far.x += 5
+    await place.client.call("UpdateActionPointPosition", rpc.UpdateActionPointPositionArgs(point.id, far))
+    await place.client.call("WriteUnlock", rpc.WriteUnlockArgs(point.id))
+    await expect(answer).to_contain_text("out of reach", timeout=30_000)
+
+
+def _yaw(q: Any) -> float:
+    return math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y**2 + q.z**2))
+
+
+async def test_joints_of_a_moved_point_say_so_and_are_computed_anew(place: Place) -> None:
+    page = place.screen.page
+    point = await place.point("point")
+    await place.client.call("WriteLock", rpc.WriteLockArgs(point.id, lock_tree=True))
+    point.position.z -= 0.05
+    await place.client.call("UpdateActionPointPosition", rpc.UpdateActionPointPositionArgs(point.id, point.position))
+    await place.client.call("WriteUnlock", rpc.WriteUnlockArgs(point.id))
+    await place.select("point")
+    await expect(page.get_by_label("Name of the point")).to_have_value("point")
+    await page.get_by_role("button", name=re.compile("^default · robot")).click()
+    await place.screen.sees("The point has moved since: these joints no longer lead to it.")
+    before = point.robot_joints[0].joints
+    await place.button("Compute anew").click()
+    solved = await place.point("point", lambda each: each.robot_joints[0].is_valid)
+    moved = max(abs(a.value - b.value) for a, b in zip(before, solved.robot_joints[0].joints, strict=True))
+    assert 0.005 < moved < 1.0, "solved near to what they were, and not the same"
+
+
+async def test_copies_in_a_row_and_what_others_hold(place: Place) -> None:
+    page = place.screen.page
+    source = await place.point("feeder")
+    await place.select("feeder")
+    await page.get_by_text("Copies in a row").click()
+    await page.get_by_label("Copies", exact=False).last.fill("2")
+    await page.keyboard.press("Enter")
+    await place.button("Make 2 copies").click()
+    first = await place.point("feeder_copy")
+    assert first.position.x - source.position.x == pytest.approx(0.05)
+    count = len([each for each in (await place.saved()).action_points if each.name.startswith("feeder_copy")])
+    assert count == 2
+    # What somebody else holds cannot be changed, and says by whom.
+    await place.client.call("WriteLock", rpc.WriteLockArgs(source.id))
+    why = page.get_by_role("button", name=re.compile("^Put it where the robot is.*colleague works on it"))
+    await expect(why).to_have_attribute("aria-disabled", "true")
+    await place.client.call("WriteUnlock", rpc.WriteUnlockArgs(source.id))
+    await expect(place.button("Put it where the robot is")).to_be_visible()
