@@ -49,8 +49,9 @@ export async function build(name: string): Promise<boolean> {
   return built !== undefined;
 }
 
-/** Set the breakpoints of a point or action, or take them away. */
-export const breakAt = (id: string, on: boolean) => ask("SetBreakpoints", on ? { add: [id] } : { remove: [id] });
+/** Set the breakpoints of a point or action, or take them away: also while the program runs, when no project is open. */
+export const breakAt = (id: string, on: boolean) =>
+  ask("SetBreakpoints", { ...(on ? { add: [id] } : { remove: [id] }), project_id: now().doc?.project?.id });
 
 /** Run, and pause before this action. */
 export async function runTo(id: string): Promise<void> {
