@@ -89,6 +89,8 @@ export class Engine {
   private width = 1;
   private height = 1;
   private hovered = "";
+  /** Where the eye was put when all was brought into view. */
+  private fitted: Vector3 | null = null;
   private readonly notes = new Map<string, string>();
   /** What is said of a thing while somebody moves it, in place of how high it is. */
   private said = { id: "", text: "" };
@@ -116,6 +118,7 @@ export class Engine {
       thing: (id) => this.things.get(id),
       metresPerPixel: (at) => (2 * this.view.camera.position.distanceTo(at) * Math.tan((this.view.camera.fov * Math.PI) / 360)) / this.height,
       invalidate: () => this.invalidate(),
+      loaded: () => this.loaded(),
     };
     this.drop = new DropLine(this.scene);
     this.gizmo = new Gizmo({
@@ -221,6 +224,13 @@ export class Engine {
     }
     if (id !== undefined) box.expandByScalar(0.12);
     this.view.fit(box);
+    this.fitted = id === undefined ? this.view.camera.position.clone() : null;
+  }
+
+  /** What was all in view is so again with what came, unless somebody has moved since. */
+  private loaded(): void {
+    if (this.fitted?.equals(this.view.camera.position)) this.focus();
+    this.invalidate();
   }
 
   item(id: string): Probe | undefined {

@@ -20,6 +20,8 @@ export interface Context {
   metresPerPixel: (at: Vector3) => number;
   /** Something has to be drawn anew. */
   invalidate: () => void;
+  /** A shape came that was being loaded. */
+  loaded: () => void;
 }
 
 export abstract class Thing<I extends Item = Item> {

@@ -107,8 +107,9 @@ export class ObjectThing extends Thing<ObjectItem> {
   private async load(asset: string, mine: number): Promise<void> {
     try {
       const geometry = readMesh(await this.context.asset(asset));
-      if (mine === this.loading) this.show(geometry);
-      else geometry.dispose();
+      if (mine !== this.loading) return geometry.dispose();
+      this.show(geometry);
+      this.context.loaded();
     } catch (error) {
       if (mine !== this.loading) return;
       this.reason = error instanceof Error ? error.message : String(error);

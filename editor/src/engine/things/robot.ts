@@ -211,7 +211,7 @@ export class RobotThing extends Thing<RobotItem> {
     this.body.add(robot ?? this.standIn());
     ownedBy(this.body, this.item.id);
     this.paint();
-    this.context.invalidate();
+    this.context.loaded();
   }
 
   /** A foot and a column: a robot stands here, and its type has no model. */
