@@ -69,7 +69,7 @@ export function ViewControls({ engine }: { engine: Engine }) {
       <div className="view-controls">
         <Button icon="zoom" aria-label="Show all" onPress={() => engine.focus()} />
         <Cube engine={engine} onLook={look} />
-        <More label="Views" icon="search" look="" choices={choices} />
+        <More label="Views" icon="eye" look="" choices={choices} />
       </div>
       {mode === "fly" && <FlyPad view={engine.view} onDone={() => change("orbit")} />}
       {naming && (
