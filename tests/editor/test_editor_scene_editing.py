@@ -14,6 +14,7 @@ from playwright.async_api import Browser, expect
 from arcor2_hw.client import Client
 from arcor2_hw.data import rpc
 from arcor2_hw.data.editor import ViewScope
+from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.scene import Scene, SceneObject
 from tests.e2e.harness import Cell, until
 from tests.editor.screen import Screen, screen_of
@@ -36,6 +37,11 @@ class Open:
 
     async def object(self, name: str) -> SceneObject:
         return next(each for each in await self.objects() if each.name == name)
+
+    async def pose(self, name: str) -> Pose:
+        pose = (await self.object(name)).pose
+        assert isinstance(pose, Pose)
+        return pose
 
     async def has(self, name: str) -> bool:
         return any(each.name == name for each in await self.objects())
@@ -100,8 +106,7 @@ async def test_a_thing_is_dragged_seen_by_others_and_taken_back(opened: Open, br
     async with screen_of(browser, opened.cell.url) as screen:
         await screen.join("Eva")
         await chosen(screen, tester.id)
-        before = (await opened.object("tester")).pose
-        assert before
+        before = await opened.pose("tester")
         x, y = await handle(screen, "axis z")
         mouse = screen.page.mouse
         await mouse.move(x, y)
@@ -111,14 +116,13 @@ async def test_a_thing_is_dragged_seen_by_others_and_taken_back(opened: Open, br
         preview = await client.next_event("MovePreview", timeout=10)
         assert (preview.data.id, preview.data.user) == (tester.id, "Eva")
         assert not await _granted(client, "WriteLock", rpc.WriteLockArgs(tester.id))
-        assert (await opened.object("tester")).pose == before
+        assert await opened.pose("tester") == before
         shown = (await screen.item(tester.id))["pose"]["position"]
         assert shown["z"] > before.position.z + 0.005
         await screen.picture("drag")
         await mouse.up()
         await until(lambda: _moved(opened, before.position.z), "the server has it")
-        after = (await opened.object("tester")).pose
-        assert after
+        after = await opened.pose("tester")
         assert after.position.z == pytest.approx(shown["z"], abs=1e-9)
         assert (after.position.x, after.position.y, after.orientation) == (
             before.position.x,
@@ -146,7 +150,7 @@ async def test_a_thing_is_dragged_seen_by_others_and_taken_back(opened: Open, br
         await screen.until(
             "([id, x]) => Math.abs(window.__engine.item(id).pose.position.x - x) < 1e-9", [tester.id, after.position.x]
         )
-        assert (await opened.object("tester")).pose == after
+        assert await opened.pose("tester") == after
 
         # What another has changed since is not undone, and says by whom.
         await client.call("WriteLock", rpc.WriteLockArgs(tester.id))
@@ -159,13 +163,13 @@ async def test_a_thing_is_dragged_seen_by_others_and_taken_back(opened: Open, br
 
 
 async def _moved(opened: Open, z: float) -> bool:
-    pose = (await opened.object("tester")).pose
-    return bool(pose) and abs(pose.position.z - z) > 1e-4
+    pose = await opened.pose("tester")
+    return abs(pose.position.z - z) > 1e-4
 
 
 async def _is_at(opened: Open, z: float) -> bool:
-    pose = (await opened.object("tester")).pose
-    return bool(pose) and abs(pose.position.z - z) < 1e-9
+    pose = await opened.pose("tester")
+    return abs(pose.position.z - z) < 1e-9
 
 
 async def test_steps_and_typed_amounts_put_it_exactly(opened: Open, browser: Browser) -> None:
@@ -174,8 +178,7 @@ async def test_steps_and_typed_amounts_put_it_exactly(opened: Open, browser: Bro
         await screen.join("Eva")
         await chosen(screen, feeder.id)
         place = screen.page.get_by_role("region", name="Place", exact=True)
-        start = (await opened.object("feeder_box")).pose
-        assert start
+        start = await opened.pose("feeder_box")
         # Two steps that come quickly are one edit: three taps from nothing selected to 20 mm up.
         await place.get_by_role("button", name="Z 1 cm more").dblclick()
         await until(lambda: _at(opened, "z", start.position.z + 0.02), "two steps up")
@@ -213,20 +216,19 @@ async def test_steps_and_typed_amounts_put_it_exactly(opened: Open, browser: Bro
 
 
 async def _at(opened: Open, axis: str, value: float) -> bool:
-    pose = (await opened.object("feeder_box")).pose
-    return bool(pose) and abs(getattr(pose.position, axis) - value) < 1e-9
+    pose = await opened.pose("feeder_box")
+    return bool(abs(getattr(pose.position, axis) - value) < 1e-9)
 
 
 async def _yaw(opened: Open, angle: float) -> bool:
-    pose = (await opened.object("feeder_box")).pose
-    return bool(pose) and abs(abs(pose.orientation.z) - math.sin(angle / 2)) < 1e-9
+    pose = await opened.pose("feeder_box")
+    return abs(abs(pose.orientation.z) - math.sin(angle / 2)) < 1e-9
 
 
-async def _same(opened: Open, start: Any) -> bool:
-    pose = (await opened.object("feeder_box")).pose
+async def _same(opened: Open, start: Pose) -> bool:
+    pose = await opened.pose("feeder_box")
     return (
-        bool(pose)
-        and math.dist(tuple(pose.position), tuple(start.position)) < 1e-9
+        math.dist(tuple(pose.position), tuple(start.position)) < 1e-9
         and abs(abs(pose.orientation.w) - abs(start.orientation.w)) < 1e-9
     )
 
@@ -250,7 +252,7 @@ async def test_shapes_are_added_by_one_tap_sized_copied_and_removed(opened: Open
         await screen.page.keyboard.press("Enter")
         await until(lambda: _measures(client, "cylinder", 0.05, 0.25), "25 cm high")
         # Pulled by its upper face: the lower one stays.
-        low = (await opened.object("cylinder")).pose.position.z - 0.125  # type: ignore[union-attr]
+        low = (await opened.pose("cylinder")).position.z - 0.125
         x, y = await handle(screen, "face +z")
         await screen.page.mouse.move(x, y)
         await screen.page.mouse.down()
@@ -307,8 +309,8 @@ async def _taller(client: Client, name: str, than: float) -> bool:
 
 
 async def _stands(opened: Open, z: float) -> bool:
-    pose = (await opened.object("cylinder")).pose
-    return bool(pose) and abs(pose.position.z - z) < 1e-9
+    pose = await opened.pose("cylinder")
+    return abs(pose.position.z - z) < 1e-9
 
 
 async def _gone(opened: Open, name: str) -> bool:
