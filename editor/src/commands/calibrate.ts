@@ -4,19 +4,9 @@ import type { Pivot, Pose, Position } from "../protocol/types";
 import { refusedWith } from "../session/assets";
 import { remembered } from "../session/memory";
 import { call } from "../session/session";
-import type { State } from "../store/state";
 import { store } from "../store/store";
 import { held, refusal } from "./asking";
 import { type Chosen, robotArg } from "./robot";
-
-/** Whether a type is, or comes from, another. */
-export function derivesFrom(state: State, type: string, base: string): boolean {
-  for (let name: string | undefined = type, left = 20; name && left > 0; left--) {
-    if (name === base) return true;
-    name = state.types.byName[name]?.base;
-  }
-  return false;
-}
 
 /** Put an object where the robot's tool points; `pivot` is which of its places is touched. */
 export const placeByRobot = (id: string, chosen: Chosen, pivot: Pivot) => refusal(() => call("UpdateObjectPoseUsingRobot", { id, robot: robotArg(chosen), pivot }));

@@ -18,3 +18,12 @@ export function heldBy(state: State, id: string): string {
   const owner = state.locks[id];
   return owner && owner !== state.connection.user ? owner : "";
 }
+
+/** Whether a type is, or comes from, another. */
+export function derivesFrom(state: State, type: string, base: string): boolean {
+  for (let name: string | undefined = type, left = 20; name && left > 0; left--) {
+    if (name === base) return true;
+    name = state.types.byName[name]?.base;
+  }
+  return false;
+}

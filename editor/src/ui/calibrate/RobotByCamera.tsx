@@ -1,8 +1,9 @@
 /** Where a robot stands, by a depth camera that sees it. */
 
 import { useState } from "react";
-import { calibrateRobot, derivesFrom } from "../../commands/calibrate";
+import { calibrateRobot } from "../../commands/calibrate";
 import { notReady } from "../../commands/robot";
+import { derivesFrom } from "../../store/selectors";
 import { useEditor } from "../../store/store";
 import { OnOff, Pick } from "../kit/fields";
 import { Button } from "../kit/kit";

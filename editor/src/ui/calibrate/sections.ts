@@ -1,7 +1,7 @@
 /** What the panel shows of objects whose place a robot or a camera can tell: in a scene, where objects are placed. */
 
-import { derivesFrom } from "../../commands/calibrate";
 import type { SceneObject } from "../../protocol/types";
+import { derivesFrom } from "../../store/selectors";
 import type { Selection, State } from "../../store/state";
 import { lazily } from "../kit/lazily";
 import type { Section } from "../workplace/sections";

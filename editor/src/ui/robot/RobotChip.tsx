@@ -9,7 +9,7 @@ import { Icon } from "../kit/icons";
 import { nameOf } from "../names";
 import "./chip.css";
 
-export function RobotChip() {
+export default function RobotChip() {
   const chosen = useEditor(chosenRobot);
   const name = useEditor((state) => (chosen ? nameOf(state, chosen.robotId) : ""));
   const open = useEditor((state) => state.ui.tool === "robot");

@@ -29,7 +29,7 @@ function bookmarksOf(kept: unknown): Bookmark[] {
   return kept.filter((each: Partial<Bookmark> | null): each is Bookmark => typeof each?.name === "string" && triple(each.position) && triple(each.target));
 }
 
-export function ViewControls({ engine }: { engine: Engine }) {
+export default function ViewControls({ engine }: { engine: Engine }) {
   const kept = useEditor((state) => state.view.user[KEY]);
   const [mode, setMode] = useState<ViewMode>("orbit");
   const [naming, setNaming] = useState(false);

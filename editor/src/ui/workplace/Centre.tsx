@@ -7,12 +7,12 @@ import { setUi, useEditor } from "../../store/store";
 import { Waiting } from "../kit/kit";
 import { lazily } from "../kit/lazily";
 import { ConnectingBanner } from "../program/ConnectingBanner";
-import { RobotChip } from "../robot/RobotChip";
 import { RunBar } from "../run/RunBar";
 import { View3D } from "./View3D";
 import "../run/run.css";
 import "./centre.css";
 
+const RobotChip = lazily(() => import("../robot/RobotChip"));
 const FlowView = lazily(() => import("../flow/FlowView"));
 const CodeView = lazily(() => import("../code/CodeView"));
 const WORDS: Record<Mode, string> = { "3d": "3D", flow: "Flow", split: "Both", code: "Code" };
@@ -45,7 +45,9 @@ export function Centre() {
             ))}
           </ToggleButtonGroup>
         )}
-        <RobotChip />
+        <Suspense fallback={null}>
+          <RobotChip />
+        </Suspense>
         <RunBar />
         <ConnectingBanner />
       </div>

@@ -1,6 +1,6 @@
 /** The view in the middle: gives the engine what to show, and takes its taps. The engine is loaded when it is needed. */
 
-import { useEffect, useRef, useState } from "react";
+import { Suspense, useEffect, useRef, useState } from "react";
 import type { Engine, Quality } from "../../engine/engine";
 import { endStep } from "../../commands/program";
 import { dragPucks } from "../../session/puckDrag";
@@ -11,10 +11,11 @@ import { now, select, setUi, store, tell, useEditor } from "../../store/store";
 import { telemetry } from "../../store/telemetry";
 import { ItemMaker } from "../../viewmodel/items";
 import { Waiting } from "../kit/kit";
-import { persistently } from "../kit/lazily";
+import { lazily, persistently } from "../kit/lazily";
 import { selectionOf } from "../names";
-import { ViewControls } from "../view/ViewControls";
 import { useTheme } from "../settings/Settings";
+
+const ViewControls = lazily(() => import("../view/ViewControls"));
 
 export function View3D() {
   const canvas = useRef<HTMLCanvasElement>(null);
@@ -96,7 +97,11 @@ export function View3D() {
           The 3D view cannot be shown on this device: {failed} Lists and panels work without it.
         </p>
       )}
-      {engine && <ViewControls engine={engine} />}
+      {engine && (
+        <Suspense fallback={null}>
+          <ViewControls engine={engine} />
+        </Suspense>
+      )}
     </main>
   );
 }
