@@ -9,7 +9,7 @@ import { nameOf, selectionOf, withNames } from "../names";
 export function Exception() {
   const exception = useEditor((state) => state.program.exception);
   const name = useEditor((state) => nameOf(state, exception?.action_id ?? ""));
-  if (!exception || exception.handled) return null;
+  if (!exception) return null;
   const id = exception.action_id;
   const show = () => {
     if (!id) return;
