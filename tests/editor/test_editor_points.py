@@ -1,4 +1,7 @@
-"""Points: added by one tap from the robot, on a surface, by numbers; hung, taught, reached; in Chromium."""
+"""Points: added by one tap from the robot, on a surface, by numbers; hung, taught, reached; in Chromium.
+
+A session in order: each test goes on with the points that the ones before have made.
+"""
 
 import contextlib
 import math
