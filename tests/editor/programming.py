@@ -60,7 +60,7 @@ class Work:
         """Choose an action, from the list of actions."""
         await self.tool("Program")
         await self.mode("Actions")
-        await self.panel.locator(".step").filter(has_text=name).first.click()
+        await self.panel.locator(".step-name").get_by_text(name, exact=True).click()
         await self.panel.get_by_role("heading", name=name, exact=True).wait_for()
 
     async def told(self, name: str, wanted: Any = lambda event: True) -> Event:

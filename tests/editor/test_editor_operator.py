@@ -45,7 +45,7 @@ async def test_what_is_built_appears_is_run_and_its_error_is_plain(
         await page.get_by_role("button", name="Stop motion").wait_for(timeout=BEGUN)
         # No board is there: the reader finds no code.
         trouble = page.get_by_role("alert").filter(has_text="It failed in scan")
-        await trouble.wait_for(timeout=BEGUN)
+        await trouble.wait_for(timeout=25000)
         await expect(trouble).to_contain_text("no code was read")
         await screen.sees("It stopped with an error")
         assert [each.end.value for each in (await colleague.call("ListRuns")).runs] == ["failed"]

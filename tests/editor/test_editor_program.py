@@ -225,6 +225,24 @@ async def test_a_fault_is_listed_and_leads_to_where_it_is(work: Work) -> None:
     await expect(fault).to_have_count(0)
 
 
+async def test_a_setting_of_a_device_is_replaced_in_this_project_alone(work: Work) -> None:
+    await work.tool("Program")
+    await work.mode("Values")
+    settings = work.panel.get_by_role("region", name="Settings of devices in this project")
+    await settings.get_by_label("Device").select_option(label="tester")
+    field = settings.get_by_label("port", exact=True)
+    scenes = await field.input_value()
+    await field.fill("1502")
+    await field.press("Enter")
+    replaced = await work.told("OverrideUpdated")
+    assert (replaced.change_type, replaced.parent_id) == (ChangeType.ADD, work.object("tester"))
+    assert (replaced.data.name, replaced.data.value) == ("port", "1502")
+    await settings.get_by_text(f"instead of {scenes} in the scene").wait_for()
+    await settings.get_by_role("button", name="port as in the scene").click()
+    assert (await work.told("OverrideUpdated")).change_type is ChangeType.REMOVE
+    await expect(field).to_have_value(scenes)
+
+
 async def test_start_stands_where_somebody_puts_it_for_all(work: Work) -> None:
     page = work.screen.page
     await work.mode("3D")

@@ -7,9 +7,10 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, expect
 
+from arcor2_hw.data import rpc
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.data.project import ActionParameter
-from tests.e2e.harness import Cell
+from tests.e2e.harness import Cell, until
 from tests.editor.programming import Work, at_work
 from tests.editor.screen import screen_of
 
@@ -29,6 +30,11 @@ async def state(work: Work, wanted: PackageStateEnum) -> None:
     await work.told("PackageState", lambda event: event.data.state is wanted)
 
 
+async def is_broken_at(work: Work, *ids: str) -> bool:
+    kept = await work.client.call("GetBreakpoints", rpc.GetBreakpointsArgs(work.project.id))
+    return list(kept.ids) == list(ids)
+
+
 async def test_runs_to_an_action_in_two_taps_steps_and_tells_where_it_failed(work: Work, browser: Browser) -> None:
     """U-08. The reader has no code in front of it: scanning fails, which is what somebody has to understand."""
     screen, page = work.screen, work.screen.page
@@ -41,7 +47,7 @@ async def test_runs_to_an_action_in_two_taps_steps_and_tells_where_it_failed(wor
     bar = page.get_by_role("group", name="The program")
     await bar.get_by_text("before scan").wait_for(timeout=BEGUN)
     await state(work, PackageStateEnum.PAUSED)
-    assert (await work.told("BreakpointsChanged")).data.ids == [scan]
+    await until(lambda: is_broken_at(work, scan), "the breakpoint is everybody's")
     assert await page.evaluate("__engine.view.camera.position.toArray()") == looked_from, "the view stays where it was"
     await work.tool("Run")
     trace = work.panel.get_by_role("region", name="What it has done")
@@ -60,9 +66,8 @@ async def test_runs_to_an_action_in_two_taps_steps_and_tells_where_it_failed(wor
         seen = other.page.get_by_role("complementary")
         await seen.get_by_role("button", name="more_boards").wait_for()
         await seen.get_by_role("button", name="Do not pause at scan").wait_for()
-        # The breakpoint is everybody's.
         await seen.get_by_role("button", name="Do not pause at scan").click()
-        assert (await work.told("BreakpointsChanged")).data.ids == []
+        await until(lambda: is_broken_at(work), "it is gone for everybody")
     await expect(work.panel.get_by_role("button", name="Do not pause at scan")).to_have_count(0)
 
     await work.tap_button("One action", bar)
@@ -109,11 +114,22 @@ async def test_one_action_is_tried_with_its_result_and_another_is_cancelled(work
     outcome = work.panel.get_by_role("status").filter(has_text="Done")
     await expect(outcome).to_contain_text("is_there")
     await expect(outcome).to_contain_text("no")
-    long = await work.add("wait_long", "flow/wait", "fixture", seconds=ActionParameter("seconds", "double", "30.0"))
+    await work.add("wait_long", "flow/wait", "fixture", seconds=ActionParameter("seconds", "double", "30.0"))
     await work.select("wait_long")
     await work.tap_button("Try it", work.panel)
     await work.tap_button("Cancel", work.panel)
     await work.told("ActionCancelled")
-    ended: Any = (await work.told("ActionResult", lambda event: event.data.action_id == long)).data
-    assert ended.error
     await work.panel.get_by_role("button", name="Try it").wait_for()
+
+
+async def test_a_package_is_built_under_the_name_that_is_proposed(work: Work) -> None:
+    """F-01: what is not saved is saved first, and that stands on the button."""
+    await work.add("late", "flow/finish", "bad")
+    await work.tool("Run")
+    await work.tap_button("Build…", work.panel)
+    dialog = work.screen.page.get_by_role("dialog")
+    await expect(dialog.get_by_label("Name")).to_have_value(work.project.name)
+    await dialog.get_by_role("button", name="Save and build").click()
+    await work.screen.sees(f"The package {work.project.name} is built.")
+    (package,) = await work.client.call("ListPackages")
+    assert package.package_meta.name == work.project.name
