@@ -77,19 +77,29 @@ async def tool(screen: Screen, name: str) -> None:
 
 
 async def handle(screen: Screen, name: str) -> tuple[float, float]:
-    """Where a handle of the gizmo is on the page."""
-    # The panel that came with the selection has made the view narrower: wait until all stands still.
-    at = await screen.until(
-        """name => {
-            const at = window.__engine?.gizmo.places()[name], last = window.lastAt;
-            window.lastAt = at;
-            return at && last && Math.hypot(at.x - last.x, at.y - last.y) < 0.01 && at;
-        }""",
-        name,
-    )
-    box = await screen.page.locator(".view canvas").bounding_box()
-    assert box is not None
-    return box["x"] + at["x"], box["y"] + at["y"]
+    """Move the pointer to a handle of the gizmo, and give where that is on the page.
+
+    The panel that comes with a selection makes the view narrower, a frame later: it is there when the handle is lit
+    below the pointer, twice.
+    """
+    lit = 0
+
+    async def is_lit() -> bool:
+        nonlocal lit
+        at = await screen.until("name => window.__engine?.gizmo.places()[name]", name)
+        box = await screen.page.locator(".view canvas").bounding_box()
+        assert box is not None
+        found.append((box["x"] + at["x"], box["y"] + at["y"]))
+        await screen.page.mouse.move(found[-1][0] + 1, found[-1][1])
+        await screen.page.mouse.move(*found[-1])
+        await screen.settle()
+        cursor = await screen.page.locator(".view canvas").evaluate("canvas => canvas.style.cursor")
+        lit = lit + 1 if cursor == "grab" and found[-1] == found[max(0, len(found) - 2)] else 0
+        return lit >= 2
+
+    found: list[tuple[float, float]] = []
+    await until(is_lit, f"the handle {name} is lit", 20)
+    return found[-1]
 
 
 async def chosen(screen: Screen, item: str) -> None:
@@ -236,7 +246,7 @@ async def _same(opened: Open, start: Pose) -> bool:
 async def test_shapes_are_added_by_one_tap_sized_copied_and_removed(opened: Open, browser: Browser) -> None:
     client = opened.client
     async with screen_of(browser, opened.cell.url) as screen:
-        await screen.join("Eva")
+        await screen.join("Ida")  # whose number pad is as it comes
         await screen.item(opened.scene.objects[0].id)
         await tool(screen, "Add")
         await screen.press("Cylinder")
@@ -290,7 +300,7 @@ async def test_shapes_are_added_by_one_tap_sized_copied_and_removed(opened: Open
         await panel.get_by_text("Hide it, and aim through it").click()
         tester = await opened.object("tester_b")
         await screen.until("id => window.__engine.item(id)?.visible === false", tester.id)
-        kept = await client.call("GetViewState", rpc.GetViewStateArgs(ViewScope.USER, opened.scene.id, "Eva"))
+        kept = await client.call("GetViewState", rpc.GetViewStateArgs(ViewScope.USER, opened.scene.id, "Ida"))
         assert kept.values["blocklist"] == [tester.id]
 
 
