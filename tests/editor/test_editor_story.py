@@ -1,0 +1,179 @@
+"""What a new user does on a first day, in one go, on the demo workplace: from joining to a cable that is pulled."""
+
+import asyncio
+import re
+import time
+from collections.abc import AsyncIterator
+from typing import Any
+
+import pytest
+import pytest_asyncio
+from playwright.async_api import Browser, Locator, expect
+
+from tests.demo.running import Run, demo
+from tests.e2e.harness import until
+from tests.editor.screen import Screen, screen_of
+
+pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(400), pytest.mark.alone]
+
+SLOWLY = "0.05"
+GOOD = 3
+"""A seed whose board is good: the arm ends where nothing is beside it."""
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def workplace(tmp_path_factory: pytest.TempPathFactory, built_editor: object) -> AsyncIterator[Run]:
+    """`make run`, when its program has ended and it goes on serving."""
+    async with demo(tmp_path_factory.mktemp("demo"), "--boards", "1", "--seed", str(GOOD)) as run:
+        await until(lambda: "serving at" in run.output or run.process.returncode is not None, "the cycle to end", 200)
+        assert run.at() is not None, run.output
+        yield run
+
+
+class User:
+    def __init__(self, screen: Screen, workplace: Run) -> None:
+        self.screen, self.page, self.workplace = screen, screen.page, workplace
+
+    @property
+    def panel(self) -> Locator:
+        return self.page.get_by_role("complementary")
+
+    async def tool(self, name: str) -> None:
+        await self.page.get_by_role("navigation").get_by_role("button", name=name, exact=True).click()
+        await self.panel.get_by_role("heading", name=name, exact=True).wait_for()
+
+    async def mode(self, name: str) -> None:
+        await self.page.get_by_role("radio", name=re.compile(rf"^{name}( \d+)?$")).click()
+
+    async def title(self) -> str:
+        return await self.panel.get_by_role("heading", level=2).inner_text()
+
+    async def robot(self) -> dict[str, Any]:
+        truth: dict[str, Any] = await self.workplace.tell("robot", "truth")
+        return truth
+
+    async def moving(self) -> bool:
+        return bool((await self.robot())["moving"])
+
+    async def resting(self) -> bool:
+        return not await self.moving()
+
+    async def at_height(self, of: float) -> bool:
+        height: float = (await self.robot())["tcp_pose"][2]
+        return abs(height - of) < 1e-3
+
+    async def online(self) -> None:
+        await self.screen.press("Go online")
+        await self.page.get_by_role("button", name="Stop motion").wait_for(timeout=40_000)
+
+    async def add_action(self, offer: str) -> str:
+        """Add an action to the selected point; gives what it is called."""
+        await self.tool("Program")
+        await self.mode("Add")
+        await self.panel.get_by_role("radio", name=re.compile("^On ")).click()
+        await self.panel.get_by_role("region", name="robot", exact=True).get_by_role("button", name=offer).first.click()
+        await self.panel.get_by_role("region", name="What it is told").wait_for()
+        return await self.title()
+
+
+async def test_the_first_day(workplace: Run, browser: Browser) -> None:
+    at = workplace.at()
+    assert at is not None
+    async with screen_of(browser, at["url"], touch=True) as screen:
+        user = User(screen, workplace)
+        page = screen.page
+
+        # Join; see the cell move.
+        await screen.join("Newcomer")
+        # What the demo has left open is closed first.
+        shows = "() => document.querySelector('.home') ? 'home' : window.__engine?.frames > 0 && 'workplace'"
+        if await screen.until(shows) == "workplace":
+            await screen.press("Close, and go to the lists")
+        await page.get_by_role("radio", name="Projects").click()
+        await screen.press("New project")
+        await page.get_by_role("dialog").get_by_label("Name").fill("First day")
+        await screen.press("Make and open")
+        await user.online()
+        await user.tool("Robot")
+        await user.panel.get_by_role("radiogroup", name="Step, mm").get_by_text("100", exact=True).click()
+        taught = (await user.robot())["tcp_pose"][2]
+
+        # A point from the robot: one tap; then away from it, on the screen as in the cell.
+        await user.tool("Points")
+        await screen.press("Where the robot is")
+        await user.panel.get_by_role("region", name="Orientations").wait_for()
+        point = await user.title()
+        await user.tool("Robot")
+        await screen.press("Move along +Z")
+        await until(lambda: user.at_height(taught + 0.1), "the arm is 100 mm higher", 20)
+        shown = """z => __engine.ids().map((id) => __engine.item(id)).some(({ kind, endEffectors }) =>
+            kind === "robot" && endEffectors?.some((tool) => Math.abs(tool.position.z - z) < 0.3))"""
+        await screen.until(shown, taught + 0.1)
+
+        # Two actions and a branch.
+        await page.get_by_role("radio", name="3D", exact=True).click()
+        await user.tool("Things")
+        await page.get_by_role("option", name=f"{point} Action point").click()
+        move = await user.add_action("move Move the TCP to a pose.")
+        speed = user.panel.get_by_label("speed", exact=True)
+        await speed.fill(SLOWLY)
+        await speed.press("Enter")
+        check = await user.add_action("get digital input")
+        number = user.panel.get_by_label("number", exact=True)
+        await number.fill("1")
+        await number.press("Enter")
+        await screen.press("Close the panel")
+        await user.mode("Flow")
+        graph = page.get_by_role("region", name="The program as a graph")
+
+        async def step(way: str, to: str) -> None:
+            await graph.get_by_role("button", name=way, exact=True).click()
+            await graph.locator(f'.react-flow__node[aria-label^="{to}"] .flow-name').click()
+
+        await step("Start: next", check)
+        await step(f"{check}: no", move)
+        await step(f"{check}: yes", "End")
+        await step(f"{move}: next", "End")
+
+        # Run with a breakpoint; stop the arm in mid-move.
+        await graph.locator(f'.react-flow__node[aria-label^="{move}"] .flow-name').click()
+        await user.panel.get_by_role("button", name="Pause before it").click()
+        await user.mode("3D")
+        await user.tool("Run")
+        await screen.press("Save and run")
+        bar = page.get_by_role("group", name="The program")
+        await expect(bar).to_contain_text(f"before {move}", timeout=60_000)
+        await screen.picture("story paused")
+        await bar.get_by_role("button", name="Go on").click()
+        await until(user.moving, "the arm moves")
+        tapped = time.monotonic()
+        await page.get_by_role("button", name="Stop motion").click()
+        await until(user.resting, "the arm rests", 2)
+        assert time.monotonic() - tapped < 2
+        assert (await user.robot())["tcp_pose"][2] > taught + 0.005, "it had come to the end"
+        await expect(bar).to_be_hidden(timeout=20_000)
+        still = (await user.robot())["q"]
+
+        # A delete is taken back.
+        await user.tool("Things")
+        await page.get_by_role("option", name=f"{move} Action").click()
+        await user.panel.get_by_role("button", name="Remove", exact=True).click()
+        undo = page.get_by_role("button", name=re.compile(f"^Undo .*{move}"))
+        await undo.click()
+        await user.tool("Things")
+        await page.get_by_role("option", name=f"{move} Action").wait_for()
+
+        # A cable is pulled: it says which device, in words, and what can be done.
+        if await page.get_by_role("button", name="Go online").is_visible():
+            await user.online()
+        await user.tool("Devices")
+        row = user.panel.get_by_role("listitem").filter(has_text="robot").filter(has_text="online")
+        await row.wait_for()
+        await workplace.tell("robot", "silence")
+        lost = user.panel.get_by_role("listitem").filter(has_text="connection lost")
+        await expect(lost).to_contain_text("robot", timeout=30_000)
+        await screen.picture("story cable")
+        await workplace.tell("robot", "heal")
+        await user.panel.get_by_role("listitem").filter(has_text="robot").filter(has_text="online").wait_for()
+        await asyncio.sleep(0.3)
+        assert (await user.robot())["q"] == pytest.approx(still, abs=1e-3), "it moved by itself"
