@@ -21,7 +21,9 @@ function Panel() {
   const live = useEditor((state) => state.live);
   const doc = useEditor((state) => state.doc);
   const cannot = useEditor((state) => barred(state, "RetryObject"));
-  const objects = Object.values(doc?.objects ?? {}).sort((a, b) => a.name.localeCompare(b.name));
+  const troubled = (id: string) => live.objects[id]?.state === "failed" || live.objects[id]?.state === "lost";
+  // What is in trouble stands first.
+  const objects = Object.values(doc?.objects ?? {}).sort((a, b) => Number(troubled(b.id)) - Number(troubled(a.id)) || a.name.localeCompare(b.name));
   return (
     <>
       {live.state === "stopped" && <p className="quiet">The workplace is offline. {live.message}</p>}
