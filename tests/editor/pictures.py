@@ -1,0 +1,109 @@
+"""Takes the pictures of the documentation anew, from the demo workplace in a fixed state.
+
+`python -m tests.editor.pictures [DIRECTORY]` writes `editor-*.png` into docs/pictures, or where it is told.
+"""
+
+import asyncio
+import re
+import sys
+import tempfile
+from pathlib import Path
+from typing import Final
+
+from playwright.async_api import Browser
+
+from tests.demo.running import Run, demo
+from tests.e2e.harness import until
+from tests.editor.screen import Screen, running_browser, screen_of
+
+SEED: Final = 3
+
+
+async def _come_in(screen: Screen) -> None:
+    await screen.page.goto(f"{screen.url}/?q=high")
+    await screen.page.get_by_label("Your name").fill("Ada")
+    await screen.press("Join")
+    shows = "() => document.querySelector('.home') ? 'home' : window.__engine?.ids().length > 20 && 'workplace'"
+    if await screen.until(shows) == "home":
+        await screen.page.get_by_role("radio", name="Projects").click()
+        await screen.page.get_by_role("button", name=re.compile("^Open ")).first.click()
+        await screen.until("() => window.__engine?.ids().length > 20")
+
+
+async def _rest(screen: Screen) -> None:
+    """Wait until everything is loaded and nothing is drawn any more."""
+    await screen.until(
+        """() => {
+            const now = performance.now(), last = window.lastDrawn;
+            const frames = window.__engine?.frames ?? 0;
+            if (last?.frames !== frames) window.lastDrawn = { frames, since: now };
+            return last?.frames === frames && now - last.since > 1200;
+        }"""
+    )
+
+
+async def _tablet(browser: Browser, run: Run, to: Path) -> None:
+    at = run.at()
+    assert at is not None
+    async with screen_of(browser, at["url"]) as screen:
+        page = screen.page
+
+        async def take(name: str) -> None:
+            await _rest(screen)
+            (to / f"editor-{name}.png").write_bytes(await page.screenshot())
+
+        await _come_in(screen)
+        await screen.press("Go online")
+        await page.get_by_role("button", name="Stop motion").wait_for(timeout=60_000)
+        await screen.until("() => __engine.ids().some((id) => __engine.item(id).endEffectors?.length)")
+        await take("workplace")
+        tools = page.get_by_role("navigation")
+        await tools.get_by_role("button", name="Robot", exact=True).click()
+        await page.get_by_role("complementary").get_by_text("Hold to move").wait_for()
+        await take("teach")
+        await page.get_by_role("radio", name="Both", exact=True).click()
+        await tools.get_by_role("button", name="Program", exact=True).click()
+        await page.get_by_role("region", name="The program as a graph").wait_for()
+        await take("program")
+
+
+async def _lists(browser: Browser, run: Run, to: Path) -> None:
+    at = run.at()
+    assert at is not None
+    async with screen_of(browser, at["url"]) as screen:
+        await _come_in(screen)
+        await screen.page.get_by_role("button", name="Online. Press to go offline").click()
+        await screen.page.get_by_role("button", name="Go online").wait_for()
+        await screen.press("Close, and go to the lists")
+        await screen.page.get_by_role("radio", name="Projects").click()
+        await screen.page.get_by_role("button", name=re.compile("^Open ")).first.wait_for()
+        await screen.settle()
+        (to / "editor-home.png").write_bytes(await screen.page.screenshot())
+
+
+async def _phone(browser: Browser, run: Run, to: Path) -> None:
+    at = run.at()
+    assert at is not None
+    async with screen_of(browser, at["url"], "phone", dark=True, touch=True) as screen:
+        await screen.join("Ben")
+        await screen.until("() => window.__engine?.ids().length > 20")
+        tools = screen.page.get_by_role("navigation")
+        await tools.get_by_role("button", name="Points", exact=True).click()
+        await _rest(screen)
+        (to / "editor-phone.png").write_bytes(await screen.page.screenshot())
+
+
+async def main(to: Path) -> None:
+    """Bring up the demo, wait until its program has run, take the pictures."""
+    to.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix="arcor2-hw-pictures-") as name:
+        async with demo(Path(name), "--boards", "1", "--seed", str(SEED)) as run, running_browser() as browser:
+            await until(lambda: "serving at" in run.output, "the demo to serve", 240)
+            await _tablet(browser, run, to)
+            await _phone(browser, run, to)
+            await _lists(browser, run, to)
+
+
+if __name__ == "__main__":
+    pictures = Path(__file__).resolve().parents[2] / "docs" / "pictures"
+    asyncio.run(main(Path(sys.argv[1]) if len(sys.argv) > 1 else pictures))
