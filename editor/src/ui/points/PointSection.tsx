@@ -38,7 +38,7 @@ const PointSection: Section["Body"] = ({ selection: { id } }) => {
           Put it where the robot is
         </Button>
         <HoldButton
-          label="Hold, move the arm by hand, and let go: the point is put there"
+          label="Hold: by hand. Move the arm, and let go: the point is put there"
           why={why || noRobot || byHand}
           onHold={() => holdHandTeaching(chosen?.robotId ?? "", chosen?.armId || undefined)}
           onOver={(reason) => void ask(reason || !chosen ? Promise.resolve(reason) : movePointToRobot(id, chosen))}

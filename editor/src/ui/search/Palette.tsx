@@ -35,7 +35,8 @@ export default function Palette({ onClose }: { onClose: () => void }) {
           <Label className="hidden-but-read">Find</Label>
           <Input placeholder="Type a part of its name" />
         </SearchField>
-        <ListBox aria-label="Found" className="found" items={shown} selectionMode="none" onAction={(key) => choose(String(key))} renderEmptyState={() => <p className="quiet">Nothing is called that.</p>}>
+        <div className="found" tabIndex={0} role="group" aria-label="What was found">
+          <ListBox aria-label="Found" items={shown} selectionMode="none" onAction={(key) => choose(String(key))} renderEmptyState={() => <p className="quiet">Nothing is called that.</p>}>
           {(entry) => (
             <ListBoxItem id={entry.id} textValue={entry.words} className="found-entry">
               <span>{entry.words}</span>
@@ -43,6 +44,7 @@ export default function Palette({ onClose }: { onClose: () => void }) {
             </ListBoxItem>
           )}
         </ListBox>
+        </div>
       </Autocomplete>
     </Window>
   );
