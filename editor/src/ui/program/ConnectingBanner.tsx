@@ -6,7 +6,7 @@ import { now, useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 import { nameOf } from "../names";
 
-export function ConnectingBanner() {
+export default function ConnectingBanner() {
   const connecting = useEditor((state) => state.ui.connecting);
   useEffect(() => {
     if (!connecting) return;

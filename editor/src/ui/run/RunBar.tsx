@@ -2,7 +2,6 @@
 
 import { barred } from "../../commands/asking";
 import * as commands from "../../commands/run";
-import { isRunning } from "../../store/selectors";
 import { useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 import { nameOf } from "../names";
@@ -18,12 +17,7 @@ export const STATES: Record<string, string> = {
   undefined: "Has not run",
 };
 
-export function RunBar() {
-  const runs = useEditor(isRunning);
-  return runs ? <Controls /> : null;
-}
-
-function Controls() {
+export default function RunBar() {
   const state = useEditor((each) => each);
   const { state: phase, running } = state.program;
   const at = running.map((id) => nameOf(state, id)).filter(Boolean);

@@ -2,23 +2,26 @@
 
 import { Suspense } from "react";
 import { ToggleButton, ToggleButtonGroup } from "react-aria-components";
+import { isRunning } from "../../store/selectors";
 import type { Mode } from "../../store/state";
 import { setUi, useEditor } from "../../store/store";
 import { Waiting } from "../kit/kit";
 import { lazily } from "../kit/lazily";
-import { ConnectingBanner } from "../program/ConnectingBanner";
-import { RunBar } from "../run/RunBar";
 import { View3D } from "./View3D";
 import "../run/run.css";
 import "./centre.css";
 
 const RobotChip = lazily(() => import("../robot/RobotChip"));
 const FlowView = lazily(() => import("../flow/FlowView"));
+const ConnectingBanner = lazily(() => import("../program/ConnectingBanner"));
+const RunBar = lazily(() => import("../run/RunBar"));
 const CodeView = lazily(() => import("../code/CodeView"));
 const WORDS: Record<Mode, string> = { "3d": "3D", flow: "Flow", split: "Both", code: "Code" };
 
 export function Centre() {
   const project = useEditor((state) => state.doc?.project);
+  const running = useEditor(isRunning);
+  const connecting = useEditor((state) => state.ui.connecting !== null);
   const chosen = useEditor((state) => state.ui.mode);
   const modes: Mode[] = project?.has_logic ? ["3d", "flow", "split", "code"] : ["3d", "code"];
   const mode = project && modes.includes(chosen) ? chosen : "3d";
@@ -48,8 +51,10 @@ export function Centre() {
         <Suspense fallback={null}>
           <RobotChip />
         </Suspense>
-        <RunBar />
-        <ConnectingBanner />
+        <Suspense fallback={null}>
+          {running && <RunBar />}
+          {connecting && <ConnectingBanner />}
+        </Suspense>
       </div>
     </div>
   );

@@ -2,8 +2,6 @@
 
 import { Suspense, useEffect, useRef, useState } from "react";
 import type { Engine, Quality } from "../../engine/engine";
-import { endStep } from "../../commands/program";
-import { dragPucks } from "../../session/puckDrag";
 import { readShown } from "../../session/assets";
 import { setEngine } from "../../session/engine";
 import { tapTaken } from "../../session/taps";
@@ -46,7 +44,7 @@ export function View3D() {
         const state = now();
         if (state.ui.connecting) {
           const target = hits.find((hit) => ["action", "terminal"].includes(selectionOf(state, hit.id)?.kind ?? ""));
-          if (target) void endStep(target.id);
+          if (target) void import("../../commands/program").then(({ endStep }) => endStep(target.id));
           return;
         }
         const found = hits.map((hit) => selectionOf(state, hit.id)).filter((each) => each !== null);
@@ -58,7 +56,11 @@ export function View3D() {
       };
       shown.show(maker.items(now()));
       shown.focus();
-      const noDrags = dragPucks(shown, canvas.current);
+      let noDrags = () => {};
+      const pane = canvas.current;
+      void persistently(() => import("../../session/puckDrag")).then(({ dragPucks }) => {
+        if (!ended) noDrags = dragPucks(shown, pane);
+      });
       const unsubscribe = store.subscribe((state, before) => {
         shown.show(maker.items(state));
         if (state.doc && state.doc.scene.id !== before.doc?.scene.id) shown.focus();
