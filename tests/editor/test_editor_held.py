@@ -120,7 +120,7 @@ async def test_a_server_that_dies_ends_it_and_when_it_is_back_nothing_moves(
     online: Client, cell: Cell, browser: Browser
 ) -> None:
     async with screen_of(browser, cell.url) as screen:
-        screen.expected_errors = ("WebSocket connection to", "ERR_CONNECTION_REFUSED")
+        screen.expected_errors = ("WebSocket connection to", "net::ERR_CONNECTION_")
         await panel(screen)
         await hold(screen, cell)
         port = urlsplit(cell.url).port
