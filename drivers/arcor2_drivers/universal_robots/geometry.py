@@ -28,7 +28,7 @@ UR5E: Final = Dimensions(0.1625, -0.425, -0.3922, 0.1333, 0.0997, 0.0996)
 UR10E: Final = Dimensions(0.1807, -0.6127, -0.57155, 0.17415, 0.11985, 0.11655)
 
 
-def _flange(arm: Dimensions, q: list[float]) -> Pose:
+def flange(arm: Dimensions, q: list[float]) -> Pose:
     """Give the flange in the controller's base for six joint values, rad."""
     quarter = math.pi / 2.0
     links = (
@@ -49,4 +49,4 @@ def _flange(arm: Dimensions, q: list[float]) -> Pose:
 def tcp_speed(arm: Dimensions, q: list[float], rates: list[float], tcp: Pose) -> float:
     """Give the speed of a TCP (pose in the flange), m/s, at joint values q (rad) and rates (rad/s)."""
     there = [value + STEP * rate for value, rate in zip(q, rates, strict=True)]
-    return (_flange(arm, q) * tcp).position.distance_to((_flange(arm, there) * tcp).position) / STEP
+    return (flange(arm, q) * tcp).position.distance_to((flange(arm, there) * tcp).position) / STEP

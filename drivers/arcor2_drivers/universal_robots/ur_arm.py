@@ -25,6 +25,7 @@ from arcor2_hw.exceptions import (
 from .arrival import at_joints, at_pose
 from .control import ControlSession
 from .frames import from_vector, to_vector, world_from_base
+from .geometry import flange
 from .observer import Sample
 from .program import Tool
 from .session_times import POLL, REST_WITHIN, STANDING, TAKE_TIMEOUT
@@ -35,6 +36,11 @@ from .ur_observed import JOINTS, UrObserved
 
 LOWER_ONLY: Final = ((5, 23), (10, 0))
 """From these versions on, ur_rtde 1.6.5 told to use the upper registers sends a program that does, but does not."""
+
+SAME_TOOL: Final = (0.005, 0.02)
+"""m and rad: by how much less the nominal model differs from the controller's TCP when both have the same tool."""
+TOLD_WITHIN: Final = 0.2
+"""Seconds for a sample that knows the tool; the stream's own watch tells when none comes at all."""
 
 log = logging.getLogger(__name__)
 
@@ -95,6 +101,7 @@ class UrArm(UrObserved):
         session.open(TAKE_TIMEOUT, self._has_dashboard)
         try:
             self._tell_tool(session, self.tool())
+            self._await_samples()
         except BaseException:
             session.end(NotInControl(f"control of {self.name} was not taken"))
             raise
@@ -154,6 +161,12 @@ class UrArm(UrObserved):
             raise Refused(f"{self.name}: payload_mass is not set; state the mass at the flange first")
         return self._tool
 
+    def _await_samples(self) -> None:
+        """Wait for two samples more: the second was taken after now, and so with the tool that was told."""
+        wanted, deadline = self.samples_received + 2, time.monotonic() + TOLD_WITHIN
+        while self.samples_received < wanted and time.monotonic() < deadline:
+            time.sleep(0.002)
+
     @staticmethod
     def _tell_tool(session: ControlSession, tool: Tool) -> None:
         session.do("the tool centre point", "setTcp", to_vector(tool.tcp))
@@ -161,6 +174,24 @@ class UrArm(UrObserved):
             session.do("the payload", "setPayload", tool.mass, list(tool.cog))
         else:
             session.do("the payload", "setTargetPayload", tool.mass, list(tool.cog), list(tool.inertia))
+
+    def get_end_effector_pose(self, end_effector: str) -> Pose:
+        """Give the TCP of the settings in the world.
+
+        Until control is taken the controller works with the tool that the pendant has set. Where that is another one,
+        the pose is computed from the joints by the nominal model, which is some millimetres off.
+        Raises NotFound, NotConnected, ConnectionLost, Stale.
+        """
+        self._check_end_effector(end_effector)
+        sample = self._observer.sample()
+        if self._is_ours():
+            return self._world(sample)
+        at = flange(self.dimensions, list(sample.q))
+        ours, theirs = at * self._tool.tcp, from_vector(sample.tcp)
+        same = ours.position.distance_to(theirs.position) < SAME_TOOL[0] and (
+            ours.orientation.angle_to(theirs.orientation) < SAME_TOOL[1]
+        )
+        return self._world(sample) if same else world_from_base(self._pose) * ours
 
     # -------------------------------------------------------------------------------- moving
     def check_if_ready_to_move(self) -> None:

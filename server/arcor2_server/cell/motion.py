@@ -73,6 +73,15 @@ async def require_ready(services: "Services", robot_id: str, feature: str, arm_i
         raise RequestRefused(f"{robot.name} is being moved by hand.")
 
 
+async def take_control(services: "Services", robot_id: str, arm_id: str | None) -> None:
+    """Take control before a goal is computed from where the robot is: with control comes the tool of its settings.
+
+    Raises what the robot refuses with.
+    """
+    if arm_id is None:  # of several arms each has its own tool all the time
+        await services.cell.call(robot_id, "check_if_ready_to_move", control=True)
+
+
 async def move(
     services: "Services", robot_id: str, method: str, arguments: Mapping[str, Any], event: str, told: Told
 ) -> None:

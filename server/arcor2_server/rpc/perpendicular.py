@@ -10,7 +10,7 @@ from arcor2_hw.data.geometry import Orientation, Pose
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.rpc import InverseKinematicsArgs, SetEefPerpendicularToWorldArgs
 from arcor2_server.cell.host import CellError
-from arcor2_server.cell.motion import require_feature, require_ready, require_speed
+from arcor2_server.cell.motion import require_feature, require_ready, require_speed, take_control
 from arcor2_server.rpc.editing import optional
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
 from arcor2_server.rpc.robot import begin_motion, pose_motion, require_robot_online, solve_inverse
@@ -37,6 +37,8 @@ async def set_eef_perpendicular_to_world(context: Context, args: SetEefPerpendic
     await require_ready(services, args.robot_id, "move_to_pose", arm_id)
     for feature in ("inverse_kinematics", "forward_kinematics"):
         require_feature(services, args.robot_id, feature)
+    if not context.dry_run:
+        await take_control(services, args.robot_id, arm_id)
     present = await cell.end_effector_pose(args.robot_id, args.end_effector_id, arm_id)
     target = await _nearest(context, args, present)
     await require_ready(services, args.robot_id, "move_to_pose", arm_id)

@@ -48,6 +48,7 @@ from arcor2_server.cell.motion import (
     require_not_moving,
     require_ready,
     require_speed,
+    take_control,
 )
 from arcor2_server.cell.online import OnlineCell
 from arcor2_server.robot_models import model_of_type
@@ -257,6 +258,8 @@ async def move_to_pose(context: Context, args: MoveToPoseArgs) -> None:
         if isinstance(args.position, Unset) and isinstance(args.orientation, Unset):
             raise RequestRefused("Give a position, an orientation, or both.")
         await require_ready(services, args.robot_id, "move_to_pose", arm_id)
+        if isinstance(args.position, Unset) or isinstance(args.orientation, Unset):
+            await take_control(services, args.robot_id, arm_id)
         present = await services.cell.end_effector_pose(args.robot_id, args.end_effector_id, arm_id)
         target = Pose(
             present.position if isinstance(args.position, Unset) else args.position,
@@ -345,6 +348,8 @@ async def step_robot_eef(context: Context, args: StepRobotEefArgs) -> None:
     services.locks.require_held(context.user, args.robot_id)
     require_speed(args.speed)
     await require_ready(services, args.robot_id, "move_to_pose", arm_id)
+    if not context.dry_run:
+        await take_control(services, args.robot_id, arm_id)
     target = _stepped(
         args, await cell.end_effector_pose(args.robot_id, args.end_effector_id, arm_id), _base(cell, args)
     )

@@ -71,6 +71,20 @@ def stays(fake: FakeUr, seconds: float = 0.6) -> None:
 
 
 # ------------------------------------------------------------------------------------------------ taking control
+def test_the_pose_is_that_of_our_tool_before_control_too(fake: FakeUr) -> None:
+    """Otherwise a goal computed from the pose before the first motion is off by the tool's length."""
+    robot = make(fake.host, tcp_z=0.25, tcp_x=0.02)
+    robot.connect(3.0)
+    try:
+        before = robot.get_end_effector_pose("tcp")
+        robot.take_control()
+        after = robot.get_end_effector_pose("tcp")
+    finally:
+        robot.disconnect()
+    assert before.position.distance_to(after.position) < 1e-3
+    assert before.orientation.angle_to(after.orientation) < 1e-3
+
+
 def test_control_is_taken_and_given_back(robot: UR5e, fake: FakeUr) -> None:
     with pytest.raises(NotInControl, match="not taken"):
         robot.move_to_joints(robot.robot_joints(), 0.5)

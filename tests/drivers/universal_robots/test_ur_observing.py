@@ -149,7 +149,9 @@ def test_the_state_is_told_whole(robot: UR5e, fake: FakeUr) -> None:
 
 def test_poses_are_in_the_world_by_the_place_of_base_link(fake: FakeUr) -> None:
     robot = make(
-        fake.host, Pose(Position(1.0, 0.0, 0.5), Orientation.from_rotation_vector(0.0, 0.0, 1.5707963267948966))
+        fake.host,
+        Pose(Position(1.0, 0.0, 0.5), Orientation.from_rotation_vector(0.0, 0.0, 1.5707963267948966)),
+        tcp_z=0.0,
     )
     robot.connect(3.0)
     try:
