@@ -69,6 +69,14 @@ class Looks:
             self.found[where] = faults
 
 
+async def at_the_project(screen: Screen, name: str, project: Project) -> None:
+    """Come in, and open the project where nobody has."""
+    await screen.join(name)
+    if await screen.until("() => document.querySelector('.home, .workplace')?.className") == "home":
+        await screen.press(f"Open {project.name}")
+    await screen.item(project.action_points[0].id)
+
+
 async def test_joining_and_the_lists(cell: Cell, project: Project, browser: Browser) -> None:
     async with screen_of(browser, cell.url, touch=True) as screen:
         looks = Looks(screen)
@@ -148,8 +156,7 @@ async def test_the_workplace(cell: Cell, project: Project, browser: Browser) -> 
 
 async def test_nothing_moves_for_who_wants_no_motion(cell: Cell, project: Project, browser: Browser) -> None:
     async with screen_of(browser, cell.url, reduced_motion=True) as screen:
-        await screen.join("Berta")
-        await screen.item(project.action_points[0].id)
+        await at_the_project(screen, "Berta", project)
         await screen.press("Things")
         # What turns slowly while something is awaited stays.
         running = """() => document.getAnimations()
@@ -161,8 +168,8 @@ async def test_without_the_server(cell: Cell, project: Project, browser: Browser
     """Last: it ends the server."""
     async with screen_of(browser, cell.url, touch=True) as screen:
         screen.expected_errors = ("WebSocket connection to", "net::ERR_CONNECTION_")
-        await screen.join("Cecil")
-        await screen.item(project.action_points[0].id)
+        await at_the_project(screen, "Cecil", project)
+        await screen.page.wait_for_load_state("networkidle")  # all parts of the page are there
         await cell.kill("server")
         await screen.sees("No connection to the server.")
         looks = Looks(screen)
