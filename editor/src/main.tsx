@@ -11,7 +11,11 @@ import "./ui/base.css";
 takeTokenFromAddress();
 // Who has been here before comes in by himself.
 const name = remembered("name");
-if (name) join(name, remembered("token"));
+if (name) {
+  join(name, remembered("token"));
+  // Most probably something is open: the view is loaded while the server is asked.
+  import("./engine/engine").catch(() => {});
+}
 const root = document.getElementById("root");
 if (root) {
   createRoot(root).render(

@@ -30,5 +30,5 @@ def test_shell_and_3d_view_are_small(built_editor: Path) -> None:
     assert len(sizes) >= 3
     assert sum(sizes.values()) <= MOST, sizes
     # What few need comes only to them.
-    assert not needed(manifest, "src/engine/loaders/mesh.ts") <= files
+    assert not needed(manifest, "src/engine/loaders/urdf.ts") <= files
     assert not needed(manifest, "src/ui/kit/menu.tsx") <= files

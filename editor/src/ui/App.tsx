@@ -2,7 +2,6 @@
 
 import { Suspense, useState, useSyncExternalStore } from "react";
 import { useEditor } from "../store/store";
-import { Home } from "./home/Home";
 import { Join } from "./join/Join";
 import { Waiting } from "./kit/kit";
 import { lazily } from "./kit/lazily";
@@ -11,6 +10,8 @@ import { Overlays } from "./search/Overlays";
 import { useScreenSettings } from "./settings/Settings";
 import { Workplace } from "./workplace/Workplace";
 
+/** Screens of which most see one: each is a chunk of its own. */
+const Home = lazily(() => import("./home/Home").then((module) => ({ default: module.Home })));
 const Operator = lazily(() => import("./operator/Operator"));
 
 /** The part of the address behind the hash, which chooses between the editor and the operator's screen. */
@@ -44,7 +45,9 @@ export function App() {
       ) : open ? (
         <Workplace />
       ) : (
-        <Home />
+        <Suspense fallback={<Waiting>Reading the lists…</Waiting>}>
+          <Home />
+        </Suspense>
       )}
       <Overlays />
     </>
