@@ -33,7 +33,7 @@ IDLE_S: Final = 5.0
 EDITS: Final = 60
 STOPS: Final = 10
 RESTARTS: Final = 3
-SLOW: Final = 0.05
+SLOW: Final = 0.02
 """Fraction of the robot's speed."""
 _INSIDE: Final = Path(__file__).with_suffix(".js").read_text()
 
