@@ -191,6 +191,8 @@ class Cell:
         former = self._devices.get(object_id)
         if former is not None and former.failure is None:
             former.fail(NotConnected(f"{former.name} is being connected anew"))
+        if former is not None and former.closed_by is not None:
+            former.closed_by.wait(CLOSE_DEADLINE)  # both would be at the same port
         device = self._make(how)
         self._absent.pop(object_id, None)
         job, deadline = device.open(lambda _: None)

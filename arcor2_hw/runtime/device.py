@@ -100,6 +100,8 @@ class Device:
         self.stop_lane = Lane(self.name, "stop")
         self._watch_lane: Lane | None = None
         self.closing = False
+        self.closed_by: Job | None = None
+        """What closes it after it failed."""
         self.failure: Arcor2Error | None = None
         """Why it did not come up, in a scene that goes on without it."""
 
@@ -148,7 +150,8 @@ class Device:
         """Count as failed from now on; what is there of it is closed beside everything else."""
         self.failure = error
         try:
-            if self.begin_close(lambda _: self.release_lanes()) is None:
+            self.closed_by = self.begin_close(lambda _: self.release_lanes())
+            if self.closed_by is None:
                 self.release_lanes()
         except Arcor2Error:  # both lanes hang
             self.release_lanes()
