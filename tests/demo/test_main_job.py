@@ -64,7 +64,7 @@ class Cell:
 
 async def watch(url: str, results: list[bool]) -> None:
     """An observer that registers nobody and only listens: collects what the script found."""
-    async with Client(url) as client:
+    async with Client(url, reconnect=False) as client:
         tests: set[str] = set()
         async for event in client.events():
             if event.event == "PackageInfo":

@@ -96,13 +96,20 @@ async def test_the_first_day(workplace: Run, browser: Browser) -> None:
         await user.online()
         await user.tool("Robot")
         await user.panel.get_by_role("radiogroup", name="Step, mm").get_by_text("100", exact=True).click()
-        taught = (await user.robot())["tcp_pose"][2]
 
         # A point from the robot: one tap; then away from it, on the screen as in the cell.
         await user.tool("Points")
         await screen.press("Where the robot is")
         await user.panel.get_by_role("region", name="Orientations").wait_for()
         point = await user.title()
+        # Of the tool of the settings, as the controller tells it once control is taken.
+        taught = await screen.until(
+            """() => {
+                const items = window.__engine.ids().map((id) => window.__engine.item(id));
+                const points = items.filter((one) => one.kind === "point");
+                return points.length === 1 && points[0].pose.position.z;
+            }"""
+        )
         await user.tool("Robot")
         await screen.press("Move along +Z")
         await until(lambda: user.at_height(taught + 0.1), "the arm is 100 mm higher", 20)
