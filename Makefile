@@ -19,7 +19,7 @@ run: .make/run .make/editor
 test: .make/dev .make/editor .make/browser
 	$(BIN)/python editor/build.py test
 	$(BIN)/python -m pytest --numprocesses 3 --dist loadgroup -m "not alone" $(ARGS) || test $$? = 5 || \
-	$(BIN)/python -m pytest --last-failed --last-failed-no-failures none -m "not alone" $(ARGS)
+	$(BIN)/python -m pytest --once-more -m "not alone" $(ARGS)
 	$(BIN)/python -m pytest -m alone $(ARGS) || test $$? = 5
 
 bench: .make/dev

@@ -16,6 +16,32 @@ def spec() -> Path:
     return path
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--once-more", action="store_true", help="run what failed last time, with what it goes on from")
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Keep what failed last time; where the tests of a module go on from each other, those before it, too."""
+    if not config.getoption("once_more"):
+        return
+    assert config.cache is not None
+    failed = set(config.cache.get("cache/lastfailed", {}))
+    last = {each.path: place for place, each in enumerate(items) if each.nodeid in failed}
+    kept = [
+        each
+        for place, each in enumerate(items)
+        if each.nodeid in failed or (_goes_on(each) and place < last.get(each.path, 0))
+    ]
+    config.hook.pytest_deselected(items=[each for each in items if each not in kept])
+    items[:] = kept
+
+
+def _goes_on(item: pytest.Item) -> bool:
+    mark = item.get_closest_marker("asyncio")
+    return mark is not None and mark.kwargs.get("loop_scope") == "module"
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     """Keep in one process what shares a fake: a module, or the suite's cases on one bench.

@@ -45,6 +45,8 @@ LOST_WITHIN: Final = 5.0
 """Seconds that a script gets to end when it is stopped because a device is lost, as when somebody stops it."""
 ROOM_WITHIN: Final = 1.0
 """Seconds that an event of the program waits for a server that does not keep up."""
+AHEAD: Final = -5
+"""Niceness that is asked for: who keeps devices alive goes before who shows them."""
 FLUSH: Final = 0.3
 """Seconds for the last messages."""
 
@@ -354,6 +356,8 @@ def main() -> None:
     parser.add_argument("--fd", type=int, required=True, help="the inherited socket to the server")
     options = parser.parse_args()
     faulthandler.enable()
+    with contextlib.suppress(OSError):  # a service needs LimitNICE for it, and a desktop does without
+        os.setpriority(os.PRIO_PROCESS, 0, AHEAD)
     sys.setswitchinterval(0.0005)  # a script that computes must not keep a stop waiting
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):

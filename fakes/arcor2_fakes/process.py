@@ -1,6 +1,7 @@
 """The life of a fake's process: ready line, orderly end on SIGTERM and SIGINT, no survival of the parent."""
 
 import asyncio
+import contextlib
 import logging
 import os
 import signal
@@ -12,6 +13,7 @@ import msgspec
 import uvloop
 
 _PARENT_WATCH_PERIOD = 0.2  # s
+_AHEAD = -10  # niceness that is asked for: a device has a processor of its own
 _PARENT = os.getppid()
 _told_to_end: ContextVar[asyncio.Event] = ContextVar("told_to_end")
 
@@ -37,8 +39,14 @@ async def until_told_to_end() -> None:
         return
 
 
-def run(main: Callable[[], Awaitable[None]], name: str) -> int:
-    """Runs a fake to its end and gives the exit status: 0, or 1 with one line on standard error (a port is taken)."""
+def run(main: Callable[[], Awaitable[None]], name: str, *, ahead: bool = True) -> int:
+    """Runs a fake to its end and gives the exit status: 0, or 1 with one line on standard error (a port is taken).
+
+    `ahead`: it goes before other processes, where we may ask for that; not for one that computes much.
+    """
+    if ahead:
+        with contextlib.suppress(OSError):
+            os.setpriority(os.PRIO_PROCESS, 0, _AHEAD)
     logging.basicConfig(stream=sys.stderr, level=logging.INFO, format=f"{name}: %(message)s")
 
     async def body() -> None:

@@ -8,6 +8,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any, Final
 
+import psutil
 from playwright.async_api import Browser, ConsoleMessage, Error, Page, async_playwright, expect
 
 ARGUMENTS: Final = [
@@ -49,9 +50,13 @@ def chromium() -> str:
 
 
 @asynccontextmanager
-async def running_browser() -> AsyncIterator[Browser]:
+async def running_browser(niceness: int = 0) -> AsyncIterator[Browser]:
+    """Chromium; with a niceness, what it draws in software waits for others that are at work."""
     async with async_playwright() as playwright:
         browser = await playwright.chromium.launch(executable_path=chromium(), args=ARGUMENTS)
+        for each in psutil.Process().children(recursive=True) if niceness else ():
+            if "chrom" in each.name():
+                each.nice(niceness)
         try:
             yield browser
         finally:

@@ -9,6 +9,7 @@ One request a line on standard input, `{"n": 1, "do": "moveL", "args": [...]}`, 
 input the process is gone at once, whatever it is doing, and with it the kicks that the watchdog waits for.
 """
 
+import contextlib
 import json
 import os
 import queue
@@ -44,12 +45,15 @@ SHOWN = 0.02  # s until the next command, a kick, may take the velocity's place 
 RESUMED_WITHIN = 3.0  # s for the control program to play again; it takes 0.1
 BEGINS_WITHIN = 2.0  # s for who asked for control to ask for the first thing, which is a kick
 FIRST_KICKS = 0.01  # s between kicks until then
+AHEAD = -10  # niceness that is asked for: kicks come in time on a busy computer
 OUTPUTS = ("setConfigurableDigitalOut", "setStandardDigitalOut", "setToolDigitalOut")
 
 
 def main() -> None:
     """Open with the arguments of the command line, a JSON object, and serve."""
     answers = os.fdopen(os.dup(1), "w", buffering=1, encoding="utf-8")
+    with contextlib.suppress(OSError):  # as a service it needs LimitNICE for it
+        os.setpriority(os.PRIO_PROCESS, 0, AHEAD)
     os.dup2(2, 1)  # the library writes to standard output as it pleases
     requests: queue.SimpleQueue[str] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(requests,), daemon=True).start()

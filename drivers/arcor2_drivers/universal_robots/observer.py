@@ -33,6 +33,8 @@ STALLED: Final = 0.5
 """Seconds without a new sample after which the connection is given up; the library itself needs 2.5 to notice."""
 FRESH: Final = 0.1
 """Seconds: how old a sample may be by default; 50 samples of an e-series, 12 of a CB3."""
+AWAITED: Final = 0.2
+"""Seconds that one who asks waits for a fresh sample: the process may just not have had its turn."""
 KEPT: Final = 1024
 """Samples in the ring: two seconds."""
 _LOOK: Final = 0.1
@@ -116,16 +118,24 @@ class Observer:
         return self._newest
 
     def sample(self, max_age: float = FRESH) -> Sample:
-        """Give the newest sample. Raises NotConnected, ConnectionLost, or Stale when it is older than asked for."""
+        """Give the newest sample, waiting a moment for one that is fresh.
+
+        Raises NotConnected, ConnectionLost, or Stale when none comes that is as fresh as asked for.
+        """
         newest = self.newest()
         if newest is not None and newest.age <= max_age and self.observing.online:
             return newest
-        self.observing.check()
-        newest = self.newest()  # it may have come, and the connection back with it, since the first look
-        if newest is not None and newest.age <= max_age:
-            return newest
-        if newest is None:
-            raise NotConnected(f"{self.who} has sent no sample yet")
+        until = time.monotonic() + AWAITED
+        while True:
+            self.observing.check()
+            newest = self.newest()  # it may have come, and the connection back with it, since the first look
+            if newest is None:
+                raise NotConnected(f"{self.who} has sent no sample yet")
+            if newest.age <= max_age:
+                return newest
+            if time.monotonic() > until:
+                break
+            time.sleep(self.period)
         raise Stale(f"the newest sample of {self.who} is {newest.age:.2f} s old, {max_age:g} s asked for")
 
     # -------------------------------------------------------------------------------- on the observing thread

@@ -151,7 +151,7 @@ def main(
             wire.close()
             await channel.close()
 
-    return run(body, "oak_d")
+    return run(body, "oak_d", ahead=False)
 
 
 if __name__ == "__main__":

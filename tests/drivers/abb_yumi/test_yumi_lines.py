@@ -139,11 +139,11 @@ def pair() -> Iterator[tuple[ArmLine, socket.socket]]:
 
     def keep_answering() -> None:
         rest = b""
-        while data := kept.recv(4096):
-            *lines, rest = (rest + data).split(b"\n")
-            for each in lines:
-                sequence, code, _ = motion_server.parsed(each.decode())
-                with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError):  # what we did not read when the line was ended is reset
+            while data := kept.recv(4096):
+                *lines, rest = (rest + data).split(b"\n")
+                for each in lines:
+                    sequence, code, _ = motion_server.parsed(each.decode())
                     kept.sendall(motion_server.framed(f"{sequence} {code} 0 0 1"))
 
     answering = threading.Thread(target=keep_answering)

@@ -268,6 +268,8 @@ while True:
     time.sleep(0.03)
 """):
         ur.control.wait_until(lambda t: t["q"][0] > 0.2)
+        if fault == "reset":
+            ur.do("refuse", wire="rtde")  # else it may be back, and kick again, before the watchdog is due
         ur.do(fault, wire="rtde")
         resting = ur.control.wait_until(lambda t: not t["moving"], within=0.5)
         assert resting["q"][0] < 2.0

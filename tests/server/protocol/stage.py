@@ -126,6 +126,14 @@ class Stage:
         person.take()
         return person
 
+    async def spare_host(self) -> None:
+        """Return when the host that stands by is up."""
+        hosts = self.services.cell.hosts
+        hosts.prepare()
+        spare = hosts._spare
+        assert spare is not None
+        await spare
+
     async def close(self) -> None:
         await asyncio.gather(*(person.leave() for person in self._people))
         await self.endpoint.close()

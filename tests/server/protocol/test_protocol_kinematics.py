@@ -35,6 +35,7 @@ async def stage(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Stage
         await opened.place(alice, arm="Arm", dumb="DumbArm", two="TwoArms")
         await add(alice, opened, "ur", "UR5e", BASE, host="127.0.0.99")
         await solve(alice, opened.ids["ur"])  # the worker comes up
+        await opened.spare_host()  # of the module, not of the test in which it happens to come up
         opened.alice = alice  # type: ignore[attr-defined]
         yield opened
 
