@@ -15,7 +15,9 @@ import {
 } from "three";
 import type { Pose } from "../protocol/types";
 import type { Telemetry } from "../store/telemetry";
+import { type Candidate, aimed, middle, targetsOf } from "./aiming";
 import { Batches } from "./batches";
+import { type Bearing, bearing } from "./bearing";
 import { View } from "./camera";
 import { DropLine, heightWords } from "./drop";
 import { Gizmo } from "./gizmo/gizmo";
@@ -50,6 +52,8 @@ export interface Probe {
   /** Pixels from the view's upper left corner, of where its label would stand; null behind the camera. */
   screen: { x: number; y: number } | null;
   visible: boolean;
+  /** How much is seen through it: 0 opaque, 1 not there. */
+  faint: number;
   badge: string;
   /** Why it is not shown as it looks; empty where it is. */
   problem: string;
@@ -77,6 +81,7 @@ export class Engine {
 
   private readonly renderer: WebGLRenderer;
   private readonly things = new Map<string, Thing>();
+  private readonly watchers = new Set<() => void>();
   private readonly batches: Batches;
   private readonly labels: Labels;
   private readonly context: Context;
@@ -209,6 +214,27 @@ export class Engine {
 
   /** Where a place of the view is on the floor, or on a level above it, m. */
   floor(x: number, y: number, level = 0): Vector3 | null {
+  /** What the cross in the middle of the view may mean, the likeliest first; `before` is what it meant last. */
+  candidates(before = ""): Candidate[] {
+    this.place();
+    const { ray, cone } = middle(this.view.camera, this.height);
+    return aimed(targetsOf(this.things.values()), ray, cone, before);
+  }
+
+  /** Where a thing is in the view, or which way to turn for it; null: it is not shown. */
+  bearing(id: string): Bearing | null {
+    const thing = this.things.get(id);
+    if (!thing || thing.item.faint >= 1) return null;
+    this.place();
+    return bearing(thing.anchor(new Vector3()), this.view.camera, this.width, this.height);
+  }
+
+  /** Be called after each drawn frame; gives what ends that. */
+  watch(by: () => void): () => void {
+    this.watchers.add(by);
+    return () => this.watchers.delete(by);
+  }
+
     return onFloor(x, y, { width: this.width, height: this.height }, this.view.camera, 20, level);
   }
 
@@ -247,6 +273,7 @@ export class Engine {
       visible: thing.root.visible && at.z <= 1 && Math.abs(at.x) <= 1 && Math.abs(at.y) <= 1,
       badge: thing.badge(),
       problem: thing.problem,
+      faint: thing.item.faint,
       triangles: trianglesOf(thing.root, id),
     };
     if (thing instanceof RobotThing) {
@@ -371,6 +398,7 @@ export class Engine {
     if (moving) this.invalidate();
   }
 
+    for (const watcher of this.watchers) watcher();
   /** The line below what is selected, and how high it is. */
   private tellHeight(): void {
     this.notes.clear();

@@ -1,0 +1,30 @@
+/** Where a place is, seen from the view: in it, or which way to turn. */
+
+import { type PerspectiveCamera, Vector3 } from "three";
+
+export interface Bearing {
+  /** Pixels from the view's upper left corner; where it is not in view, on the line there, outside of the view. */
+  x: number;
+  y: number;
+  inView: boolean;
+}
+
+const at = new Vector3();
+
+export function bearing(place: Vector3, camera: PerspectiveCamera, width: number, height: number): Bearing {
+  camera.updateMatrixWorld();
+  at.copy(place).applyMatrix4(camera.matrixWorldInverse);
+  const behind = at.z > -camera.near;
+  // What is behind the camera would be drawn upside down: the way to it is that of its picture on the camera's plane.
+  let [x, y] = [at.x, at.y];
+  if (!behind) {
+    at.applyMatrix4(camera.projectionMatrix);
+    [x, y] = [at.x, at.y];
+  } else {
+    const length = Math.hypot(x, y);
+    // Exactly behind: it is as far to the right as to the left.
+    [x, y] = length < 1e-6 ? [4, 0] : [(4 * x) / length, (4 * y) / length];
+  }
+  const inView = !behind && Math.abs(x) <= 1 && Math.abs(y) <= 1;
+  return { x: ((x + 1) / 2) * width, y: ((1 - y) / 2) * height, inView };
+}
