@@ -79,9 +79,9 @@ export class Engine {
   /** Called after each drawn frame, for what is laid over the view. */
   onFrame: () => void = () => {};
 
+  private readonly watchers = new Set<() => void>();
   private readonly renderer: WebGLRenderer;
   private readonly things = new Map<string, Thing>();
-  private readonly watchers = new Set<() => void>();
   private readonly batches: Batches;
   private readonly labels: Labels;
   private readonly context: Context;
@@ -212,8 +212,6 @@ export class Engine {
     });
   }
 
-  /** Where a place of the view is on the floor, or on a level above it, m. */
-  floor(x: number, y: number, level = 0): Vector3 | null {
   /** What the cross in the middle of the view may mean, the likeliest first; `before` is what it meant last. */
   candidates(before = ""): Candidate[] {
     this.place();
@@ -235,6 +233,8 @@ export class Engine {
     return () => this.watchers.delete(by);
   }
 
+  /** Where a place of the view is on the floor, or on a level above it, m. */
+  floor(x: number, y: number, level = 0): Vector3 | null {
     return onFloor(x, y, { width: this.width, height: this.height }, this.view.camera, 20, level);
   }
 
@@ -271,9 +271,9 @@ export class Engine {
       pose: worldPose(thing.root),
       screen: at.z > 1 ? null : { x: ((at.x + 1) / 2) * this.width, y: ((1 - at.y) / 2) * this.height },
       visible: thing.root.visible && at.z <= 1 && Math.abs(at.x) <= 1 && Math.abs(at.y) <= 1,
+      faint: thing.item.faint,
       badge: thing.badge(),
       problem: thing.problem,
-      faint: thing.item.faint,
       triangles: trianglesOf(thing.root, id),
     };
     if (thing instanceof RobotThing) {
@@ -395,10 +395,10 @@ export class Engine {
     this.frames++;
     this.labels.show(labelsOf(this.things, this.hovered, this.notes), this.view.camera, this.width, this.height);
     this.onFrame();
+    for (const watcher of this.watchers) watcher();
     if (moving) this.invalidate();
   }
 
-    for (const watcher of this.watchers) watcher();
   /** The line below what is selected, and how high it is. */
   private tellHeight(): void {
     this.notes.clear();
