@@ -1,8 +1,9 @@
 """The Execution service: packages, and the one program that runs (protocol, section 12)."""
 
 import asyncio
+import contextlib
 from collections.abc import Coroutine
-from typing import IO, TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import msgspec
 import structlog
@@ -10,7 +11,6 @@ import structlog
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.editor import RunEnd
 from arcor2_hw.data.events import (
-    ChangeType,
     Event,
     MainScreen,
     ObjectStateData,
@@ -20,14 +20,15 @@ from arcor2_hw.data.events import (
     ShowMainScreenData,
 )
 from arcor2_hw.data.operation import ObjectHealthData
-from arcor2_hw.data.package import PackageStateEnum, PackageSummary
-from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.data.package import PackageStateEnum
+from arcor2_hw.exceptions import Arcor2Error, NotFound
 from arcor2_hw.runtime import messages as m
 from arcor2_server.build.versions import check_versions
 from arcor2_server.cell.devices import DeviceBoard, DeviceStatus, overlay_for
 from arcor2_server.cell.host import CellHost
 from arcor2_server.cell.opening import shapes_put_in
-from arcor2_server.packages import Packages
+from arcor2_server.cell.streams import RobotStreams
+from arcor2_server.kept_packages import KeptPackages
 from arcor2_server.rpc.registry import RequestRefused, make_event
 from arcor2_server.runs import How
 
@@ -46,11 +47,11 @@ RUN_STATES: Final = frozenset({S.RUNNING, S.PAUSING, S.PAUSED, S.RESUMING})
 _IDLE: Final = frozenset({S.UNDEFINED, S.STOPPED})
 
 
-class Execution:
+class Execution(KeptPackages):
     """Runs one package at a time, in a cell host of its own. Requests that a state forbids raise RequestRefused."""
 
     def __init__(self, services: "Services") -> None:
-        self.packages = Packages(services.settings.packages_dir)
+        super().__init__(services.hub, services.settings.packages_dir)
         self.state = S.UNDEFINED
         self.package_id = ""
         self.stop_within = STOP_WITHIN
@@ -64,6 +65,8 @@ class Execution:
         self._before: bytes | None = None
         self._exception: ProjectExceptionData | None = None
         self.board = DeviceBoard(services.hub)
+        self.streams = RobotStreams(services.hub, self._say, everybody=True)
+        services.hub.on_leave.append(self.streams.forget)
         self._run_number = 0
         self._stopped_by: str | None = None
         self._shared_of = ""
@@ -96,6 +99,16 @@ class Execution:
         """Give the health of the objects of the running program."""
         return self.board.healths() if self.busy else []
 
+    def streams_of(self, robot_id: str) -> RobotStreams:
+        """Give who is sent what of a robot of the running program. NotFound; RequestRefused while it comes up."""
+        if self._info is None:
+            raise RequestRefused("The devices of the program are not there yet: ask again once PackageInfo has come.")
+        found = self.board.object(robot_id)
+        with contextlib.suppress(NotFound):  # a package may bring a type that is not known here
+            if not self._services.types.derives_from(found.type, "Robot"):
+                raise RequestRefused(f"{found.name} is not a robot.")
+        return self.streams
+
     @property
     def action_in_progress(self) -> bytes | None:
         """Give the ActionStateBefore of the action that runs, or that the program is paused before, as it was sent."""
@@ -120,41 +133,11 @@ class Execution:
         log.info("package", id=self.package_id, state=state.value)
         self._services.hub.broadcast(self._state_event())
 
-    # -------------------------------------------------------------------------------- packages
-    async def list(self) -> list[PackageSummary]:
-        """Give all packages."""
-        return await asyncio.to_thread(self.packages.all)
-
-    async def upload(self, package_id: str, data: str) -> PackageSummary:
-        """Take a package as a zip in base64, in place of one of the same id."""
-        self._require_not_used(package_id)
-        return await asyncio.to_thread(self.packages.upload, package_id, data)
-
-    async def take(self, package_id: str, content: IO[bytes]) -> PackageSummary:
-        """Take a package as a zip, in place of one of the same id."""
-        self._require_not_used(package_id)
-        return await asyncio.to_thread(self.packages.take, package_id, content)
-
-    async def delete(self, package_id: str) -> PackageSummary:
-        """Delete a package that does not run."""
-        self._require_not_used(package_id)
-        return await asyncio.to_thread(self.packages.delete, package_id)
-
-    async def rename(self, package_id: str, name: str) -> PackageSummary:
-        """Give a package another name."""
-        return await asyncio.to_thread(self.packages.rename, package_id, name)
-
-    async def added(self, package_id: str) -> None:
-        """Tell everybody of a package that was written among the others, after the answer that is being given."""
-        summary = await asyncio.to_thread(self.packages.summary, package_id)
-        event = make_event("PackageChanged", summary, ChangeType.ADD)
-        asyncio.get_running_loop().call_soon(self._services.hub.broadcast, event)
-
+    # -------------------------------------------------------------------------------- commands
     def _require_not_used(self, package_id: str) -> None:
         if self.state not in _IDLE and package_id == self.package_id:
             raise RequestRefused("This package is running: stop it first.")
 
-    # -------------------------------------------------------------------------------- commands
     async def run(self, package_id: str, how: How | None = None) -> None:
         """Begin to run a package: `started` is told at once, the rest as it happens."""
         self._require_not_reserved()
@@ -263,6 +246,10 @@ class Execution:
         self._enter(S.RESUMING)
         host.send(m.Step())
 
+    def _say(self, message: m.ToHost) -> None:
+        if self._host is not None:
+            self._host.send(message)
+
     def _breakpoints_changed(self, project_id: str, ids: set[str]) -> None:
         if self._host is not None and self._shared_of == project_id and self.state not in _IDLE:
             self._host.send(m.SetBreakpoints(sorted(ids)))
@@ -295,7 +282,8 @@ class Execution:
         hub = self._services.hub
         match message:
             case m.StreamEvent():
-                hub.stream(message.event, message.object_id, message.encoded)
+                if host is self._host:
+                    self.streams.heard(message)
             case m.ProgramEvent():
                 self._remember(message)
                 hub.broadcast_encoded(message.event, message.encoded)
@@ -359,6 +347,7 @@ class Execution:
     def _ended(self, *, lost: bool = False) -> None:
         self._host = None
         self._note_end(lost)
+        self.streams.clear()
         self.board.clear("" if self.last_error is None else self.last_error.message)
         self._info = self._before = None
         if self._killing is not None:

@@ -11,6 +11,7 @@ from arcor2_hw.data.device import Alarm, Connection, Health
 from arcor2_hw.data.events import ObjectStateData
 from arcor2_hw.data.operation import ObjectHealthData
 from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
+from arcor2_hw.exceptions import NotFound
 from arcor2_hw.runtime.messages import DeviceChanged
 from arcor2_server.hub import Hub
 from arcor2_server.rpc.registry import RequestRefused, make_event
@@ -88,6 +89,12 @@ class DeviceBoard:
         """
         self._objects = {obj.id: obj for obj in objects}
         self._overlaid = overlaid
+
+    def object(self, object_id: str) -> SceneObject:
+        """Give an object of the scene that is shown; NotFound."""
+        if (found := self._objects.get(object_id)) is None:
+            raise NotFound(f"There is no object {object_id!r} in operation.")
+        return found
 
     def changed(self, message: DeviceChanged) -> None:
         """Take what a device says."""

@@ -13,11 +13,15 @@ _KINDS: Final = {"RobotJoints": RobotEventKind.JOINTS, "RobotEef": RobotEventKin
 
 
 class RobotStreams:
-    """The subscriptions; `say` tells the host, where there is one."""
+    """The subscriptions; `say` tells the host, where there is one.
 
-    def __init__(self, hub: Hub, say: Callable[[m.ToHost], None]) -> None:
+    everybody: what comes at the streaming period goes to all, as in the protocol while a program runs.
+    """
+
+    def __init__(self, hub: Hub, say: Callable[[m.ToHost], None], *, everybody: bool = False) -> None:
         self._hub = hub
         self._say = say
+        self._everybody = everybody
         self._subscribers: dict[tuple[str, RobotEventKind], set[Client]] = {}
         self._rates: dict[tuple[str, RobotEventKind], dict[Client, float]] = {}
 
@@ -51,7 +55,7 @@ class RobotStreams:
             clients = {client for client, rate in rates.items() if rate == message.rate}
             stream = f"{message.object_id}/{message.rate:g}"
         else:
-            clients = self._subscribers.get(key, set()) - rates.keys()
+            clients = (self._hub.clients if self._everybody else self._subscribers.get(key, set())) - rates.keys()
             stream = message.object_id
         if clients:
             self._hub.stream(message.event, stream, message.encoded, clients)
@@ -67,7 +71,7 @@ class RobotStreams:
                 self._tell_rates(robot_id)
 
     def clear(self) -> None:
-        """Forget all: the scene is offline."""
+        """Forget all: the scene is offline, or the program over."""
         self._subscribers.clear()
         self._rates.clear()
 

@@ -120,11 +120,18 @@ def _axes(context: Context, args: JogRobotArgs) -> Orientation:
 # ------------------------------------------------------------------------------------------------ streams
 @rpc("StreamRobot")
 async def stream_robot(context: Context, args: StreamRobotArgs) -> None:
-    """Send joints or end effector poses of a robot to this client at a rate of its own, or no longer."""
-    cell = require_robot_online(context, args.robot_id)
+    """Send joints or end effector poses of a robot to this client at a rate of its own, or no longer.
+
+    The robot is one of the scene that is online, or of the program that runs.
+    """
+    execution = context.services.execution
+    if execution.busy:
+        streams = execution.streams_of(args.robot_id)
+    else:
+        streams = require_robot_online(context, args.robot_id).streams
     if args.send and not 1.0 <= args.rate <= FASTEST_STREAM:
         raise RequestRefused(f"The rate must be 1 to {FASTEST_STREAM} Hz, not {args.rate:g}.")
-    cell.streams.at_rate(context.client, args.robot_id, args.what, args.rate, args.send)
+    streams.at_rate(context.client, args.robot_id, args.what, args.rate, args.send)
 
 
 # ------------------------------------------------------------------------------------------------ devices

@@ -1,12 +1,18 @@
 """What the requests about operation answer in every state of the server, and which role each needs."""
 
+import asyncio
+import itertools
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import RPCS
-from tests.server.protocol.stage import Actor, open_stage, refused
+from tests.server.protocol.stage import Actor, happens, open_stage, refused, until
 from tests.server.protocol.test_protocol_states import enter, outcome
+from tests.server.protocol.test_protocol_temporary import project
+from tests.server.session.desk import Refused
 
 HOLD = {"robot_id": "nobody", "hold": 1, "sent_ms": 1.0, "valid_ms": 100}
 ASKED: dict[str, dict[str, Any] | None] = {
@@ -68,3 +74,57 @@ async def test_the_role_that_is_stated_is_asked_for(tmp_path: Path) -> None:
             assert RPCS[name].role is role
             text = await refused(operator, name, **(ASKED[name] or {}))
             assert ("needs the role standard_user" in text) is (role is Role.STANDARD_USER), f"{name}: {text}"
+
+
+def joints(person: Actor) -> list[dict[str, Any]]:
+    return [message["data"] for message in person.waiting if message.get("event") == "RobotJoints"]
+
+
+async def test_a_robot_is_streamed_while_a_program_runs(tmp_path: Path) -> None:
+    async with open_stage(tmp_path, "Arm") as stage:
+        alice, viewer, other = await stage.person("alice"), await stage.person(), await stage.person()
+        await project(stage, alice, arm="Arm")
+        arm, clock = stage.ids["arm"], stage.ids["time"]
+        what = {"robot_id": arm, "what": "joints"}
+        assert "offline" in await refused(viewer, "StreamRobot", **what)
+        await alice.ask("TemporaryPackage")
+        with pytest.raises(Refused, match="not there yet"):
+            await viewer.ask("StreamRobot", **what)
+        await happens(viewer, "ActionStateBefore")
+
+        await viewer.ask("StreamRobot", **what, rate=30)
+        viewer.take(), other.take()
+        await asyncio.sleep(1.0)
+        seen, usual = joints(viewer), joints(other)
+        assert 15 <= len(seen) <= 36
+        assert all("time_ms" in data for data in seen), "it gets the ordinary events too"
+        steps = [after["time_ms"] - before["time_ms"] for before, after in itertools.pairwise(seen)]
+        assert 30.0 <= sum(steps) / len(steps) <= 60.0
+        assert usual, "who asked for nothing gets what the protocol has"
+        assert all("time_ms" not in data for data in usual)
+        await viewer.ask("StreamRobot", **what, send=False)
+        viewer.take()
+        await until(lambda: len(joints(viewer)) > 1)
+        assert "time_ms" not in joints(viewer)[-1]
+        for args, words in (
+            (what | {"send": False}, "not streamed"),
+            (what | {"rate": 31}, "1 to 30 Hz"),
+            (what | {"robot_id": clock}, "not a robot"),
+            (what | {"robot_id": "nobody"}, "nobody"),
+        ):
+            with pytest.raises(Refused, match=words):
+                await viewer.ask("StreamRobot", **args)
+
+        # It ends with the program, and is asked for anew in the next.
+        await viewer.ask("StreamRobot", **what, rate=30)
+        await alice.ask("StopPackage")
+        await happens(viewer, "OpenProject")
+        assert stage.services.execution.streams._rates == {}
+        viewer.take()
+        await alice.ask("TemporaryPackage")
+        await happens(viewer, "ActionStateBefore")
+        viewer.take()
+        await until(lambda: len(joints(viewer)) > 1)
+        assert all("time_ms" not in data for data in joints(viewer))
+        await alice.ask("StopPackage")
+        await happens(alice, "OpenProject")

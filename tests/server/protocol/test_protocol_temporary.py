@@ -26,9 +26,9 @@ def story(actor: Actor) -> list[str]:
     return told
 
 
-async def project(stage: Stage, actor: Actor, *, seconds: str = "0.05") -> str:
-    """Make and save a project that waits again and again; gives the action's id."""
-    await stage.place(actor, time="TimeActions")
+async def project(stage: Stage, actor: Actor, *, seconds: str = "0.05", **more: str) -> str:
+    """Make and save a project that waits again and again, with more objects; gives the action's id."""
+    await stage.place(actor, time="TimeActions", **more)
     await actor.ask("SaveScene")
     scene = stage.services.session.require_scene()
     await actor.ask("NewProject", scene_id=scene.id, name="round")

@@ -1,0 +1,53 @@
+"""Packages as clients bring them in, name them and delete them, while one of them may be running."""
+
+import abc
+import asyncio
+from pathlib import Path
+from typing import IO
+
+from arcor2_hw.data.events import ChangeType
+from arcor2_hw.data.package import PackageSummary
+from arcor2_server.hub import Hub
+from arcor2_server.packages import Packages
+from arcor2_server.rpc.registry import make_event
+
+
+class KeptPackages(abc.ABC):
+    """What may be done with packages on disk; with that which runs, nothing but to give it another name."""
+
+    def __init__(self, hub: Hub, directory: Path) -> None:
+        self.packages = Packages(directory)
+        self._hub = hub
+
+    @abc.abstractmethod
+    def _require_not_used(self, package_id: str) -> None:
+        """Raise RequestRefused for the package that runs."""
+
+    async def list(self) -> list[PackageSummary]:
+        """Give all packages."""
+        return await asyncio.to_thread(self.packages.all)
+
+    async def upload(self, package_id: str, data: str) -> PackageSummary:
+        """Take a package as a zip in base64, in place of one of the same id."""
+        self._require_not_used(package_id)
+        return await asyncio.to_thread(self.packages.upload, package_id, data)
+
+    async def take(self, package_id: str, content: IO[bytes]) -> PackageSummary:
+        """Take a package as a zip, in place of one of the same id."""
+        self._require_not_used(package_id)
+        return await asyncio.to_thread(self.packages.take, package_id, content)
+
+    async def delete(self, package_id: str) -> PackageSummary:
+        """Delete a package that does not run."""
+        self._require_not_used(package_id)
+        return await asyncio.to_thread(self.packages.delete, package_id)
+
+    async def rename(self, package_id: str, name: str) -> PackageSummary:
+        """Give a package another name."""
+        return await asyncio.to_thread(self.packages.rename, package_id, name)
+
+    async def added(self, package_id: str) -> None:
+        """Tell everybody of a package that was written among the others, after the answer that is being given."""
+        summary = await asyncio.to_thread(self.packages.summary, package_id)
+        event = make_event("PackageChanged", summary, ChangeType.ADD)
+        asyncio.get_running_loop().call_soon(self._hub.broadcast, event)
