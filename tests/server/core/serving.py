@@ -42,11 +42,23 @@ class ServerProcess:
                 stderr=log,
                 env=self._environment,
             )
-        assert self._process.stdout is not None
-        async with asyncio.timeout(READY_WITHIN):
-            line = (await self._process.stdout.readline()).decode()
+        try:
+            self.url = await self._ready()
+        except BaseException:  # nobody will stop what has not started
+            if self._process.returncode is None:
+                self._process.kill()
+            await self._process.communicate()
+            raise
+
+    async def _ready(self) -> str:
+        assert self.process.stdout is not None
+        try:
+            async with asyncio.timeout(READY_WITHIN):
+                line = (await self.process.stdout.readline()).decode()
+        except TimeoutError:
+            raise TimeoutError(f"not ready within {READY_WITHIN:g} s; its log: {self.log.read_text()}") from None
         assert line.startswith("ready "), self.log.read_text()
-        self.url = line.split()[1]
+        return line.split()[1]
 
     async def stop(self) -> int:
         if self.process.returncode is None:

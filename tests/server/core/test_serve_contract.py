@@ -14,6 +14,7 @@ import psutil
 import pytest
 
 from arcor2_server.cli.status import ExitStatus
+from tests.server.core import serving
 from tests.server.core.serving import COMMAND, ServerProcess, running, talking
 
 
@@ -53,6 +54,16 @@ async def test_ready_line_and_end(tmp_path: Path, number: signal.Signals) -> Non
         await talker.socket.wait_closed()
         assert talker.socket.close_code == 1012
     assert "Traceback" not in server.log.read_text()
+
+
+async def test_a_server_of_the_tests_that_is_not_ready_in_time_is_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(serving, "READY_WITHIN", 0.01)
+    server = ServerProcess(tmp_path / "data")
+    with pytest.raises(TimeoutError, match="not ready"):
+        await server.start()
+    assert not psutil.pid_exists(server.process.pid)
 
 
 async def test_port_taken(tmp_path: Path) -> None:
