@@ -1,7 +1,9 @@
 """The home screen: lists that follow the server, names where they stand, what a deletion needs, packages as files."""
 
+import asyncio
 from collections.abc import AsyncIterator
 
+import httpx
 import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, expect
@@ -9,7 +11,10 @@ from playwright.async_api import Browser, expect
 from arcor2_hw.client import Client
 from arcor2_hw.data import rpc
 from arcor2_hw.data.editor import ViewScope
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.object_type import Box, Model3dType, ObjectModel
 from arcor2_hw.data.project import Project
+from arcor2_hw.data.rpc import ListScenesData
 from arcor2_hw.data.scene import Scene
 from tests.e2e.harness import Cell, until
 from tests.editor.screen import Screen, screen_of
@@ -163,7 +168,12 @@ async def test_packages_come_live_and_go_as_files(
         await tab(screen, "Packages")
         await screen.sees("No package yet")
         await client.call("OpenProject", rpc.IdArgs(project.id))
-        await client.call("BuildProject", rpc.BuildProjectArgs(project.id, "sorting 1"), timeout=60)
+        # What a colleague builds is under way in the tray of everybody, whichever screen is shown.
+        tray = screen.page.get_by_role("region", name="Tasks and messages")
+        await asyncio.gather(
+            client.call("BuildProject", rpc.BuildProjectArgs(project.id, "sorting 1"), timeout=60),
+            tray.locator(".task").filter(has_text="Building the package sorting 1 · colleague").wait_for(),
+        )
         await client.call("CloseProject")
         await tab(screen, "Packages")
         await screen.page.get_by_role("heading", name="sorting 1").wait_for()
@@ -177,6 +187,7 @@ async def test_packages_come_live_and_go_as_files(
         await screen.page.locator("input[type=file]").set_input_files(
             {"name": "brought.zip", "mimeType": "application/zip", "buffer": content}
         )
+        await tray.locator(".task").filter(has_text="Taking in the package brought").wait_for()
         await screen.sees("brought.zip is taken in.")
         await until(lambda: _packages(client, 2), "the package is there twice")
         await expect(screen.page.locator(".card")).to_have_count(2)
@@ -188,12 +199,112 @@ async def test_packages_come_live_and_go_as_files(
         await until(lambda: _packages(client, 1), "it is deleted")
         await expect(screen.page.locator(".card")).to_have_count(1)
 
+        # It is run from its tile: here to look first. Afterwards the tile says that it has.
+        await more(screen, "sorting 1", "Run, paused at the start")
+        program = screen.page.get_by_role("group", name="The program")
+        await program.get_by_text("Paused").wait_for()
+        await screen.picture("home package paused")
+        await program.get_by_role("button", name="Stop").click()
+        await screen.page.get_by_role("radio", name="Packages").wait_for()
+        await tab(screen, "Packages")
+        await screen.sees("has run just now")
+        (run,) = (await client.call("ListRuns")).runs
+        assert (run.package_name, run.started_by, run.stopped_by) == ("sorting 1", "Eva", "Eva")
+
         # What is no package is refused with the server's sentence, and stays told.
         screen.expected_errors = ("Failed to load resource",)
         await screen.page.locator("input[type=file]").set_input_files(
             {"name": "letter.zip", "mimeType": "application/zip", "buffer": b"no zip at all"}
         )
         await screen.page.get_by_role("alert").wait_for()
+
+
+LAMP = """from arcor2_hw.objects import GenericWithPose
+
+
+class %s(GenericWithPose):
+    \"\"\"A lamp of its own kind.\"\"\"
+
+    _ABSTRACT = False
+"""
+
+
+async def test_what_is_wrong_stands_on_the_tiles_and_is_mended_from_there(
+    made: tuple[Client, Scene, Project], cell: Cell, browser: Browser
+) -> None:
+    client, _, _ = made
+    async with httpx.AsyncClient(base_url=cell.url.replace("ws", "http", 1)) as rest:
+        for kind in ("Lamp", "Torch", "Spare"):
+            source = {"id": kind, "name": kind, "source": LAMP % kind, "description": ""}
+            assert (await rest.put("/object-types", json=source)).status_code == 200
+        await client.call("NewScene", rpc.NewSceneArgs("lamps"))
+        for kind in ("Lamp", "Torch"):
+            await client.call("AddObjectToScene", rpc.AddObjectToSceneArgs(kind.lower(), kind, Pose()))
+        model = ObjectModel(Model3dType.BOX, box=Box("sill", 1.0, 0.2, 0.02))
+        await client.call(
+            "AddVirtualCollisionObjectToScene", rpc.AddVirtualCollisionObjectToSceneArgs("sill", Pose(), model)
+        )
+        await client.call("SaveScene")
+        await until(lambda: _listed(client, "lamps"), "saved")
+        async with screen_of(browser, cell.url) as screen:
+            # A kind that nothing uses goes with what is known of it; of others it is said where they are.
+            await screen.join("Eva")
+            panel = screen.page.get_by_role("complementary")
+            await screen.page.get_by_role("navigation").get_by_role("button", name="Add").click()
+            await panel.get_by_role("button", name="Torch").click()
+            await screen.sees("Used in lamps.")
+            await expect(panel.get_by_role("button", name="Delete this kind")).to_have_attribute(
+                "aria-disabled", "true"
+            )
+            await screen.press("← All kinds")
+            await panel.get_by_role("button", name="Spare").click()
+            await screen.sees("Not used in any saved scene.")
+            await panel.get_by_role("button", name="Delete this kind").click()
+            await screen.press("Delete")
+            await until(lambda: _known(client, "Spare", there=False), "the kind is deleted")
+            await expect(panel.get_by_role("button", name="Spare")).to_have_count(0)
+
+            await client.call("NewProject", rpc.NewProjectArgs((await _listed(client, "lamps")).id, "lighting"))
+            await client.call("SaveProject")
+            await client.call("CloseProject")
+            await tab(screen, "Projects")
+            await screen.page.get_by_role("heading", name="lighting").wait_for()
+            for kind in ("Lamp", "Torch"):
+                assert (await rest.delete(f"/object-types/{kind}")).status_code == 200
+            # All that is wrong, not the first, and by itself; and a project says that it is its scene.
+            card = screen.page.locator(".card").filter(has=screen.page.get_by_role("heading", name="lighting"))
+            await card.get_by_text("2 problems").click()
+            await card.get_by_text("lamp: the object type Lamp is not known.").wait_for()
+            await card.get_by_text("torch: the object type Torch is not known.").wait_for()
+            await expect(card.get_by_role("button", name="Open lighting")).to_have_attribute("aria-disabled", "true")
+            assert await screen.faults() == []
+            await screen.picture("home problems")
+            await screen.press("Show the scene of lighting to mend it")
+            card = screen.page.locator(".card").filter(has=screen.page.get_by_role("heading", name="lamps"))
+            await card.get_by_text("2 problems").click()
+            await screen.press("Mend lamps")
+            await screen.sees("goes out of the scene: lamp, torch.")
+            await screen.picture("home mending")
+            await screen.press("Take them out")
+            await screen.sees("lamps can be opened again.")
+            await screen.page.get_by_role("heading", name="lamps as it was").wait_for()
+            stored = {each.name: each for each in await client.call("ListScenes")}
+            assert not stored["lamps"].problems
+            assert len(stored["lamps as it was"].problems) == 2
+            await tab(screen, "Projects")
+            await screen.page.get_by_label("Search").fill("")
+            await screen.press("Open lighting")
+            await screen.page.get_by_role("heading", name="lighting").wait_for()
+            await screen.press("Close, and go to the lists")
+            await screen.page.get_by_role("radio", name="Projects").wait_for()
+
+
+async def _listed(client: Client, name: str) -> ListScenesData | None:
+    return next((each for each in await client.call("ListScenes") if each.name == name), None)
+
+
+async def _known(client: Client, kind: str, *, there: bool) -> bool:
+    return (kind in {each.type for each in await client.call("GetObjectTypes")}) is there
 
 
 async def _packages(client: Client, count: int) -> bool:

@@ -162,8 +162,9 @@ store.subscribe((state, before) => {
   followArms(state);
   tellPresence(state, now);
   followPrograms(state);
-  // The home screen is back: problems may have come or gone with what was edited.
-  if (before.doc && !state.doc && state.connection.status === "ready") loadLists().catch(() => {});
+  // Problems, which no event tells, may have come or gone with what was edited, or with a kind of object.
+  const mended = before.doc !== null || (before.connection.status === "ready" && before.types.byName !== state.types.byName);
+  if (mended && !state.doc && state.connection.status === "ready") loadLists().catch(() => {});
 });
 
 if (typeof window !== "undefined") {

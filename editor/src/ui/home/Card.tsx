@@ -15,6 +15,7 @@ import { AskName, Button, type Choice, More } from "../kit/kit";
 import { ago } from "../times";
 import { Deleting } from "./Deleting";
 import { Inline } from "./Inline";
+import { Problems } from "./Problems";
 import { starsOf } from "./stars";
 import { Thumbnail } from "./Thumbnail";
 
@@ -49,6 +50,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
     return request ? barred({ ...now(), connection }, request) : "";
   };
   const whyOpen = why("open") || (running ? "A program runs: stop it first." : "");
+  const whyThis = whyOpen || (problems.length > 0 ? "Something is wrong with it, see its problems: it can be opened once they are mended." : "");
   const open = (paused = false) => void (kind === "scene" ? documents.openScene(id) : kind === "project" ? documents.openProject(id) : runPackage(id, paused));
   const star = () => {
     const others = [...starsOf(now())].filter((each) => each !== id);
@@ -95,10 +97,10 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
         ) : (
           entry.description && <p className="small description">{entry.description}</p>
         )}
-        {problems.length > 0 && <Problems entry={entry} whyOpen={whyOpen} />}
+        {problems.length > 0 && <Problems entry={entry} whyOpen={whyOpen} onScene={() => onRelated("scene", entry.from?.name ?? "")} />}
       </div>
       <div className="card-actions">
-        <Button look="primary" icon={kind === "package" ? "play" : undefined} why={whyOpen} onPress={() => open()} aria-label={`${kind === "package" ? "Run" : "Open"} ${name}`}>
+        <Button look="primary" icon={kind === "package" ? "play" : undefined} why={whyThis} onPress={() => open()} aria-label={`${kind === "package" ? "Run" : "Open"} ${name}`}>
           {kind === "package" ? "Run" : "Open"}
         </Button>
         <Related entry={entry} onRelated={onRelated} />
@@ -133,33 +135,5 @@ function Related({ entry: { kind, name, from, projects }, onRelated }: { entry: 
     <Button look="plain" aria-label={`${to === "scene" ? "Scene" : "Project"} of ${name}`} onPress={() => onRelated(to, from.name)}>
       {to === "scene" ? "Scene" : "Project"}
     </Button>
-  );
-}
-
-/** All that is wrong with it, and the way to mend it: where it is edited. */
-function Problems({ entry: { kind, id, name, problems, from }, whyOpen }: { entry: Entry; whyOpen: string }) {
-  return (
-    <details className="problems">
-      <summary>
-        <span className="tag bad">
-          <Icon name="warn" size={16} /> {count(problems.length, "problem")}
-        </span>
-      </summary>
-      <ul>
-        {problems.map((each) => (
-          <li key={each}>{each}</li>
-        ))}
-      </ul>
-      {kind === "project" && from && !from.gone && (
-        <Button why={whyOpen} aria-label={`Open the scene of ${name} to mend it`} onPress={() => void documents.openScene(from.id)}>
-          Open its scene
-        </Button>
-      )}
-      {kind === "scene" && (
-        <Button why={whyOpen} aria-label={`Open ${name} to mend it`} onPress={() => void documents.openScene(id)}>
-          Open to mend it
-        </Button>
-      )}
-    </details>
   );
 }

@@ -1,0 +1,44 @@
+/** What cannot be opened as it is: the server refuses a document with problems, so it is mended where it is kept. */
+
+import { refusedWith } from "../session/assets";
+import { remembered } from "../session/memory";
+import { call, loadLists } from "../session/session";
+import { now } from "../store/store";
+import { refusal } from "./asking";
+
+/** The objects that problems of a scene are about: the server begins each with the object's name. */
+export const atFault = (problems: readonly string[], names: readonly string[]): string[] =>
+  names.filter((name) => problems.some((each) => each.startsWith(`${name}: `)));
+
+interface StoredScene {
+  objects: { name: string }[];
+}
+
+async function stored(path: string, options: RequestInit = {}): Promise<unknown> {
+  const token = remembered("token");
+  const headers = { "Content-Type": "application/json", ...(token ? { Authorization: `Bearer ${token}` } : {}) };
+  const response = await fetch(path, { ...options, headers });
+  if (!response.ok) throw new Error(await refusedWith(response, "The server refuses it"));
+  return response.json();
+}
+
+const read = async (id: string) => (await stored(`/scenes/${encodeURIComponent(id)}`)) as StoredScene;
+
+/** The names of the objects of a scene that something is wrong with; rejects with why nobody knows. */
+export async function faultyObjects(id: string, problems: readonly string[]): Promise<string[]> {
+  return atFault(problems, (await read(id)).objects.map((each) => each.name));
+}
+
+/** Take objects out of a saved scene; the scene as it was stays as a copy. Gives why not. */
+export function takeOut(id: string, name: string, objects: readonly string[]): Promise<string> {
+  return refusal(async () => {
+    const taken = new Set(now().lists.scenes?.map((each) => each.name));
+    let copy = `${name} as it was`;
+    for (let number = 2; taken.has(copy); number++) copy = `${name} as it was ${number}`;
+    const scene = await read(id);
+    await call("CopyScene", { source_id: id, target_name: copy });
+    const kept = { ...scene, objects: scene.objects.filter((each) => !objects.includes(each.name)) };
+    await stored("/scenes", { method: "PUT", body: JSON.stringify(kept) });
+    await loadLists(); // problems, which no event tells
+  });
+}

@@ -1,0 +1,63 @@
+/** All that is wrong with a scene or project, and the way to mend it: as it is, the server does not open it. */
+
+import { useState } from "react";
+import { barred, sentence } from "../../commands/asking";
+import * as documents from "../../commands/documents";
+import { faultyObjects, takeOut } from "../../commands/mend";
+import { count, type Entry } from "../../home/entries";
+import { tell, useEditor } from "../../store/store";
+import { Icon } from "../kit/icons";
+import { Button, Confirm } from "../kit/kit";
+
+interface ProblemsProps {
+  entry: Entry;
+  whyOpen: string;
+  /** Show the scene of a project among the scenes. */
+  onScene: () => void;
+}
+
+export function Problems({ entry: { kind, id, name, problems, from }, whyOpen, onScene }: ProblemsProps) {
+  const [faulty, setFaulty] = useState<string[] | null>(null);
+  const noScene = useEditor((state) => barred(state, "SaveScene"));
+  const ofScene = useEditor((state) => state.lists.scenes?.find((each) => each.id === from?.id)?.problems?.length ?? 0);
+  return (
+    <details className="problems">
+      <summary>
+        <span className="tag bad">
+          <Icon name="warn" size={16} /> {count(problems.length, "problem")}
+        </span>
+      </summary>
+      <ul>
+        {problems.map((each) => (
+          <li key={each}>{each}</li>
+        ))}
+      </ul>
+      {kind === "project" && from && !from.gone && (ofScene ? (
+        <Button aria-label={`Show the scene of ${name} to mend it`} onPress={onScene}>
+          To its scene, to mend it
+        </Button>
+      ) : (
+        <Button why={whyOpen} aria-label={`Open the scene of ${name} to mend it`} onPress={() => void documents.openScene(from.id)}>
+          Open its scene
+        </Button>
+      ))}
+      {kind === "scene" && (
+        <Button why={noScene} aria-label={`Mend ${name}`} onPress={() => void faultyObjects(id, problems).then(setFaulty, (error) => tell("error", sentence(error)))}>
+          Mend it…
+        </Button>
+      )}
+      {faulty && (
+        <Confirm
+          title={`Mend ${name}?`}
+          yes="Take them out"
+          not={faulty.length > 0 ? "" : "None of its objects is at fault by itself: import the scene anew."}
+          onClose={() => setFaulty(null)}
+          onYes={() => void takeOut(id, name, faulty).then((wrong) => (wrong ? tell("error", wrong) : tell("info", `${name} can be opened again.`)))}
+        >
+          <p>{faulty.length > 0 ? `What is wrong goes out of the scene: ${faulty.join(", ")}. The scene as it is now stays as a copy.` : "The names of its objects do not stand in the problems."}</p>
+          <p className="quiet small">Is a kind of device missing? Once its driver is installed again, the problem goes by itself.</p>
+        </Confirm>
+      )}
+    </details>
+  );
+}
