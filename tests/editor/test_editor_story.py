@@ -111,8 +111,6 @@ async def test_the_first_day(workplace: Run, browser: Browser) -> None:
             }"""
         )
         await user.tool("Robot")
-        # Where the cycle ends, the model of the arm may touch a box: then the way out is for the user to judge.
-        await user.panel.get_by_text("Look for collisions first").click()
         await screen.press("Move along +Z")
         await until(lambda: user.at_height(taught + 0.1), "the arm is 100 mm higher", 20)
         shown = """z => __engine.ids().map((id) => __engine.item(id)).some(({ kind, endEffectors }) =>
