@@ -253,18 +253,19 @@ async def test_what_is_wrong_stands_on_the_tiles_and_is_mended_from_there(
             await screen.page.get_by_role("navigation").get_by_role("button", name="Add").click()
             await panel.get_by_role("button", name="Torch").click()
             await screen.sees("Used in lamps.")
-            await expect(panel.get_by_role("button", name="Delete this kind")).to_have_attribute(
-                "aria-disabled", "true"
-            )
+            delete = panel.get_by_role("button", name="Delete this kind")
+            await expect(delete).to_have_attribute("aria-disabled", "true")
             await screen.press("← All kinds")
             await panel.get_by_role("button", name="Spare").click()
             await screen.sees("Not used in any saved scene.")
-            await panel.get_by_role("button", name="Delete this kind").click()
+            await delete.click()
             await screen.press("Delete")
             await until(lambda: _known(client, "Spare", there=False), "the kind is deleted")
             await expect(panel.get_by_role("button", name="Spare")).to_have_count(0)
 
-            await client.call("NewProject", rpc.NewProjectArgs((await _listed(client, "lamps")).id, "lighting"))
+            scene = await _listed(client, "lamps")
+            assert scene is not None
+            await client.call("NewProject", rpc.NewProjectArgs(scene.id, "lighting"))
             await client.call("SaveProject")
             await client.call("CloseProject")
             await tab(screen, "Projects")
