@@ -22,9 +22,41 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if config.getoption("once_more"):
+        _keep_what_failed(config, items)
+    elif hasattr(config, "workerinput"):
+        items[:] = _spread(items, "tests/editor/")
+
+
+def _spread(items: list[pytest.Item], heavy: str) -> list[pytest.Item]:
+    """Spread the modules of a folder over the others: neither three browsers shall draw at once, nor one last, alone."""
+    modules: dict[str, list[pytest.Item]] = {}
+    others = []
+    for each in items:
+        if each.nodeid.startswith(heavy):
+            modules.setdefault(each.nodeid.partition("::")[0], []).append(each)
+        else:
+            others.append(each)
+    spread: list[pytest.Item] = []
+    done = 0
+    for number, module in enumerate(modules.values()):
+        until = len(others) * number // (len(modules) + 3)
+        while 0 < until < len(others) and _scope(others[until].nodeid) == _scope(others[until - 1].nodeid):
+            until += 1
+        spread += others[done:until] + module
+        done = until
+    return spread + others[done:]
+
+
+def _scope(nodeid: str) -> str:
+    """What shares a fake."""
+    file, _, rest = nodeid.partition("::")
+    bench = rest.rpartition("[")[2] if rest.startswith("TestConformance::") else ""
+    return f"{file}:{bench}"
+
+
+def _keep_what_failed(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Keep what failed last time; where the tests of a module go on from each other, those before it, too."""
-    if not config.getoption("once_more"):
-        return
     assert config.cache is not None
     failed = set(config.cache.get("cache/lastfailed", {}))
     last = {each.path: place for place, each in enumerate(items) if each.nodeid in failed}
@@ -54,8 +86,6 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
     class TogetherOnOneFake(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
-            file, _, rest = nodeid.partition("::")
-            bench = rest.rpartition("[")[2] if rest.startswith("TestConformance::") else ""
-            return f"{file}:{bench}"
+            return _scope(nodeid)
 
     return TogetherOnOneFake(config, log)
