@@ -29,7 +29,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def _spread(items: list[pytest.Item], heavy: str) -> list[pytest.Item]:
-    """Spread the modules of a folder over the others: neither three browsers shall draw at once, nor one last, alone."""
+    """Spread the modules of a folder over the others: neither shall three browsers draw at once, nor one last alone."""
     modules: dict[str, list[pytest.Item]] = {}
     others = []
     for each in items:
