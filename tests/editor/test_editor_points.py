@@ -18,7 +18,8 @@ from arcor2_hw.client import Client
 from arcor2_hw.client.errors import RequestFailed
 from arcor2_hw.data import rpc
 from arcor2_hw.data.events import SceneStateEnum
-from arcor2_hw.data.project import ActionPoint, Project
+from arcor2_hw.data.geometry import Orientation
+from arcor2_hw.data.project import ActionParameter, ActionPoint, Flow, FlowTypes, Project
 from arcor2_hw.data.scene import Scene
 from tests.e2e.harness import Cell, scene_state, until
 from tests.editor.screen import Screen, screen_of
@@ -30,6 +31,7 @@ pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(180)
 class Place:
     """The project is open and the scene online; Eva sits at the screen."""
 
+    cell: Cell
     client: Client
     scene: Scene
     project: Project
@@ -79,7 +81,7 @@ async def place(cell: Cell, browser: Browser) -> AsyncIterator[Place]:
         await client.call("StartSceneKeepGoing")
         await scene_state(client, SceneStateEnum.STARTED, 60)
         await screen.until("id => window.__engine?.item(id)?.endEffectors?.length > 0", robot)
-        yield Place(client, scene, project, robot, screen)
+        yield Place(cell, client, scene, project, robot, screen)
 
 
 async def test_one_tap_keeps_where_the_robot_is(place: Place) -> None:
@@ -169,6 +171,17 @@ async def test_orientations_are_added_turned_and_told_whether_they_are_reached(p
     await yaw.fill("90")
     await yaw.press("Enter")
     await place.point("point_3", lambda each: abs(_yaw(each.orientations[0].orientation) - math.pi / 2) < 1e-6)
+    # An action that goes there tells it as well, by a sign on it in the view.
+    args = rpc.AddActionArgs(
+        point.id,
+        "go_there",
+        f"{place.robot}/move",
+        [ActionParameter("pose", "pose", f'"{orientation.id}"')],
+        [Flow(FlowTypes.DEFAULT, [])],
+    )
+    await place.client.call("AddAction", args)
+    action = (await place.point("point_3", lambda each: len(each.actions) == 1)).actions[0].id
+    await place.screen.until("id => window.__engine.item(id)?.sign === 'reachable'", action)
     # Moved out of reach, it is told with the reason.
     await place.client.call("WriteLock", rpc.WriteLockArgs(point.id, lock_tree=True))
     far = (await place.point("point_3")).position
@@ -176,6 +189,117 @@ async def test_orientations_are_added_turned_and_told_whether_they_are_reached(p
     await place.client.call("UpdateActionPointPosition", rpc.UpdateActionPointPositionArgs(point.id, far))
     await place.client.call("WriteUnlock", rpc.WriteUnlockArgs(point.id))
     await expect(answer).to_contain_text("out of reach", timeout=30_000)
+    await place.screen.until("id => window.__engine.item(id).sign === 'out_of_reach'", action)
+    await place.tool("Program")
+    await page.get_by_role("radio", name="Actions", exact=True).click()
+    step = page.get_by_role("complementary").locator(".steps li", has_text="go_there")
+    await expect(step.locator(".reach")).to_contain_text("out of reach")
+    await step.get_by_text("go_there", exact=True).click()
+    told = page.locator(".reach-of-action")
+    await expect(told).to_contain_text("robot: out of reach")
+    assert len((await told.locator(".small").inner_text()).split()) > 3, "and why"
+    assert (await place.screen.item(action))["badge"] == "out of reach"
+    await place.screen.picture("points action out of reach")
+
+
+async def test_a_point_goes_where_the_robot_is_by_a_tap_and_by_hand(place: Place) -> None:
+    """D-05, T-06: by hand it is put there when the arm is let go, and not before."""
+    page, screen = place.screen.page, place.screen
+    point = (await place.point("point_3")).id
+
+    async def apart() -> float:
+        drawn = (await screen.item(point))["pose"]["position"]
+        tool = (await screen.item(place.robot))["endEffectors"][0]["position"]
+        return math.dist(drawn.values(), tool.values())
+
+    async def there() -> bool:
+        return await apart() < 1e-3
+
+    await place.select("point_3")
+    assert await apart() > 1
+    await place.button("Put it where the robot is").click()
+    await until(there, "the point is where the robot is")
+    joints = await place.client.call("GetRobotJoints", rpc.GetRobotJointsArgs(place.robot))
+    goal = [each.value for each in joints]
+    goal[1] += 0.1
+    await page.get_by_role("button", name=re.compile("^Hold: by hand")).hover()
+    await page.mouse.down()
+
+    async def free() -> bool:
+        return bool((await place.cell.tell("robot", "truth"))["freedrive"])
+
+    await until(free, "the arm is free")
+    await place.cell.tell("robot", "guide", q=goal, speed=0.5)
+
+    async def guided() -> bool:
+        actual = (await place.cell.tell("robot", "truth"))["q"]
+        return max(abs(a - b) for a, b in zip(actual, goal, strict=True)) < 1e-3
+
+    await until(guided, "the arm was moved by hand")
+    assert await apart() > 0.02, "it waits until the arm is let go"
+    await page.mouse.up()
+    await until(there, "the point followed", 15)
+    assert not await free()
+
+
+async def test_what_somebody_notes_about_a_point_is_seen_by_all(place: Place) -> None:
+    """D-13."""
+    point = await place.point("point_3")
+    note = place.screen.page.get_by_label("Note")
+    await note.fill("mind the cable")
+    await note.blur()
+
+    async def kept() -> bool:
+        state = await place.client.call("GetViewState", rpc.GetViewStateArgs("shared", place.project.id))  # type: ignore[arg-type]
+        return bool(state.values.get(f"note/{point.id}") == "mind the cable")
+
+    await until(kept, "the note is kept for all")
+    changed = rpc.SetViewStateArgs("shared", {f"note/{point.id}": "the cable is mended"}, place.project.id)  # type: ignore[arg-type]
+    await place.client.call("SetViewState", changed)
+    await expect(note).to_have_value("the cable is mended")
+
+
+async def test_the_robot_is_shown_at_what_is_taught_goes_there_and_turns_as_it_is(place: Place) -> None:
+    """R-07, R-04."""
+    page, screen = place.screen.page, place.screen
+    point = await place.point("point_3")
+    down = point.orientations[0].id
+    await page.get_by_role("button", name=re.compile("^down")).first.click()
+    before = (await screen.item(place.robot))["joints"]
+    await page.get_by_text("At 25 % of its speed").click()
+    await page.get_by_role("slider", name="Speed").fill("1")
+    await place.button("Show robot there").click()
+    await screen.sees("It can go there: the ghost shows how.")
+    ghost = await screen.until("id => window.__engine.item(id).ghost", place.robot)
+    real = (await screen.item(place.robot))["joints"]
+    assert max(abs(real[name] - before[name]) for name in real) < 1e-3, "it is only shown"
+    assert max(abs(ghost[name] - real[name]) for name in real) > 0.05
+    await screen.picture("points ghost at an orientation")
+    await place.button("Move it there").click()
+    as_taught = """([robot, orientation]) => {
+        const tool = window.__engine.item(robot).endEffectors[0], wanted = window.__engine.item(orientation).pose;
+        const [p, q] = [tool.orientation, wanted.orientation];
+        const turned = 2 * Math.acos(Math.min(1, Math.abs(p.x * q.x + p.y * q.y + p.z * q.z + p.w * q.w)));
+        const [a, b] = [tool.position, wanted.position];
+        return { turned, apart: Math.hypot(a.x - b.x, a.y - b.y, a.z - b.z) };
+    }"""
+
+    async def reached() -> bool:
+        found = await page.evaluate(as_taught, [place.robot, down])
+        return bool(found["turned"] < 2e-3 and found["apart"] < 1e-3)
+
+    await until(reached, "the tool is as it is taught", 20)
+    # The tool turns as another orientation, and stays where it is.
+    await place.client.call("WriteLock", rpc.WriteLockArgs(down))
+    yawed = Orientation(math.cos(0.5), math.sin(0.5), 0.0, 0.0)
+    await place.client.call("UpdateActionPointOrientation", rpc.UpdateActionPointOrientationArgs(down, yawed))
+    await place.client.call("WriteUnlock", rpc.WriteUnlockArgs(down))
+    await screen.until(f"(ids) => ({as_taught})(ids).turned > 0.1", [place.robot, down])
+    await page.get_by_role("button", name=re.compile("^Robot in hand")).click()
+    await page.get_by_role("radiogroup", name="How to move it").get_by_role("radio", name="Tool", exact=True).click()
+    await place.button("Turn as down").click()
+    await until(reached, "the tool is turned as the orientation", 20)
+    await place.button("Close the panel").click()
 
 
 def _yaw(q: Any) -> float:

@@ -55,6 +55,8 @@ export interface Probe {
   /** How much is seen through it: 0 opaque, 1 not there. */
   faint: number;
   badge: string;
+  /** What the sign on it tells by its shape. */
+  sign: string;
   /** Why it is not shown as it looks; empty where it is. */
   problem: string;
   /** Triangles of its picture, without those of a ghost; 0 for what is drawn with others of its kind. */
@@ -273,6 +275,7 @@ export class Engine {
       visible: thing.root.visible && at.z <= 1 && Math.abs(at.x) <= 1 && Math.abs(at.y) <= 1,
       faint: thing.item.faint,
       badge: thing.badge(),
+      sign: thing.sign,
       problem: thing.problem,
       triangles: trianglesOf(thing.root, id),
     };

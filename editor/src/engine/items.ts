@@ -49,11 +49,14 @@ export interface PointItem extends Base {
   breakpoint: boolean;
 }
 
+/** Empty: nothing is known, or nothing is to be reached. */
+export type ReachShown = "" | "reachable" | "near_limit" | "in_collision" | "out_of_reach" | "unknown";
+
 export interface OrientationItem extends Base {
   kind: "orientation";
   parent: string;
   orientation: Orientation;
-  reach: "" | "reachable" | "near_limit" | "in_collision" | "out_of_reach" | "unknown";
+  reach: ReachShown;
 }
 
 export interface PuckItem extends Base {
@@ -70,6 +73,8 @@ export interface PuckItem extends Base {
   breakpoint: boolean;
   /** Of its object, so that all of one object have one colour. */
   colour: number;
+  /** Whether its robot gets where it is told to go. */
+  reach: ReachShown;
 }
 
 export interface LinkItem extends Base {

@@ -57,6 +57,11 @@ export abstract class Thing<I extends Item = Item> {
     return "";
   }
 
+  /** What the sign on it tells by its shape; empty where there is none. */
+  get sign(): string {
+    return "";
+  }
+
   /** A word beside the name, when something is to be told. */
   badge(): string {
     return "";

@@ -1,6 +1,7 @@
 /** What is wrong with a program before it is run: each fault in words, and where it is. */
 
 import type { OpenDocument, State } from "../store/state";
+import { reachOfAction } from "./reach";
 import { decoded } from "./values";
 import { after, END, incoming, linkTo, metaOf, outgoing, placeOf, resultAt, resultsOf, START } from "./logic";
 
@@ -22,15 +23,10 @@ export function problemsOf(doc: OpenDocument, types: State["types"], reach: Stat
   for (const action of Object.values(doc.actions)) {
     ofAction(doc, types, action, error, warn);
   }
-  const used = poses(doc);
-  for (const { items } of Object.values(reach)) {
-    for (const { id, reach: how, reason } of items) {
-      if ((how === "out_of_reach" || how === "in_collision") && used.has(id)) {
-        for (const user of used.get(id) ?? []) {
-          warn(user, `${doc.actions[user]?.name}: ${reason ?? (how === "in_collision" ? "the robot would touch something there." : "the robot does not reach there.")}`);
-        }
-      }
-    }
+  for (const action of Object.values(doc.actions)) {
+    const there = reachOfAction(action, reach);
+    if (there?.reach !== "out_of_reach" && there?.reach !== "in_collision") continue;
+    warn(action.id, `${action.name}: ${there.reason || (there.reach === "in_collision" ? "the robot would touch something there." : "the robot does not reach there.")}`);
   }
   return found;
 }
@@ -102,19 +98,6 @@ function ofAction(doc: OpenDocument, types: State["types"], action: OpenDocument
       warn(action.id, `${action.name}: the joints ${doc.joints[String(value)]?.name} were taken before their point was moved.`);
     }
   }
-}
-
-/** Orientations and joints by the actions that use them. */
-function poses(doc: OpenDocument): Map<string, string[]> {
-  const found = new Map<string, string[]>();
-  for (const action of Object.values(doc.actions)) {
-    for (const { type, value } of action.parameters) {
-      if (type !== "pose" && type !== "joints") continue;
-      const id = String(decoded(value));
-      found.set(id, [...(found.get(id) ?? []), action.id]);
-    }
-  }
-  return found;
 }
 
 /** Names of what uses a project parameter or a result of an action. */

@@ -2,7 +2,7 @@
 
 import { deflateRawSync } from "node:zlib";
 import { describe, expect, test } from "vitest";
-import type { LogicItem, ObjectAction, Project, Scene } from "../protocol/types";
+import type { LogicItem, ObjectAction, Project, Reach, Scene } from "../protocol/types";
 import { opened } from "../store/document";
 import type { OpenDocument, State } from "../store/state";
 import { initialState } from "../store/state";
@@ -13,6 +13,7 @@ import { against } from "../commands/aimed";
 import { cannotLead, conditionWords, freeStep, usable } from "./logic";
 import { freeName, newOutputs } from "./naming";
 import { problemsOf, usersOf } from "./problems";
+import { reachOfAction } from "./reach";
 import { double, extraOf, initial, rangeWords, read, textOf } from "./values";
 
 const meta = (name: string, returns: string[], parameters: ObjectAction["parameters"] = []): ObjectAction => ({
@@ -208,4 +209,24 @@ test("Python in pieces keeps every character, and texts over lines stay texts", 
   expect(lines[0]?.at(-1)).toEqual({ text: "# why", kind: "comment" });
   expect(lines[2]?.[0]?.kind).toBe("text");
   expect(lines[3]?.at(-1)).toEqual({ text: "2.5e-3", kind: "number" });
+});
+
+describe("whether a robot gets there", () => {
+  const action = (...parameters: [string, string][]) => ({ type: "ur/move", parameters: parameters.map(([type, id], n) => ({ name: `p${n}`, type, value: JSON.stringify(id) })) });
+  const told = (robot_id: string, end_effector_id: string, ...items: [string, Reach, string?][]) => ({
+    [`${robot_id}//${end_effector_id}`]: { robot_id, end_effector_id, revision: 1, items: items.map(([id, reach, reason]) => ({ id, reach, ...(reason ? { reason } : {}) })) },
+  });
+
+  test("of each goal the end effector counts that gets there best, of all goals the worst", () => {
+    const reach = { ...told("ur", "grip", ["a", "out_of_reach", "too far"], ["b", "in_collision", "table"]), ...told("ur", "cup", ["a", "reachable"], ["b", "out_of_reach", "too far"]) };
+    expect(reachOfAction(action(["pose", "a"]), reach)?.reach).toBe("reachable");
+    expect(reachOfAction(action(["pose", "a"], ["joints", "b"]), reach)).toEqual({ reach: "in_collision", reason: "table", goal: "b" });
+  });
+
+  test("another robot does not count, nor what is no goal or not known", () => {
+    const reach = told("other", "grip", ["a", "out_of_reach"]);
+    expect(reachOfAction(action(["pose", "a"]), reach)).toBeNull();
+    expect(reachOfAction(action(["position", "a"]), told("ur", "grip", ["a", "reachable"]))).toBeNull();
+    expect(reachOfAction(action(["pose", "z"]), told("ur", "grip", ["a", "reachable"]))).toBeNull();
+  });
 });

@@ -1,7 +1,8 @@
 /** From the state to what the 3D view shows: pure, and the same object for what did not change. */
 
-import type { Item, LinkItem, OrientationItem, RobotItem, Shape } from "../engine/items";
-import type { LogicItem, ObjectTypeMeta, Pose, Position } from "../protocol/types";
+import type { Item, LinkItem, RobotItem, Shape } from "../engine/items";
+import { reachOfAction, worse } from "../program/reach";
+import type { LogicItem, ObjectTypeMeta, Pose, Position, Reach } from "../protocol/types";
 import { isRunning } from "../store/selectors";
 import type { Draft, Ghost, OpenDocument, State } from "../store/state";
 
@@ -114,7 +115,8 @@ export class ItemMaker {
       const breakpoint = action.id in state.breakpoints;
       const colour = Math.max(0, colours.indexOf(action.type.split("/")[0] ?? ""));
       const place = state.view.shared[`place/${action.id}`];
-      add(action.id, [action, level, count, running, breakpoint, colour, place, ...tell(action.id)], () => ({
+      const reach = reachOfAction(action, state.reach)?.reach ?? "";
+      add(action.id, [action, level, count, running, breakpoint, colour, place, reach, ...tell(action.id)], () => ({
         ...common(action.id, action.name),
         kind: "action",
         ...(isPosition(place) ? { position: place } : { parent: action.pointId }),
@@ -124,6 +126,7 @@ export class ItemMaker {
         running,
         breakpoint,
         colour,
+        reach,
       }));
     }
     if (!doc.project?.has_logic) return;
@@ -142,6 +145,7 @@ export class ItemMaker {
         running: false,
         breakpoint: false,
         colour: 0,
+        reach: "",
       }));
     }
   }
@@ -194,15 +198,13 @@ export function shapeOf(type: ObjectTypeMeta | undefined): Shape {
   return { kind: "none" };
 }
 
-const GOODNESS: OrientationItem["reach"][] = ["reachable", "near_limit", "unknown", "in_collision", "out_of_reach"];
-
 /** How an orientation can be reached by the robot that reaches it best. */
-function bestReach(state: State): Record<string, OrientationItem["reach"]> {
-  const best: Record<string, OrientationItem["reach"]> = {};
+function bestReach(state: State): Record<string, Reach> {
+  const best: Record<string, Reach> = {};
   for (const robot of Object.values(state.reach)) {
     for (const { id, reach } of robot.items) {
       const known = best[id];
-      if (!known || GOODNESS.indexOf(reach) < GOODNESS.indexOf(known)) best[id] = reach;
+      if (!known || worse(known, reach)) best[id] = reach;
     }
   }
   return best;

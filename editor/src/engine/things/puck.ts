@@ -3,9 +3,10 @@
  * them. From afar they grow, so that they stay as large as fingers need.
  */
 
-import { CylinderGeometry, Matrix4, MeshLambertMaterial, Object3D, Vector3 } from "three";
+import { type BufferGeometry, CylinderGeometry, Matrix4, MeshLambertMaterial, Object3D, OctahedronGeometry, SphereGeometry, TorusGeometry, Vector3 } from "three";
+import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 import type { Batch, Instance } from "../batches";
-import type { PuckItem } from "../items";
+import type { PuckItem, ReachShown } from "../items";
 import { Thing, type Context } from "../thing";
 
 /** m: radius of a puck, of START and END, height of the first one above its point, and from one to the next. */
@@ -19,12 +20,33 @@ const LEAST = 9;
 const MOST = 4;
 const up = new Vector3();
 
+/** m: how high above a puck's middle the sign stands that tells whether its robot gets there. */
+const SIGN = 0.012;
+const bar = () => new CylinderGeometry(0.0028, 0.0028, 0.034, 6).rotateZ(Math.PI / 2);
+function cross(): BufferGeometry {
+  const bars = [bar().rotateZ(Math.PI / 4), bar().rotateZ(-Math.PI / 4)];
+  const whole = mergeGeometries(bars);
+  for (const each of bars) each.dispose();
+  return whole;
+}
+/** A dot that it does; a ring near a limit; a lump in collision; a cross out of reach. Readable in grey, too. */
+const SIGNS: Partial<Record<ReachShown, () => BufferGeometry>> = {
+  reachable: () => new SphereGeometry(0.0055, 12, 8),
+  near_limit: () => new TorusGeometry(0.011, 0.0026, 8, 24),
+  in_collision: () => new OctahedronGeometry(0.012),
+  out_of_reach: cross,
+};
+
+const REASONS: Partial<Record<ReachShown, string>> = { near_limit: "near a limit", in_collision: "in collision", out_of_reach: "out of reach" };
+
 export class PuckThing extends Thing<PuckItem> {
   readonly root = new Object3D();
   item: PuckItem;
   private readonly batch: Batch;
   private readonly instance: Instance;
   private grown = 1;
+  private signs: Batch | null = null;
+  private readonly above: Instance;
 
   constructor(item: PuckItem, context: Context) {
     super(context);
@@ -36,6 +58,7 @@ export class PuckThing extends Thing<PuckItem> {
     ]);
     this.instance = { id: item.id, frame: this.root, offset: new Matrix4(), color: context.palette.point };
     this.batch.add(this.instance);
+    this.above = { id: item.id, frame: this.root, offset: new Matrix4(), color: context.palette.point };
   }
 
   update(item: PuckItem): void {
@@ -58,13 +81,27 @@ export class PuckThing extends Thing<PuckItem> {
               : item.lockedBy
                 ? palette.locked
                 : (palette.actions[item.colour % palette.actions.length] ?? palette.point);
+    this.showReach();
     this.scale();
+  }
+
+  /** The sign that stands on it. */
+  private showReach(): void {
+    const { reach } = this.item;
+    const make = SIGNS[reach];
+    const signs = make ? this.context.batches.of(`puck ${reach}`, () => [make(), new MeshLambertMaterial()]) : null;
+    if (reach) this.above.color = this.context.palette.reach[reach];
+    if (signs === this.signs) return;
+    this.signs?.remove(this.above);
+    signs?.add(this.above);
+    this.signs = signs;
   }
 
   private scale(): void {
     const { faint, selected, running } = this.item;
     const size = faint >= 1 ? 0 : this.grown * (selected || running ? 1.25 : 1);
     this.instance.offset.makeScale(size, size, size);
+    this.above.offset.makeScale(size, size, size).setPosition(0, 0, SIGN * size);
   }
 
   override resized(): boolean {
@@ -94,8 +131,18 @@ export class PuckThing extends Thing<PuckItem> {
     return target.setFromMatrixPosition(this.root.matrixWorld);
   }
 
+  override get sign(): string {
+    return this.signs ? this.item.reach : "";
+  }
+
+  override badge(): string {
+    if (this.item.lockedBy) return `locked by ${this.item.lockedBy}`;
+    return this.item.selected ? (REASONS[this.item.reach] ?? "") : "";
+  }
+
   override dispose(): void {
     this.batch.remove(this.instance);
+    this.signs?.remove(this.above);
     this.root.removeFromParent();
   }
 }

@@ -4,6 +4,7 @@ import { Handle, type NodeProps, type Node, Position } from "@xyflow/react";
 import { beginStep, notEditable } from "../../commands/program";
 import { now, tell } from "../../store/store";
 import { Icon } from "../kit/icons";
+import { ReachBadge } from "../points/Reach";
 import type { Box, Way } from "./graph";
 
 export type FlowNodeType = Node<{ box: Box; running: boolean; breakpoint: boolean; paused: boolean; trouble: string; target: boolean; from: boolean }, "box">;
@@ -16,6 +17,7 @@ export function FlowNode({ data }: NodeProps<FlowNodeType>) {
       <div className="flow-name">
         {breakpoint && <span className="breakpoint-dot" data-on="true" role="img" aria-label="pauses before it" />}
         {box.name}
+        {box.kind === "action" && <ReachBadge id={box.id} />}
         {running && <span className="tag good">{paused ? "next" : "runs"}</span>}
         {trouble && (
           <span className="flow-trouble" role="img" aria-label={trouble} title={trouble}>

@@ -1,5 +1,6 @@
 /** Whether robots get there: a word and a sign of its own for each answer, not the colour alone. */
 
+import { reachOfAction, worse } from "../../program/reach";
 import type { Reach, ReachOfItem } from "../../protocol/types";
 import type { State } from "../../store/state";
 import { useEditor } from "../../store/store";
@@ -30,9 +31,12 @@ function answers(state: State, id: string): Answer[] {
   return found;
 }
 
-/** Small, for lists and actions: of the robot that gets there best. */
+/** Small, for lists: of the robot that gets there best; of an action, of its own robot. */
 export function ReachBadge({ id }: { id: string }) {
-  const reach = useEditor((state) => best(answers(state, id))?.reach ?? "");
+  const reach = useEditor((state) => {
+    const action = state.doc?.actions[id];
+    return (action ? reachOfAction(action, state.reach)?.reach : best(answers(state, id))?.reach) ?? "";
+  });
   if (!reach) return null;
   return (
     <span className={`tag reach ${TONES[reach]}`} title={WORDS[reach]}>
@@ -62,8 +66,24 @@ export function ReachAnswers({ id }: { id: string }) {
   );
 }
 
-const ORDER: Reach[] = ["reachable", "near_limit", "unknown", "in_collision", "out_of_reach"];
+/** Of an action, in words: whether its robot gets where it is told to go, and what stands against it. */
+export function ReachOfAction({ id }: { id: string }) {
+  const reach = useEditor((state) => state.reach);
+  const action = useEditor((state) => state.doc?.actions[id]);
+  const doc = useEditor((state) => state.doc);
+  const found = action && reachOfAction(action, reach);
+  if (!action || !found || !doc) return null;
+  const robot = nameOf({ doc } as State, action.type.split("/")[0] ?? "");
+  return (
+    <p className="reach-of-action">
+      <span className={`tag reach ${TONES[found.reach]}`}>
+        <span aria-hidden="true">{SIGNS[found.reach]}</span> {robot}: {WORDS[found.reach]}
+      </span>
+      {found.reason && <span className="small quiet">{found.reason}</span>}
+    </p>
+  );
+}
 
 function best(found: Answer[]): Answer | undefined {
-  return [...found].sort((a, b) => ORDER.indexOf(a.reach) - ORDER.indexOf(b.reach))[0];
+  return found.reduce<Answer | undefined>((known, each) => (known && !worse(known.reach, each.reach) ? known : each), undefined);
 }

@@ -9,6 +9,7 @@ import { decoded, extraOf, initial, SIMPLE, sourceOf, type Source, TYPE_WORDS } 
 import type { State } from "../../store/state";
 import { now, useEditor } from "../../store/store";
 import { nameOf } from "../names";
+import { ReachOfAction } from "../points/Reach";
 import type { Section } from "../workplace/sections";
 import { type Choice, ValueField } from "./ValueField";
 import "./program.css";
@@ -23,9 +24,14 @@ const ActionParameters: Section["Body"] = ({ selection: { id } }) => {
   const meta = metaOf(types, doc, action);
   if (!meta) return <p className="quiet small">What it can be told is not known: its device is gone, or cannot do this any more.</p>;
   if (meta.parameters.length === 0) return <p className="quiet small">It needs nothing.</p>;
-  return meta.parameters.map((wanted) => (
-    <One key={`${id}/${wanted.name}`} actionId={id} wanted={wanted} parameter={action.parameters.find((each) => each.name === wanted.name)} />
-  ));
+  return (
+    <>
+      <ReachOfAction id={id} />
+      {meta.parameters.map((wanted) => (
+        <One key={`${id}/${wanted.name}`} actionId={id} wanted={wanted} parameter={action.parameters.find((each) => each.name === wanted.name)} />
+      ))}
+    </>
+  );
 };
 export default ActionParameters;
 

@@ -12,6 +12,7 @@ import { theEngine } from "../../session/engine";
 import { select, setUi, tell, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { nameOf, withNames } from "../names";
+import { ReachBadge } from "../points/Reach";
 
 export function Steps({ problems }: { problems: Problem[] }) {
   const state = useEditor((each) => each);
@@ -51,7 +52,10 @@ export function Steps({ problems }: { problems: Problem[] }) {
                   theEngine()?.focus(id);
                 }}
               >
-                <span className="step-name">{action.name}</span>
+                <span className="step-head">
+                  <span className="step-name">{action.name}</span>
+                  <ReachBadge id={id} />
+                </span>
                 <span className="quiet small">
                   {nameOf(state, action.type.split("/")[0] ?? "")} at {nameOf(state, action.pointId)}
                   {after.length > 0 && ` · when ${after.join(", ")}`}
