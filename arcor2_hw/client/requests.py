@@ -166,6 +166,7 @@ from arcor2_hw.data.rpc.projects import (
     CopyProjectArgs,
     ListProjectsData,
     NewProjectArgs,
+    RemoveActionArgs,
     RemoveLogicItemArgs,
     RemoveProjectParameterArgs,
     RenameActionArgs,
@@ -1097,9 +1098,13 @@ class Requests(ABC):
         """RegisterUser. Needs the role operator."""
         await self.call("RegisterUser", RegisterUserArgs(user_name=user_name), timeout=timeout)
 
-    async def remove_action(self, id: str, *, dry_run: bool = False, timeout: float | None = None) -> None:
+    async def remove_action(
+        self, id: str, *, with_steps: bool = False, dry_run: bool = False, timeout: float | None = None
+    ) -> None:
         """RemoveAction. Needs the role standard user."""
-        await self.call("RemoveAction", IdArgs(id=id), dry_run=dry_run, timeout=timeout)
+        await self.call(
+            "RemoveAction", RemoveActionArgs(id=id, with_steps=with_steps), dry_run=dry_run, timeout=timeout
+        )
 
     async def remove_action_point(self, id: str, *, dry_run: bool = False, timeout: float | None = None) -> None:
         """RemoveActionPoint. Needs the role standard user."""

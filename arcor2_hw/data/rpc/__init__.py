@@ -102,6 +102,7 @@ from arcor2_hw.data.rpc.projects import CloseProjectArgs as CloseProjectArgs
 from arcor2_hw.data.rpc.projects import CopyProjectArgs as CopyProjectArgs
 from arcor2_hw.data.rpc.projects import ListProjectsData as ListProjectsData
 from arcor2_hw.data.rpc.projects import NewProjectArgs as NewProjectArgs
+from arcor2_hw.data.rpc.projects import RemoveActionArgs as RemoveActionArgs
 from arcor2_hw.data.rpc.projects import RemoveLogicItemArgs as RemoveLogicItemArgs
 from arcor2_hw.data.rpc.projects import RemoveProjectParameterArgs as RemoveProjectParameterArgs
 from arcor2_hw.data.rpc.projects import RenameActionArgs as RenameActionArgs
@@ -263,7 +264,7 @@ RPCS: Final = {
         Rpc("Redo", RedoArgs, UndoData, Role.STANDARD_USER, args_optional=True, dry_run=True, additional=True),
         Rpc("RegisterForRobotEvent", RegisterForRobotEventArgs, set[str], Role.OPERATOR),
         Rpc("RegisterUser", RegisterUserArgs, None, Role.OPERATOR),
-        Rpc("RemoveAction", IdArgs, None, Role.STANDARD_USER, dry_run=True),
+        Rpc("RemoveAction", RemoveActionArgs, None, Role.STANDARD_USER, dry_run=True),
         Rpc("RemoveActionPoint", IdArgs, None, Role.STANDARD_USER, dry_run=True),
         Rpc("RemoveActionPointJoints", RemoveActionPointJointsArgs, None, Role.STANDARD_USER),
         Rpc("RemoveActionPointOrientation", RemoveActionPointOrientationArgs, None, Role.STANDARD_USER, dry_run=True),

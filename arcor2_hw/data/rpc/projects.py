@@ -72,6 +72,13 @@ class RemoveProjectParameterArgs(Data, frozen=True):
     id: str
 
 
+class RemoveActionArgs(Data, frozen=True):
+    """Arguments of RemoveAction. With `with_steps` the action is taken out of the logic first, by the same edit."""
+
+    id: str
+    with_steps: bool = False
+
+
 class RenameActionArgs(Data, frozen=True):
     """Arguments of RenameAction."""
 

@@ -5,7 +5,7 @@ import { isRunning } from "../store/selectors";
 import type { State } from "../store/state";
 import { now, select, setUi, store, tell } from "../store/store";
 import type { Action, ActionParameter, ObjectAction, Orientation, Parameter, Position, ProjectLogicIf, Requests } from "../protocol/types";
-import { cannotLead, freeStep, incoming, outgoing, placeOf } from "../program/logic";
+import { cannotLead, freeStep, incoming, outgoing } from "../program/logic";
 import { actionNames, freeName, newOutputs } from "../program/naming";
 import { initial } from "../program/values";
 import { ask, barred, held, refusal, sentence } from "./asking";
@@ -183,30 +183,13 @@ export async function duplicateAction(action: Action & { pointId: string }): Pro
   if (added) select({ kind: "action", id: added.id });
 }
 
-/**
- * Remove an action and its steps. Where one way alone leads on from it, what led to it leads there instead.
- */
+/** Remove an action and its steps, by one edit. Where one way alone leads on from it, what led to it leads there instead. */
 export async function removeAction(id: string): Promise<void> {
   const { doc } = now();
   const name = doc?.actions[id]?.name;
   if (!doc || name === undefined) return;
-  const ways = outgoing(doc, id);
-  const next = ways.length === 1 && !ways[0]?.condition ? placeOf(ways[0]?.end ?? "") : undefined;
-  const steps = incoming(doc, id);
-  try {
-    for (const way of ways) await call("RemoveLogicItem", { logic_item_id: way.id });
-    for (const { id: item, start, condition } of steps) {
-      if (next && cannotLead(now().doc ?? doc, placeOf(start), next, item) === "") {
-        await call("UpdateLogicItem", { logic_item_id: item, start, end: next, condition });
-      } else await call("RemoveLogicItem", { logic_item_id: item });
-    }
-    await call("RemoveAction", { id });
-  } catch (error) {
-    tell("error", sentence(error));
-    return;
-  }
-  const edits = ways.length + steps.length + 1;
-  tell("info", edits === 1 ? `Removed ${name}.` : `Removed ${name} with its steps, in ${edits} edits that can be undone one by one.`);
+  const steps = outgoing(doc, id).length + incoming(doc, id).length;
+  if (await ask("RemoveAction", { id, with_steps: true })) tell("info", `Removed ${name}${steps > 0 ? " with its steps" : ""}. Undo brings ${steps > 0 ? "all of it" : "it"} back.`);
 }
 
 // ------------------------------------------------------------------------------------------------ steps

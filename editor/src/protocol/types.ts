@@ -1112,6 +1112,12 @@ export interface RegisterUserArgs {
   user_name: string;
 }
 
+/** Arguments of RemoveAction. With `with_steps` the action is taken out of the logic first, by the same edit. */
+export interface RemoveActionArgs {
+  id: string;
+  with_steps?: boolean;
+}
+
 /** Arguments of RemoveActionPointJoints. */
 export interface RemoveActionPointJointsArgs {
   joints_id: string;
@@ -1791,7 +1797,7 @@ export interface Requests {
   Redo: { args: RedoArgs | undefined; data: UndoData };
   RegisterForRobotEvent: { args: RegisterForRobotEventArgs; data: string[] };
   RegisterUser: { args: RegisterUserArgs; data: undefined };
-  RemoveAction: { args: IdArgs; data: undefined };
+  RemoveAction: { args: RemoveActionArgs; data: undefined };
   RemoveActionPoint: { args: IdArgs; data: undefined };
   RemoveActionPointJoints: { args: RemoveActionPointJointsArgs; data: undefined };
   RemoveActionPointOrientation: { args: RemoveActionPointOrientationArgs; data: undefined };

@@ -4,12 +4,12 @@ from msgspec.structs import replace
 
 from arcor2_hw.data.base import Unset, new_id
 from arcor2_hw.data.events import ChangeType
-from arcor2_hw.data.project import Action, BareAction
-from arcor2_hw.data.rpc import AddActionArgs, IdArgs, RenameActionArgs, UpdateActionArgs
+from arcor2_hw.data.project import Action, BareAction, LogicItem
+from arcor2_hw.data.rpc import AddActionArgs, RemoveActionArgs, RenameActionArgs, UpdateActionArgs
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.rpc.editing import commit, drop_locks, require_free, require_held, tell, unlock
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
-from arcor2_server.session.changes import Kind
+from arcor2_server.session.changes import Change, Kind
 from arcor2_server.session.checks import (
     action_meta,
     check_flows,
@@ -17,7 +17,8 @@ from arcor2_server.session.checks import (
     check_parameters,
     complete_parameters,
 )
-from arcor2_server.session.document import Document
+from arcor2_server.session.document import Document, action_of
+from arcor2_server.session.logic import check_logic_item
 
 
 def _check_name(context: Context, name: str) -> None:
@@ -89,17 +90,59 @@ async def rename_action(context: Context, args: RenameActionArgs) -> None:
 
 
 @rpc("RemoveAction")
-async def remove_action(context: Context, args: IdArgs) -> None:
-    """Remove an action; refused while the logic or another action needs it."""
+async def remove_action(context: Context, args: RemoveActionArgs) -> None:
+    """Remove an action; refused while another action needs it, or the logic does and its steps are not to go along."""
     services = context.services
     document = services.session.require_project_open()
-    async with services.locks.auto_skip_held(context.user, args.id):
+    document.action(args.id)
+    places = _beside(document, args.id) if args.with_steps else ()
+    async with services.locks.auto_skip_held(context.user, args.id, *places):
         _, action = document.action(args.id)
-        if document.outgoing(action.id) or document.incoming(action.id):
+        if not args.with_steps and (document.outgoing(action.id) or document.incoming(action.id)):
             raise RequestRefused(f"{action.name} is part of the logic: remove its steps first.")
+        steps = [] if not args.with_steps else _taken_out(context, document, action)
+        gone = {step.id for step in steps if step.after is None}
         for user in document.users_of(action.id):
+            if isinstance(user, LogicItem) and user.id in gone:
+                continue
             who = f"the action {user.name}" if isinstance(user, Action) else "a condition of the logic"
             raise RequestRefused(f"A result of {action.name} is used by {who}: change that first.")
-        if await commit(context, [document.remove(Kind.ACTION, action.id)]):
+        # The action first: what is undone is told by what it began with.
+        if await commit(context, [document.remove(Kind.ACTION, action.id), *steps]):
+            for step in steps:
+                tell(
+                    context, [step], "LogicItemChanged", ChangeType.REMOVE if step.after is None else ChangeType.UPDATE
+                )
             context.emit("ActionChanged", BareAction(action.name, action.type, action.id), ChangeType.REMOVE)
             drop_locks(context, action.id)
+
+
+def _beside(document: Document, action_id: str) -> set[str]:
+    """Give the places of the logic from which steps lead to an action, and to which they lead from it."""
+    before = {action_of(step.start) for step in document.incoming(action_id)}
+    return before | {action_of(step.end) for step in document.outgoing(action_id)}
+
+
+def _taken_out(context: Context, document: Document, action: Action) -> list[Change]:
+    """Give what happens to the steps of an action that goes.
+
+    Where one way alone leads on from it, in any case, what led to it leads there instead, as far as that is a step.
+    """
+    leaving = document.outgoing(action.id)
+    changes = [document.remove(Kind.LOGIC, step.id) for step in leaving]
+    on = leaving[0].end if len(leaving) == 1 and isinstance(leaving[0].condition, Unset) else None
+    for step in document.incoming(action.id):
+        instead = None if on is None else replace(step, end=on)
+        if instead is not None and _is_step(context, document, instead):
+            changes.append(document.update(Kind.LOGIC, step.id, instead))
+        else:
+            changes.append(document.remove(Kind.LOGIC, step.id))
+    return changes
+
+
+def _is_step(context: Context, document: Document, step: LogicItem) -> bool:
+    try:
+        check_logic_item(document, lambda action: action_meta(action, document, context.services.types), step)
+    except InvalidData:
+        return False
+    return True

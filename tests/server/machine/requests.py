@@ -194,6 +194,7 @@ EDITS: dict[str, Callable[[Draw], Request]] = {
     "update action": _update_action,
     "rename action": _on("RenameAction", "action_id", "actions", new_name=_name),
     "remove action": _free("RemoveAction", id=lambda d: d.action(d.x)),
+    "remove action and steps": _free("RemoveAction", id=lambda d: d.action(d.x), with_steps=lambda _: True),
     "add step": lambda draw: ("AddLogicItem", _logic(draw), "", False),
     "add step again": lambda draw: ("AddLogicItem", _logic(draw), "", False),
     "update step": _update_step,

@@ -73,6 +73,54 @@ async def test_logic_items_always_tell_of_unlocking(work: Work, alice: Person, b
         await alice.ask("AddLogicItem", start="START", end=one)
 
 
+async def test_an_action_goes_with_its_steps_by_one_edit(desk: Desk, work: Work, alice: Person, bob: Person) -> None:
+    await work.project("p")
+    point = work.point("p")
+    one, two, three = [await work.add_action(point, name) for name in ("one", "two", "three")]
+    for start, end in (("START", one), (one, two), (two, three), (three, "END")):
+        await alice.ask("AddLogicItem", start=start, end=end)
+    steps = {(item.start, item.end): item.id for item in desk.session.require_project().logic}
+    bob.take()
+    edits = len(desk.session.history)
+    await bob.lock(one)
+    with pytest.raises(Refused, match="bob"):
+        await alice.ask("RemoveAction", id=two, with_steps=True)
+    await bob.ask("WriteUnlock", object_id=one)
+    bob.take()
+    await alice.ask("RemoveAction", id=two, with_steps=True, dry_run=True)
+    assert len(desk.session.history) == edits
+    await alice.ask("RemoveAction", id=two, with_steps=True)
+    # What led to it leads on; the step that led away from it is gone.
+    assert bob.names() == ["LogicItemChanged/remove", "LogicItemChanged/update", "ActionChanged/remove"]
+    logic = {item.id: (item.start, item.end) for item in desk.session.require_project().logic}
+    assert logic[steps[one, two]] == (one, three)
+    assert steps[two, three] not in logic
+    assert len(desk.session.history) == edits + 1
+    await alice.ask("Undo")
+    assert {(item.start, item.end): item.id for item in desk.session.require_project().logic} == steps
+    await alice.ask("Redo")
+    assert {item.id: (item.start, item.end) for item in desk.session.require_project().logic} == logic
+    # The last one: nothing may lead straight from START to END.
+    await alice.ask("RemoveAction", id=one, with_steps=True)
+    await alice.ask("RemoveAction", id=three, with_steps=True)
+    assert desk.session.require_project().logic == []
+
+
+async def test_an_action_whose_result_is_used_stays_with_its_steps(desk: Desk, work: Work, alice: Person) -> None:
+    await work.project("p")
+    point = work.point("p")
+    kept = [{"type": "default", "outputs": ["lucky"]}]
+    half = {"name": "probability", "type": "double", "value": "0.5"}
+    first = await work.add_action(point, "first", "rnd/random_bool", half, flows=kept)
+    other = await work.add_action(point, "other")
+    await alice.ask("AddLogicItem", start=first, end=other)
+    await alice.ask("AddLogicItem", start=other, end="END", condition={"what": f"{first}/default/0", "value": "true"})
+    before = desk.session.require_project().logic
+    with pytest.raises(Refused, match="condition of the logic"):
+        await alice.ask("RemoveAction", id=first, with_steps=True)
+    assert desk.session.require_project().logic == before
+
+
 async def test_changing_the_parent_twice(work: Work, alice: Person) -> None:
     await work.project("a", "b")
     a, b = work.point("a"), work.point("b")

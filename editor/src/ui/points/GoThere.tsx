@@ -2,6 +2,7 @@
 
 import { useEffect, useState } from "react";
 import { hideGhost, moveToTaught, notReady, chosenRobot, showAt, showJoints } from "../../commands/robot";
+import { theEngine } from "../../session/engine";
 import { now, useEditor } from "../../store/store";
 import { worldOf } from "../../viewmodel/frames";
 import { Button } from "../kit/kit";
@@ -32,6 +33,8 @@ const GoThere: Section["Body"] = ({ selection: { kind, id } }) => {
   if (!chosen) return <p className="quiet">There is no robot in this scene.</p>;
   const show = () => {
     const { doc } = now();
+    // A ghost that nobody sees would tell nothing.
+    if (theEngine()?.item(robotId)?.visible === false) theEngine()?.focus(robotId);
     if (joints) {
       const known = now().reach;
       const reach = Object.values(known).flatMap((each) => each.items).find((each) => each.id === id);
