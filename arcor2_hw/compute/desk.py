@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Final
 import msgspec
 
 from arcor2_hw.compute.world import RobotModel, Thing
-from arcor2_hw.data.robot import KinematicCalibration
 
 if TYPE_CHECKING:
     from arcor2_hw.compute.standing_world import StandingWorld
@@ -57,6 +56,7 @@ class Desk:
 
         With a calibration: also where that is one of another arm.
         """
+        from arcor2_hw.kinematics.dh import of_very_arm
         from arcor2_hw.kinematics.model import RobotModel as Model
 
         key = msgspec.msgpack.encode((wanted.urdf.path, wanted.settings, wanted.calibration))
@@ -65,19 +65,8 @@ class Desk:
             settings: dict[str, Any] = wanted.settings
             found = Model.load(Path(wanted.urdf.path), settings, name=wanted.urdf.name)
             if wanted.calibration is not None:
-                found = _calibrated(found, wanted.calibration)
+                found = of_very_arm(found, wanted.calibration)
         self._models[key] = found
         while len(self._models) > MODELS:
             self._models.popitem(last=False)
         return found
-
-
-def _calibrated(nominal: "model.RobotModel", calibration: KinematicCalibration) -> "model.RobotModel":
-    """Give the model of the very arm. Raises ModelError when the calibration is none of it."""
-    from arcor2_hw.kinematics.dh import calibrated, rows_of
-    from arcor2_hw.kinematics.errors import ModelError
-
-    if not nominal.end_effectors:
-        raise ModelError(f"{nominal.name} has no end effector, and so no arm that a calibration could be of.")
-    # Those of one arm share its joints.
-    return calibrated(nominal, next(iter(nominal.end_effectors)), rows_of(calibration))

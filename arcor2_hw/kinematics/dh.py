@@ -92,6 +92,14 @@ def calibrated(model: RobotModel, end_effector: str, rows: Sequence[DhRow]) -> R
     return model.with_origins(origins)
 
 
+def of_very_arm(nominal: RobotModel, calibration: KinematicCalibration) -> RobotModel:
+    """Give the model of the very arm whose controller told the calibration. Raises ModelError when it is of another."""
+    if not nominal.end_effectors:
+        raise ModelError(f"{nominal.name} has no end effector, and so no arm that a calibration could be of.")
+    # Those of one arm share its joints.
+    return calibrated(nominal, next(iter(nominal.end_effectors)), rows_of(calibration))
+
+
 def _onto(axis_frame: Array, nominal: Array, what: str) -> Array:
     """Give the frame on the z axis of `axis_frame` that is nearest to a nominal one."""
     z, at = axis_frame[:3, 2], axis_frame[:3, 3]

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from arcor2_hw.data.object_type import Mesh
+from arcor2_hw.data.robot import KinematicCalibration
 from arcor2_hw.exceptions import Arcor2Error, Refused
 from arcor2_hw.objects.robot import Robot
 from arcor2_hw.objects.surroundings import Obstacle, Surroundings
@@ -24,21 +25,23 @@ if TYPE_CHECKING:
 class RobotTools:
     """Model, arms and meshes of a robot, and models of others.
 
-    made_of: settings and package, by which it is seen whether it still holds. Raises Refused without a package or the
-    extra `kinematics`, ModelError for a model that is not right.
+    made_of: settings, package and calibration, by which it is seen whether it still holds. Raises Refused without a
+    package or the extra `kinematics`, ModelError for a model that is not right, or a calibration of another arm.
     """
 
-    def __init__(self, robot: Robot, settings: dict[str, object], package: Path | None) -> None:
-        self.made_of = settings, package
+    def __init__(
+        self, robot: Robot, settings: dict[str, object], package: Path | None, calibration: KinematicCalibration | None
+    ) -> None:
+        self.made_of = settings, package, calibration
         self._surroundings: Surroundings = robot.surroundings
         if package is None:
             raise Refused(f"{robot.name} has no model (URDF) from which anything could be computed")
-        self.model = _load(robot, settings, package)
+        self.model = _load(robot, settings, package, calibration)
         self.model.name = robot.name
         self._arms: dict[str, Arm] = {}
         self._inverse: dict[str, InverseKinematics] = {}
-        self._others: dict[str, tuple[dict[str, object], RobotModel | None]] = {}
-        self._meshes: dict[Path, TriangleMesh] = {}
+        self._others: dict[str, tuple[object, RobotModel | None]] = {}
+        self._meshes: dict[tuple[Path, tuple[float, float, float]], TriangleMesh] = {}
 
     def arm(self, end_effector: str) -> "Arm":
         """Give the chain to an end effector. Raises NotFound."""
@@ -56,12 +59,12 @@ class RobotTools:
 
     def other(self, robot: Robot) -> "RobotModel | None":
         """Give the model of another robot, None when it has none."""
-        settings = settings_of(robot)
+        settings, calibration = settings_of(robot), self._surroundings.calibration(robot.id)
         known = self._others.get(robot.name)
-        if known is None or known[0] != settings:
+        if known is None or known[0] != (settings, calibration):
             package = package_of(robot)
-            model = None if package is None else _load(robot, settings, package)
-            known = self._others[robot.name] = settings, model
+            model = None if package is None else _load(robot, settings, package, calibration)
+            known = self._others[robot.name] = (settings, calibration), model
         return known[1]
 
     def shape(self, obstacle: Obstacle) -> Any:
@@ -73,24 +76,28 @@ class RobotTools:
         model = obstacle.model
         if not isinstance(model, Mesh):
             return shapes.of_model(model)
-        file = self._surroundings.asset(model.asset_id)
+        file, scale = obstacle.file or self._surroundings.asset(model.asset_id), obstacle.scale
         if file is None or not file.is_file():
             raise Refused(f"the mesh of {obstacle.name} is not known here, so no way can be looked at for collisions")
-        if file not in self._meshes:
+        if (file, scale) not in self._meshes:
             with file.open("rb") as opened:
-                self._meshes[file] = read_mesh(opened.read(MAX_MESH + 1), model.asset_id)
-        return shapes.of_model(model, self._meshes[file])
+                self._meshes[file, scale] = read_mesh(opened.read(MAX_MESH + 1), model.asset_id, scale)
+        return shapes.of_model(model, self._meshes[file, scale])
 
 
-def _load(robot: Robot, settings: Mapping[str, object], package: Path) -> "RobotModel":
+def _load(
+    robot: Robot, settings: Mapping[str, object], package: Path, calibration: KinematicCalibration | None
+) -> "RobotModel":
     try:
+        from arcor2_hw.kinematics.dh import of_very_arm
         from arcor2_hw.kinematics.model import RobotModel
     except ImportError as error:
         raise Refused(
             f"{robot.name}: nothing can be computed here: install arcor2-hw[kinematics]", str(error)
         ) from error
     try:
-        return RobotModel.load(package, settings)
+        nominal = RobotModel.load(package, settings)
+        return nominal if calibration is None else of_very_arm(nominal, calibration)
     except Arcor2Error as error:
         raise type(error)(f"The model of {robot.name} cannot be used: {error}", error.detail) from error
 

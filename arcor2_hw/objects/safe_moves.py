@@ -16,10 +16,12 @@ from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import Arcor2Error, KinematicsError, NotFound, Refused
 from arcor2_hw.objects.robot import Robot
 from arcor2_hw.objects.robot_tools import RobotTools, package_of, settings_of
+from arcor2_hw.objects.surroundings import Holder
 
 if TYPE_CHECKING:
     from arcor2_hw.kinematics.arm import Arm
-    from arcor2_hw.kinematics.shapes import Array
+    from arcor2_hw.kinematics.model import RobotModel
+    from arcor2_hw.kinematics.shapes import Array, Shape
     from arcor2_hw.kinematics.sweep import Sweep
     from arcor2_hw.kinematics.timing import Timed
     from arcor2_hw.kinematics.world import CollisionWorld
@@ -244,11 +246,13 @@ class SafeMoves:
         """Let an object of the scene move with a link, from where both are now on: a part that was taken.
 
         It is led past what is around from then on, and may touch that link. `joints`: where the robot stands. Raises
-        NotFound for an object that is no obstacle, or a link that is not there.
+        NotFound for an object that is no obstacle, or a link that is not there, Refused for what is held already.
         """
         obstacle = next((each for each in self._robot.surroundings.obstacles() if each.name == name), None)
         if obstacle is None:
             raise NotFound(f"{self._robot.name} cannot hold {name}: it is no collision object of the scene")
+        if obstacle.holder is not None:
+            raise Refused(f"{self._robot.name} cannot hold {name}: {obstacle.holder.robot} holds it")
         self.held[name] = Held(link, self._link_pose(link, joints).inverted() * obstacle.pose)
 
     def release(self, name: str, joints: Sequence[Joint]) -> Pose:
@@ -309,24 +313,23 @@ class SafeMoves:
         _put_tool(world, robot.name, self.tool())
         if alone:
             return world
-        held = {name: (robot.name, one) for name, one in self.held.items()}
+        held = {name: (Holder(robot.name, one.link), one.in_link) for name, one in self.held.items()}
         for other, joints in robot.surroundings.robots():
             model = tools.other(other)
             if model is not None:
+                _require_told(other, model, joints)
                 world.add_robot(other.name, model, other.pose, model.values(joints, model.neutral()))
                 moves = getattr(other, "safe_moves", None)
                 if isinstance(moves, SafeMoves):
                     _put_tool(world, other.name, moves.tool())
-                    held |= {name: (other.name, one) for name, one in moves.held.items()}
+                    held |= {name: (Holder(other.name, one.link), one.in_link) for name, one in moves.held.items()}
         for obstacle in robot.surroundings.obstacles():
-            holder, one = held.get(obstacle.name, ("", None))
-            pose = obstacle.pose
-            if one is not None:
-                standing = world.robot(holder)
-                pose = Pose.from_matrix(standing.link_frames(standing.q)[one.link]) * one.in_link
-            world.put(obstacle.name, tools.shape(obstacle), pose)
-            if one is not None:
-                world.attach(obstacle.name, holder, one.link)
+            holder, pose = held.get(obstacle.name, (obstacle.holder, obstacle.pose))
+            shape = tools.shape(obstacle)
+            if holder is None:
+                world.put(obstacle.name, shape, pose)
+            else:
+                _put_held(world, obstacle.name, shape, holder, pose)
         return world
 
     def _q(self, joints: Sequence[Joint]) -> "Array":
@@ -355,11 +358,12 @@ class SafeMoves:
             raise self._robot.KinematicsException(str(error), error.detail or error.code) from error
 
     def _tools(self) -> RobotTools:
-        """Give what the present thread computes with, made anew when settings, or the model's file, have changed."""
-        settings, package = dict(self._settings()), package_of(self._robot)
+        """Give what the present thread computes with, made anew when settings, model or calibration have changed."""
+        robot = self._robot
+        made_of = dict(self._settings()), package_of(robot), robot.surroundings.calibration(robot.id)
         found: RobotTools | None = getattr(self._here, "tools", None)
-        if found is None or found.made_of != (settings, package):
-            found = self._here.tools = RobotTools(self._robot, settings, package)
+        if found is None or found.made_of != made_of:
+            found = self._here.tools = RobotTools(robot, *made_of)
         return found
 
 
@@ -367,7 +371,27 @@ def _put_tool(world: "CollisionWorld", robot: str, tool: Tool | None) -> None:
     if tool is not None:
         from arcor2_hw.kinematics.shapes import of_model
 
-        name, standing = f"tool of {robot}", world.robot(robot)
-        at = Pose.from_matrix(standing.link_frames(standing.q)[tool.link]) * tool.in_link
-        world.put(name, of_model(tool.shape), at)
-        world.attach(name, robot, tool.link)
+        _put_held(world, f"tool of {robot}", of_model(tool.shape), Holder(robot, tool.link), tool.in_link)
+
+
+def _put_held(world: "CollisionWorld", name: str, shape: "Shape", holder: Holder, in_link: Pose) -> None:
+    """Let a robot hold something. Raises Refused for a robot or a link that is not there."""
+    if holder.robot not in world.robots:
+        raise Refused(f"where {holder.robot} stands, which holds {name}, is not known")
+    standing = world.robot(holder.robot)
+    frames = standing.link_frames(standing.q)
+    if holder.link not in frames:
+        raise Refused(f"{name} is held by {holder.link}, which is no link of {holder.robot}")
+    world.put(name, shape, Pose.from_matrix(frames[holder.link]) * in_link)
+    world.attach(name, holder.robot, holder.link, touching=holder.touching)
+
+
+def _require_told(robot: Robot, model: "RobotModel", joints: Sequence[Joint]) -> None:
+    """Raise Refused unless a robot has told all joints that lead to its end effectors: it may be in the way."""
+    told = {joint.name for joint in joints}
+    for name in model.end_effectors:
+        for joint in model.arm(name).joint_names:
+            if joint not in told:
+                raise Refused(
+                    f"where {robot.name} stands is not known, which may be in the way: it does not tell {joint}"
+                )

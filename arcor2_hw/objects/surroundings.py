@@ -6,18 +6,32 @@ from typing import TYPE_CHECKING, Protocol
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import Models
-from arcor2_hw.data.robot import Joint
+from arcor2_hw.data.robot import Joint, KinematicCalibration
 
 if TYPE_CHECKING:
     from arcor2_hw.objects.robot import Robot
 
 
+class Holder(Data, frozen=True):
+    """Who holds something: a robot by its name, one of its links. It may touch the links `touching`, too."""
+
+    robot: str
+    link: str
+    touching: tuple[str, ...] = ()
+
+
 class Obstacle(Data, frozen=True):
-    """A collision model that counts now, and where it stands in the world. name: of its object."""
+    """A collision model that counts now, and where it stands in the world. name: of its object.
+
+    holder: who holds it; then the pose is in the frame of that link. scale, file: of a mesh that has no asset here.
+    """
 
     name: str
     model: Models
     pose: Pose
+    holder: Holder | None = None
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    file: Path | None = None
 
 
 class Surroundings(Protocol):
@@ -35,6 +49,9 @@ class Surroundings(Protocol):
     def asset(self, asset_id: str) -> Path | None:
         """Give the file of a mesh or robot model that was uploaded, None when it is not known here."""
 
+    def calibration(self, robot_id: str) -> KinematicCalibration | None:
+        """Give what the controller of a robot told of its very arm; None: its kinematics are nominal."""
+
 
 class Nothing:
     """The surroundings of a robot that nobody told of any."""
@@ -48,5 +65,9 @@ class Nothing:
         return []
 
     def asset(self, asset_id: str) -> Path | None:
+        """Give none."""
+        return None
+
+    def calibration(self, robot_id: str) -> KinematicCalibration | None:
         """Give none."""
         return None

@@ -18,6 +18,7 @@ from arcor2_hw.runtime.device import CLOSE_DEADLINE, STOP_DEADLINE, Device, desc
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.messages import OpenScene
 from arcor2_hw.runtime.surroundings import SceneSurroundings
+from arcor2_hw.runtime.told import Told
 
 CONTROL_DEADLINE: Final = 10.0
 """Seconds for taking control: a controller may have to load and start its control program."""
@@ -110,6 +111,8 @@ class Cell:
         self._abandoned = False
         self.assets: Mapping[str, str] = {}
         """Files of meshes and of robots' models that were uploaded, by the asset's id."""
+        self.told = Told()
+        """What is known of the world besides."""
         self.changed: Callable[[Device], None] = lambda _: None
         """Called when the connection of a device changes, on the thread that keeps it."""
 
@@ -167,7 +170,7 @@ class Cell:
             failed(fault)
 
     def _make(self, how: Recipe) -> Device:
-        surroundings = SceneSurroundings(how.scene_object.id, self, self.assets)
+        surroundings = SceneSurroundings(how.scene_object.id, self, self.assets, self.told)
         device = Device(how, lambda device: self.changed(device), self.find, surroundings)
         self._devices[device.id] = device
         return device

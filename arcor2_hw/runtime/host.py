@@ -70,6 +70,7 @@ class Host:
         self.clock = Clock()
         self.program: Program | None = None
         self._cell = Cell()
+        self._told = self._cell.told
         self._work: SimpleQueue[m.HostBound] = SimpleQueue()
         self._subscribed: dict[str, m.Subscribe] = {}
         self._calls = Calls(lambda: self._cell, self.link.post, self.clock, self._stopping)
@@ -190,7 +191,7 @@ class Host:
             here=message.cell,
         )
         self._cell = program.cell
-        self._cell.assets = message.assets
+        self._cell.assets, self._cell.told = message.assets, self._told
         self._watch = Watch(program.cell, self.link.post, self._lost)
         program.inside = True
         self.program = program
@@ -248,7 +249,17 @@ class Host:
     def _handle(self, message: m.HostBound) -> None:
         match message:
             case m.OpenScene() | m.RunPackage():
+                for body in message.bodies:  # at once: what follows may change them
+                    self._told.put(body)
+                for object_id, calibration in message.calibrations.items():
+                    self._told.calibrate(object_id, calibration)
                 self._work.put(message)
+            case m.PutBody():
+                self._told.put(message.body)
+            case m.RemoveBodies():
+                self._told.remove(message.ids)
+            case m.Calibrate():
+                self._told.calibrate(message.object_id, message.calibration)
             case m.CloseScene():
                 self._cell.abandon()
                 self._work.put(message)

@@ -11,10 +11,11 @@ from msgspec import Struct, field
 from arcor2_hw import framing
 from arcor2_hw.data.cell import Cell
 from arcor2_hw.data.device import Alarm, Connection, Health
+from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.operation import HoldKind
 from arcor2_hw.data.project import Project
-from arcor2_hw.data.robot import Joint
+from arcor2_hw.data.robot import Joint, KinematicCalibration
 from arcor2_hw.data.scene import Scene, SceneObjectOverride
 from arcor2_hw.framing import PREFIX_SIZE as PREFIX_SIZE
 
@@ -44,6 +45,23 @@ class TypeCode(Struct, frozen=True):
     source: str = ""
 
 
+class PutIn(Struct, frozen=True):
+    """Something that stands in the way beside the objects of the scene.
+
+    pose: in the world, or in the frame of the link that holds it. scale: of a mesh, whose file is `file`. robot: the id
+    of the object that holds it with `link`, empty when nobody does; it may touch the links `touching`, too.
+    """
+
+    id: str
+    model: ObjectModel
+    pose: Pose
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    file: str = ""
+    robot: str = ""
+    link: str = ""
+    touching: list[str] = field(default_factory=list)
+
+
 # ------------------------------------------------------------------------------------------------ server to host
 class ToHost(Struct, frozen=True, tag=True):
     """Base of everything the server says."""
@@ -53,7 +71,8 @@ class OpenScene(ToHost, frozen=True):
     """Create and connect all objects at once. Answer: SceneOpened or SceneFailed.
 
     keep_going: an object that cannot be made or connected is told as failed by DeviceChanged, and the others come up.
-    assets: files of the meshes and of robots' models that were uploaded, by id.
+    assets: files of the meshes and of robots' models that were uploaded, by id. bodies: what stands in the way besides.
+    calibrations: kinematics of robots as their controllers told them, by id.
     """
 
     scene: Scene
@@ -64,6 +83,8 @@ class OpenScene(ToHost, frozen=True):
     project: Project | None = None
     keep_going: bool = False
     assets: dict[str, str] = field(default_factory=dict)
+    bodies: list[PutIn] = field(default_factory=list)
+    calibrations: dict[str, KinematicCalibration] = field(default_factory=dict)
 
 
 class RetryObject(ToHost, frozen=True):
@@ -77,8 +98,8 @@ class RunPackage(ToHost, frozen=True):
     """Run script.py of a package directory. The script's life is told by ProgramChanged and ProgramEvent.
 
     cell: the settings of devices at this place, which win over those of the package. breakpoints: ids of action points
-    and actions, which must be there. shared_breakpoints: more of them, left out where the project lacks them. assets:
-    files of meshes and of robots' models that were uploaded, by id.
+    and actions, which must be there. shared_breakpoints: more of them, left out where the project lacks them. assets,
+    bodies, calibrations: as in OpenScene.
     """
 
     package_id: str
@@ -89,6 +110,27 @@ class RunPackage(ToHost, frozen=True):
     cell: Cell | None = None
     shared_breakpoints: list[str] = field(default_factory=list)
     assets: dict[str, str] = field(default_factory=dict)
+    bodies: list[PutIn] = field(default_factory=list)
+    calibrations: dict[str, KinematicCalibration] = field(default_factory=dict)
+
+
+class PutBody(ToHost, frozen=True):
+    """Something stands in the way from now on, in place of what had that id."""
+
+    body: PutIn
+
+
+class RemoveBodies(ToHost, frozen=True):
+    """What was put in under these ids is gone."""
+
+    ids: list[str]
+
+
+class Calibrate(ToHost, frozen=True):
+    """Kinematics of a robot are from now on those that its controller told; None: nominal ones."""
+
+    object_id: str
+    calibration: KinematicCalibration | None
 
 
 class Call(ToHost, frozen=True):
@@ -303,6 +345,9 @@ HostBound = (
     OpenScene
     | RetryObject
     | RunPackage
+    | PutBody
+    | RemoveBodies
+    | Calibrate
     | Call
     | StopMotion
     | Subscribe

@@ -4,11 +4,13 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Final
 
-from arcor2_hw.data.robot import Joint
+from arcor2_hw.data.robot import Joint, KinematicCalibration
 from arcor2_hw.exceptions import Arcor2Error, Refused
-from arcor2_hw.objects import CollisionObject, MultiArmRobot, Robot
-from arcor2_hw.objects.surroundings import Obstacle
+from arcor2_hw.objects import CollisionObject, Robot
+from arcor2_hw.objects.surroundings import Holder, Obstacle
 from arcor2_hw.runtime.device import Device
+from arcor2_hw.runtime.messages import PutIn
+from arcor2_hw.runtime.told import Told
 
 JOINTS_WITHIN: Final = 0.5
 """Seconds in which another robot has to tell its joints: what moves does not stay there longer anyway."""
@@ -17,22 +19,33 @@ JOINTS_WITHIN: Final = 0.5
 class SceneSurroundings:
     """The things around one robot of a scene.
 
-    Collision objects that count now, each with the model of its type, where it stands now; robots with one arm, as they
-    stand now. Not known are objects that never came up, and robots with several arms.
+    Collision objects that count now, each with the model of its type, where it stands now; what was put in besides, in
+    place of the object of the same id; other robots that have a model, as they stand now. Not known are objects that
+    never came up, and what is held by a robot that is not in the scene.
     """
 
-    def __init__(self, robot: str, devices: Iterable[Device], assets: Mapping[str, str]) -> None:
-        self._robot, self._devices, self._assets = robot, devices, assets
+    def __init__(self, robot: str, devices: Iterable[Device], assets: Mapping[str, str], told: Told) -> None:
+        self._robot, self._devices, self._assets, self._told = robot, devices, assets, told
 
     def obstacles(self) -> list[Obstacle]:
         """Give what robots must not run into."""
-        found = []
+        found, bodies, names = [], self._told.bodies(), {}
         for device in self._devices:
+            names[device.id] = device.name
             instance = device.instance
-            if not isinstance(instance, CollisionObject) or not instance.enabled:
+            if not isinstance(instance, CollisionObject) or not instance.enabled or device.id in bodies:
                 continue
             if instance.collision_model is not None:
                 found.append(Obstacle(instance.name, instance.collision_model, instance.pose))
+        taken = set(names.values())
+        for body in bodies.values():
+            if body.robot and body.robot not in names:
+                continue
+            name = body.id
+            while name in taken:
+                name += " (put in)"
+            taken.add(name)
+            found.append(_put_in(body, name, names.get(body.robot)))
         return found
 
     def robots(self) -> list[tuple[Robot, list[Joint]]]:
@@ -41,7 +54,7 @@ class SceneSurroundings:
         for device in self._devices:
             if device.id == self._robot or not issubclass(device.recipe.cls, Robot):
                 continue
-            if issubclass(device.recipe.cls, MultiArmRobot) or device.recipe.cls.urdf_package_name is None:
+            if device.recipe.cls.urdf_package_name is None:
                 continue
             try:
                 instance = device.require()
@@ -56,3 +69,12 @@ class SceneSurroundings:
         """Give the file of an uploaded asset, None when it is not known here."""
         path = self._assets.get(asset_id)
         return None if path is None else Path(path)
+
+    def calibration(self, robot_id: str) -> KinematicCalibration | None:
+        """Give what the controller of a robot told of its very arm; None: its kinematics are nominal."""
+        return self._told.calibration(robot_id)
+
+
+def _put_in(body: PutIn, name: str, robot: str | None) -> Obstacle:
+    holder = None if robot is None else Holder(robot, body.link, tuple(body.touching))
+    return Obstacle(name, body.model.model(), body.pose, holder, body.scale, Path(body.file) if body.file else None)

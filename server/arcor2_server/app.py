@@ -11,6 +11,7 @@ from arcor2_hw.data.role import Role
 from arcor2_server.access import Access, role_needed
 from arcor2_server.build.service import BuildService
 from arcor2_server.cell.online import OnlineCell
+from arcor2_server.cell.told import tell_hosts
 from arcor2_server.classic import SOCKET
 from arcor2_server.collisions import CollisionWorld
 from arcor2_server.editor import editor_routes
@@ -97,6 +98,7 @@ async def running_services(settings: ServerSettings) -> AsyncIterator[Services]:
         stack.push_async_callback(services.session.close)
         services.cell = OnlineCell(services)
         services.execution = Execution(services)
+        tell_hosts(services)
         services.build = BuildService(services)
         stack.push_async_callback(services.type_news.close)
         locks.tree = services.session

@@ -9,6 +9,7 @@ import enum
 import hashlib
 import os
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -21,7 +22,7 @@ from arcor2_hw.data.base import Data, Timestamp, now
 from arcor2_hw.data.device import Connection
 from arcor2_hw.data.events import NotificationData, NotificationLevel
 from arcor2_hw.data.robot import KinematicCalibration
-from arcor2_hw.data.scene import SceneObject
+from arcor2_hw.data.scene import SceneObject, SceneObjectOverride
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, StorageError
 from arcor2_server.robot_models import model_of_type, settings_of
 from arcor2_server.rpc.registry import make_event
@@ -73,6 +74,13 @@ class ArmCalibrations:
         """Robots that were asked since they were connected."""
         self._reading: set[asyncio.Task[None]] = set()
         self._writing = asyncio.Lock()
+        self.on_change: list[Callable[[SceneObject], None]] = []
+        """Called with a robot of which another calibration, or none, is in force."""
+
+    @property
+    def any(self) -> bool:
+        """Tell whether any are kept."""
+        return bool(self._kept)
 
     def load(self) -> None:
         """Read what was kept. StorageError naming the file when that is damaged."""
@@ -84,14 +92,19 @@ class ArmCalibrations:
             raise StorageError(f"The calibrations in {self._path} cannot be read: {error}") from error
         self._kept = {each.object_id: each for each in kept}
 
-    def kept(self, robot: SceneObject) -> ArmCalibration | None:
-        """Give what was told of a robot's arm, used or not; None when nothing was."""
-        found = self._kept.get(robot.id)
-        return found if found is not None and found.device == self._device(robot) else None
+    def kept(self, robot: SceneObject, overrides: list[SceneObjectOverride] | None = None) -> ArmCalibration | None:
+        """Give what was told of a robot's arm, used or not; None when nothing was.
 
-    def in_force(self, robot: SceneObject) -> KinematicCalibration | None:
-        """Give the calibration with which kinematics of a robot are computed; None: they are nominal."""
-        found = self.kept(robot)
+        overrides: of the project that the robot is used in, else those of the open one.
+        """
+        found = self._kept.get(robot.id)
+        return found if found is not None and found.device == self._device(robot, overrides) else None
+
+    def in_force(
+        self, robot: SceneObject, overrides: list[SceneObjectOverride] | None = None
+    ) -> KinematicCalibration | None:
+        """Give the calibration with which kinematics of a robot are computed; None: they are nominal. As `kept`."""
+        found = self.kept(robot, overrides)
         return None if found is None or found.refused else found.calibration
 
     def look(self) -> None:
@@ -129,9 +142,9 @@ class ArmCalibrations:
         meta = types.robot_meta(robot.type)
         return meta.features.kinematic_calibration is True and not meta.multi_arm
 
-    def _device(self, robot: SceneObject) -> str:
+    def _device(self, robot: SceneObject, overrides: list[SceneObjectOverride] | None = None) -> str:
         """Give what stands for where a robot's device is: its settings that are texts or whole numbers."""
-        settings = settings_of(self._services, robot)
+        settings = settings_of(self._services, robot, overrides)
         cell = self._services.settings.cell
         here = None if cell is None else cell.device(robot.name)
         if here is not None and here.type == robot.type:
@@ -162,11 +175,12 @@ class ArmCalibrations:
         await self._save()
         if same:
             return
+        for tell in self.on_change:
+            tell(robot)
         if refused:
             self._tell(robot, f"the calibration in its controller is not used, kinematics are nominal. {refused}")
         else:
             self._tell(robot, "kinematics are from now on those of the calibration in its controller.", bad=False)
-        services.reachability.look()
 
     async def _refused(self, robot: SceneObject, calibration: KinematicCalibration) -> str:
         """Tell why a calibration cannot be used, empty when it can."""

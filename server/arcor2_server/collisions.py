@@ -45,10 +45,21 @@ class CollisionWorld:
         self._put: dict[str, Placed] = {}
         self.on_change: list[Callable[[], None]] = []
         """Called when what was put in changed."""
+        self.on_put: list[Callable[[Placed], None]] = []
+        """Called with what was put in, or moved, or is held by another."""
+        self.on_remove: list[Callable[[list[str]], None]] = []
+        """Called with the ids of what was taken out."""
+
+    @property
+    def put_in(self) -> dict[str, Placed]:
+        """Give what was put in, by id."""
+        return dict(self._put)
 
     def put(self, placed: Placed) -> None:
         """Put a model in, in place of one of its id."""
         self._put[placed.model.id] = placed
+        for tell in self.on_put:
+            tell(placed)
         self._changed()
 
     def given(self, key: str) -> Placed:
@@ -61,12 +72,18 @@ class CollisionWorld:
         """Take a model out; NotFound."""
         if self._put.pop(key, None) is None:
             raise NotFound(f"There is no collision model {key!r}.")
-        self._changed()
+        self._removed([key])
 
     def stop(self) -> None:
         """Stop, and take all models out that were put in."""
         self.started = False
+        gone = list(self._put)
         self._put.clear()
+        self._removed(gone)
+
+    def _removed(self, keys: list[str]) -> None:
+        for tell in self.on_remove:
+            tell(keys)
         self._changed()
 
     def _changed(self) -> None:

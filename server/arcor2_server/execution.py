@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 from collections.abc import Coroutine
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import msgspec
@@ -28,6 +29,7 @@ from arcor2_server.cell.devices import DeviceBoard, DeviceStatus, overlay_for
 from arcor2_server.cell.host import CellHost
 from arcor2_server.cell.opening import shapes_put_in
 from arcor2_server.cell.streams import RobotStreams
+from arcor2_server.cell.told import calibrations_of_package, with_world
 from arcor2_server.kept_packages import KeptPackages
 from arcor2_server.rpc.registry import RequestRefused, make_event
 from arcor2_server.runs import How
@@ -65,7 +67,7 @@ class Execution(KeptPackages):
         self._before: bytes | None = None
         self._exception: ProjectExceptionData | None = None
         self.board = DeviceBoard(services.hub)
-        self.streams = RobotStreams(services.hub, self._say, everybody=True)
+        self.streams = RobotStreams(services.hub, self.say, everybody=True)
         services.hub.on_leave.append(self.streams.forget)
         self._run_number = 0
         self._stopped_by: str | None = None
@@ -196,12 +198,13 @@ class Execution(KeptPackages):
             if self._shared_of:  # at the last moment: a change after this is told to the program
                 shared = await self._services.breakpoints.ids(self._shared_of)
                 message = msgspec.structs.replace(message, shared_breakpoints=sorted(shared))
+            measured = await calibrations_of_package(self._services, Path(message.directory))
         except Arcor2Error as error:
             self._fail(str(error), type(error).__name__)
             self._ended()
             return
         self._host = host
-        host.send(message)
+        host.send(with_world(self._services, message, measured))
 
     async def _note_run(self, package_id: str, number: int) -> None:
         try:
@@ -246,7 +249,8 @@ class Execution(KeptPackages):
         self._enter(S.RESUMING)
         host.send(m.Step())
 
-    def _say(self, message: m.ToHost) -> None:
+    def say(self, message: m.ToHost) -> None:
+        """Tell the program's host, when there is one."""
         if self._host is not None:
             self._host.send(message)
 

@@ -71,6 +71,7 @@ class ReachabilityBoard:
         self._working: asyncio.Task[None] | None = None
         services.session.on_change.append(lambda edit: self.look() if edit is not None else self._begin_anew())
         services.collisions.on_change.append(self.look)
+        services.arm_calibrations.on_change.append(lambda _: self.look())
 
     # -------------------------------------------------------------------------------- asked
     async def ask(self, args: "ReachabilityArgs") -> list[ReachabilityData]:

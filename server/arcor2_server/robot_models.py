@@ -9,7 +9,7 @@ import msgspec
 from arcor2_hw.compute.world import KeptFile, RobotModel
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.geometry import Pose
-from arcor2_hw.data.scene import SceneObject
+from arcor2_hw.data.scene import SceneObject, SceneObjectOverride
 from arcor2_hw.exceptions import NotFound
 from arcor2_server.rpc.registry import RequestRefused
 
@@ -40,10 +40,13 @@ def model_of(services: "Services", robot: SceneObject, why: str) -> RobotModel:
     return RobotModel(file, base, settings_of(services, robot), robot.name, calibration)
 
 
-def settings_of(services: "Services", robot: SceneObject) -> dict[str, Any]:
-    """Give the settings of an object by name, as the open scene and the overrides of the open project have them."""
-    project = services.session.project
-    overrides = [] if project is None else project.object_overrides
+def settings_of(
+    services: "Services", robot: SceneObject, overrides: list[SceneObjectOverride] | None = None
+) -> dict[str, Any]:
+    """Give the settings of an object by name, as its scene and the overrides, else those of the open project, say."""
+    if overrides is None:
+        project = services.session.project
+        overrides = [] if project is None else list(project.object_overrides)
     parameters = list(robot.parameters)
     for override in overrides:
         if override.id == robot.id:

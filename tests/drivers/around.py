@@ -7,7 +7,7 @@ import numpy as np
 
 from arcor2_hw.data import object_type
 from arcor2_hw.data.geometry import Pose, Position
-from arcor2_hw.data.robot import Joint
+from arcor2_hw.data.robot import Joint, KinematicCalibration
 from arcor2_hw.kinematics.model import RobotModel
 from arcor2_hw.kinematics.shapes import Box
 from arcor2_hw.kinematics.world import CollisionWorld
@@ -26,6 +26,9 @@ class Around:
         return []
 
     def asset(self, asset_id: str) -> Path | None:
+        return None
+
+    def calibration(self, robot_id: str) -> KinematicCalibration | None:
         return None
 
     def touches(self, model: RobotModel, base: Pose, seen: Iterable[Iterable[float]]) -> set[str]:

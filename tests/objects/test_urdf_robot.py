@@ -18,7 +18,7 @@ from arcor2_hw.analysis.library import Library
 from arcor2_hw.analysis.source import SourceFile
 from arcor2_hw.data import object_type
 from arcor2_hw.data.geometry import Orientation, Pose, Position
-from arcor2_hw.data.robot import Joint
+from arcor2_hw.data.robot import Joint, KinematicCalibration
 from arcor2_hw.exceptions import Cancelled, InvalidData, NotFound, OutOfRange, Refused
 from arcor2_hw.kinematics.model import RobotModel
 from arcor2_hw.kinematics.shapes import Box
@@ -33,7 +33,7 @@ ACROSS = (np.pi - 0.4, -1.57, 1.57, -1.57, -1.57, 0.0)
 BASE = Pose(Position(0.5, -0.2, 0.1), Orientation.from_rotation_vector(0.0, 0.0, 0.7))
 SOURCE = '''"""A robot arm that goes from joint values to joint values."""
 
-from arcor2_hw.data.robot import Joint
+from arcor2_hw.data.robot import Joint, KinematicCalibration
 from arcor2_hw.exceptions import Cancelled
 from arcor2_hw.objects.safe_moves import Way
 from arcor2_hw.objects.urdf_robot import UrdfRobot
@@ -81,6 +81,9 @@ class Around:
 
     def asset(self, asset_id: str) -> Path | None:
         return self.files.get(asset_id)
+
+    def calibration(self, robot_id: str) -> KinematicCalibration | None:
+        return None
 
     def box(self, name: str, at: Position, *sizes: float) -> None:
         self.things.append(Obstacle(name, object_type.Box(name, *sizes), BASE * Pose(at)))

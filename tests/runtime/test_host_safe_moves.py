@@ -1,14 +1,16 @@
 """In the host a robot knows what stands in the scene: it goes around that, as it is now."""
 
+import math
 from pathlib import Path
 from typing import Any
 
 import pytest
+import trimesh
 
 import arcor2_drivers
 from arcor2_hw.data import object_type
-from arcor2_hw.data.geometry import Pose, Position
-from arcor2_hw.data.robot import Joint
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.robot import DhParameters, Joint, KinematicCalibration
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.runtime import messages as m
 
@@ -18,6 +20,8 @@ URDF = Path(next(iter(arcor2_drivers.__path__))) / "universal_robots" / "urdf" /
 NAMES = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
 READY = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
 ACROSS = (2.74, -1.57, 1.57, -1.57, -1.57, 0.0)
+MEETING = (1.04, -1.57, 1.57, -1.57, -1.57, 0.0)
+"""Where the tip is where that of another arm is that reaches over."""
 ARM = """
 from arcor2_hw.objects.safe_moves import Way
 from arcor2_hw.objects.urdf_robot import UrdfRobot
@@ -111,3 +115,133 @@ def test_another_robot_is_known_by_its_joints_or_the_move_is_refused(scene: Host
     assert error.code == "refused"
     assert "where other stands is not known" in error.message
     assert go(scene, READY, safe=False) is None
+
+
+# ---------------------------------------------------------------------------------------------------- what is put in
+TIP = Position(0.4922, 0.1334, 0.4878)
+"""Where the tip is in READY; the tool points down."""
+
+
+def line(host: HostProcess, by: Position) -> Any:
+    """Lead the tip in a line from READY, safely; gives what was said."""
+    assert go(host, READY, safe=False) is None
+    target = Pose(TIP + by, UPSIDE_DOWN)
+    return host.call("obj_arm", "move_to_pose", end_effector_id="tcp", target_pose=target, speed=0.5)
+
+
+UPSIDE_DOWN = Orientation(math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0)
+
+
+def box(key: str, at: Position, x: float, y: float, z: float, **more: Any) -> m.PutBody:
+    return m.PutBody(m.PutIn(key, object_type.ObjectModel.of(object_type.Box(key, x, y, z)), Pose(at), **more))
+
+
+def collision(answer: Any, *names: str) -> None:
+    assert isinstance(answer, m.ErrorData), answer
+    assert answer.code == "kinematics"
+    for name in names:
+        assert name in answer.message
+
+
+def test_what_was_put_in_stands_in_the_way_until_it_is_taken_out(scene: HostProcess, tmp_path: Path) -> None:
+    up, beside = Position(0.0, 0.0, 0.2), Position(0.0, 0.25, 0.0)
+    assert line(scene, beside) is None
+    scene.send(box("crate", TIP + Position(0.0, 0.25, 0.0), 0.1, 0.1, 0.1))
+    collision(line(scene, beside), "arm/", "crate")
+    scene.send(box("crate", TIP + Position(0.0, 9.0, 0.0), 0.1, 0.1, 0.1))
+    assert line(scene, beside) is None, "it was moved"
+
+    # A mesh brings its file, and may be scaled; a body of an object's id stands for that object.
+    mesh = tmp_path / "mesh"
+    mesh.write_bytes(trimesh.creation.box((1.0, 1.0, 1.0)).export(file_type="stl"))
+    model = object_type.ObjectModel.of(object_type.Mesh("lump", "lump.stl"))
+    there = Pose(TIP + Position(0.0, 0.25, 0.0))
+    scene.send(m.PutBody(m.PutIn("lump", model, there, (0.1, 0.1, 0.1), str(mesh))))
+    collision(line(scene, beside), "lump")
+    scene.send(m.PutBody(m.PutIn("lump", model, Pose(TIP + Position(0.0, 0.0, 0.3)), (0.1, 0.1, 0.1), str(mesh))))
+    assert line(scene, beside) is None
+    scene.send(m.RemoveBodies(["lump"]))
+    assert go(scene, READY, safe=False) is None
+    scene.send(box("wall", Position(0.0, 9.0, 0.0), 0.1, 0.1, 0.1))
+    assert go(scene, ACROSS) is None
+    assert scene.call("obj_arm", "waypoints") > 2, "the wall is there, too, although something is called so"
+    scene.send(box("obj_wall", Position(0.0, 9.0, 0.0), 0.1, 0.1, 0.1))
+    assert go(scene, READY) is None
+    assert scene.call("obj_arm", "waypoints") == 2
+    assert line(scene, up) is None
+
+
+def test_what_is_held_collides_where_the_arm_alone_would_not(scene: HostProcess) -> None:
+    beside = Position(0.0, 0.25, 0.0)
+    scene.send(box("table", TIP + Position(0.0, 0.25, -0.2), 0.1, 0.1, 0.02))
+    assert line(scene, beside) is None
+    rod = Position(0.0, 0.0, 0.16)
+    scene.send(box("rod", rod, 0.03, 0.03, 0.3, robot="obj_arm", link="tcp"))
+    collision(line(scene, beside), "rod", "table")
+    assert line(scene, Position(0.0, -0.1, 0.0)) is None, "it is no obstacle to who holds it"
+    scene.send(box("rod", rod, 0.03, 0.03, 0.3, robot="obj_arm", link="claw"))
+    error = line(scene, beside)
+    assert isinstance(error, m.ErrorData)
+    assert "claw, which is no link of arm" in error.message
+    scene.send(box("rod", rod, 0.03, 0.03, 0.3, robot="obj_of_another_scene", link="tcp"))
+    assert line(scene, beside) is None
+    scene.send(box("rod", TIP + beside, 0.03, 0.03, 0.3))
+    collision(line(scene, beside), "rod")
+
+
+def test_another_arm_is_in_the_way_where_it_is_now(host: HostProcess) -> None:
+    objects = [placed("arm", "Arm", Pose()), placed("other", "Arm", Pose(Position(0.0, 1.0, 0.0)))]
+    host.send(open_scene([type_code("Arm", ARM)], *objects, assets={"arm.urdf": str(URDF)}))
+    host.expect(m.SceneOpened)
+    assert go(host, ACROSS) is None
+    assert host.call("obj_arm", "waypoints") == 2
+    reaching = joints((-1.57, *READY[1:]))
+    assert host.call("obj_other", "move_to_joints", target_joints=reaching, speed=0.5, safe=False) is None
+    assert go(host, READY) is None
+    assert host.call("obj_arm", "waypoints") > 2
+    collision(go(host, MEETING), "arm/", "other/")
+    # The other way round: neither is led into the other.
+    assert go(host, MEETING, safe=False) is None
+    home = joints(READY)
+    assert host.call("obj_other", "move_to_joints", target_joints=home, speed=0.5, safe=False) is None
+    answer = host.call("obj_other", "move_to_joints", target_joints=reaching, speed=0.5)
+    collision(answer, "arm/", "other/")
+    # What it holds is part of it.
+    assert go(host, READY, safe=False) is None
+    assert host.call("obj_other", "move_to_joints", target_joints=joints((1.57, *READY[1:])), speed=0.5) is None
+    assert go(host, ACROSS) is None
+    assert host.call("obj_arm", "waypoints") == 2
+    host.send(box("beam", Position(0.27, 0.5, 0.0), 0.1, 1.0, 0.1, robot="obj_other", link="tcp"))
+    collision(go(host, MEETING), "arm/", "beam")
+
+
+# ---------------------------------------------------------------------------------------------------- the very arm
+def calibration(longer: float) -> KinematicCalibration:
+    """That of an arm whose upper arm is longer by so much."""
+    half = math.pi / 2
+    d, a = (0.1625, 0.0, 0.0, 0.1333, 0.0997, 0.0996), (0.0, -0.425 - longer, -0.3922, 0.0, 0.0, 0.0)
+    rows = zip(d, a, (half, 0.0, 0.0, half, -half, 0.0), strict=True)
+    return KinematicCalibration([DhParameters(0.0, *row) for row in rows], "0x1")
+
+
+def tip(host: HostProcess) -> Position:
+    found = host.call("obj_arm", "get_end_effector_pose", end_effector="tcp")["position"]
+    return Position(*(found[axis] for axis in "xyz"))
+
+
+def test_the_arm_is_computed_as_its_controller_told(host: HostProcess) -> None:
+    objects = [placed("arm", "Arm", Pose())]
+    calibrated = {"obj_arm": calibration(0.002), "obj_gone": calibration(0.003)}
+    given = {"assets": {"arm.urdf": str(URDF)}, "calibrations": calibrated}
+    host.send(open_scene([type_code("Arm", ARM)], *objects, **given))
+    host.expect(m.SceneOpened)
+    # With the upper arm upright it is so much higher.
+    assert tip(host).z - TIP.z == pytest.approx(0.002, abs=1e-4)
+    host.send(m.Calibrate("obj_arm", None))
+    assert tip(host).z - TIP.z == pytest.approx(0.0, abs=1e-4)
+    host.send(m.Calibrate("obj_arm", calibration(0.004)))
+    assert tip(host).z - TIP.z == pytest.approx(0.004, abs=1e-4)
+    host.send(m.Calibrate("obj_arm", calibration(0.2)))
+    error = host.call("obj_arm", "get_end_effector_pose", end_effector="tcp")
+    assert isinstance(error, m.ErrorData)
+    assert "not one of" in error.message

@@ -12,6 +12,7 @@ from typing import Any, Final, Protocol, TypeVar, cast
 import msgspec
 import structlog
 
+from arcor2_hw.actions.json_values import encode
 from arcor2_hw.data.operation import HoldKind
 from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, DeviceTimeout
 from arcor2_hw.runtime import messages as m
@@ -365,3 +366,10 @@ def _reason(code: int) -> str:
             name = f"signal {-code}"
         return f"the cell host was killed by {name}"
     return f"the cell host ended with status {code}" if code else "the cell host ended"
+
+
+def json_of(value: Any) -> bytes:
+    """Give an argument of a call as it travels."""
+    if isinstance(value, msgspec.Raw):
+        return bytes(value)
+    return encode(value).encode()

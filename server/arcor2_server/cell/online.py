@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Final
 import msgspec
 import structlog
 
-from arcor2_hw.actions.json_values import encode
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.events import ActionResultData, Event, ObjectStateData, SceneStateData, SceneStateEnum
 from arcor2_hw.data.geometry import Pose
@@ -19,11 +18,12 @@ from arcor2_hw.runtime import messages as m
 from arcor2_server.cell.actions import RunningAction
 from arcor2_server.cell.devices import DeviceBoard, DeviceStatus
 from arcor2_server.cell.holding import HeldRobots
-from arcor2_server.cell.host import CellHost
+from arcor2_server.cell.host import CellHost, json_of
 from arcor2_server.cell.hosts import CellHosts
 from arcor2_server.cell.opening import opening
 from arcor2_server.cell.scene_task import SceneTask
 from arcor2_server.cell.streams import RobotStreams
+from arcor2_server.cell.told import calibrations, with_world
 from arcor2_server.locks import PROJECT, SCENE, SERVER
 from arcor2_server.rpc.registry import RequestRefused, make_event
 
@@ -58,7 +58,7 @@ class OnlineCell:
         self._host: CellHost | None = None
         self._task: asyncio.Task[None] | None = None
         self._answer: asyncio.Future[m.ErrorData | None] | None = None
-        self.streams = RobotStreams(services.hub, self._say)
+        self.streams = RobotStreams(services.hub, self.say)
         self.held = HeldRobots(services, self._online_host, self.moving)
         self.task = SceneTask(services.tasks)
         self.board = DeviceBoard(services.hub, self._one_connected)
@@ -166,7 +166,7 @@ class OnlineCell:
         self.board.show(scene.objects, overlaid)
         self._answer = asyncio.get_running_loop().create_future()
         host = self._host = await self.hosts.take(self)
-        host.send(message)
+        host.send(with_world(self._services, message, calibrations(self._services, scene.objects)))
         try:
             async with asyncio.timeout(START_WITHIN):
                 error = await self._answer
@@ -308,7 +308,7 @@ class OnlineCell:
         deadline: float | None = None,
     ) -> bytes:
         """Call a method of an object; gives the result as JSON, empty for None."""
-        encoded = {name: _json(value) for name, value in (args or {}).items()}
+        encoded = {name: json_of(value) for name, value in (args or {}).items()}
         return await self._online_host().call(object_id, method, encoded, control=control, deadline=deadline)
 
     async def cancel(self, object_id: str, action: str) -> None:
@@ -367,7 +367,8 @@ class OnlineCell:
             raise RequestRefused(f"{robot.name} has one arm: do not name it.")
         return {} if arm_id is None else {"arm_id": arm_id}
 
-    def _say(self, message: m.ToHost) -> None:
+    def say(self, message: m.ToHost) -> None:
+        """Tell the scene's host, when there is one."""
         if self._host is not None:
             self._host.send(message)
 
@@ -390,9 +391,3 @@ class OnlineCell:
 
 OBSERVE_WITHIN: Final = 5.0
 """Seconds for reading a value; a device on a local network answers within one."""
-
-
-def _json(value: Any) -> bytes:
-    if isinstance(value, msgspec.Raw):
-        return bytes(value)
-    return encode(value).encode()

@@ -18,6 +18,7 @@ from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import NotFound
 from arcor2_hw.runtime.messages import TypeCode
 from arcor2_server.cell.online import OnlineCell
+from arcor2_server.cell.told import tell_hosts
 from arcor2_server.execution import Execution
 from arcor2_server.hub import Hub
 from arcor2_server.locks import Locks
@@ -142,6 +143,7 @@ async def running_server(data_dir: Path) -> AsyncIterator[Server]:
     await services.session.open()
     services.cell = OnlineCell(services)
     services.execution = Execution(services)
+    tell_hosts(services)
     locks.tree = services.session
     try:
         yield Server(services, types)

@@ -1,15 +1,33 @@
 """A safe move as a client asks for it: an uploaded mesh and robot model get to where ways are planned."""
 
 from collections.abc import AsyncIterator
+from typing import Any
 
 import msgspec
+import pytest
 import trimesh
+from msgspec.structs import replace
 
+from arcor2_hw.compute.world import Holder
 from arcor2_hw.data import object_type
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import ObjectTypeMeta
+from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
-from tests.runtime.test_host_safe_moves import ACROSS, ARM, READY, URDF, WALL, joints, placed
+from arcor2_server.collisions import Placed
+from tests.runtime.conftest import Package
+from tests.runtime.test_host_safe_moves import (
+    ACROSS,
+    ARM,
+    READY,
+    TIP,
+    UPSIDE_DOWN,
+    URDF,
+    WALL,
+    calibration,
+    joints,
+    placed,
+)
 
 from .conftest import Server, robot_meta, serving
 
@@ -54,3 +72,133 @@ async def test_around_a_mesh_or_refused(server: Server) -> None:
     stuck = await move(server, READY)
     assert stuck["move_event_type"] == "failed"
     assert "where it stands" in str(stuck["message"])
+
+
+# ---------------------------------------------------------------------------------------------------- the same world
+OBJ = "obj_arm"
+LONGER = 0.004
+TELLS = f"""
+import msgspec
+from arcor2_hw.data.robot import KinematicCalibration
+{ARM}
+    def kinematic_calibration(self) -> KinematicCalibration:
+        return msgspec.json.decode({msgspec.json.encode(calibration(LONGER)).decode()!r}, type=KinematicCalibration)
+"""
+
+
+async def with_arm_alone(server: Server) -> None:
+    meta = robot_meta("Arm", move_to_pose=True, move_to_joints=True, kinematic_calibration=True)
+    server.types.add("Arm", TELLS, [], replace(meta, urdf_package_filename="arm.urdf"))
+    await server.services.assets.put(_pieces(URDF.read_bytes()), "arm.urdf")
+    await server.open(Scene("scene", id="scn_1", objects=[placed("arm", "Arm", Pose())]))
+
+
+def box(key: str, at: Position, x: float, y: float, z: float, holder: Holder | None = None) -> Placed:
+    return Placed(object_type.Box(key, x, y, z), Pose(at), holder=holder)
+
+
+async def line(server: Server, to: Position) -> str:
+    """Lead the tip to where it is in READY, and from there in a line; gives why not, empty when it went."""
+    assert (await move(server, READY, safe=False))["move_event_type"] == "end"
+    target = {"position": msgspec.to_builtins(to), "orientation": msgspec.to_builtins(UPSIDE_DOWN)}
+    args = {"robot_id": OBJ, "end_effector_id": "tcp", "speed": 0.5, "safe": True, "linear": True} | target
+    await server.ask("MoveToPose", args)
+    told = await server.client.event("RobotMoveToPose", lambda data: data["move_event_type"] != "start")
+    return str(told.get("message", ""))
+
+
+async def height(server: Server) -> float:
+    return (await server.services.cell.end_effector_pose(OBJ, "tcp")).position.z
+
+
+@serving(with_arm_alone)
+async def test_what_was_put_in_or_is_held_counts_online_and_in_programs(server: Server) -> None:
+    world, beside = server.services.collisions, TIP + Position(0.0, 0.25, 0.0)
+    try:
+        world.put(box("table", beside + Position(0.0, 0.0, -0.2), 0.1, 0.1, 0.02))  # it was there before
+        await server.start()
+        assert await line(server, beside) == ""
+        world.put(box("crate", beside, 0.1, 0.1, 0.1))
+        assert "crate" in await line(server, beside)
+        world.remove("crate")
+        assert await line(server, beside) == ""
+        world.put(box("rod", Position(0.0, 0.0, 0.16), 0.03, 0.03, 0.3, Holder(OBJ, "tcp")))
+        met = await line(server, beside)
+        assert "rod" in met
+        assert "table" in met
+        world.stop()
+        assert await line(server, beside) == ""
+        await server.ask("StopScene")
+        await server.client.state("stopped")
+
+        # A program meets what was there before it, and what comes while it runs.
+        world.put(box("table", beside + Position(0.0, 0.0, -0.2), 0.1, 0.1, 0.02))
+        world.put(box("rod", Position(0.0, 0.0, 0.16), 0.03, 0.03, 0.3, Holder(OBJ, "tcp")))
+        write(server)
+        await server.ask("RunPackage", {"id": "pkg_1"})
+        met = (await server.client.event("ProjectException"))["message"]
+        assert "rod" in met
+        assert "table" in met
+        await server.client.state("stopped", "PackageState")
+        world.remove("rod")
+        await server.ask("RunPackage", {"id": "pkg_1"})
+        (tip,) = (await server.client.event("RobotEef", lambda data: _at(data).distance_to(beside) < 1e-3))[
+            "end_effectors"
+        ]
+        assert tip["end_effector_id"] == "tcp"
+        world.put(box("crate", beside, 0.1, 0.1, 0.1))
+        assert "crate" in (await server.client.event("ProjectException"))["message"]
+        await server.client.state("stopped", "PackageState")
+    finally:
+        await server.services.compute.close()
+
+
+def _at(data: dict[str, Any]) -> Position:
+    (tip,) = data["end_effectors"]
+    return msgspec.convert(tip["pose"]["position"], Position)
+
+
+def write(server: Server) -> None:
+    """A package that leads the tip to the side in a line, again and again."""
+    target = msgspec.json.encode(Pose(TIP + Position(0.0, 0.25, 0.0), UPSIDE_DOWN)).decode()
+    ready = [(joint.name, joint.value) for joint in joints(READY)]
+    body = f"""
+        import msgspec
+        from arcor2_hw.data.geometry import Pose
+        from arcor2_hw.data.robot import Joint
+        arm = res.objects["{OBJ}"]
+        while True:
+            arm.move_to_joints([Joint(*one) for one in {ready}], 0.5, safe=False)
+            arm.move_to_pose("tcp", msgspec.json.decode({target!r}, type=Pose), 0.5)
+            time.sleep(0.05)
+    """
+    objects = [placed("arm", "Arm", Pose())]
+    directory = server.services.settings.packages_dir / "pkg_1"
+    Package(directory).write({"Arm": TELLS}, objects, Project("project", "scn_1", id="pro_1"), body)
+
+
+@serving(with_arm_alone)
+async def test_the_arm_is_led_as_its_controller_told_also_in_programs(server: Server) -> None:
+    kept = server.services.arm_calibrations
+    try:
+        await server.start()
+        assert await height(server) == pytest.approx(TIP.z, abs=1e-4)
+        await kept.settled()
+        assert await height(server) == pytest.approx(TIP.z + LONGER, abs=1e-4)
+        await server.ask("StopScene")
+        await server.client.state("stopped")
+        await server.start()  # and from the start, the next time
+        assert await height(server) == pytest.approx(TIP.z + LONGER, abs=1e-4)
+        await server.ask("StopScene")
+        await server.client.state("stopped")
+        write(server)
+        server.client.got.clear()
+        await server.ask("RunPackage", {"id": "pkg_1"})
+        await server.client.state("running", "PackageState")
+        height_there = _at(await server.client.event("RobotEef")).z
+        assert height_there == pytest.approx(TIP.z + LONGER, abs=1e-4)
+        await server.ask("StopPackage")
+        await server.client.state("stopped", "PackageState")
+    finally:
+        await kept.close()
+        await server.services.compute.close()

@@ -85,7 +85,7 @@ async def test_a_robot_is_streamed_while_a_program_runs(tmp_path: Path) -> None:
         alice, viewer, other = await stage.person("alice"), await stage.person(), await stage.person()
         await project(stage, alice, arm="Arm")
         arm, clock = stage.ids["arm"], stage.ids["time"]
-        what = {"robot_id": arm, "what": "joints"}
+        what: dict[str, Any] = {"robot_id": arm, "what": "joints"}
         assert "offline" in await refused(viewer, "StreamRobot", **what)
         await alice.ask("TemporaryPackage")
         with pytest.raises(Refused, match="not there yet"):
