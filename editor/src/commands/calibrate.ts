@@ -1,15 +1,34 @@
 /** Where things stand, found out by robots and cameras. Each gives why it was refused, empty when it was done or begun. */
 
+import { createStore } from "zustand/vanilla";
 import type { Pivot, Pose, Position } from "../protocol/types";
 import { refusedWith } from "../session/assets";
 import { remembered } from "../session/memory";
 import { call } from "../session/session";
-import { store } from "../store/store";
+import { now, setUi, store } from "../store/store";
+import { FLIPPED, pivotOffset } from "../transform/pivots";
+import { composed } from "../viewmodel/frames";
 import { held, refusal } from "./asking";
 import { type Chosen, robotArg } from "./robot";
 
 /** Put an object where the robot's tool points; `pivot` is which of its places is touched. */
 export const placeByRobot = (id: string, chosen: Chosen, pivot: Pivot) => refusal(() => call("UpdateObjectPoseUsingRobot", { id, robot: robotArg(chosen), pivot }));
+
+/** Show an object where `placeByRobot` would put it, with the tool at a pose in the world; gives why it cannot be. */
+export function showAtTool(id: string, tool: Pose, pivot: Pivot): string {
+  const state = now();
+  const of = state.doc?.objects[id];
+  const offset = pivotOffset(state.types.byName[of?.type ?? ""]?.object_model, pivot);
+  if (!of || typeof offset === "string") return typeof offset === "string" ? offset : "It is gone.";
+  const pose = composed(tool, { position: { x: 0, y: 0, z: -offset }, orientation: FLIPPED });
+  setUi({ draft: { id, of, pose } });
+  return "";
+}
+
+/** Show it where it stands again. */
+export function hideAtTool(id: string): void {
+  if (now().ui.draft?.id === id) setUi({ draft: undefined });
+}
 
 // ------------------------------------------------------------------------------------------------ aiming
 /** An aiming that is under way: it holds the object and the robot until it is over. */
@@ -57,10 +76,22 @@ export function beginAiming(id: string, chosen: Chosen, onLost: () => void): Pro
 }
 
 // ------------------------------------------------------------------------------------------------ cameras
-export const calibrateCamera = (id: string) => refusal(() => held(id, () => call("CalibrateCamera", { id }, { deadline: 30 })));
+export const calibrateCamera = (id: string) => refusal(() => held(id, () => remembering(id, () => call("CalibrateCamera", { id }, { deadline: 30 }))));
 
 export const calibrateRobot = (robot_id: string, camera_id: string, move_to_calibration_pose: boolean) =>
-  refusal(() => held(robot_id, () => call("CalibrateRobot", { robot_id, camera_id, move_to_calibration_pose }, { deadline: 30 })));
+  refusal(() =>
+    held(robot_id, () => remembering(robot_id, () => call("CalibrateRobot", { robot_id, camera_id, move_to_calibration_pose }, { deadline: 30 }))),
+  );
+
+/** Where the thing that was calibrated last stood before, until somebody has said that its new place is right. */
+export const before = createStore<{ id: string; pose: Pose | null }>(() => ({ id: "", pose: null }));
+export const keepPlace = (): void => before.setState({ id: "", pose: null });
+
+async function remembering(id: string, begin: () => Promise<unknown>): Promise<void> {
+  const pose = now().doc?.objects[id]?.pose ?? null;
+  await begin();
+  before.setState({ id, pose });
+}
 
 /** Take a picture; a JPEG, whose bytes come as one character each. Rejects with why it was refused. */
 export async function takePicture(id: string): Promise<Blob> {
@@ -93,7 +124,16 @@ export interface TouchedFrame {
   pose: Pose;
   grade: string;
   verdict: string;
+  /** m, of each point, in the order given; `checked`: there are more than are needed, so that they say something. */
+  residuals: number[];
+  residual: number;
+  worst: number;
+  checked: boolean;
 }
+
+/** The frame of points that are known in it, and were touched, in the same order; nothing is kept of it. */
+export const frameByPoints = (known: Position[], touched: Position[]) =>
+  rest<TouchedFrame>("/api/calibration/touch/frame-by-points", { method: "PUT", body: JSON.stringify({ known, touched }) });
 
 /** The frame of three touched points: its origin, one on its x axis, one in its xy plane. */
 export const frameByAxes = (origin: Position, on_x: Position, in_plane: Position[], record: { object_id: string; object_name: string }) =>

@@ -148,6 +148,12 @@ export function showJoints(robotId: string, joints: Joint[], problem = ""): void
   setUi({ ghost: { robotId, joints, problem } });
 }
 
+/** Show the robot as it is, but standing elsewhere: its base at a pose in the world. */
+export function showStanding(robotId: string, at: Pose): void {
+  const joints = [...(telemetry.latest(robotId)?.joints ?? [])].map(([name, value]) => ({ name, value }));
+  setUi({ ghost: { robotId, joints, problem: "", at } });
+}
+
 export function hideGhost(): void {
   if (now().ui.ghost) setUi({ ghost: null });
 }

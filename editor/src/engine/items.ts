@@ -38,7 +38,7 @@ export interface RobotItem extends Base {
   online: boolean;
   trouble: boolean;
   /** Where it would be, beside where it is. */
-  ghost?: { joints: Record<string, number>; possible: boolean } | undefined;
+  ghost?: { joints: Record<string, number>; possible: boolean; at?: Pose | undefined } | undefined;
 }
 
 export interface PointItem extends Base {

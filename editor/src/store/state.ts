@@ -173,6 +173,8 @@ export interface Connecting {
 export interface Ghost {
   robotId: string;
   joints: Joint[];
+  /** Where its base stands, in the world; left out: where the robot's own does. */
+  at?: Pose | undefined;
   /** What is wrong with it, as a sentence; empty when it can go there. */
   problem: string;
 }

@@ -45,6 +45,12 @@ export function relativeTo(frame: Pose, pose: Pose): Pose {
   };
 }
 
+/** How far two poses in one frame are from each other, m and degrees. */
+export function apart(a: Pose, b: Pose): { distance: number; degrees: number } {
+  const { position: p, orientation: q } = relativeTo(a, b);
+  return { distance: Math.hypot(p.x, p.y, p.z), degrees: (2 * Math.atan2(Math.hypot(q.x, q.y, q.z), Math.abs(q.w)) * 180) / Math.PI };
+}
+
 /** The rotation by an angle in rad about an axis of length 1. */
 export function turn(axis: Position, angle: number): Orientation {
   const sine = Math.sin(angle / 2);

@@ -157,8 +157,8 @@ export function pointSize(state: State): number {
   return typeof kept === "number" ? Math.min(4, Math.max(0.5, kept)) : 1;
 }
 
-function ghostOf({ joints, problem }: Ghost): RobotItem["ghost"] {
-  return { joints: Object.fromEntries(joints.map((each) => [each.name, each.value])), possible: problem === "" };
+function ghostOf({ joints, problem, at }: Ghost): RobotItem["ghost"] {
+  return { joints: Object.fromEntries(joints.map((each) => [each.name, each.value])), possible: problem === "", at };
 }
 
 /** Where the user has a thing just now, while the server still knows it as it was. */

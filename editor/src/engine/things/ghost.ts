@@ -1,13 +1,19 @@
 /** A robot where it would be: seen through, in another colour, and never instead of the real one. */
 
-import { type Group, type Material, type Mesh, MeshLambertMaterial } from "three";
+import { Group, type Material, Matrix4, type Mesh, MeshLambertMaterial } from "three";
 import type { URDFRobot } from "urdf-loader";
+import type { Pose } from "../../protocol/types";
 import type { RobotItem } from "../items";
 import type { Palette } from "../palette";
+import { setPose } from "../poses";
+
+const inverse = new Matrix4();
 
 export class GhostRobot {
   private robot: URDFRobot | null = null;
   private of: URDFRobot | null = null;
+  /** Where its base is. */
+  private readonly frame = new Group();
   private readonly material = new MeshLambertMaterial({ transparent: true, opacity: 0.45, depthWrite: false });
 
   constructor(private readonly host: Group) {}
@@ -28,8 +34,10 @@ export class GhostRobot {
         mesh.material = this.material;
         mesh.castShadow = false;
       });
-      this.host.add(this.robot);
+      this.frame.add(this.robot);
+      this.host.add(this.frame);
     }
+    this.place(ghost.at);
     this.material.color.copy(ghost.possible ? palette.selected : palette.trouble);
     for (const [name, value] of Object.entries(ghost.joints)) this.robot.joints[name]?.setJointValue(value);
   }
@@ -44,7 +52,20 @@ export class GhostRobot {
     this.material.dispose();
   }
 
+  /** Put its base to a pose in the world, or to that of the robot. */
+  private place(at: Pose | undefined): void {
+    const { frame, host } = this;
+    frame.position.set(0, 0, 0);
+    frame.quaternion.identity();
+    if (!at) return;
+    setPose(frame, at);
+    frame.updateMatrix();
+    host.updateWorldMatrix(true, false);
+    inverse.copy(host.matrixWorld).invert().multiply(frame.matrix).decompose(frame.position, frame.quaternion, frame.scale);
+  }
+
   private remove(): void {
+    this.frame.removeFromParent();
     this.robot?.removeFromParent();
     this.robot = null;
     this.of = null;

@@ -4,8 +4,9 @@ import { useState } from "react";
 import { useStore } from "zustand";
 import { createStore } from "zustand/vanilla";
 import { sentence } from "../../commands/asking";
-import { type Aiming, beginAiming } from "../../commands/calibrate";
-import { chosenRobot, notReady } from "../../commands/robot";
+import { type Aiming, beginAiming, frameByPoints, type TouchedFrame } from "../../commands/calibrate";
+import { chosenRobot, effectorPose, notReady } from "../../commands/robot";
+import type { Position } from "../../protocol/types";
 import { theEngine } from "../../session/engine";
 import { useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
@@ -17,15 +18,46 @@ import "../robot/robot.css";
 import "./calibrate.css";
 import type { Section } from "../workplace/sections";
 
+/** How well the points so far fit: `of` are the points that it is about. */
+interface Fit {
+  of: number[];
+  found: TouchedFrame;
+}
+
+interface Aim {
+  id: string;
+  aiming: Aiming | null;
+  done: number[];
+  touched: Record<number, Position>;
+  fit: Fit | null;
+}
+
+const NONE: Aim = { id: "", aiming: null, done: [], touched: {}, fit: null };
 /** What is aimed at; it goes on while other panels are open. */
-const aim = createStore<{ id: string; aiming: Aiming | null; done: number[] }>(() => ({ id: "", aiming: null, done: [] }));
+const aim = createStore<Aim>(() => NONE);
+
+/** Points that a frame needs; one more shows by how much they differ. */
+const NEEDED = 3;
+
+/** Ask how well the points that were touched so far fit each other. */
+async function fit(known: readonly Position[]): Promise<void> {
+  const { touched, aiming } = aim.getState();
+  const of = Object.keys(touched).map(Number);
+  if (of.length < NEEDED) return;
+  const found = await frameByPoints(
+    of.map((n) => known[n] ?? { x: 0, y: 0, z: 0 }),
+    of.map((n) => touched[n] ?? { x: 0, y: 0, z: 0 }),
+  );
+  if (aim.getState().aiming === aiming && aim.getState().touched === touched) aim.setState({ fit: { of, found } });
+}
 
 const AimWizard: Section["Body"] = ({ selection: { id } }) => {
   const chosen = useEditor(chosenRobot);
-  const points = useEditor((state) => state.types.byName[state.doc?.objects[id]?.type ?? ""]?.object_model?.mesh?.focus_points?.length ?? 0);
+  const known = useEditor((state) => state.types.byName[state.doc?.objects[id]?.type ?? ""]?.object_model?.mesh?.focus_points);
+  const points = known?.length ?? 0;
   const why = useWhyNot(id, "ObjectAimingStart");
   const noRobot = useEditor((state) => notReady(state, chosen, "ObjectAimingStart"));
-  const { id: aimedAt, aiming: current, done } = useStore(aim);
+  const { id: aimedAt, aiming: current, done, fit: fitted } = useStore(aim);
   const aiming = aimedAt === id ? current : null;
   const [refused, setRefused] = useState("");
   const [told, setTold] = useState("");
@@ -49,7 +81,7 @@ const AimWizard: Section["Body"] = ({ selection: { id } }) => {
           onPress={() =>
             chosen &&
             void trying(async () => {
-              aim.setState({ id, aiming: await beginAiming(id, chosen, () => aim.setState({ aiming: null })), done: [] });
+              aim.setState({ ...NONE, id, aiming: await beginAiming(id, chosen, () => aim.setState(NONE)) });
             })
           }
         >
@@ -64,8 +96,15 @@ const AimWizard: Section["Body"] = ({ selection: { id } }) => {
       </>
     );
   }
+  const take = async (n: number) => {
+    // The server reads the tool itself; what is reported here is for the fit that is shown on the way.
+    const tool = chosen && effectorPose(chosen);
+    aim.setState({ done: await aiming.add(n) });
+    if (tool) aim.setState((so) => ({ touched: { ...so.touched, [n]: tool.position }, fit: null }));
+    await fit((known ?? []).map((each) => each.position));
+  };
   const end = (words: string) => {
-    aim.setState({ aiming: null });
+    aim.setState(NONE);
     setTold(words);
     theEngine()?.focus(id);
   };
@@ -75,12 +114,13 @@ const AimWizard: Section["Body"] = ({ selection: { id } }) => {
       <ol className="focus-points">
         {Array.from({ length: points }, (_, n) => (
           <li key={n}>
-            <Button look={n === next ? "primary" : ""} icon={done.includes(n) ? "check" : "point"} onPress={() => void trying(async () => aim.setState({ done: await aiming.add(n) }))}>
+            <Button look={n === next ? "primary" : ""} icon={done.includes(n) ? "check" : "point"} onPress={() => void trying(() => take(n))}>
               {done.includes(n) ? `Take point ${n + 1} again` : `The tool is on point ${n + 1}`}
             </Button>
           </li>
         ))}
       </ol>
+      {fitted && <FitSoFar {...fitted} />}
       <div className="actions start">
         <Button look="primary" why={next < 0 ? "" : `Point ${next + 1} is missing.`} onPress={() => void trying(async () => aiming.done().then(() => end("It stands where its points were found.")))}>
           Put it there
@@ -99,3 +139,17 @@ const AimWizard: Section["Body"] = ({ selection: { id } }) => {
 };
 
 export default AimWizard;
+
+function FitSoFar({ of, found }: Fit) {
+  const { checked, residual, residuals, worst } = found;
+  const number = (of[worst] ?? 0) + 1;
+  return (
+    <p className="small" role="status">
+      {checked
+        ? `The points fit within ${millimetres(residual)} (root mean square); point ${number} is ${millimetres(residuals[worst] ?? 0)} off.`
+        : "Three points give its place; the next shows how well they fit."}
+    </p>
+  );
+}
+
+const millimetres = (metres: number) => `${(metres * 1000).toFixed(1)} mm`;

@@ -1,18 +1,19 @@
 /** Where an object stands, shown by the robot: one touch with a straight tool, or three points of its frame. */
 
-import { useState } from "react";
-import { frameByAxes, placeAt, placeByRobot } from "../../commands/calibrate";
+import { useEffect, useState } from "react";
+import { frameByAxes, hideAtTool, placeAt, placeByRobot, showAtTool } from "../../commands/calibrate";
 import { refusal } from "../../commands/asking";
 import { chosenRobot, effectorPose, notReady } from "../../commands/robot";
 import type { Pivot, Position } from "../../protocol/types";
 import { now, useEditor } from "../../store/store";
-import { OneOf } from "../kit/fields";
+import { OneOf, OnOff } from "../kit/fields";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
 import { nameOf } from "../names";
 import { RefusedText, useAsking } from "../points/Doing";
 import { useWhyNot } from "../points/editing";
 import { RobotChooser } from "../robot/RobotChooser";
+import { useTelemetry } from "../robot/useTelemetry";
 import "../points/points.css";
 import "../robot/robot.css";
 import type { Section } from "../workplace/sections";
@@ -33,6 +34,7 @@ const PlaceByRobot: Section["Body"] = ({ selection: { id } }) => {
     <>
       <RobotChooser />
       <OneOf label="The tool touches" value={pivot} choices={PIVOTS} onChange={setPivot} />
+      <Preview key={id} id={id} pivot={pivot} why={why || noRobot} />
       <Button icon="robot" why={why || noRobot} isDisabled={busy} onPress={() => chosen && void ask(placeByRobot(id, chosen, pivot))}>
         It stands where the tool is
       </Button>
@@ -43,6 +45,26 @@ const PlaceByRobot: Section["Body"] = ({ selection: { id } }) => {
 };
 
 export default PlaceByRobot;
+
+/** Shows the object on the tool, as it would be put there, and follows the tool. */
+function Preview({ id, pivot, why }: { id: string; pivot: Pivot; why: string }) {
+  const chosen = useEditor(chosenRobot);
+  const [on, setOn] = useState(false);
+  const [cannot, setCannot] = useState("");
+  const object = useEditor((state) => state.doc?.objects[id]);
+  const tool = useTelemetry(chosen?.robotId, () => (chosen ? effectorPose(chosen) : undefined));
+  const shown = on && !why;
+  useEffect(() => setCannot(shown && tool ? showAtTool(id, tool, pivot) : ""), [shown, tool, id, pivot, object]);
+  useEffect(() => (shown ? () => hideAtTool(id) : undefined), [shown, id]);
+  return (
+    <>
+      <OnOff isSelected={shown} onChange={(to) => (why ? setCannot(why) : setOn(to))}>
+        Show it on the tool first
+      </OnOff>
+      <RefusedText>{cannot}</RefusedText>
+    </>
+  );
+}
 
 const STEPS = ["Origin", "On its x axis", "In its xy plane"] as const;
 

@@ -4,11 +4,12 @@ import { useEffect, useState } from "react";
 import { type CalibrationRecord, recordsOf } from "../../commands/calibrate";
 import { useEditor } from "../../store/store";
 import { nameOf } from "../names";
+import { BeforeAfter } from "./BeforeAfter";
 import "./calibrate.css";
 
 export function Records({ id }: { id: string }) {
   const name = useEditor((state) => nameOf(state, id));
-  const task = useEditor((state) => Object.values(state.tasks).find((each) => each.kind === "calibration" && each.title.includes(name)));
+  const task = useEditor((state) => Object.values(state.tasks).findLast((each) => each.kind === "calibration" && each.title.includes(name)));
   const [records, setRecords] = useState<CalibrationRecord[]>([]);
   const state = task?.state ?? "";
   useEffect(() => {
@@ -29,6 +30,7 @@ export function Records({ id }: { id: string }) {
           {task.message}
         </p>
       )}
+      <BeforeAfter id={id} />
       {records.length > 0 && (
         <ul className="records" aria-label="How it was calibrated">
           {records.map((each) => (

@@ -1,0 +1,49 @@
+/** By how much a calibration has moved a thing, and where it stood before: to be kept, or put back. */
+
+import { useEffect } from "react";
+import { useStore } from "zustand";
+import { before, keepPlace, placeAt } from "../../commands/calibrate";
+import { hideGhost, showStanding } from "../../commands/robot";
+import { now, useEditor } from "../../store/store";
+import { notMovable } from "../../transform/target";
+import { apart } from "../../viewmodel/frames";
+import { Button } from "../kit/kit";
+import { RefusedText, useAsking } from "../points/Doing";
+
+/** m and degrees: less is the noise of numbers. */
+const NOTHING = 1e-6;
+
+export function BeforeAfter({ id }: { id: string }) {
+  const { id: of, pose: was } = useStore(before);
+  const pose = useEditor((state) => state.doc?.objects[id]?.pose);
+  const isRobot = useEditor((state) => (state.doc?.objects[id]?.type ?? "") in state.types.robots);
+  const why = useEditor((state) => notMovable(state, { kind: "object", id }));
+  const { refused, busy, ask } = useAsking();
+  const moved = of === id && was && pose ? apart(was, pose) : null;
+  const shown = moved !== null && (moved.distance > NOTHING || moved.degrees > NOTHING);
+  useEffect(() => {
+    if (!shown || !isRobot || !was) return;
+    showStanding(id, was);
+    return () => {
+      if (now().ui.ghost?.at === was) hideGhost();
+    };
+  }, [shown, isRobot, id, was]);
+  if (!shown || !was) return null;
+  return (
+    <div className="before-after" role="group" aria-label="Before and after">
+      <p role="status">
+        {`It stands ${(moved.distance * 1000).toFixed(1)} mm and ${moved.degrees.toFixed(2)}° from where it stood.`}
+        {isRobot && <span className="quiet small"> Seen through: where it stood before.</span>}
+      </p>
+      <div className="actions start">
+        <Button look="primary" onPress={keepPlace}>
+          Keep the new place
+        </Button>
+        <Button why={why} isDisabled={busy} onPress={() => void ask(placeAt(id, was)).then((done) => done && keepPlace())}>
+          Put it back
+        </Button>
+      </div>
+      <RefusedText>{refused}</RefusedText>
+    </div>
+  );
+}
