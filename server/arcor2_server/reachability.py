@@ -20,7 +20,8 @@ from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error, NotFound
 from arcor2_server.robot_models import model_of
 from arcor2_server.rpc.registry import make_event
-from arcor2_server.scene_world import robot_model, robots, things
+from arcor2_server.scene_world import in_names, robot_model, robots, things
+from arcor2_server.standing_arms import PERIOD, StandingArms
 
 if TYPE_CHECKING:
     from arcor2_hw.data.rpc.editor import ReachabilityArgs
@@ -69,6 +70,7 @@ class ReachabilityBoard:
         self._described = asyncio.Event()
         """The rows are there."""
         self._working: asyncio.Task[None] | None = None
+        self._arms = StandingArms(services)
         services.session.on_change.append(lambda edit: self.look() if edit is not None else self._begin_anew())
         services.collisions.on_change.append(self.look)
         services.arm_calibrations.on_change.append(lambda _: self.look())
@@ -114,11 +116,13 @@ class ReachabilityBoard:
         return ReachabilityData(row.robot, row.end_effector, self._services.session.revision, items, row.arm)
 
     # -------------------------------------------------------------------------------- when
+    @property
+    def _wanted(self) -> bool:
+        return self._asked or bool(self._services.hub.subscribers(NAME))
+
     def look(self) -> None:
         """Look, a moment later, whether something changed."""
-        services = self._services
-        wanted = self._asked or bool(services.hub.subscribers(NAME))
-        if not wanted or services.session.project is None:
+        if not self._wanted or self._services.session.project is None:
             return
         self._idle.clear()
         self._wake.set()
@@ -137,6 +141,7 @@ class ReachabilityBoard:
             self._working = None
         self._rows.clear()
         self._effectors.clear()
+        self._arms.forget()
         self._wake.clear()
         self._described.set()  # who waits is told that there is nothing to wait for
         self._described = asyncio.Event()
@@ -152,7 +157,7 @@ class ReachabilityBoard:
     async def _work(self) -> None:
         loop = asyncio.get_running_loop()
         while True:
-            await self._wake.wait()
+            await self._changed()
             since = loop.time()
             while self._wake.is_set() and loop.time() < since + AT_LATEST:
                 self._wake.clear()
@@ -165,10 +170,33 @@ class ReachabilityBoard:
             if not self._wake.is_set():
                 self._idle.set()
 
+    async def _changed(self) -> None:
+        """Wait for a change of the document, or of where robots stand in each other's way."""
+        while not self._wake.is_set():
+            try:
+                async with asyncio.timeout(PERIOD):
+                    await self._wake.wait()
+            except TimeoutError:
+                if self._wanted and await self._moved():
+                    self.look()
+
+    async def _moved(self) -> bool:
+        try:
+            return await self._arms.look(self._neighbours())
+        except Exception:
+            log.exception("where robots stand could not be asked")
+            return False
+
+    def _neighbours(self) -> list[SceneObject]:
+        """Give the robots that have a model, where there are several."""
+        found = robots(self._services)
+        return found if len(found) > 1 else []
+
     # -------------------------------------------------------------------------------- one round
     async def _round(self) -> None:
         services = self._services
         standing = robots(services)
+        await self._arms.look(self._neighbours())
         names = {robot.id for robot in standing}
         for key in [key for key in self._rows if key[0] not in names]:
             del self._rows[key]
@@ -177,8 +205,12 @@ class ReachabilityBoard:
         poses = await self._poses()
         for robot in standing:
             problem = problems[robot.id]
+            # One whose model cannot be used is in nobody's way, nor is one of which nobody knows where it stands.
+            others = [
+                one for one in standing if one is not robot and not problems[one.id] and one.id in self._arms.joints
+            ]
             for row in [row for row in self._rows.values() if row.robot == robot.id]:
-                await self._judge(row, robot, poses | self._joints(row), problem)
+                await self._judge(row, [robot, *others], poses | self._joints(row), problem)
             if self._wake.is_set():
                 return  # something changed meanwhile: what is known of the old state is of no use
 
@@ -233,13 +265,13 @@ class ReachabilityBoard:
         points = project.action_points if project is not None else ()
         return {each.id: each.joints for point in points for each in point.robot_joints if _is_of(each, row)}
 
-    async def _judge(self, row: _Row, robot: SceneObject, targets: dict[str, Target], problem: str) -> None:
-        """Judge what is new, or may have changed."""
+    async def _judge(self, row: _Row, standing: list[SceneObject], targets: dict[str, Target], problem: str) -> None:
+        """Judge what is new, or may have changed. standing: its robot, and those that are in the way of that."""
         services = self._services
         for gone in row.judged.keys() - targets.keys():
             del row.judged[gone]
             row.targets.pop(gone, None)
-        world = things(services, [robot])
+        world = things(services, standing, {key: at for key, at in self._arms.joints.items() if key != row.robot})
         if world != row.world:
             row.targets.clear()
             row.world = world
@@ -274,7 +306,7 @@ class ReachabilityBoard:
         """Keep what was judged, and tell what is another than before."""
         changed = []
         for key, one in judged.items():
-            item = ReachOfItem(key, one.reach, one.reason or UNSET)
+            item = ReachOfItem(key, one.reach, in_names(self._services, one.reason) or UNSET)
             row.targets[key] = targets[key]
             if row.judged.get(key) != item:
                 row.judged[key] = item

@@ -77,8 +77,9 @@ async def present_joints(services: "Services", robot: SceneObject) -> list[Joint
     if not services.cell.online:
         return []
     try:
-        if services.types.robot_meta(robot.type).multi_arm:
-            return []
+        if services.types.robot_meta(robot.type).multi_arm:  # without an arm's name it tells those of all
+            joints: list[Joint] = await services.cell.ask(list[Joint], robot.id, "robot_joints")
+            return joints
         return await services.cell.robot_joints(robot.id)
     except Arcor2Error:
         return []
@@ -99,6 +100,15 @@ def things(services: "Services", chosen: list[SceneObject], joints: Joints | Non
         if key not in found and (placed.holder is None or placed.holder.robot in found):
             found[key] = body_of(services, key, placed)
     return found
+
+
+def in_names(services: "Services", text: str) -> str:
+    """Give a sentence of the worker, which knows ids, with the names by which people know the objects."""
+    scene = services.session.scene
+    for obj in () if scene is None else scene.objects:
+        if obj.id in text:
+            text = text.replace(obj.id, obj.name)
+    return text
 
 
 # ------------------------------------------------------------------------------------------------ lines

@@ -9,8 +9,9 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.rpc import ForwardKinematicsArgs, InverseKinematicsArgs
 from arcor2_hw.data.scene import SceneObject
+from arcor2_hw.exceptions import Arcor2Error, KinematicsError
 from arcor2_server.robot_models import model_of
-from arcor2_server.scene_world import present_joints, robots, things
+from arcor2_server.scene_world import in_names, present_joints, robots, things
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services
@@ -38,7 +39,11 @@ async def inverse(services: "Services", robot: SceneObject, args: InverseKinemat
     joints = {one.id: await present_joints(services, one) for one in others}
     # Others whose joints are not known are not known to stand anywhere.
     known = [one for one in others if joints[one.id]]
-    return await services.compute.run(task, world=things(services, [robot, *known], joints))
+    try:
+        return await services.compute.run(task, world=things(services, [robot, *known], joints))
+    except KinematicsError as error:
+        Arcor2Error.__init__(error, in_names(services, str(error)), error.detail)  # with its code and reason
+        raise
 
 
 async def forward(services: "Services", robot: SceneObject, args: ForwardKinematicsArgs) -> Pose:

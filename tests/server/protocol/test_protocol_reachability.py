@@ -137,6 +137,70 @@ async def _add_joints(stage: Stage, point_id: str, robot: str, joints: list[Join
     return "jnt_kept"
 
 
+LED = """
+from .arm import Arm
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.robot import Joint
+
+NAMES = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
+
+
+class Led(Arm):
+    _ABSTRACT = False
+    urdf_package_name = "ur5e.zip"
+
+    def __init__(self, obj_id: str, name: str, pose: Pose) -> None:
+        super().__init__(obj_id, name, pose)
+        self._now = [Joint(f"{n}_joint", v) for n, v in zip(NAMES, (0.0, -1.57, 1.57, -1.57, -1.57, 0.0))]
+
+    def robot_joints(self, include_gripper: bool = False) -> list[Joint]:
+        return self._now
+
+    def move_to_joints(self, target_joints: list[Joint], speed: float, safe: bool = True) -> None:
+        self._now = target_joints
+"""
+
+
+async def test_two_arms_are_in_each_others_way_where_they_stand(tmp_path: Path) -> None:
+    async with open_stage(tmp_path, "Arm") as stage:
+        alice, bob = await stage.person("alice"), await stage.person("bob")
+        await stage.services.types.add(ObjectTypeSource("Led", LED.lstrip()))
+        await alice.ask("NewScene", name="scene")
+        await add(alice, stage, "arm", "Led", Pose())
+        other = await add(alice, stage, "other", "Led", Pose(Position(0, 1, 0)))
+        await alice.ask("SaveScene")
+        await alice.ask("NewProject", scene_id=stage.services.session.require_scene().id, name="project")
+        _, between = await point(alice, stage, "between", 0.134, 0.492, 0.488)
+        await alice.ask("SaveProject")
+        await bob.ask("SubscribeEvents", events=["ReachabilityChanged"])
+
+        async def reach(expected: dict[str, str]) -> dict[str, str]:
+            """Wait until that is what is told; gives the reasons."""
+            found: dict[str, str] = {}
+            async with asyncio.timeout(PATIENCE):
+                while found != expected:
+                    rows = await alice.ask("Reachability", ids=[between])
+                    found = {row["robot_id"]: row["items"][0]["reach"] for row in rows}
+            return {row["robot_id"]: row["items"][0].get("reason", "") for row in rows}
+
+        free = dict.fromkeys((stage.ids["arm"], other), "reachable")
+        await reach(free)
+        await stage.start(alice)
+        bob.take()
+        joints = await alice.ask("GetRobotJoints", robot_id=other)
+        await alice.ask("MoveToJoints", robot_id=other, speed=1.0, joints=[joints[0] | {"value": -1.57}, *joints[1:]])
+        reasons = await reach(free | {stage.ids["arm"]: "in_collision"})
+        assert "arm/wrist" in reasons[stage.ids["arm"]]
+        assert "other/wrist" in reasons[stage.ids["arm"]]
+        assert told(bob) == {between: "in_collision"}, "nobody edited anything"
+        await alice.ask("MoveToJoints", robot_id=other, speed=1.0, joints=joints)
+        await reach(free)
+        await alice.ask("MoveToJoints", robot_id=other, speed=1.0, joints=[joints[0] | {"value": -1.57}, *joints[1:]])
+        await reach(free | {stage.ids["arm"]: "in_collision"})
+        await stage.stop(alice)
+        await reach(free)
+
+
 async def test_it_ends_with_the_document_and_survives_the_worker(tmp_path: Path) -> None:
     async with open_stage(tmp_path) as stage:
         alice, bob = await stage.person("alice"), await stage.person("bob")
