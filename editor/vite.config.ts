@@ -1,7 +1,7 @@
 /** Build of the editor: into the server's static files, with a gzip and a brotli copy beside each text file. */
 
 import { readdirSync, readFileSync, writeFileSync } from "node:fs";
-import { join } from "node:path";
+import { join, resolve } from "node:path";
 import { brotliCompressSync, constants, gzipSync } from "node:zlib";
 import react from "@vitejs/plugin-react";
 import { defineConfig, type Plugin } from "vitest/config";
@@ -12,11 +12,15 @@ const SERVER = process.env["ARCOR2_HW_URL"] ?? "http://127.0.0.1:6789";
 
 /** Compressing at build time costs the server nothing and is denser than it could afford per request. */
 function compressed(): Plugin {
+  let out = OUT;
   return {
     name: "compressed",
     apply: "build",
+    configResolved({ root, build }) {
+      out = resolve(root, build.outDir);
+    },
     closeBundle() {
-      for (const entry of readdirSync(OUT, { recursive: true, withFileTypes: true })) {
+      for (const entry of readdirSync(out, { recursive: true, withFileTypes: true })) {
         const path = join(entry.parentPath, entry.name);
         if (!entry.isFile() || !/\.(js|css|svg|json)$/.test(entry.name)) continue;
         const content = readFileSync(path);

@@ -1,6 +1,7 @@
 /** Many equal small things drawn in one go: points, pucks, arrows. Each keeps its frame in the scene graph. */
 
 import { type BufferGeometry, Color, DynamicDrawUsage, InstancedMesh, type Material, Matrix4, type Object3D, type Scene } from "three";
+import { cheapen, discOf } from "./surface";
 
 export interface Instance {
   id: string;
@@ -19,10 +20,12 @@ export class Batch {
   private mesh: InstancedMesh;
   private readonly instances: Instance[] = [];
 
+  /** `geometry` is what is met by who points at it; drawn is `drawn`. */
   constructor(
     private readonly scene: Scene,
     private readonly geometry: BufferGeometry,
     private readonly material: Material,
+    private readonly drawn = geometry,
   ) {
     this.mesh = this.made(FIRST_SIZE);
   }
@@ -53,21 +56,29 @@ export class Batch {
     });
     this.mesh.instanceMatrix.needsUpdate = true;
     if (this.mesh.instanceColor) this.mesh.instanceColor.needsUpdate = true;
+    this.mesh.geometry = this.geometry;
     this.mesh.computeBoundingSphere();
+    this.mesh.geometry = this.drawn;
   }
 
   dispose(): void {
     this.scene.remove(this.mesh);
     this.mesh.dispose();
     this.geometry.dispose();
+    this.drawn.dispose();
     this.material.dispose();
   }
 
   private made(size: number): InstancedMesh {
-    const mesh = new InstancedMesh(this.geometry, this.material, size);
+    const mesh = new InstancedMesh(this.drawn, this.material, size);
     mesh.instanceMatrix.setUsage(DynamicDrawUsage);
     mesh.setColorAt(0, new Color(1, 1, 1)); // makes the attribute, so that the shader is compiled once
     mesh.count = 0;
+    mesh.raycast = (...given) => {
+      mesh.geometry = this.geometry;
+      InstancedMesh.prototype.raycast.apply(mesh, given);
+      mesh.geometry = this.drawn;
+    };
     mesh.userData["batch"] = (index: number) => this.instances[index]?.id;
     this.scene.add(mesh);
     return mesh;
@@ -78,12 +89,19 @@ export class Batch {
 export class Batches {
   private readonly byName = new Map<string, Batch>();
 
-  constructor(private readonly scene: Scene) {}
+  constructor(
+    private readonly scene: Scene,
+    private readonly cheap: boolean,
+  ) {}
 
-  of(name: string, make: () => [BufferGeometry, Material]): Batch {
+  /** Where every triangle costs, balls of a radius of `ball` m are drawn as discs. */
+  of(name: string, make: () => [BufferGeometry, Material], ball = 0): Batch {
     let batch = this.byName.get(name);
     if (!batch) {
-      batch = new Batch(this.scene, ...make());
+      const [geometry, material] = make();
+      const discs = this.cheap && ball > 0;
+      if (this.cheap) cheapen(material, discs);
+      batch = new Batch(this.scene, geometry, material, discs ? discOf(ball) : geometry);
       this.byName.set(name, batch);
     }
     return batch;

@@ -28,11 +28,11 @@ import { labelsOf } from "./naming";
 import { DARK, LIGHT, type Palette } from "./palette";
 import { type Hit, onFloor, pick } from "./picking";
 import { worldPose } from "./poses";
-import { type Context, type Thing, trianglesOf } from "./thing";
+import { type Context, type Quality, type Thing, trianglesOf } from "./thing";
 import { make } from "./things/make";
 import { type JointLimit, RobotThing } from "./things/robot";
 
-export type Quality = "low" | "high";
+export type { Quality };
 
 export interface EngineOptions {
   canvas: HTMLCanvasElement;
@@ -67,8 +67,8 @@ export interface Probe {
 }
 
 const SMALL = new Set<Item["kind"]>(["point", "orientation", "action", "logic"]);
-/** s between frames at low quality. */
-const SLOW = 1 / 30;
+/** s between two frames. */
+const PERIODS: Record<Quality, number> = { low: 1 / 30, high: 1 / 60 };
 
 export class Engine {
   readonly view: View;
@@ -78,8 +78,6 @@ export class Engine {
   /** Frames drawn since the start. */
   frames = 0;
   onTap: (hits: Hit[], floor: Vector3 | null) => void = () => {};
-  /** Called after each drawn frame, for what is laid over the view. */
-  onFrame: () => void = () => {};
 
   private readonly watchers = new Set<() => void>();
   private readonly renderer: WebGLRenderer;
@@ -93,6 +91,8 @@ export class Engine {
   private last = 0;
   /** Frames of things may have changed since the last drawn frame. */
   private dirty = true;
+  /** Robots whose joints have changed since then, and nothing else. */
+  private readonly stirred = new Set<RobotThing>();
   private width = 1;
   private height = 1;
   private hovered = "";
@@ -107,19 +107,23 @@ export class Engine {
 
   constructor(private readonly options: EngineOptions) {
     const { canvas, quality } = options;
-    this.renderer = new WebGLRenderer({ canvas, antialias: quality !== "low", powerPreference: "low-power" });
+    // Nothing is seen through the view: what draws pages need not look for what is behind it.
+    const context = canvas.getContext("webgl2", { alpha: false, antialias: quality !== "low", powerPreference: "low-power" });
+    this.renderer = new WebGLRenderer({ canvas, ...(context && { context }) });
     this.renderer.outputColorSpace = SRGBColorSpace;
     this.renderer.setPixelRatio(quality === "low" ? 1 : Math.min(2, window.devicePixelRatio));
     this.renderer.shadowMap.enabled = quality === "high";
     this.renderer.shadowMap.type = PCFShadowMap;
     this.renderer.shadowMap.autoUpdate = false;
     this.view = new View(canvas, () => this.draw());
-    this.batches = new Batches(this.scene);
+    this.batches = new Batches(this.scene, quality === "low");
     this.labels = new Labels(options.labels);
     this.context = {
       telemetry: options.telemetry,
       palette: this.palette,
       batches: this.batches,
+      quality,
+      period: PERIODS[quality],
       asset: options.asset,
       trouble: options.trouble,
       thing: (id) => this.things.get(id),
@@ -326,6 +330,7 @@ export class Engine {
   }
 
   private remove(id: string, thing: Thing): void {
+    if (thing instanceof RobotThing) this.stirred.delete(thing);
     // What hangs on it gets its own place by `hang`, or goes by itself.
     for (const other of this.things.values()) if (other.root.parent === thing.root) other.root.removeFromParent();
     thing.dispose();
@@ -341,7 +346,9 @@ export class Engine {
 
   private reported(id: string): void {
     const thing = this.things.get(id);
-    if (thing instanceof RobotThing && thing.moved()) this.invalidate();
+    if (!(thing instanceof RobotThing) || !thing.moved()) return;
+    this.stirred.add(thing);
+    this.draw();
   }
 
   private checkAges(): void {
@@ -362,7 +369,7 @@ export class Engine {
     this.scheduled = requestAnimationFrame((time) => {
       this.scheduled = 0;
       const seconds = (time - this.last) / 1000;
-      if (this.options.quality === "low" && seconds < SLOW * 0.9) {
+      if (this.options.quality === "low" && seconds < this.context.period * 0.9) {
         this.draw();
         return;
       }
@@ -373,33 +380,39 @@ export class Engine {
     });
   }
 
-  /** Bring all frames up to date. */
-  private place(): boolean {
-    let moving = false;
-    if (!this.dirty) return moving;
+  /** Bring all frames up to date, or those of robots alone, on whose joints nothing else hangs. */
+  private place(): void {
+    const stirred = [...this.stirred];
+    this.stirred.clear();
+    if (!this.dirty) {
+      for (const robot of stirred) {
+        if (robot.frame()) this.stirred.add(robot);
+        robot.root.updateMatrixWorld();
+        this.renderer.shadowMap.needsUpdate = true;
+      }
+      return;
+    }
     this.dirty = false;
     this.scene.updateMatrixWorld();
-    for (const thing of this.things.values()) moving = thing.frame() || moving;
+    for (const thing of this.things.values()) if (thing instanceof RobotThing && thing.frame()) this.stirred.add(thing);
     this.scene.updateMatrixWorld();
     for (const thing of this.things.values()) if (thing.item.kind !== "logic") thing.placed();
     for (const thing of this.things.values()) if (thing.item.kind === "logic") thing.placed();
     this.scene.updateMatrixWorld();
     this.batches.refresh();
     this.renderer.shadowMap.needsUpdate = true;
-    return moving;
   }
 
   private render(): void {
     for (const thing of this.things.values()) if (thing.resized()) this.dirty = true;
-    const moving = this.place();
+    this.place();
     this.gizmo.place();
     this.tellHeight();
     this.renderer.render(this.scene, this.view.camera);
     this.frames++;
     this.labels.show(labelsOf(this.things, this.hovered, this.notes), this.view.camera, this.width, this.height);
-    this.onFrame();
     for (const watcher of this.watchers) watcher();
-    if (moving) this.invalidate();
+    if (this.stirred.size > 0) this.draw();
   }
 
   /** The line below what is selected, and how high it is. */

@@ -6,10 +6,16 @@ import type { Batches } from "./batches";
 import type { Item } from "./items";
 import type { Palette } from "./palette";
 
+/** `low` draws less often, with fewer triangles, without shadows, and lights corners instead of pixels. */
+export type Quality = "low" | "high";
+
 export interface Context {
   telemetry: Telemetry;
   palette: Palette;
   batches: Batches;
+  quality: Quality;
+  /** s between two frames while something moves. */
+  period: number;
   /** Read an asset of the server, ready to be shown. */
   asset: (id: string) => Promise<ArrayBuffer>;
   /** Tell people what cannot be shown, and why. */
@@ -33,11 +39,6 @@ export abstract class Thing<I extends Item = Item> {
 
   /** Show another state of the item. */
   abstract update(item: I): void;
-
-  /** Called before each drawn frame when something moved; gives whether it goes on moving by itself. */
-  frame(): boolean {
-    return false;
-  }
 
   /** Called before each drawn frame, also when only the camera moved: gives whether it has another size now. */
   resized(): boolean {

@@ -37,6 +37,26 @@ describe("joints", () => {
     expect(telemetry.interpolated("r")).toEqual({ joints: new Map([["j", 1]]), settled: true });
   });
 
+  test("of an arm at rest are settled, however often they come", () => {
+    const { telemetry, go } = at();
+    telemetry.takeJoints(joints(1));
+    go(0.03);
+    telemetry.takeJoints(joints(1.00005));
+    expect(telemetry.interpolated("r")).toEqual({ joints: new Map([["j", 1.00005]]), settled: true });
+    go(0.03);
+    telemetry.takeJoints(joints(1.001));
+    expect(telemetry.interpolated("r")?.settled).toBe(false);
+  });
+
+  test("that come as often as is drawn are drawn at once", () => {
+    const { telemetry, go } = at();
+    telemetry.takeJoints(joints(0));
+    go(1 / 30);
+    telemetry.takeJoints(joints(1));
+    expect(telemetry.interpolated("r", 1 / 30)).toEqual({ joints: new Map([["j", 1]]), settled: true });
+    expect(telemetry.interpolated("r", 1 / 60)?.settled).toBe(false);
+  });
+
   test("grow old, and are forgotten when the scene goes offline", () => {
     const { telemetry, go } = at();
     expect(telemetry.age("r")).toBe(Infinity);

@@ -16,6 +16,9 @@ export interface Sample {
 /** Seconds after which what is shown is stale. */
 export const STALE = 0.5;
 
+/** rad or m: what moves less is not drawn anew. */
+export const STILL = 1e-4;
+
 type Listener = (robotId: string) => void;
 
 export class Telemetry {
@@ -55,16 +58,17 @@ export class Telemetry {
 
   /**
    * Joints to be drawn now: between the last two samples, one sample's time after them. `settled` when the last one
-   * is reached, so that there is nothing more to draw until another comes.
+   * is reached, so that there is nothing more to draw until another comes. Where samples come about as often as is
+   * drawn, every `period` s, there is nothing between them to be seen: the last one is drawn at once.
    */
-  interpolated(robotId: string): { joints: Map<string, number>; settled: boolean } | undefined {
+  interpolated(robotId: string, period = 0): { joints: Map<string, number>; settled: boolean } | undefined {
     const pair = this.joints.get(robotId);
     if (!pair) return undefined;
     const [before, last] = pair;
     // After a pause there is nothing to interpolate from; between samples a tenth of a second at most.
     // By when they were read, not by when they came: the network bunches them.
     const span = before ? last.read - before.read : 0;
-    if (!before || span <= 0 || span > 0.25) return { joints: last.joints, settled: true };
+    if (!before || span <= period * 1.5 || span <= 0 || span > 0.25 || alike(before, last)) return { joints: last.joints, settled: true };
     const part = (this.clock() - last.at) / span;
     if (part >= 1) return { joints: last.joints, settled: true };
     const between = new Map<string, number>();
@@ -92,6 +96,12 @@ export class Telemetry {
   private tell(robotId: string): void {
     for (const listener of this.listeners) listener(robotId);
   }
+}
+
+/** An arm at rest goes on reporting: there is no way from one sample to the next. */
+function alike(one: Sample, other: Sample): boolean {
+  for (const [name, value] of other.joints) if (Math.abs((one.joints.get(name) ?? value) - value) > STILL) return false;
+  return true;
 }
 
 export const telemetry = new Telemetry();

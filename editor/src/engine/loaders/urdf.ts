@@ -1,7 +1,8 @@
 /** A robot as the server makes it ready to be shown: its URDF with its meshes. A chunk of its own. */
 
-import { LoadingManager, type Material, Mesh } from "three";
-import URDFLoader, { type URDFRobot } from "urdf-loader";
+import { LoadingManager, type Material, Mesh, type Object3D, SphereGeometry } from "three";
+import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
+import URDFLoader, { type URDFLink, type URDFRobot, type URDFVisual } from "urdf-loader";
 import { readGlb } from "./glb";
 
 /** What surfaces are made of: those with colours of their own, and all others. */
@@ -29,6 +30,7 @@ export function loadRobot(content: ArrayBuffer, { plain, coloured }: RobotMateri
     if (geometry) done(new Mesh(geometry, plain));
   };
   const robot = loader.parse(extras.urdf);
+  for (const link of Object.values(robot.links)) joinShapes(link);
   robot.traverse((each) => {
     const mesh = each as Mesh;
     if (!mesh.isMesh) return;
@@ -36,4 +38,26 @@ export function loadRobot(content: ArrayBuffer, { plain, coloured }: RobotMateri
     mesh.castShadow = true;
   });
   return { robot, problems: [...new Set(Object.values(extras.problems ?? {}))] };
+}
+
+/** The balls, cylinders and boxes of a link become one mesh: each piece that is drawn costs, however small it is. */
+function joinShapes(link: URDFLink): void {
+  link.updateWorldMatrix(true, true);
+  const base = link.matrixWorld.clone().invert();
+  const pieces: Mesh[] = [];
+  for (const each of link.children) if ((each as Partial<URDFVisual>).isURDFVisual) each.traverse((one) => void (isShape(one) && pieces.push(one)));
+  if (pieces.length === 0) return;
+  const shapes = pieces.map(({ geometry, matrixWorld }) => {
+    // The loader's balls have as many triangles as a whole robot needs.
+    const shape = geometry instanceof SphereGeometry ? new SphereGeometry(1, 18, 12) : geometry;
+    shape.deleteAttribute("uv");
+    return shape.applyMatrix4(base.clone().multiply(matrixWorld));
+  });
+  for (const piece of pieces) piece.removeFromParent();
+  link.add(new Mesh(mergeGeometries(shapes)));
+}
+
+/** Whether it is one of the shapes that URDF itself has; the geometries of meshes have no type of their own. */
+function isShape(of: Object3D): of is Mesh {
+  return (of as Mesh).isMesh && (of as Mesh).geometry.type !== "BufferGeometry";
 }

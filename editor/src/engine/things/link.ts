@@ -99,12 +99,13 @@ export class LinkThing extends Thing<LinkItem> {
     const length = Math.max(1e-3, this.from.distanceTo(this.to));
     const control = new Vector3().addVectors(this.from, this.to).multiplyScalar(0.5);
     control.z += Math.min(0.25, 0.03 + length * 0.3);
+    const around = this.context.quality === "low" ? 3 : 5;
     const curve = new QuadraticBezierCurve3(this.from.clone(), control, this.to.clone());
     curve.getPoint(0.5, this.middle);
     const pieces: BufferGeometry[] = [];
     const dash = DASHES[this.item.branch];
     const full = curve.getLength();
-    if (!dash) pieces.push(new TubeGeometry(curve, 14, RADIUS, 5));
+    if (!dash) pieces.push(new TubeGeometry(curve, 14, RADIUS, around));
     else {
       const [on, off] = dash;
       const most = Math.max(on + off, full / 40); // of long lines the dashes grow, not their number
@@ -112,7 +113,7 @@ export class LinkThing extends Thing<LinkItem> {
         const from = at / full;
         const to = Math.min(1, (at + (most * on) / (on + off)) / full);
         const part = new QuadraticBezierCurve3(...subdivided(curve, from, to));
-        pieces.push(new TubeGeometry(part, 3, RADIUS, 5));
+        pieces.push(new TubeGeometry(part, 3, RADIUS, around));
       }
     }
     const head = new ConeGeometry(0.008, 0.022, 8);

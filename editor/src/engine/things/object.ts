@@ -10,7 +10,6 @@ import {
   LineBasicMaterial,
   LineSegments,
   Mesh,
-  MeshLambertMaterial,
   OctahedronGeometry,
   SphereGeometry,
   Vector3,
@@ -18,13 +17,14 @@ import {
 import type { ObjectItem, Shape } from "../items";
 import { readMesh } from "../loaders/glb";
 import { setPose } from "../poses";
+import { surface } from "../surface";
 import { disposeTree, ownedBy, Thing, type Context } from "../thing";
 
 export class ObjectThing extends Thing<ObjectItem> {
   readonly root = new Group();
   item: ObjectItem;
   private shape = "";
-  private readonly material = new MeshLambertMaterial();
+  private readonly material = surface(this.context);
   private readonly edges = new LineBasicMaterial({ transparent: true, opacity: 0.35 });
   /** Counts shapes, so that a mesh that comes late does not replace a newer one. */
   private loading = 0;

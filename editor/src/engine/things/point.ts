@@ -17,10 +17,7 @@ export class PointThing extends Thing<PointItem> {
   constructor(item: PointItem, context: Context) {
     super(context);
     this.item = item;
-    this.batch = context.batches.of("point", () => [
-      new SphereGeometry(RADIUS, 14, 10),
-      new MeshLambertMaterial(),
-    ]);
+    this.batch = context.batches.of("point", () => [new SphereGeometry(RADIUS, 14, 10), new MeshLambertMaterial()], RADIUS);
     this.instance = { id: item.id, frame: this.root, offset: new Matrix4(), color: context.palette.point };
     this.batch.add(this.instance);
   }

@@ -6,15 +6,15 @@ import {
   Group,
   Matrix4,
   Mesh,
-  MeshLambertMaterial,
   type Object3D,
   SphereGeometry,
   Vector3,
 } from "three";
 import type { URDFRobot } from "urdf-loader";
-import { STALE } from "../../store/telemetry";
+import { STALE, STILL } from "../../store/telemetry";
 import type { RobotItem } from "../items";
 import { setPose } from "../poses";
+import { surface } from "../surface";
 import { disposeTree, ownedBy, Thing, type Context } from "../thing";
 import { GhostRobot } from "./ghost";
 
@@ -26,8 +26,6 @@ export interface JointLimit {
   prismatic: boolean;
 }
 
-/** rad or m: what moves less is not drawn anew. */
-const STILL = 1e-4;
 const inverse = new Matrix4();
 const tip = new Vector3();
 
@@ -39,9 +37,9 @@ export class RobotThing extends Thing<RobotItem> {
   private readonly body = new Group();
   private readonly tips = new Map<string, Object3D>();
   private readonly shown = new Map<string, number>();
-  private readonly material = new MeshLambertMaterial();
+  private readonly material = surface(this.context);
   /** Of surfaces that have colours of their own. */
-  private readonly coloured = new MeshLambertMaterial({ vertexColors: true });
+  private readonly coloured = surface(this.context, { vertexColors: true });
   private reason = "";
   private readonly ghost = new GhostRobot(this.root);
   private urdf: string | null = null;
@@ -99,9 +97,10 @@ export class RobotThing extends Thing<RobotItem> {
     });
   }
 
-  override frame(): boolean {
+  /** Called before a drawn frame when its joints changed, or anything did; gives whether it goes on moving by itself. */
+  frame(): boolean {
     this.placeTips();
-    const drawn = this.context.telemetry.interpolated(this.item.id);
+    const drawn = this.context.telemetry.interpolated(this.item.id, this.context.period);
     if (!drawn || !this.robot) return false;
     const first = this.shown.size === 0;
     for (const [name, value] of drawn.joints) {

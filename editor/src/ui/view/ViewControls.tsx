@@ -9,13 +9,18 @@ import { AskName, Button, type Choice, More } from "../kit/kit";
 import { FlyPad } from "./FlyPad";
 import "./view.css";
 
-const SIDES: [ViewName, string, string][] = [
-  ["top", "Top", "translateZ(30px)"],
-  ["front", "Front", "rotateX(-90deg) translateZ(30px)"],
-  ["back", "Back", "rotateZ(180deg) rotateX(-90deg) translateZ(30px)"],
-  ["side", "Right", "rotateZ(-90deg) rotateX(-90deg) translateZ(30px)"],
-  ["left", "Left", "rotateZ(90deg) rotateX(-90deg) translateZ(30px)"],
+type Direction = [number, number, number];
+
+/** The sides of the cube: what is written there, where it faces, and where its words run and their upper edge points. */
+const SIDES: [ViewName, string, Direction, Direction, Direction][] = [
+  ["top", "Top", [0, 0, 1], [1, 0, 0], [0, 1, 0]],
+  ["front", "Front", [0, -1, 0], [1, 0, 0], [0, 0, 1]],
+  ["back", "Back", [0, 1, 0], [-1, 0, 0], [0, 0, 1]],
+  ["side", "Right", [1, 0, 0], [0, 1, 0], [0, 0, 1]],
+  ["left", "Left", [-1, 0, 0], [0, -1, 0], [0, 0, 1]],
 ];
+/** Half of its edge, pixels. */
+const HALF = 30;
 
 const KEY = "bookmarks";
 
@@ -86,28 +91,36 @@ export default function ViewControls({ engine }: { engine: Engine }) {
   );
 }
 
-/** Turns as the view does; a tap on a face looks from there. The menu has the same for the keyboard. */
+/**
+ * Turns as the view does; a tap on a face looks from there. The menu has the same for the keyboard. Its faces are
+ * slanted in the plane: a cube in space would be put together anew whenever anything on the page is drawn.
+ */
 function Cube({ engine, onLook }: { engine: Engine; onLook: (from: ViewName) => void }) {
   const cube = useRef<HTMLDivElement>(null);
   useEffect(() => {
     const turn = () => {
-      // The camera's rotation the other way round; CSS has y downwards.
       const e = engine.view.camera.matrixWorldInverse.elements;
-      const at = (row: number, column: number) => (e[column * 4 + row] ?? 0) * (row === 1 ? -1 : 1) * (column === 1 ? -1 : 1);
-      const columns = [0, 1, 2].map((column) => `${at(0, column)},${at(1, column)},${at(2, column)},0`);
-      if (cube.current) cube.current.style.transform = `matrix3d(${columns.join(",")},0,0,0,1)`;
+      // Right, down and towards the eye: how far a direction goes there.
+      const along = (row: number, [x, y, z]: Direction) => (e[row] ?? 0) * x + (e[4 + row] ?? 0) * y + (e[8 + row] ?? 0) * z;
+      SIDES.forEach(([, , faces, words, upper], n) => {
+        const face = cube.current?.children[n] as HTMLElement | undefined;
+        if (!face) return;
+        const towards = along(2, faces) > 0.01;
+        const parts = [along(0, words), -along(1, words), -along(0, upper), along(1, upper), HALF * along(0, faces), -HALF * along(1, faces)];
+        const transform = towards ? `matrix(${parts.map((each) => each.toFixed(3)).join()})` : "";
+        if (face.style.transform === transform) return;
+        face.style.transform = transform;
+        face.style.visibility = towards ? "visible" : "hidden";
+      });
     };
-    engine.onFrame = turn;
     turn();
-    return () => {
-      engine.onFrame = () => {};
-    };
+    return engine.watch(turn);
   }, [engine]);
   return (
     <div className="view-cube" aria-hidden="true">
       <div ref={cube} className="view-cube-body">
-        {SIDES.map(([id, words, place]) => (
-          <div key={id} className="view-cube-face" style={{ transform: place }} onClick={() => onLook(id)}>
+        {SIDES.map(([id, words]) => (
+          <div key={id} className="view-cube-face" onClick={() => onLook(id)}>
             {words}
           </div>
         ))}

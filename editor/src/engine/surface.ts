@@ -1,0 +1,105 @@
+/** What solid things are made of, and how they are drawn where each triangle and each pixel costs. */
+
+import { BufferAttribute, BufferGeometry, type Material, MeshLambertMaterial, type MeshLambertMaterialParameters } from "three";
+import type { Context } from "./thing";
+
+/** As the Lambert material of three.js does it, with lights of the two kinds that there are. */
+const LIT = `
+uniform vec3 diffuse;
+struct DirectionalLight { vec3 direction; vec3 color; };
+uniform DirectionalLight directionalLights[ NUM_DIR_LIGHTS ];
+struct HemisphereLight { vec3 direction; vec3 skyColor; vec3 groundColor; };
+uniform HemisphereLight hemisphereLights[ NUM_HEMI_LIGHTS ];
+#ifdef USE_FOG
+uniform vec3 fogColor;
+uniform float fogNear;
+uniform float fogFar;
+#endif
+vec3 lit( vec3 color, vec3 normal, float far ) {
+  vec3 light = vec3( 0.0 );
+  for ( int i = 0; i < NUM_HEMI_LIGHTS; i ++ )
+    light += mix( hemisphereLights[ i ].groundColor, hemisphereLights[ i ].skyColor, 0.5 * dot( normal, hemisphereLights[ i ].direction ) + 0.5 );
+  for ( int i = 0; i < NUM_DIR_LIGHTS; i ++ )
+    light += directionalLights[ i ].color * clamp( dot( normal, directionalLights[ i ].direction ), 0.0, 1.0 );
+  vec3 shade = clamp( light * diffuse * color * 0.3183098861837907, 0.0, 1.0 );
+  // sRGB to a thousandth, of roots alone, which cost a tenth of powers.
+  vec3 root = sqrt( shade ), second = sqrt( root );
+  shade = clamp( 0.662002687 * root + 0.684122060 * second - 0.323583601 * sqrt( second ) - 0.0225411470 * shade, 0.0, 1.0 );
+  #ifdef USE_FOG
+  shade = mix( shade, fogColor, smoothstep( fogNear, fogFar, far ) );
+  #endif
+  return shade;
+}
+#if defined( USE_COLOR ) || defined( USE_INSTANCING_COLOR )
+#define OWN vColor.rgb
+#else
+#define OWN vec3( 1.0 )
+#endif
+`;
+
+/** Lit at the corners of triangles, of which few cover many pixels. */
+const CORNERS = {
+  vertexShader: `
+#include <common>
+#include <color_pars_vertex>
+${LIT}
+varying vec3 vShade;
+void main() {
+  #include <color_vertex>
+  #include <beginnormal_vertex>
+  #include <defaultnormal_vertex>
+  #include <begin_vertex>
+  #include <project_vertex>
+  vShade = lit( OWN, normalize( transformedNormal ), - mvPosition.z );
+}`,
+  fragmentShader: `
+uniform float opacity;
+varying vec3 vShade;
+void main() { gl_FragColor = vec4( vShade, opacity ); }`,
+};
+
+/** Instances of a square that faces the eye, on which a ball is painted. */
+const DISCS = {
+  vertexShader: `
+#include <common>
+#include <color_pars_vertex>
+varying vec3 vPlace;
+void main() {
+  #include <color_vertex>
+  vec4 middle = modelViewMatrix * instanceMatrix * vec4( 0.0, 0.0, 0.0, 1.0 );
+  vPlace = vec3( position.xy, - middle.z );
+  middle.xy += position.xy * position.z * length( instanceMatrix[ 0 ].xyz );
+  gl_Position = projectionMatrix * middle;
+}`,
+  fragmentShader: `
+#include <color_pars_fragment>
+${LIT}
+varying vec3 vPlace;
+void main() {
+  float off = dot( vPlace.xy, vPlace.xy );
+  if ( off > 1.0 ) discard;
+  gl_FragColor = vec4( lit( OWN, vec3( vPlace.xy, sqrt( 1.0 - off ) ), vPlace.z ), 1.0 );
+}`,
+};
+
+/** Have a dull material drawn at little cost: as it is, or as balls on the squares of `discOf`. */
+export function cheapen(material: Material, discs = false): void {
+  if (!(material instanceof MeshLambertMaterial)) return;
+  const shaders = discs ? DISCS : CORNERS;
+  material.onBeforeCompile = (shader) => void Object.assign(shader, shaders);
+  material.customProgramCacheKey = () => (discs ? "discs" : "corners");
+}
+
+/** A square for a ball of a radius in m, which stands in its third coordinate. */
+export function discOf(radius: number): BufferGeometry {
+  const corners = [-1, -1, 1, -1, 1, 1, -1, 1].flatMap((each, n) => (n % 2 ? [each, radius] : [each]));
+  const square = new BufferGeometry().setAttribute("position", new BufferAttribute(new Float32Array(corners), 3));
+  return square.setIndex([0, 1, 2, 0, 2, 3]);
+}
+
+/** A dull material, of a colour that can be set. */
+export function surface({ quality }: Pick<Context, "quality">, parameters: MeshLambertMaterialParameters = {}): MeshLambertMaterial {
+  const material = new MeshLambertMaterial(parameters);
+  if (quality === "low") cheapen(material);
+  return material;
+}
