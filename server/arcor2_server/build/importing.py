@@ -327,7 +327,7 @@ def _check_here(services: "Services", given: Imported) -> None:
 async def import_package(services: "Services", data: Path | bytes, options: ImportOptions) -> ImportedIds:
     """Save what a package (a zip, or the path of one) holds; nothing is saved before all of it is checked.
 
-    What is saved already and equal is left as it is, so that an import that a crash cut short is ended by another one.
+    All of it is saved in one transaction; what is saved already and equal is left as it is.
     Raises InvalidPackage for a damaged, too large or contradictory package, NotFound for an object type or asset that
     is neither in it nor here, Conflict naming everything that differs from what is saved or is open, InvalidProject
     naming what cannot be built or the line of a script that cannot be read back, StorageError.
@@ -339,20 +339,22 @@ async def import_package(services: "Services", data: Path | bytes, options: Impo
         plan, conflicts = _plan(given, await _saved(services, given), options)
         if conflicts := [*conflicts, *_open_conflicts(services, plan, given)]:
             raise Conflict(" ".join(conflicts))
-        await _write(services, given, plan)
+        if plan != _Plan([], False, False, False):
+            await _write(services, given, plan)
     return ImportedIds(given.scene.id, given.project.id)
 
 
 async def _write(services: "Services", given: Imported, plan: _Plan) -> None:
-    """Save, what others refer to first; clients are told of the types soon after, or when something is opened."""
+    """Save all, or nothing; clients are told of the types soon after, or when something is opened."""
     storage = services.storage
-    for one in plan.types:
-        await storage.put_object_type(one)
-    if plan.scene:
-        await storage.put_scene(given.scene)
-    if plan.project:
-        await storage.put_project(given.project)
-    if plan.source:
-        await storage.put_project_source(given.project.id, given.script)
+    async with storage.together():
+        for one in plan.types:
+            await storage.put_object_type(one)
+        if plan.scene:
+            await storage.put_scene(given.scene)
+        if plan.project:
+            await storage.put_project(given.project)
+        if plan.source:
+            await storage.put_project_source(given.project.id, given.script)
     if plan.types:
         await services.type_news.taken(services)

@@ -1,10 +1,8 @@
 """Reading and writing saved documents; what a method wrote is on disk when it returns."""
 
-import contextlib
-import sqlite3
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
-from pathlib import Path
+from contextvars import ContextVar
 from typing import Any, Final, Self
 
 import msgspec
@@ -21,7 +19,10 @@ from arcor2_hw.exceptions import NotFound, StorageError
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage.models import ModelRow, ObjectTypeRow, ProjectRow, ProjectSourceRow, SceneRow
 from arcor2_server.storage.schema import bring_up_to_date
+from arcor2_server.storage.sqlite import check_opens, prepare
 
+_together: ContextVar[AsyncSession | None] = ContextVar("together", default=None)
+"""The session of the transaction that the present task is in."""
 _encode = msgspec.json.Encoder().encode
 _decode_scene = msgspec.json.Decoder(Scene).decode
 _decode_project = msgspec.json.Decoder(Project).decode
@@ -57,12 +58,12 @@ class Storage:
         if settings.database_url:
             engine = create_async_engine(settings.database_url)
         else:
-            _check_opens(settings.documents_database)
+            check_opens(settings.documents_database)
             # One connection: SQLite writes one at a time anyway, and each connection costs a thread.
             engine = create_async_engine(
                 f"sqlite+aiosqlite:///{settings.documents_database}", pool_size=1, max_overflow=0
             )
-            event.listen(engine.sync_engine, "connect", _prepare_sqlite)
+            event.listen(engine.sync_engine, "connect", prepare)
         try:
             await bring_up_to_date(engine, place)
         except BaseException:
@@ -311,9 +312,28 @@ class Storage:
 
     # ------------------------------------------------------------------------------------------------ inside
     @asynccontextmanager
+    async def together(self) -> AsyncIterator[None]:
+        """Make one transaction of all that is written inside by the present task: all of it is kept, or nothing.
+
+        StorageError for what the database says of it as a whole.
+        """
+        before = self.types_revision
+        async with self.writing() as session:
+            token = _together.set(session)
+            try:
+                yield
+            finally:
+                _together.reset(token)
+        if self.types_revision != before:
+            self.types_revision += 1  # only now they are there for others
+
+    @asynccontextmanager
     async def reading(self) -> AsyncIterator[AsyncSession]:
         """Give a session to read with; StorageError for whatever the database says."""
         try:
+            if (session := _together.get()) is not None:
+                yield session
+                return
             async with self._sessions() as session:
                 yield session
         except SQLAlchemyError as error:
@@ -326,6 +346,10 @@ class Storage:
         `documents`: `revision` grows, since answers that are made from documents may be others now.
         """
         try:
+            if (session := _together.get()) is not None:
+                yield session
+                await session.flush()
+                return
             async with self._sessions() as session, session.begin():
                 yield session
         except SQLAlchemyError as error:
@@ -369,23 +393,3 @@ class Storage:
 
 def _model_row(model: Models) -> ModelRow:
     return ModelRow(id=model.id, kind=model.type().value, document=_encode(model))
-
-
-def _check_opens(path: Path) -> None:
-    """Raise StorageError where there is no opening the file.
-
-    aiosqlite leaves a thread to itself after an open that failed, which then speaks to a loop that may be closed.
-    """
-    try:
-        with contextlib.closing(sqlite3.connect(path)):
-            return
-    except sqlite3.Error as error:
-        raise StorageError(f"cannot use the database {path}: {error}", detail=str(error)) from error
-
-
-def _prepare_sqlite(connection: Any, _record: Any) -> None:
-    cursor = connection.cursor()
-    # FULL: in WAL mode only then is every commit flushed before it returns.
-    for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "busy_timeout=5000"):
-        cursor.execute(f"PRAGMA {pragma}")
-    cursor.close()

@@ -124,6 +124,24 @@ async def test_twice_changes_nothing(here: Any, packed: bytes) -> None:
     assert await here.storage.project("pro_1") == before
 
 
+async def test_what_fails_on_the_way_leaves_nothing(here: Any, packed: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def full(project: Project) -> Project:
+        assert [one.name for one in await here.storage.scenes()], "what was written before is seen within"
+        raise StorageError("The disk is full.")
+
+    monkeypatch.setattr(here.storage, "put_project", full)
+    with pytest.raises(StorageError, match="disk is full"):
+        await import_package(here, packed, NOTHING)
+    storage = here.storage
+    assert [await storage.scenes(), await storage.projects(), await storage.object_types(), await storage.models()] == [
+        [] for _ in range(4)
+    ]
+    monkeypatch.undo()
+    assert (await import_package(here, packed, NOTHING)).project_id == "pro_1"
+    assert len(await storage.object_types()) > 0
+    assert [one.id for one in await storage.projects()] == ["pro_1"]
+
+
 async def test_camel_case_documents_are_read(here: Any, packed: bytes) -> None:
     project = json.loads(files_in(packed)["data/project.json"])
     renamed = {"sceneId": project.pop("scene_id"), "hasLogic": project.pop("has_logic", True), **project}
