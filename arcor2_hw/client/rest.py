@@ -181,6 +181,10 @@ class Rest:
         """Save a scene, new or changed."""
         await self.request("PUT", "/scenes", body=scene)
 
+    async def delete_scene(self, key: str) -> None:
+        """Delete a saved scene."""
+        await self.request("DELETE", f"/scenes/{_part(key)}")
+
     # ------------------------------------------------------------------------------------------------ projects
     async def projects(self) -> list[Listed]:
         """List the saved projects."""
@@ -193,6 +197,10 @@ class Rest:
     async def put_project(self, project: Project) -> None:
         """Save a project, new or changed; its scene has to be saved."""
         await self.request("PUT", "/projects", body=project)
+
+    async def delete_project(self, key: str) -> None:
+        """Delete a saved project, with its script."""
+        await self.request("DELETE", f"/projects/{_part(key)}")
 
     async def project_script(self, key: str) -> str:
         """Give the script of a project that was written by hand. NothingThere when it has none."""
@@ -251,6 +259,10 @@ class Rest:
         """Save a collision model, in place of whatever has its id."""
         await self.request("PUT", f"/models/{model.type().value.lower()}", body=model)
 
+    async def delete_model(self, name: str) -> None:
+        """Delete a collision model."""
+        await self.request("DELETE", f"/models/{_part(name)}")
+
     # ------------------------------------------------------------------------------------------------ assets
     async def assets(self) -> list[Asset]:
         """List the assets."""
@@ -268,6 +280,10 @@ class Rest:
         query = {"id": key, "upsert": str(replace).lower()}
         asset: Asset = await self._upload("POST", "/assets", "assetData", name, content, query, Asset)
         return asset
+
+    async def delete_asset(self, key: str) -> None:
+        """Delete an asset."""
+        await self.request("DELETE", f"/assets/{_part(key)}")
 
     # ------------------------------------------------------------------------------------------------ packages
     async def publish(self, project_id: str, target: Path, package_name: str = "") -> None:

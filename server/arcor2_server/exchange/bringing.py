@@ -1,5 +1,6 @@
 """From an export into a server: what differs from what is there is refused unless it may be replaced."""
 
+import contextlib
 import hashlib
 import tempfile
 from collections.abc import Collection
@@ -11,15 +12,16 @@ from msgspec.structs import replace
 
 from arcor2_hw.analysis import SourceFile, module_name
 from arcor2_hw.client import Client, NothingThere
-from arcor2_hw.client.rest import Listed
+from arcor2_hw.client.rest import Asset, Listed
 from arcor2_hw.data.base import Data, Unset, new_id
-from arcor2_hw.data.object_type import ObjectTypeSource
+from arcor2_hw.data.object_type import Models, ObjectTypeSource
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
-from arcor2_hw.exceptions import Conflict, DeviceTimeout, InvalidPackage
+from arcor2_hw.exceptions import Arcor2Error, Conflict, DeviceTimeout, InvalidPackage
 from arcor2_server.exchange.archive import Archive, AssetFile, with_needed
 from arcor2_server.exchange.findings import Known, find
 from arcor2_server.exchange.gathering import Source
+from arcor2_server.exchange.undoing import Undoing
 
 Part = Literal["all", "scene", "project", "types", "assets"]
 """What of an export may take the place of something else on the server."""
@@ -58,6 +60,8 @@ class Target:
         self._conflicts: list[str] = []
         self.steps: list[Step] = []
         self._work: list[Step] = []
+        self._old_scene: Scene | None = None
+        self._old_project: Project | None = None
 
     async def plan(self, installed: list[SourceFile]) -> list[Step]:
         """Give what would be done. Nothing is changed.
@@ -137,7 +141,10 @@ class Target:
     ) -> None:
         old: Scene | Project | None = None
         if any(one.id == given.id for one in there):
-            old = await (self._rest.scene(given.id) if kind == "scene" else self._rest.project(given.id))
+            if kind == "scene":
+                old = self._old_scene = await self._rest.scene(given.id)
+            else:
+                old = self._old_project = await self._rest.project(given.id)
         if any(one.name == given.name and one.id != given.id for one in there):
             self._conflicts.append(f"Another {kind} is named {given.name}: bring this one in with --name.")
         same = old is not None and replace(old, **_UNTIMED) == replace(given, **_UNTIMED)
@@ -176,29 +183,101 @@ class Target:
             if given is not None and kind in changed and any(one.id == given.id for one in opened):
                 self._conflicts.append(f"The {kind} {given.name} is open there: close it first.")
 
+    # -------------------------------------------------------------------------------- done
     async def carry_out(self) -> None:
-        """Do what was planned, what others refer to first. What was cut short is ended by doing it again."""
-        archive, rest = self._archive, self._rest
+        """Do what was planned, what others refer to first; when something fails, what was done is taken back.
+
+        The error then names what was, and what could not be.
+        """
+        undoing = Undoing()
+        try:
+            with tempfile.TemporaryDirectory(prefix="arcor2-import-") as directory:
+                try:
+                    await self._carry_out(undoing, Path(directory))
+                except BaseException as error:
+                    told = await undoing.take_back()
+                    if isinstance(error, Arcor2Error) and told:
+                        Arcor2Error.__init__(error, f"{error} {told}", error.detail)
+                    raise
+        finally:
+            self._work.clear()
+
+    async def _carry_out(self, undoing: Undoing, directory: Path) -> None:
+        archive = self._archive
         work = {(step.kind, step.name) for step in self._work}
-        for key, asset in archive.assets.items():
+        there = {asset.id: asset for asset in await self._rest.assets()}
+        for number, (key, asset) in enumerate(archive.assets.items()):
             if ("asset", key) in work:
-                await rest.upload_asset(key, asset.content, file_name=asset.file_name or key, replace=True)
+                await self._put_asset(undoing, key, asset, there.get(key), directory / str(number))
         for name in _bases_first(archive.types):
             if ("object type", name) in work:
-                one = archive.types[name]
-                model = None if isinstance(one.model, Unset) else one.model.model()
-                if model is not None:
-                    await rest.put_model(model)
-                await rest.put_object_type(name, one.source, model)
+                await self._put_type(undoing, archive.types[name])
         scene, project = archive.scene, archive.project
         if scene is not None and ("scene", scene.name) in work:
-            await rest.put_scene(scene)
+            await self._put_scene(undoing, scene)
         if project is not None and ("project", project.name) in work:
-            await rest.put_project(project)
-            if archive.script is not None:
-                await rest.put_project_script(project.id, archive.script)
-            await rest.put_kept_parameters(project.id, archive.parameters)
-            await rest.put_kept_overrides(project.id, archive.overrides)
+            await self._put_project(undoing, project)
+
+    async def _put_asset(self, undoing: Undoing, key: str, asset: AssetFile, old: Asset | None, kept: Path) -> None:
+        rest = self._rest
+        if old is None:
+            undoing.about_to(f"asset {key}", lambda: rest.delete_asset(key))
+        else:
+            await rest.download_asset(key, kept)
+            name = key if isinstance(old.file_name, Unset) else old.file_name
+            undoing.about_to(f"asset {key}", lambda: rest.upload_asset(key, kept, file_name=name, replace=True))
+        await rest.upload_asset(key, asset.content, file_name=asset.file_name or key, replace=True)
+
+    async def _put_type(self, undoing: Undoing, one: ObjectTypeSource) -> None:
+        rest, name = self._rest, one.id
+        old = (await self._source.uploaded()).get(name)
+        what = f"object type {name}"
+        model, old_model = _model(one), None if old is None else _model(old)
+        if model is not None:
+            if old_model is None:
+                undoing.about_to(what, lambda: rest.delete_model(name))
+            else:
+                undoing.about_to(what, lambda: rest.put_model(old_model))
+            await rest.put_model(model)
+        if old is None:
+            undoing.about_to(what, lambda: rest.delete_object_type(name))
+        else:
+            undoing.about_to(what, lambda: rest.put_object_type(name, old.source, old_model))
+        await rest.put_object_type(name, one.source, model)
+
+    async def _put_scene(self, undoing: Undoing, scene: Scene) -> None:
+        rest, old = self._rest, self._old_scene
+        if old is None:
+            undoing.about_to(f"scene {scene.name}", lambda: rest.delete_scene(scene.id))
+        else:
+            undoing.about_to(f"scene {old.name}", lambda: rest.put_scene(old))
+        await rest.put_scene(scene)
+
+    async def _put_project(self, undoing: Undoing, project: Project) -> None:
+        archive, rest, old, key = self._archive, self._rest, self._old_project, project.id
+        script = None
+        if old is None:
+            undoing.about_to(f"project {project.name}", lambda: rest.delete_project(key))
+        else:
+            what = f"project {old.name}"
+            parameters, overrides = await rest.kept_parameters(key), await rest.kept_overrides(key)
+            with contextlib.suppress(NothingThere):
+                script = await rest.project_script(key)
+            undoing.about_to(what, lambda: rest.put_kept_overrides(key, overrides))
+            undoing.about_to(what, lambda: rest.put_kept_parameters(key, parameters))
+            if script is not None:
+                before = script
+                undoing.about_to(what, lambda: rest.put_project_script(key, before))
+            undoing.about_to(what, lambda: rest.put_project(old))
+        await rest.put_project(project)
+        if archive.script is not None:
+            await rest.put_project_script(key, archive.script)
+        await rest.put_kept_parameters(key, archive.parameters)
+        await rest.put_kept_overrides(key, archive.overrides)
+
+
+def _model(one: ObjectTypeSource) -> Models | None:
+    return None if isinstance(one.model, Unset) else one.model.model()
 
 
 def _file(one: ObjectTypeSource) -> SourceFile:

@@ -1,6 +1,7 @@
 """`arcor2-hw scene | project | object-type`: out of one server, into another, checked and compared."""
 
 import asyncio
+import contextlib
 import json
 import zipfile
 from collections.abc import Callable, Iterator
@@ -12,7 +13,7 @@ from msgspec import UNSET
 from msgspec.structs import replace
 
 from arcor2_hw.analysis import module_name
-from arcor2_hw.client import Client
+from arcor2_hw.client import Client, NothingThere, RequestFailed, Rest
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import Box, Mesh, ObjectModel
 from arcor2_hw.data.parameter import Parameter
@@ -298,6 +299,77 @@ def test_what_differs_is_named_and_replaced_only_when_it_may_be(cli: Any, place:
     assert open_there.status == ExitStatus.CONFLICT
     assert "The scene bench is open there: close it first." in open_there.err
     assert "The project open it is open there: close it first." in open_there.err
+
+
+async def _whole(client: Client, directory: Path) -> Any:
+    assets = {}
+    for asset in await client.rest.assets():
+        await client.rest.download_asset(asset.id, directory / "asset")
+        assets[asset.id] = (directory / "asset").read_bytes(), asset.file_name
+    scripts = {}
+    for one in await client.rest.projects():
+        with contextlib.suppress(NothingThere):
+            scripts[one.name] = await client.rest.project_script(one.id)
+    return await _picture(client), assets, scripts, sorted(one.name for one in await client.rest.scenes())
+
+
+def test_what_fails_on_the_way_is_taken_back(
+    cli: Any, place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert cli("project", "export", "open it", "-o", "out.zip", at=place.first).status == 0
+    assert cli("project", "import", "out.zip", "--overwrite", "all", at=place.second).status == 0
+
+    def alter(files: dict[str, bytes]) -> None:
+        changed("data/scene.json", lambda scene: scene["objects"][0]["pose"]["position"].update(x=9.0))(files)
+        changed("data/project.json", lambda project: _named(project["parameters"], "angle").update(value="0.5"))(files)
+        files["data/models/wall.json"] = files["data/models/wall.json"].replace(b"0.1", b"0.2")
+        files["object_types/crate.py"] += b"\n# changed\n"
+        files["assets/0001"] += b"more"
+
+    repacked(Path("out.zip"), Path("other.zip"), alter)
+    picture = lambda: place.ask(place.second, lambda client: _whole(client, tmp_path))  # noqa: E731
+    before, full = picture(), RequestFailed("PUT", ["The disk is full."])
+    real = Rest.put_kept_overrides
+
+    async def fails(rest: Rest, key: str, overrides: Any) -> None:
+        """The last thing that an import does."""
+        monkeypatch.setattr(Rest, "put_kept_overrides", real)
+        async with Client(place.second) as client:
+            names = {one.name for one in await client.rest.projects()}
+            assert "copy" in names or await _whole(client, tmp_path) != before, "all else is done by now"
+        raise full
+
+    monkeypatch.setattr(Rest, "put_kept_overrides", fails)
+    failed = cli("project", "import", "other.zip", "--overwrite", "all", at=place.second)
+    assert failed.status == ExitStatus.FAILED
+    taken = "asset crate_mesh, object type Crate, object type Wall, scene bench, project open it"
+    assert f"The disk is full. Taken back: {taken}." in failed.err
+    assert picture() == before
+
+    # What was new goes.
+    monkeypatch.setattr(Rest, "put_kept_overrides", fails)
+    failed = cli("project", "import", "out.zip", "--name", "copy", at=place.second)
+    assert "Taken back: project copy." in failed.err
+    assert picture() == before
+
+    # What cannot be taken back is named.
+    async def gone(rest: Rest, scene: Any) -> None:
+        monkeypatch.setattr(Rest, "put_scene", put_again)
+        await put_scene(rest, scene)
+
+    async def put_again(rest: Rest, scene: Any) -> None:
+        raise full
+
+    put_scene = Rest.put_scene
+    monkeypatch.setattr(Rest, "put_kept_overrides", fails)
+    monkeypatch.setattr(Rest, "put_scene", gone)
+    failed = cli("project", "import", "other.zip", "--overwrite", "all", at=place.second)
+    assert "Taken back: asset crate_mesh, object type Crate, object type Wall, project open it." in failed.err
+    assert "Could not be taken back: scene bench; to end it, import the file again." in failed.err
+    monkeypatch.undo()
+    monkeypatch.chdir(tmp_path)
+    assert cli("project", "import", "out.zip", "--overwrite", "all", at=place.second).status == 0
+    assert picture() == before
 
 
 def test_a_copy_gets_a_name_and_an_id_of_its_own(cli: Any, place: Place) -> None:
