@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import math
 import os
 import signal
 from collections.abc import AsyncIterator
@@ -11,59 +10,22 @@ from typing import Any
 
 import httpx
 import msgspec
-import numpy as np
 import psutil
 import pytest
 import pytest_asyncio
 
-from arcor2_fakes.cell import arm
 from arcor2_hw.client import Client, RequestFailed
 from arcor2_hw.data.events import SceneStateEnum
-from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.parameter import Parameter
 from arcor2_server.cli.main import app
 from arcor2_server.demo.fakes import free_loopback_address
 from tests.e2e.harness import scene_state, until
+from tests.e2e.seen_workplace import CAMERA, MARKERS, ROBOT, SIZE, Q, in_view, off, pose, tilted
 from tests.fakes.conftest import FakeProcess
 from tests.server.core.serving import ServerProcess
 
 pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(180)]
-
-Q = (0.4, -1.3, 1.5, -1.2, -1.2, 0.3)
-ROBOT = Pose(Position(0.10, 0.05, 0.0), Orientation.from_rotation_vector(0.0, 0.0, 0.35))
-"""Where the robot's base really stands."""
-MARKERS = {10: (0.45, -0.35), 11: (0.75, -0.30), 12: (0.60, 0.35), 13: (0.35, 0.45)}
-SIZE = 0.15
-
-
-def looking_at(eye: tuple[float, float, float], target: tuple[float, float, float]) -> Pose:
-    """Give the pose of a camera's optical frame."""
-    z = np.subtract(target, eye) / np.linalg.norm(np.subtract(target, eye))
-    x = np.cross(z, (0.0, 0.0, 1.0))
-    x /= np.linalg.norm(x)
-    matrix = np.eye(4)
-    matrix[:3, :3] = np.column_stack((x, np.cross(z, x), z))
-    matrix[:3, 3] = eye
-    return Pose.from_matrix(matrix)
-
-
-CAMERA = looking_at((1.2, -0.6, 0.85), (0.42, 0.03, 0.12))
-"""Where the camera really is."""
-
-
-def pose(of: Pose) -> dict[str, Any]:
-    return {"position": list(of.position), "orientation": list(of.orientation)}
-
-
-def printed(number: int, x: float, y: float) -> dict[str, Any]:
-    """A marker on paper, as the fake camera is told of it: its face is the origin's plane."""
-    return {
-        "name": f"marker {number}",
-        "pose": {"position": [x, y, -0.0005]},
-        "size": [0.22, 0.22, 0.001],
-        "color": [235, 235, 235],
-        "marker": {"id": number, "size": SIZE},
-    }
 
 
 class World:
@@ -114,10 +76,7 @@ class World:
 
     def show(self, *, markers: bool = True, robot: bool = True) -> None:
         """Put into the camera's view what stands there."""
-        things = [printed(number, *place) for number, place in MARKERS.items()] if markers else []
-        if robot:
-            things += arm.things("ur5e", ROBOT.matrix(), Q, np.eye(4)).values()
-        self.camera.control.do("scene", things=things)
+        self.camera.control.do("scene", things=in_view(markers=markers, robot=robot))
         self.camera.control.do("camera", pose=pose(CAMERA))
 
     async def stop(self) -> None:
@@ -156,15 +115,6 @@ class World:
 
 def setting(name: str, value: str | float) -> Parameter:
     return Parameter(name, "string" if isinstance(value, str) else "double", msgspec.json.encode(value).decode())
-
-
-def tilted(angle: float) -> Orientation:
-    return Orientation.from_rotation_vector(0.0, 0.0, angle)
-
-
-def off(found: Pose, truth: Pose) -> tuple[float, float]:
-    """Give by how much a pose is off, mm and degrees."""
-    return 1e3 * found.position.distance_to(truth.position), math.degrees(found.orientation.angle_to(truth.orientation))
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")

@@ -202,7 +202,9 @@ function live(state: State, event: ServerEvent): Partial<State> | null {
       return become({ executing: "" });
     case "ProcessState": {
       const { id, state: phase, message } = event.data;
-      return phase === "failed" ? notice(state, "error", message || `${id} failed.`) : {};
+      // The task of it says the same, and stays; an older server has none.
+      const told = Object.values(state.tasks).some((each) => each.kind === "calibration");
+      return phase === "failed" && !told ? notice(state, "error", message || `${id} failed.`) : {};
     }
     default:
       return null;

@@ -38,7 +38,8 @@ export class GhostRobot {
       this.host.add(this.frame);
     }
     this.place(ghost.at);
-    this.material.color.copy(ghost.possible ? palette.selected : palette.trouble);
+    // Beside a robot that is selected it has to be another colour.
+    this.material.color.copy(ghost.at ? palette.point : ghost.possible ? palette.selected : palette.trouble);
     for (const [name, value] of Object.entries(ghost.joints)) this.robot.joints[name]?.setJointValue(value);
   }
 

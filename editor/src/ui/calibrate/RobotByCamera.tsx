@@ -29,7 +29,7 @@ const RobotByCamera: Section["Body"] = ({ selection: { id } }) => {
       <OnOff isSelected={moves} onChange={setMoves}>
         Let it move to where it is seen well
       </OnOff>
-      <Button icon="robot" why={why || offline || (camera ? "" : "There is no camera in this scene.")} isDisabled={busy} onPress={() => void ask(calibrateRobot(id, camera, moves))}>
+      <Button icon="robot" className="wraps" why={why || offline || (camera ? "" : "There is no camera in this scene.")} isDisabled={busy} onPress={() => void ask(calibrateRobot(id, camera, moves))}>
         {camera ? `Find where it stands by ${names[ids.indexOf(camera)] ?? "the camera"}` : "Find where it stands"}
       </Button>
       <RefusedText>{refused}</RefusedText>
