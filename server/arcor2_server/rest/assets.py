@@ -42,7 +42,16 @@ async def _pieces(file: IO[bytes]) -> AsyncIterator[bytes]:
         yield chunk
 
 
-@operation("POST", "/assets", STORAGE, Role.TECHNICIAN, file="assetData", limit=MAX_ASSET + MIB)
+@operation(
+    "POST",
+    "/assets",
+    STORAGE,
+    Role.TECHNICIAN,
+    file="assetData",
+    title="Taking in a file",
+    told_from=MIB,
+    limit=MAX_ASSET + MIB,
+)
 async def post_asset(services: Services, query: AssetQuery, upload: Upload) -> AssetInfo:
     """Take in a file, a mesh or a robot's description."""
     key = None if isinstance(query.id, Unset) else query.id

@@ -31,7 +31,15 @@ async def publish(services: Services, query: PublishQuery) -> Binary:
     return Binary(content, ZIP, f"{name}_package.zip")
 
 
-@operation("PUT", "/project/import", BUILD, Role.PROGRAMMER, file="executionPackage", limit=MAX_UPLOAD + MIB)
+@operation(
+    "PUT",
+    "/project/import",
+    BUILD,
+    Role.PROGRAMMER,
+    file="executionPackage",
+    title="Taking in a project",
+    limit=MAX_UPLOAD + MIB,
+)
 async def import_project(services: Services, query: ImportOptions, upload: Upload) -> ImportedIds:
     """Save the scene, the project and the object types that a package holds; what differs must be allowed to go."""
     with tempfile.TemporaryDirectory(prefix="arcor2-import-") as directory:

@@ -10,7 +10,6 @@ import msgspec
 from msgspec import field
 
 from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset, new_id
-from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.data.events import ChangeType
 from arcor2_hw.data.package import PackageStateEnum, PackageSummary
 from arcor2_hw.data.role import Role
@@ -107,11 +106,18 @@ async def list_packages(services: Services) -> list[SummaryPackage]:
     return [_summary(package) for package in await services.execution.list()]
 
 
-@operation("POST", "/packages/{id}", EXECUTION, Role.PROGRAMMER, file="executionPackage", limit=MAX_UPLOAD + MIB)
-async def upload_package(services: Services, id: str, upload: Upload, person: str) -> None:  # noqa: A002
+@operation(
+    "POST",
+    "/packages/{id}",
+    EXECUTION,
+    Role.PROGRAMMER,
+    file="executionPackage",
+    title="Taking in the package {id}",
+    limit=MAX_UPLOAD + MIB,
+)
+async def upload_package(services: Services, id: str, upload: Upload) -> None:  # noqa: A002
     """Take in a package as a zip, in place of one of that id."""
-    with services.tasks.running(TaskKind.UPLOAD, f"Taking in the package {id}", person):
-        summary = await services.execution.take(id, upload.file)
+    summary = await services.execution.take(id, upload.file)
     services.hub.broadcast(make_event("PackageChanged", summary, ChangeType.ADD))
 
 

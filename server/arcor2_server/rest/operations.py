@@ -24,6 +24,7 @@ from arcor2_hw.exceptions import Arcor2Error, InvalidData
 from arcor2_server.rest.answers import OPEN, PERSON, ROLE, SERVICE, InternalError, Unsupported, refusal
 from arcor2_server.rest.encodings import accepted_encodings
 from arcor2_server.rest.naming import camelized, camelized_names, snake, snaked
+from arcor2_server.rest.receiving import receiving
 
 log = structlog.get_logger(__name__)
 F = TypeVar("F", bound=Callable[..., Awaitable[Any]])
@@ -90,6 +91,10 @@ class Operation:
     """The name of the part of a multipart body that is the file."""
     parts: tuple[str, ...] = ()
     """The names of further parts that have to be there."""
+    title: str = ""
+    """What is told of the file while it comes and is kept (TaskState); `{name}` stands for a part of the path."""
+    told_from: int = 0
+    """Bytes of a body below which nothing is told."""
     limit: int = LARGEST_BODY
     plain: bool = False
     """The answer keeps snake_case: so do those of the original that came late."""
@@ -129,8 +134,9 @@ def route(declared: Operation) -> HTTPRouteHandler:
     async def handle(request: Request[Any, Any, Any]) -> Response[Any]:
         uploads: list[UploadFile] = []
         try:
-            given = await _arguments(declared, request, uploads)
-            return await _response(declared, request, await declared.handler(**given))
+            with receiving(request, declared.title, declared.told_from):
+                done = await declared.handler(**await _arguments(declared, request, uploads))
+            return await _response(declared, request, done)
         except Arcor2Error as error:
             if error.detail:
                 log.info("request refused", path=declared.path, reason=str(error)[:1000], detail=error.detail[:1000])

@@ -11,6 +11,8 @@ import httpx
 import psutil
 import pytest
 
+from arcor2_hw.client import Client
+from arcor2_hw.data.base import Unset
 from tests.server.core.serving import COMMAND, ServerProcess, Talker, running, talking
 from tests.server.rest.asking import granted, refused
 
@@ -275,6 +277,9 @@ async def test_an_upload_of_a_hundred_megabytes_does_not_stop_the_others(server:
     async with httpx.AsyncClient(base_url=base(server), timeout=60) as http:
         # On a thread: to put a body of that size together takes this process a while too.
         url = base(server) + "/packages/pkg_big"
+        follower = Client(server.url)
+        await follower.open()
+        await follower.subscribe_events({"TaskState"})
         upload = asyncio.create_task(asyncio.to_thread(httpx.post, url, files=as_file(content), timeout=60))
         process = psutil.Process(server.process.pid)
         slowest, before, most = 0.0, process.memory_info().rss, 0
@@ -287,9 +292,29 @@ async def test_an_upload_of_a_hundred_megabytes_does_not_stop_the_others(server:
         granted(upload.result())
         assert slowest < 2.0
         assert most - before < 40_000_000, "it goes to the disk as it comes"
+        told = await _told_of_uploads(follower)
+        assert {one.title for one in told} == {"Taking in the package pkg_big"}
+        shares = [one.progress for one in told if not isinstance(one.progress, Unset)]
+        assert shares == sorted(shares)
+        assert len([share for share in shares if 0.05 < share < 0.9]) >= 2, "as it comes"
+        assert (told[-1].state, told[-1].progress) == ("finished", 1.0)
+        # What is refused has failed, with the reason.
+        answer = await http.post("/packages/pkg_bad", files=as_file(b"no zip"))
+        assert answer.status_code == 400
+        told = await _told_of_uploads(follower)
+        assert (told[-1].state, told[-1].message) == ("failed", answer.json()["message"])
+        await follower.close()
         with zipfile.ZipFile(io.BytesIO((await http.get("/packages/pkg_big")).content)) as back:
             assert back.getinfo("data/mesh.bin").file_size == len(mesh)
         granted(await http.delete("/packages/pkg_big"))
+
+
+async def _told_of_uploads(follower: Client) -> list[Any]:
+    """Give what is told of a task to its end."""
+    told: list[Any] = []
+    while not told or told[-1].state == "running":
+        told.append((await follower.next_event("TaskState", timeout=10)).data)
+    return told
 
 
 async def test_the_table_of_tokens(server: ServerProcess) -> None:

@@ -1,0 +1,65 @@
+"""A file that comes in over REST, as a task that people can follow: how much of it is there, then that it is kept."""
+
+import asyncio
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, Final
+
+from litestar import Request
+from litestar.exceptions import HTTPException
+
+from arcor2_hw.data.editor import TaskKind
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.rest.answers import PERSON
+from arcor2_server.tasks import Task
+
+RECEIVED: Final = 0.9
+"""How far the task is when all has come: what came is checked and kept then."""
+
+
+@contextmanager
+def receiving(request: Request[Any, Any, Any], title: str, told_from: int) -> Iterator[None]:
+    """Tell of what is received and done inside; not without a title, nor of a body below `told_from` bytes.
+
+    title: a sentence, in which `{name}` stands for a part of the path.
+    """
+    size = request.content_length
+    if not title or (size is not None and size < told_from):
+        yield
+        return
+    named = title.format(**request.path_params)
+    task = request.app.state.services.tasks.begin(TaskKind.UPLOAD, named, request.state.get(PERSON, ""))
+    _count(request, task, size)
+    try:
+        yield
+    except asyncio.CancelledError:
+        task.cancel()
+        raise
+    except Arcor2Error as error:
+        task.fail(str(error))
+        raise
+    except HTTPException as error:  # too much, or the sender has gone
+        task.fail(error.detail)
+        raise
+    except BaseException:
+        task.fail("An error inside the server.")
+        raise
+    task.finish()
+
+
+def _count(request: Request[Any, Any, Any], task: Task, size: int | None) -> None:
+    """Let the task follow what comes."""
+    receive, received = request.receive, 0
+
+    async def counted() -> Any:
+        nonlocal received
+        message: Any = await receive()
+        if message["type"] == "http.request":
+            received += len(message.get("body", b""))
+            if not message.get("more_body", False):
+                task.at(RECEIVED if size else None, "All has come: it is checked and kept.")
+            elif size:
+                task.at(RECEIVED * received / size, f"{received / 1e6:.1f} of {size / 1e6:.1f} MB have come.")
+        return message
+
+    request.receive = counted
