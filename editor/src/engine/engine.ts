@@ -29,6 +29,7 @@ import { DARK, LIGHT, type Palette } from "./palette";
 import { type Hit, onFloor, pick } from "./picking";
 import { worldPose } from "./poses";
 import { type Context, type Quality, type Thing, trianglesOf } from "./thing";
+import { Ties } from "./ties";
 import { make } from "./things/make";
 import { type JointLimit, RobotThing } from "./things/robot";
 
@@ -102,6 +103,8 @@ export class Engine {
   /** What is said of a thing while somebody moves it, in place of how high it is. */
   private said = { id: "", text: "" };
   private readonly drop: DropLine;
+  /** Lines from points to what they hang on. */
+  readonly ties: Ties;
   private readonly ends: (() => void)[] = [];
   private down: { x: number; y: number; time: number } | null = null;
 
@@ -132,6 +135,7 @@ export class Engine {
       loaded: () => this.loaded(),
     };
     this.drop = new DropLine(this.scene);
+    this.ties = new Ties(this.scene);
     this.gizmo = new Gizmo({
       canvas,
       scene: this.scene,
@@ -233,6 +237,18 @@ export class Engine {
     return bearing(thing.anchor(new Vector3()), this.view.camera, this.width, this.height);
   }
 
+  /** Bring a thing into the middle of the view, as far away as what is looked at now. */
+  lookAt(id: string): void {
+    const thing = this.things.get(id);
+    if (!thing) return;
+    this.place();
+    if (this.view.mode === "fly") return this.focus(id);
+    const { position, target } = this.view.viewpoint;
+    const to = thing.anchor(new Vector3());
+    const moved = to.clone().sub(new Vector3(...target)).add(new Vector3(...position));
+    this.view.set(moved.toArray(), to.toArray());
+  }
+
   /** Be called after each drawn frame; gives what ends that. */
   watch(by: () => void): () => void {
     this.watchers.add(by);
@@ -324,6 +340,7 @@ export class Engine {
     this.labels.dispose();
     this.gizmo.dispose();
     this.drop.dispose();
+    this.ties.dispose();
     this.grid?.dispose();
     this.view.dispose();
     this.renderer.dispose();
@@ -400,6 +417,7 @@ export class Engine {
     for (const thing of this.things.values()) if (thing.item.kind === "logic") thing.placed();
     this.scene.updateMatrixWorld();
     this.batches.refresh();
+    this.ties.show(this.things, this.palette);
     this.renderer.shadowMap.needsUpdate = true;
   }
 
@@ -410,7 +428,7 @@ export class Engine {
     this.tellHeight();
     this.renderer.render(this.scene, this.view.camera);
     this.frames++;
-    this.labels.show(labelsOf(this.things, this.hovered, this.notes), this.view.camera, this.width, this.height);
+    this.labels.show(labelsOf(this.things, this.hovered, this.notes, this.view.camera.position), this.view.camera, this.width, this.height);
     for (const watcher of this.watchers) watcher();
     if (this.stirred.size > 0) this.draw();
   }

@@ -43,6 +43,8 @@ export interface RobotItem extends Base {
 
 export interface PointItem extends Base {
   kind: "point";
+  /** A line leads to what it hangs on. */
+  tied: boolean;
   /** How large the user wants points, of what they are. */
   size: number;
   position: Position;

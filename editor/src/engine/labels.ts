@@ -5,6 +5,10 @@ import { Vector3 } from "three";
 
 /** At most so many: more are not read, and cost. */
 export const MOST_LABELS = 8;
+/** Of so many it is looked whether they have room: where things stand close together, most have none. */
+const MOST_TRIED = 24;
+/** Pixels between two labels. */
+const GAP = 3;
 
 export interface Label {
   id: string;
@@ -28,14 +32,15 @@ export class Labels {
   /** Put the labels where their things are drawn now. */
   show(labels: Label[], camera: PerspectiveCamera, width: number, height: number): void {
     const placed: { left: number; top: number; right: number; bottom: number }[] = [];
-    const shown = new Set<string>();
+    const tried = new Set<string>();
     const wanted = [...labels].sort((a, b) => b.weight - a.weight);
     for (const label of wanted) {
-      if (shown.size >= MOST_LABELS) break;
+      if (placed.length >= MOST_LABELS || tried.size >= MOST_TRIED) break;
       label.anchor(at).project(camera);
       if (at.z > 1 || Math.abs(at.x) > 1 || Math.abs(at.y) > 1) continue;
       const x = ((at.x + 1) / 2) * width;
       const y = ((1 - at.y) / 2) * height;
+      tried.add(label.id);
       const element = this.element(label);
       const half = element.offsetWidth / 2;
       // Inside the view, even when what it names is at its edge.
@@ -49,10 +54,9 @@ export class Labels {
       element.style.visibility = "visible";
       element.style.transform = `translate(${Math.round(box.left)}px, ${Math.round(box.top)}px)`;
       placed.push(box);
-      shown.add(label.id);
     }
     for (const [id, element] of this.elements) {
-      if (shown.has(id)) continue;
+      if (tried.has(id)) continue;
       element.remove();
       this.elements.delete(id);
     }
@@ -84,5 +88,5 @@ export class Labels {
 }
 
 function overlap(a: { left: number; top: number; right: number; bottom: number }, b: typeof a): boolean {
-  return a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+  return a.left < b.right + GAP && b.left < a.right + GAP && a.top < b.bottom + GAP && b.top < a.bottom + GAP;
 }

@@ -92,6 +92,13 @@ export function trianglesOf(root: Object3D, id: string): number {
   return count;
 }
 
+/** Let a material be seen through, or not: its shader is another one then. */
+export function seenThrough(material: Material, on: boolean): void {
+  if (material.transparent === on) return;
+  material.transparent = on;
+  material.needsUpdate = true;
+}
+
 /** Free what the graphics card holds of a tree; shared geometry and material are marked and stay. */
 export function disposeTree(root: Object3D): void {
   root.traverse((each) => {

@@ -5,6 +5,7 @@ import { reachOfAction, worse } from "../program/reach";
 import type { LogicItem, ObjectTypeMeta, Pose, Position, Reach } from "../protocol/types";
 import { isRunning } from "../store/selectors";
 import type { Draft, Ghost, OpenDocument, State } from "../store/state";
+import { faintness } from "./seeing";
 
 export const START = "START";
 export const END = "END";
@@ -36,14 +37,15 @@ export class ItemMaker {
     };
     const { selection, draft } = state.ui;
     const me = state.connection.user;
+    const faint = faintness(state);
     const common = (id: string, name: string) => ({
       id,
       name,
       selected: selection?.id === id,
       lockedBy: lockedBy(state, id, me),
-      faint: faintness(state, id),
+      faint: faint(id),
     });
-    const tell = (id: string) => [selection?.id === id, lockedBy(state, id, me), faintness(state, id)];
+    const tell = (id: string) => [selection?.id === id, lockedBy(state, id, me), faint(id)];
 
     for (const object of Object.values(doc.objects)) {
       const type = state.types.byName[object.type];
@@ -65,16 +67,19 @@ export class ItemMaker {
       });
     }
     const size = pointSize(state);
+    const lines = parentLines(state);
     for (const point of Object.values(doc.points)) {
       const preview = (drafted(draft, point) ?? state.previews[point.id])?.position;
       const breakpoint = point.id in state.breakpoints;
-      add(point.id, [point, size, preview, breakpoint, ...tell(point.id)], () => ({
+      const tied = point.parent !== undefined && (lines || selection?.id === point.id);
+      add(point.id, [point, size, preview, breakpoint, tied, ...tell(point.id)], () => ({
         ...common(point.id, point.name),
         kind: "point",
         size,
         parent: point.parent,
         position: preview ?? point.position,
         breakpoint,
+        tied,
       }));
     }
     const reach = bestReach(state);
@@ -157,6 +162,9 @@ export function pointSize(state: State): number {
   return typeof kept === "number" ? Math.min(4, Math.max(0.5, kept)) : 1;
 }
 
+/** Whether lines lead from all points to what they hang on; else from the selected one alone. */
+export const parentLines = (state: State): boolean => state.view.general["parent_lines"] === true;
+
 function ghostOf({ joints, problem, at }: Ghost): RobotItem["ghost"] {
   return { joints: Object.fromEntries(joints.map((each) => [each.name, each.value])), possible: problem === "", at };
 }
@@ -174,13 +182,6 @@ function isPosition(value: unknown): value is Position {
 function lockedBy(state: State, id: string, me: string): string {
   const owner = state.locks[id];
   return owner && owner !== me ? owner : "";
-}
-
-function faintness(state: State, id: string): number {
-  const blocked = state.view.user["blocklist"];
-  if (Array.isArray(blocked) && blocked.includes(id)) return 1;
-  const opacity = (state.view.user["opacity"] as Record<string, unknown> | undefined)?.[id];
-  return typeof opacity === "number" ? 1 - Math.min(1, Math.max(0, opacity)) : 0;
 }
 
 function isTrouble(state: State, id: string): boolean {

@@ -18,7 +18,7 @@ import type { ObjectItem, Shape } from "../items";
 import { readMesh } from "../loaders/glb";
 import { setPose } from "../poses";
 import { surface } from "../surface";
-import { disposeTree, ownedBy, Thing, type Context } from "../thing";
+import { disposeTree, ownedBy, seenThrough, Thing, type Context } from "../thing";
 
 export class ObjectThing extends Thing<ObjectItem> {
   readonly root = new Group();
@@ -51,7 +51,7 @@ export class ObjectThing extends Thing<ObjectItem> {
     if (color || !this.coloured) this.material.color.copy(color ?? palette.object);
     else this.material.color.setRGB(1, 1, 1);
     this.edges.color.copy(item.selected ? palette.selected : palette.gridStrong);
-    this.material.transparent = item.faint > 0 || item.shape.kind === "none";
+    seenThrough(this.material, item.faint > 0 || item.shape.kind === "none");
     this.material.opacity = 1 - item.faint;
     this.material.depthWrite = item.faint < 0.5;
     this.root.visible = item.faint < 1;

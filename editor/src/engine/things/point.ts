@@ -1,4 +1,4 @@
-/** An action point: a ball, drawn with all others at once. */
+/** An action point: a ball, drawn with all others at once. From afar it grows, so that it stays as large as is seen and hit. */
 
 import { Matrix4, MeshLambertMaterial, Object3D, SphereGeometry, Vector3 } from "three";
 import type { Batch, Instance } from "../batches";
@@ -7,12 +7,17 @@ import { setPosition } from "../poses";
 import { Thing, type Context } from "../thing";
 
 const RADIUS = 0.012;
+/** Pixels: the least radius on the screen; it grows by steps, and so many times at most. */
+const LEAST = 5;
+const MOST = 8;
+const at = new Vector3();
 
 export class PointThing extends Thing<PointItem> {
   readonly root = new Object3D();
   item: PointItem;
   private readonly batch: Batch;
   private readonly instance: Instance;
+  private grown = 1;
 
   constructor(item: PointItem, context: Context) {
     super(context);
@@ -33,8 +38,22 @@ export class PointThing extends Thing<PointItem> {
         : item.lockedBy
           ? palette.locked
           : palette.point;
-    const size = item.faint >= 1 ? 0 : item.size * (item.selected ? 1.4 : 1);
-    this.instance.offset.makeScale(size, size, size);
+    this.scale();
+  }
+
+  private scale(): void {
+    const { faint, size, selected } = this.item;
+    const scale = faint >= 1 ? 0 : this.grown * size * (selected ? 1.4 : 1);
+    this.instance.offset.makeScale(scale, scale, scale);
+  }
+
+  override resized(): boolean {
+    const wanted = (LEAST * this.context.metresPerPixel(this.anchor(at))) / RADIUS;
+    const grown = Math.min(MOST, Math.max(1, 2 ** (Math.ceil(Math.log2(wanted) * 2) / 2)));
+    if (grown === this.grown) return false;
+    this.grown = grown;
+    this.scale();
+    return true;
   }
 
   override anchor(target: Vector3): Vector3 {

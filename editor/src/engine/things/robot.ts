@@ -15,7 +15,7 @@ import { STALE, STILL } from "../../store/telemetry";
 import type { RobotItem } from "../items";
 import { setPose } from "../poses";
 import { surface } from "../surface";
-import { disposeTree, ownedBy, Thing, type Context } from "../thing";
+import { disposeTree, ownedBy, seenThrough, Thing, type Context } from "../thing";
 import { GhostRobot } from "./ghost";
 
 /** How far a joint goes, rad, m where prismatic. */
@@ -152,7 +152,7 @@ export class RobotThing extends Thing<RobotItem> {
     // Where its joints are is not known: what is shown is only where it stands.
     const vague = this.stale || (this.robot !== null && this.shown.size === 0);
     for (const material of [this.material, this.coloured]) {
-      material.transparent = faint > 0 || vague;
+      seenThrough(material, faint > 0 || vague);
       material.opacity = (1 - faint) * (vague ? 0.5 : 1);
     }
   }

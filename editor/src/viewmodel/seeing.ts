@@ -1,0 +1,47 @@
+/** How the user sees things: what he hides, what he sees through, what fades beside what he looks for. */
+
+import type { OpenDocument, State } from "../store/state";
+import { GROUPS, type Group } from "./things";
+
+/** How much is seen through what is not looked for. */
+const FADED = 0.85;
+
+/** Kinds to which the list of things is narrowed; empty: all. */
+export function groupsOf(state: State): Group[] {
+  const kept = state.view.user["filters"];
+  return Array.isArray(kept) ? GROUPS.filter((each) => kept.includes(each)) : [];
+}
+
+/** Whether what is not of these kinds fades in the view. */
+export const fadesOthers = (state: State): boolean => state.view.user["fade_others"] === true;
+
+/** Opaqueness of all objects but robots: 1 as they are, 0 not there. */
+export function opacityOfAll(state: State): number {
+  const kept = state.view.user["opacity_all"];
+  return typeof kept === "number" ? Math.min(1, Math.max(0, kept)) : 1;
+}
+
+/** Tells of each thing how much is seen through it: 0 nothing, 1 it is not shown, and not aimed at. */
+export function faintness(state: State): (id: string) => number {
+  const { doc, ui } = state;
+  const { blocklist, opacity } = state.view.user;
+  const hidden = new Set<unknown>(Array.isArray(blocklist) ? blocklist : []);
+  const own = (opacity ?? {}) as Record<string, unknown>;
+  const all = 1 - opacityOfAll(state);
+  const groups = new Set<Group>(fadesOthers(state) ? groupsOf(state) : []);
+  return (id) => {
+    if (hidden.has(id)) return 1;
+    const object = doc?.objects[id];
+    const robot = object !== undefined && object.type in state.types.robots;
+    const given = own[id];
+    const faint = Math.max(typeof given === "number" ? 1 - Math.min(1, Math.max(0, given)) : 0, object && !robot ? all : 0);
+    if (groups.size === 0 || ui.selection?.id === id || groups.has(object ? (robot ? "robots" : "objects") : groupOf(doc, id))) return faint;
+    return object ? Math.max(faint, FADED) : 1;
+  };
+}
+
+function groupOf(doc: OpenDocument | null, id: string): Group {
+  if (doc && id in doc.points) return "points";
+  if (doc && id in doc.actions) return "actions";
+  return id === "START" || id === "END" || (doc && id in doc.logic) ? "program" : "others";
+}

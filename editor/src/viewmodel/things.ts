@@ -1,0 +1,97 @@
+/** All that is in the workplace, as the list of things shows it: what hangs on what, by kinds, found by words. */
+
+import type { Kind, State } from "../store/state";
+
+/** What the list is narrowed to; `program`: its start, its end and the steps between. */
+export const GROUPS = ["robots", "objects", "points", "actions", "program", "others"] as const;
+export type Group = (typeof GROUPS)[number];
+
+export interface Row {
+  id: string;
+  kind: Kind;
+  group: Group;
+  name: string;
+  /** What it is: its type, or its kind in words. */
+  detail: string;
+  below: Row[];
+}
+
+export interface Things {
+  /** What has a place in the view, each with what hangs on it. */
+  placed: Row[];
+  /** Objects without a pose: what has no place. */
+  unplaced: Row[];
+  program: Row[];
+}
+
+const WORDS = { point: "Action point", orientation: "Orientation", joints: "Joints", action: "Action", logic: "Step", terminal: "Program" } as const;
+
+export function thingsOf({ doc, types }: Pick<State, "doc" | "types">): Things {
+  if (!doc) return { placed: [], unplaced: [], program: [] };
+  const points = Object.values(doc.points);
+  const row = (id: string, kind: Exclude<Kind, "object">, group: Group, name: string, below: Row[] = []): Row => ({ id, kind, group, name, detail: WORDS[kind], below });
+  const on = (parent: string | undefined): Row[] =>
+    points
+      .filter((each) => each.parent === parent)
+      .map(({ id, name }) => {
+        const mine = (each: { pointId: string }) => each.pointId === id;
+        return row(id, "point", "points", name, [
+          ...Object.values(doc.actions).filter(mine).map((each) => row(each.id, "action", "actions", each.name)),
+          ...Object.values(doc.orientations).filter(mine).map((each) => row(each.id, "orientation", "others", each.name)),
+          ...Object.values(doc.joints).filter(mine).map((each) => row(each.id, "joints", "others", each.name)),
+          ...on(id),
+        ]);
+      });
+  const objects = Object.values(doc.objects).sort((a, b) => a.name.localeCompare(b.name));
+  const object = ({ id, name, type }: (typeof objects)[number]): Row => ({ id, kind: "object", group: type in types.robots ? "robots" : "objects", name, detail: type, below: on(id) });
+  const hasPlace = (each: (typeof objects)[number]) => each.pose !== undefined || each.type in types.robots;
+  const called = (id: string) => (id === "START" ? "Start" : id === "END" ? "End" : (doc.actions[id]?.name ?? ""));
+  return {
+    placed: [...objects.filter(hasPlace).map(object), ...on(undefined)],
+    unplaced: objects.filter((each) => !hasPlace(each)).map(object),
+    program: doc.project?.has_logic
+      ? [
+          row("START", "terminal", "program", "Start"),
+          row("END", "terminal", "program", "End"),
+          ...Object.values(doc.logic).map((each) => row(each.id, "logic", "program", `${called(each.start)} → ${called(each.end)}`)),
+        ]
+      : [],
+  };
+}
+
+/** All of them, one below the other. */
+export function flat(rows: readonly Row[]): Row[] {
+  return rows.flatMap((each) => [each, ...flat(each.below)]);
+}
+
+export const allOf = (things: Things): Row[] => flat([...things.placed, ...things.unplaced, ...things.program]);
+
+/** Those that fit, with what they hang on. */
+export function narrowed(rows: readonly Row[], fits: (row: Row) => boolean): Row[] {
+  return rows.flatMap((row) => {
+    const below = narrowed(row.below, fits);
+    return below.length > 0 || fits(row) ? [{ ...row, below }] : [];
+  });
+}
+
+/** Whether it is of one of the groups, all where there is none, and is called so: every word stands in it. */
+export function fitting(groups: ReadonlySet<string>, words: string): (row: Row) => boolean {
+  const wanted = words.toLowerCase().split(/\s+/).filter(Boolean);
+  return ({ group, name, detail }) => {
+    const text = `${name} ${detail}`.toLowerCase();
+    return (groups.size === 0 || groups.has(group)) && wanted.every((each) => text.includes(each));
+  };
+}
+
+export function counts(rows: readonly Row[]): Record<Group, number> {
+  const found = Object.fromEntries(GROUPS.map((group) => [group, 0])) as Record<Group, number>;
+  for (const row of rows) found[row.group]++;
+  return found;
+}
+
+/** The one `by` further on from this, from the end to the beginning again; null where it is alone. */
+export function neighbour(rows: readonly Row[], id: string, by: 1 | -1): Row | null {
+  const at = rows.findIndex((each) => each.id === id);
+  const next = rows[(at < 0 ? (by > 0 ? 0 : rows.length - 1) : at + by + rows.length) % rows.length];
+  return next && next.id !== id ? next : null;
+}
