@@ -134,7 +134,7 @@ async def editing(report: Report, browser: Browser, one: Screen, cell: Cell, pro
         await two.join("looks on")
         await two.item(point.id)
         await one.press("Things")
-        await one.page.get_by_role("option", name=f"{point.name} Action point").click()
+        await one.page.get_by_role("row", name=f"{point.name} Action point").click()
         took = []
         for number in range(EDITS):
             before = len((await _inside(two))["edits"])

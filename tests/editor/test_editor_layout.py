@@ -120,7 +120,7 @@ async def test_the_workplace(cell: Cell, project: Project, browser: Browser) -> 
         await tools.filter(has_text="Things").click()
         action = project.action_points[0].actions[0].name
         for name, what in ((f"{project.action_points[0].name} Action point", "point"), (f"{action} Action", "action")):
-            await page.get_by_role("option", name=name, exact=True).click()
+            await page.get_by_role("row", name=name, exact=True).click()
             await looks.at(f"{what} selected", FEW)
             await screen.press("Close the panel")
             await tools.filter(has_text="Things").click()
@@ -149,8 +149,11 @@ async def test_the_workplace(cell: Cell, project: Project, browser: Browser) -> 
         await looks.at("left hand")
         await page.set_viewport_size(VIEWPORTS["phone"])  # type: ignore[arg-type]
         await screen.press("Make the panel larger")
+        await looks.at("large panel", ("phone", "portrait"))
+        await page.set_viewport_size(VIEWPORTS["phone"])  # type: ignore[arg-type]
         await page.get_by_role("button", name="Make the panel smaller").click(trial=True)
         await page.get_by_role("button", name="Stop motion").click(trial=True)
+        await page.get_by_role("button", name="Views", exact=True).click(trial=True)
         assert not looks.found, looks.told()
 
 

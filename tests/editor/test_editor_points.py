@@ -67,7 +67,7 @@ class Place:
         """Choose a thing in the list, which the keyboard can do as well."""
         await self.tool("Things")
         page = self.screen.page
-        await page.get_by_role("option").filter(has=page.get_by_text(name, exact=True)).first.click()
+        await page.get_by_role("row").filter(has=page.get_by_text(name, exact=True)).first.click()
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")

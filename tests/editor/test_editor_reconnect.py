@@ -33,7 +33,7 @@ async def test_the_view_stays_without_the_server_and_it_comes_back_by_itself(
             screen.expected_errors = ("WebSocket connection to", "Failed to load resource: net::ERR_CONNECTION_REFUSED")
             await screen.join("Eva")
             await screen.press("Things")
-            await screen.page.get_by_role("option", name="table").click()
+            await screen.page.get_by_role("row", name="table").click()
             assert (await screen.item(table))["pose"]["position"]["x"] == 0.2
             port = urlsplit(cell.url).port
             assert port is not None

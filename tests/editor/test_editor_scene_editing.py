@@ -282,7 +282,7 @@ async def test_shapes_are_added_by_one_tap_sized_copied_and_removed(opened: Open
 
         # What is needed says by what.
         await tool(screen, "Things")
-        await screen.page.get_by_role("option", name="tester").click()
+        await screen.page.get_by_role("row", name="tester").click()
         await screen.press("Remove")
         await screen.sees("These projects use it")
         await screen.press("Cancel")

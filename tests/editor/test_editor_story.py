@@ -120,7 +120,7 @@ async def test_the_first_day(workplace: Run, browser: Browser) -> None:
         # Two actions and a branch.
         await page.get_by_role("radio", name="3D", exact=True).click()
         await user.tool("Things")
-        await page.get_by_role("option", name=f"{point} Action point").click()
+        await page.get_by_role("row", name=f"{point} Action point").click()
         move = await user.add_action("move Move the TCP to a pose.")
         speed = user.panel.get_by_label("speed", exact=True)
         await speed.fill(SLOWLY)
@@ -163,12 +163,12 @@ async def test_the_first_day(workplace: Run, browser: Browser) -> None:
 
         # A delete is taken back.
         await user.tool("Things")
-        await page.get_by_role("option", name=f"{move} Action").click()
+        await page.get_by_role("row", name=f"{move} Action").click()
         await user.panel.get_by_role("button", name="Remove", exact=True).click()
         undo = page.get_by_role("button", name=re.compile(f"^Undo .*{move}"))
         await undo.click()
         await user.tool("Things")
-        await page.get_by_role("option", name=f"{move} Action").wait_for()
+        await page.get_by_role("row", name=f"{move} Action").wait_for()
 
         # A cable is pulled: it says which device, in words, and what can be done.
         if await page.get_by_role("button", name="Go online").is_visible():

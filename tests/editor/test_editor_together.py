@@ -104,7 +104,7 @@ async def test_two_who_edit_the_same_point_and_a_third_see_the_same_in_the_end(c
             await screen.join(name)
             await screen.item(point.id)
             await screen.press("Things")
-            await screen.page.get_by_role("option", name=f"{point.name} Action point").click()
+            await screen.page.get_by_role("row", name=f"{point.name} Action point").click()
         await one.page.get_by_role("img", name=f"Adam, at {point.name}").wait_for()
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(edits_at_a_screen(one, SEED))

@@ -11,6 +11,7 @@ from playwright.async_api import Browser
 
 from arcor2_hw.client import Client
 from arcor2_hw.data import rpc
+from arcor2_hw.data.editor import ViewScope
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
@@ -168,6 +169,16 @@ async def test_an_edit_of_somebody_else_is_seen_and_a_tap_selects(closed: Place,
         await screen.sees("not saved")
         await client.call("WriteLock", rpc.WriteLockArgs(new))
         await screen.until("id => window.__engine.item(id).badge === 'locked by colleague'", new)
+        await client.call("SubscribeEvents", rpc.SubscribeEventsArgs({"ViewStateChanged"}))
+        await _tool(screen, "Things")
+        await screen.page.get_by_role("row", name="lonely colleague works on it").click()
+        # Who has it, since when, and that it need not be waited for in silence.
+        about = screen.page.get_by_role("region", name="About", exact=True)
+        await about.get_by_text("just now. It is free when colleague is done with it").wait_for()
+        await screen.press("Ask colleague for it")
+        asked = await client.next_event("ViewStateChanged", timeout=10)
+        assert (asked.data.scope, asked.data.values[f"asked/{new}"]["by"]) == (ViewScope.SHARED, "Eva")
+        await about.get_by_text("colleague is asked for it").wait_for()
         lock = place.project.action_points[0].id
         await screen.page.evaluate("id => window.__engine.focus(id)", lock)
         await screen.tap(lock)
@@ -175,3 +186,8 @@ async def test_an_edit_of_somebody_else_is_seen_and_a_tap_selects(closed: Place,
         await panel.get_by_role("heading", name=place.project.action_points[0].name).wait_for()
         await client.call("WriteUnlock", rpc.WriteUnlockArgs(new))
         await screen.until("id => window.__engine.item(id).badge === ''", new)
+        await screen.sees("lonely is free now.")
+
+
+async def _tool(screen: Screen, name: str) -> None:
+    await screen.page.get_by_role("navigation").get_by_role("button").filter(has_text=name).click()

@@ -16,10 +16,11 @@ export function forgetPresence(): void {
 }
 
 export function presenceOf(state: State): Presence {
-  const { selection } = state.ui;
+  const { selection, aimed } = state.ui;
   return {
     document: openId(state),
     selected: selection ? [selection.id] : [],
+    ...(aimed ? { aimed } : {}),
     ...(state.ui.draft ? { editing: state.ui.draft.id } : {}),
     view: state.doc ? "3d" : "home",
   };

@@ -69,6 +69,7 @@ client.onState = (state, reason, code) => {
     // What is held, who is there and what is under way is told anew; the view and the document stay.
     store.setState((known) => ({
       locks: {},
+      lockedAt: {},
       users: {},
       tasks: {},
       previews: {},

@@ -105,6 +105,7 @@ describe("what others do", () => {
   test("locks are known by what they hold", () => {
     const held = after({ event: "ObjectsLocked", data: { object_ids: ["a", "b"], owner: "Eva" } }, { event: "ObjectsUnlocked", data: { object_ids: ["a"], owner: "Eva" } });
     expect(held.locks).toEqual({ b: "Eva" });
+    expect(Object.keys(held.lockedAt)).toEqual(["b"]);
   });
 
   test("who left is gone, and a preview that is over, too", () => {

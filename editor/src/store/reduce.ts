@@ -55,9 +55,11 @@ export function reduce(state: State, event: ServerEvent): Partial<State> {
     case "ObjectsLocked":
       return {
         locks: { ...state.locks, ...Object.fromEntries(event.data.object_ids.map((id) => [id, event.data.owner])) },
+        // Who is told again of the same owner does not hold it anew.
+        lockedAt: { ...state.lockedAt, ...Object.fromEntries(event.data.object_ids.filter((id) => state.locks[id] !== event.data.owner).map((id) => [id, Date.now()])) },
       };
     case "ObjectsUnlocked":
-      return { locks: without(state.locks, ...event.data.object_ids) };
+      return { locks: without(state.locks, ...event.data.object_ids), lockedAt: without(state.lockedAt, ...event.data.object_ids) };
     case "UserPresence":
       return {
         users: event.data.online

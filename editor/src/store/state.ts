@@ -193,6 +193,8 @@ export interface Draft {
 
 export interface Ui {
   selection: Selection | null;
+  /** What is at the cross, where the user picks by it. */
+  aimed?: string | undefined;
   draft?: Draft | undefined;
   mode: Mode;
   connecting: Connecting | null;
@@ -215,6 +217,8 @@ export interface State {
   doc: OpenDocument | null;
   /** Owners by what they hold. */
   locks: Record<string, string>;
+  /** When it was heard that they do, as `Date.now()`: what was held before this user came, since he came. */
+  lockedAt: Record<string, number>;
   users: Record<string, UserPresenceData>;
   previews: Record<string, MovePreviewData>;
   history: HistoryChangedData | null;
@@ -263,6 +267,7 @@ export function initialState(): State {
     types: { byName: {}, robots: {}, actions: {} },
     doc: null,
     locks: {},
+    lockedAt: {},
     users: {},
     previews: {},
     history: null,

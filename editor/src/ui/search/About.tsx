@@ -11,6 +11,7 @@ const KEYS: readonly (readonly [string, string])[] = [
   ["?", "this page"],
   ["Esc, twice", "stop motion, while a robot is live"],
   ["Tab, arrows", "through tools, lists and fields; Enter does it"],
+  ["X", "the cross in the middle of the view comes and goes; N: the next thing there, Enter: select it"],
   ["W A S D Q E", "fly, when the view has the focus"],
   ["arrow keys at a number", "one step more or less"],
 ];

@@ -15,7 +15,7 @@ export function openOverlay(open: Open): void {
 }
 
 /** Whether a key is typed into something. */
-function typing(target: EventTarget | null): boolean {
+export function writing(target: EventTarget | null): boolean {
   return target instanceof HTMLElement && (target.isContentEditable || /^(INPUT|TEXTAREA|SELECT)$/.test(target.tagName));
 }
 
@@ -24,7 +24,7 @@ export function Overlays() {
   useEffect(() => {
     const key = (event: KeyboardEvent) => {
       const wanted: Open = event.key === "/" ? "search" : event.key === "?" ? "about" : "";
-      if (!wanted || event.ctrlKey || event.metaKey || event.altKey || typing(event.target) || document.querySelector(".overlay")) return;
+      if (!wanted || event.ctrlKey || event.metaKey || event.altKey || writing(event.target) || document.querySelector(".overlay")) return;
       event.preventDefault();
       openOverlay(wanted);
     };

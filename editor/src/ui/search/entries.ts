@@ -3,15 +3,17 @@
 import { barred } from "../../commands/asking";
 import * as documents from "../../commands/documents";
 import { goOffline, goOnline, stopMotion } from "../../commands/operation";
+import { keepGeneral } from "../../commands/viewstate";
+import { aimsAlways } from "../../session/aiming";
 import { theEngine } from "../../session/engine";
 import { remember } from "../../session/memory";
 import { leave } from "../../session/session";
 import { isRunning } from "../../store/selectors";
 import type { State } from "../../store/state";
 import { now, select, setUi } from "../../store/store";
+import { allOf, thingsOf } from "../../viewmodel/things";
 import { KINDS, selectionOf } from "../names";
 import { TOOLS } from "../workplace/tools";
-import { rowsOf } from "../workplace/tools/ThingsPanel";
 import type { Entry } from "./found";
 import { openOverlay } from "./Overlays";
 
@@ -35,15 +37,15 @@ function ofWorkplace(state: State): Entry[] {
     online
       ? entry("offline", "Go offline", cannotSwitch, goOffline)
       : entry("online", "Go online", cannotSwitch || (live.state === "stopped" ? "" : "It is on its way."), goOnline),
+    entry("cross", aimsAlways(state) ? "No more picking by the cross" : "Pick by the cross", "", () => keepGeneral({ aiming: !aimsAlways(state) || null })),
     entry("all", "Show all in the view", "", () => theEngine()?.focus()),
     ...(state.ui.selection ? [entry("zoom", "Zoom to what is selected", "", () => theEngine()?.focus(now().ui.selection?.id))] : []),
   ];
 }
 
 function things(state: State): Entry[] {
-  const { doc } = state;
-  if (!doc) return [];
-  return rowsOf(doc).map(({ id, name, kind, detail }) => ({
+  const rows = allOf(thingsOf(state)).filter((each) => each.kind !== "logic");
+  return rows.map(({ id, name, kind, detail }) => ({
     id,
     words: name,
     detail: kind === "object" ? detail : KINDS[kind].toLowerCase(),

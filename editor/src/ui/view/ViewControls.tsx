@@ -3,10 +3,16 @@
 import { useEffect, useRef, useState } from "react";
 import type { ViewMode, ViewName, Viewpoint } from "../../engine/camera";
 import type { Engine } from "../../engine/engine";
-import { keepView } from "../../commands/viewstate";
-import { useEditor } from "../../store/store";
+import { followWishes } from "../../commands/handover";
+import { keepGeneral, keepView } from "../../commands/viewstate";
+import { aimsAlways, useAiming } from "../../session/aiming";
+import { now, useEditor } from "../../store/store";
+import { Aim } from "../aim/Aim";
+import { OffScreen } from "../aim/OffScreen";
 import { AskName, Button, type Choice, More } from "../kit/kit";
 import { FlyPad } from "./FlyPad";
+import { writing } from "../search/Overlays";
+import "../aim/aim.css";
 import "./view.css";
 
 type Direction = [number, number, number];
@@ -39,6 +45,10 @@ export default function ViewControls({ engine }: { engine: Engine }) {
   const [mode, setMode] = useState<ViewMode>("orbit");
   const [naming, setNaming] = useState(false);
   const bookmarks = bookmarksOf(kept);
+  const always = useEditor(aimsAlways);
+  const listed = useAiming((state) => state.listed);
+  useCrossKey();
+  useEffect(followWishes, []);
   const change = (next: ViewMode) => {
     engine.view.setMode(next);
     setMode(next);
@@ -53,6 +63,7 @@ export default function ViewControls({ engine }: { engine: Engine }) {
     mode === "orbit"
       ? { id: "fly", label: "Fly through it", icon: "play" as const, act: () => change("fly") }
       : { id: "orbit", label: "Turn around it", icon: "redo" as const, act: () => change("orbit") },
+    { id: "cross", label: always ? "No more picking by the cross" : "Pick by the cross ( X )", icon: "point", act: switchCross },
     { id: "keep", label: "Keep this view…", icon: "plus", act: () => setNaming(true) },
     ...bookmarks.map((each, n) => ({
       id: `go ${n}`,
@@ -76,6 +87,8 @@ export default function ViewControls({ engine }: { engine: Engine }) {
         <Cube engine={engine} onLook={look} />
         <More label="Views" icon="eye" look="" choices={choices} />
       </div>
+      {(always || listed) && <Aim engine={engine} />}
+      <OffScreen engine={engine} />
       {mode === "fly" && <FlyPad view={engine.view} onDone={() => change("orbit")} />}
       {naming && (
         <AskName
@@ -89,6 +102,23 @@ export default function ViewControls({ engine }: { engine: Engine }) {
       )}
     </>
   );
+}
+
+function switchCross(): void {
+  keepGeneral({ aiming: !aimsAlways(now()) || null });
+}
+
+/** X: the cross comes and goes. */
+function useCrossKey(): void {
+  useEffect(() => {
+    const key = (event: KeyboardEvent) => {
+      if (event.key.toLowerCase() !== "x" || event.repeat || event.ctrlKey || event.metaKey || event.altKey) return;
+      if (writing(event.target) || document.querySelector(".overlay")) return;
+      switchCross();
+    };
+    window.addEventListener("keydown", key);
+    return () => window.removeEventListener("keydown", key);
+  }, []);
 }
 
 /**

@@ -3,9 +3,12 @@
 import { Suspense, useState } from "react";
 import { select, setUi, useEditor } from "../../store/store";
 import { Button, Waiting } from "../kit/kit";
+import { lazily } from "../kit/lazily";
 import { nameOf } from "../names";
 import { SECTIONS } from "./sections";
 import { TOOLS } from "./tools";
+
+const Neighbours = lazily(() => import("../things/Neighbours"));
 
 export function Panel() {
   const toolId = useEditor((state) => state.ui.tool);
@@ -21,6 +24,11 @@ export function Panel() {
       </button>
       <header>
         <h2>{tool?.label ?? title}</h2>
+        {!tool && selection && (
+          <Suspense fallback={null}>
+            <Neighbours id={selection.id} />
+          </Suspense>
+        )}
         <Button look="plain" icon="close" aria-label="Close the panel" onPress={close} />
       </header>
       <div className="panel-body">

@@ -5,13 +5,13 @@ import type { Engine, Quality } from "../../engine/engine";
 import { readShown } from "../../session/assets";
 import { setEngine } from "../../session/engine";
 import { tapTaken } from "../../session/taps";
-import { now, select, setUi, store, tell, useEditor } from "../../store/store";
+import { now, store, tell, useEditor } from "../../store/store";
 import { telemetry } from "../../store/telemetry";
 import { ItemMaker } from "../../viewmodel/items";
 import { Waiting } from "../kit/kit";
 import { lazily, persistently } from "../kit/lazily";
-import { selectionOf } from "../names";
 import { useTheme } from "../settings/Settings";
+import { pick } from "./pick";
 
 const ViewControls = lazily(() => import("../view/ViewControls"));
 
@@ -40,19 +40,7 @@ export function View3D() {
       made = new Engine({ canvas: canvas.current, labels: labels.current, telemetry, asset: readShown, trouble: once, quality: chosen(quality), dark: themeAtStart.current === "dark" });
       const shown = made;
       shown.onTap = (hits, floor) => {
-        if (tapTaken(hits, floor)) return;
-        const state = now();
-        if (state.ui.connecting) {
-          const target = hits.find((hit) => ["action", "terminal"].includes(selectionOf(state, hit.id)?.kind ?? ""));
-          if (target) void import("../../commands/program").then(({ endStep }) => endStep(target.id));
-          return;
-        }
-        const found = hits.map((hit) => selectionOf(state, hit.id)).filter((each) => each !== null);
-        // A tap on what is selected goes to what is behind it: so everything can be reached.
-        const at = found.findIndex((each) => each.id === state.ui.selection?.id);
-        const next = found[(at + 1) % Math.max(1, found.length)] ?? null;
-        select(next);
-        if (next) setUi({ tool: "" });
+        if (!tapTaken(hits, floor)) pick(hits.map((hit) => hit.id));
       };
       shown.show(maker.items(now()));
       shown.focus();

@@ -1,12 +1,15 @@
 /** What the selected thing is, who holds it, how it is. */
 
+import { Suspense } from "react";
 import { theEngine } from "../../../session/engine";
 import { heldBy } from "../../../store/selectors";
 import { useEditor } from "../../../store/store";
-import { Icon } from "../../kit/icons";
 import { Button } from "../../kit/kit";
+import { lazily } from "../../kit/lazily";
 import { KINDS, nameOf } from "../../names";
 import type { Section } from "../sections";
+
+const Holder = lazily(() => import("./Holder"));
 
 const Body: Section["Body"] = ({ selection: { kind, id } }) => {
   const holder = useEditor((state) => heldBy(state, id));
@@ -24,9 +27,9 @@ const Body: Section["Body"] = ({ selection: { kind, id } }) => {
       {state?.reason && <p className="small">{state.reason}</p>}
       {description && <p className="quiet small">{description}</p>}
       {holder && (
-        <p className="tag warn">
-          <Icon name="lock" size={16} /> {holder} works on it
-        </p>
+        <Suspense fallback={null}>
+          <Holder id={id} />
+        </Suspense>
       )}
       <Button icon="zoom" onPress={() => theEngine()?.focus(id)}>
         Zoom to it

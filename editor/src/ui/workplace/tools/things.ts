@@ -3,4 +3,4 @@
 import { lazily } from "../../kit/lazily";
 import type { Tool } from "../tools";
 
-export const things: Tool = { id: "things", label: "Things", icon: "tree", Panel: lazily(() => import("./ThingsPanel")) };
+export const things: Tool = { id: "things", label: "Things", icon: "tree", Panel: lazily(() => import("../../things/ThingsPanel")) };

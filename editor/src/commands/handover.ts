@@ -1,0 +1,26 @@
+/** Asking somebody for what he holds, and being told when others ask, or when it is free. */
+
+import { handOver, keyOf } from "../store/handover";
+import { now, store, tell } from "../store/store";
+import { nameOf } from "../ui/names";
+import { keepView } from "./viewstate";
+
+export function askFor(id: string): void {
+  keepView("shared", { [keyOf(id)]: { by: now().connection.user, at: Date.now() } });
+}
+
+export function noLongerAsk(id: string): void {
+  keepView("shared", { [keyOf(id)]: null });
+}
+
+/** Tell the user of wishes from now on; gives what ends that. */
+export function followWishes(): () => void {
+  return store.subscribe((state, before) => {
+    const { wanted, free } = handOver(state, before);
+    for (const { id, by } of wanted) tell("warn", `${by} asks for ${nameOf(state, id)}, which you hold: it is free as soon as you are done with it.`);
+    for (const id of free) {
+      tell("info", `${nameOf(state, id)} is free now.`);
+      noLongerAsk(id);
+    }
+  });
+}

@@ -1,0 +1,47 @@
+/** An arrow at the edge of the view to what is selected and not in it; a tap turns there. */
+
+import { useLayoutEffect, useRef, useState } from "react";
+import type { Engine } from "../../engine/engine";
+import { useEditor } from "../../store/store";
+import { nameOf } from "../names";
+import { atEdge, type Rect } from "./edge";
+
+/** What stands at the edge of the view. */
+const OTHERS = ".view-controls, .centre-top > *, .stop, .aim-bar, .fly-pad, .tray";
+
+export function OffScreen({ engine }: { engine: Engine }) {
+  const id = useEditor((state) => state.ui.selection?.id ?? "");
+  const name = useEditor((state) => nameOf(state, id));
+  const [away, setAway] = useState(false);
+  const button = useRef<HTMLButtonElement>(null);
+  useLayoutEffect(() => {
+    const look = () => {
+      const at = id ? engine.bearing(id) : null;
+      const shown = at !== null && !at.inView;
+      setAway(shown);
+      const view = button.current?.closest(".view")?.getBoundingClientRect();
+      if (!shown || !button.current || !view) return;
+      const { x, y, angle } = atEdge(at, view.width, view.height, taken(view));
+      button.current.style.transform = `translate(${Math.round(x)}px, ${Math.round(y)}px) translate(-50%, -50%)`;
+      button.current.style.setProperty("--turned", `${Math.round(angle)}deg`);
+    };
+    look();
+    return engine.watch(look);
+  }, [engine, id, away]);
+  if (!away) return null;
+  return (
+    <button ref={button} type="button" className="off-screen" aria-label={`Look at ${name || "what is selected"}, which is out of the view`} title={name} onClick={() => engine.lookAt(id)}>
+      <svg width="26" height="26" viewBox="0 0 24 24" fill="none" stroke="currentColor" strokeWidth="2.500" strokeLinecap="round" strokeLinejoin="round" aria-hidden="true">
+        <path d="M3 12h17M13 5l7 7-7 7" />
+      </svg>
+    </button>
+  );
+}
+
+/** What the arrow must not cover, in pixels of the view. */
+function taken(view: DOMRect): Rect[] {
+  return [...document.querySelectorAll(OTHERS)]
+    .map((each) => each.getBoundingClientRect())
+    .filter((box) => box.width > 0)
+    .map((box) => ({ left: box.left - view.left, top: box.top - view.top, right: box.right - view.left, bottom: box.bottom - view.top }));
+}

@@ -1,0 +1,56 @@
+/** What the cross in the middle of the view may mean, the likeliest first: exact where things stand close together. */
+
+import { useEffect } from "react";
+import { ListBox, ListBoxItem } from "react-aria-components";
+import { keepGeneral } from "../../commands/viewstate";
+import { aimsAlways, listAimed, useAiming } from "../../session/aiming";
+import type { State } from "../../store/state";
+import { now, useEditor } from "../../store/store";
+import { OnOff } from "../kit/fields";
+import { Icon } from "../kit/icons";
+import { KINDS, nameOf, selectionOf } from "../names";
+import { pick } from "../workplace/pick";
+import { ICONS } from "./ThingTree";
+
+export function AtTheCross() {
+  const { candidates, chosen } = useAiming();
+  const always = useEditor(aimsAlways);
+  useEffect(listAimed, []);
+  return (
+    <>
+      <ListBox
+        aria-label="At the cross"
+        className="things"
+        items={candidates.map((id) => ({ id }))}
+        dependencies={[chosen]}
+        onAction={(key) => pick([String(key)])}
+        renderEmptyState={() => <p className="quiet">Nothing is near the cross: turn the view until it is at what you look for.</p>}
+      >
+        {({ id }) => {
+          const state = now();
+          const kind = selectionOf(state, id)?.kind ?? "object";
+          return (
+            <ListBoxItem id={id} textValue={nameOf(state, id)} className="thing" data-chosen={id === chosen} onHoverStart={() => useAiming.setState({ chosen: id })}>
+              <Icon name={ICONS[kind]} />
+              <span className="thing-name">{nameOf(state, id)}</span>
+              <span className="quiet small">
+                {KINDS[kind]}
+                {parentOf(state, id) && ` on ${parentOf(state, id)}`}
+              </span>
+            </ListBoxItem>
+          );
+        }}
+      </ListBox>
+      <OnOff isSelected={always} onChange={(on) => keepGeneral({ aiming: on || null })}>
+        Keep the cross when this is closed
+      </OnOff>
+    </>
+  );
+}
+
+/** The name of what a thing hangs on. */
+function parentOf(state: State, id: string): string {
+  const { doc } = state;
+  const on = doc?.points[id]?.parent ?? doc?.actions[id]?.pointId ?? doc?.orientations[id]?.pointId;
+  return on ? nameOf(state, on) : "";
+}

@@ -1,0 +1,40 @@
+/** How all things together are seen, for this user: seen through, faded beside what is looked for, with lines to parents. */
+
+import { useState } from "react";
+import { keepGeneral, keepView } from "../../commands/viewstate";
+import { useEditor } from "../../store/store";
+import { parentLines } from "../../viewmodel/items";
+import { fadesOthers, opacityOfAll } from "../../viewmodel/seeing";
+import { MoreOrLess, OnOff } from "../kit/fields";
+
+export function InTheView({ narrowed }: { narrowed: boolean }) {
+  const opacity = useEditor(opacityOfAll);
+  const fades = useEditor(fadesOthers);
+  const lines = useEditor(parentLines);
+  const [moved, setMoved] = useState<number | null>(null);
+  return (
+    <section className="section" aria-label="In the view">
+      <h3>In the view</h3>
+      <OnOff isSelected={fades} onChange={(on) => keepView("user", { fade_others: on || null })}>
+        Fade what is not of the chosen kinds
+      </OnOff>
+      {fades && !narrowed && <p className="quiet small">Nothing fades until kinds are chosen above.</p>}
+      <MoreOrLess
+        label="All objects but robots seen through"
+        value={1 - (moved ?? opacity)}
+        least={0}
+        most={0.95}
+        step={0.05}
+        words={(value) => `${Math.round(value * 100)} %`}
+        onChange={(value) => setMoved(1 - value)}
+        onEnd={(value) => {
+          keepView("user", { opacity_all: value > 0 ? 1 - value : null });
+          setMoved(null);
+        }}
+      />
+      <OnOff isSelected={lines} onChange={(on) => keepGeneral({ parent_lines: on || null })}>
+        Lines from points to what they hang on
+      </OnOff>
+    </section>
+  );
+}

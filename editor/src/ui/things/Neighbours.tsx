@@ -1,0 +1,26 @@
+/** From the selected thing to the one before and after it in the list of things, as that is narrowed. */
+
+import { useMemo } from "react";
+import { select, useEditor } from "../../store/store";
+import { groupsOf } from "../../viewmodel/seeing";
+import { allOf, fitting, neighbour, thingsOf } from "../../viewmodel/things";
+import { Button } from "../kit/kit";
+
+export default function Neighbours({ id }: { id: string }) {
+  const doc = useEditor((state) => state.doc);
+  const types = useEditor((state) => state.types);
+  const groups = useEditor((state) => groupsOf(state).join());
+  const rows = useMemo(() => {
+    const fits = fitting(new Set(groups.split(",").filter(Boolean)), "");
+    const all = allOf(thingsOf({ doc, types })).filter((row) => fits(row) || row.id === id);
+    return { before: neighbour(all, id, -1), after: neighbour(all, id, 1) };
+  }, [doc, types, groups, id]);
+  const to = (row: typeof rows.before) => row && select({ kind: row.kind, id: row.id });
+  const alone = "There is nothing else in the list of things.";
+  return (
+    <span className="neighbours">
+      <Button look="plain" icon="left" aria-label={`To the thing before, ${rows.before?.name ?? ""}`} why={rows.before ? "" : alone} onPress={() => to(rows.before)} />
+      <Button look="plain" icon="right" aria-label={`To the thing after, ${rows.after?.name ?? ""}`} why={rows.after ? "" : alone} onPress={() => to(rows.after)} />
+    </span>
+  );
+}

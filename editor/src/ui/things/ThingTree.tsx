@@ -1,0 +1,85 @@
+/** Things with what hangs on them below; each can be folded, which the user finds so on every tablet. */
+
+import { Button, Collection, Tree, TreeItem, TreeItemContent } from "react-aria-components";
+import { keepView } from "../../commands/viewstate";
+import { theEngine } from "../../session/engine";
+import { heldBy } from "../../store/selectors";
+import type { Kind } from "../../store/state";
+import { now, select, setUi, useEditor } from "../../store/store";
+import { flat, type Row } from "../../viewmodel/things";
+import { Icon, type IconName } from "../kit/icons";
+import { selectionOf } from "../names";
+import { asideOf } from "../scene/seeing";
+
+export const ICONS: Record<Kind, IconName> = { object: "box", point: "point", orientation: "point", joints: "robot", action: "action", logic: "list", terminal: "play" };
+
+const NOTHING: string[] = [];
+
+function foldedOf(kept: unknown): string[] {
+  return Array.isArray(kept) ? kept.filter((each) => typeof each === "string") : NOTHING;
+}
+
+/** Select a thing of a list, and bring it into the view. */
+export function goTo(id: string): void {
+  select(selectionOf(now(), id));
+  setUi({ tool: "" });
+  theEngine()?.focus(id);
+}
+
+interface ThingTreeProps {
+  label: string;
+  rows: readonly Row[];
+  /** All is unfolded: what was looked for is to be seen. */
+  unfolded: boolean;
+}
+
+export function ThingTree({ label, rows, unfolded }: ThingTreeProps) {
+  const locks = useEditor((state) => state.locks);
+  const aside = useEditor(asideOf);
+  const folded = foldedOf(useEditor((state) => state.view.user["collapsed"]));
+  const parents = flat(rows).filter((row) => row.below.length > 0);
+  const open = new Set(parents.map((row) => row.id).filter((id) => unfolded || !folded.includes(id)));
+  const fold = (keys: ReadonlySet<unknown>) => {
+    if (unfolded) return;
+    const mine = parents.map((row) => row.id);
+    // What is gone from the workplace is not kept for good.
+    const rest = folded.filter((id) => !mine.includes(id) && selectionOf(now(), id) !== null);
+    const next = [...rest, ...mine.filter((id) => !keys.has(id))];
+    keepView("user", { collapsed: next.length > 0 ? next : null });
+  };
+  const item = (row: Row) => {
+    const holder = heldBy(now(), row.id);
+    const detail = holder ? `${holder} works on it` : aside.includes(row.id) ? "hidden" : row.detail;
+    return (
+      <TreeItem id={row.id} textValue={`${row.name} ${detail}`} className="thing thing-row" onHoverStart={() => theEngine()?.hover(row.id)}>
+        <TreeItemContent>
+          {({ hasChildItems, isExpanded, level }) => (
+            <>
+              <span style={{ width: (level - 1) * 16 }} className="thing-indent" />
+              {hasChildItems ? (
+                <Button slot="chevron" className="thing-fold" isDisabled={unfolded}>
+                  <svg width="16" height="16" viewBox="0 0 16 16" fill="none" stroke="currentColor" strokeWidth="2" strokeLinecap="round" aria-hidden="true" data-open={isExpanded}>
+                    <path d="M6 3l5 5-5 5" />
+                  </svg>
+                </Button>
+              ) : (
+                <span className="thing-fold" />
+              )}
+              <Icon name={row.group === "robots" ? "robot" : ICONS[row.kind]} />
+              <span className="thing-name">{row.name}</span>
+              <span className="quiet small">{detail}</span>
+            </>
+          )}
+        </TreeItemContent>
+        <Collection items={row.below} dependencies={[locks, aside, unfolded]}>
+          {item}
+        </Collection>
+      </TreeItem>
+    );
+  };
+  return (
+    <Tree aria-label={label} className="things" items={rows} dependencies={[locks, aside, unfolded]} expandedKeys={open} onExpandedChange={fold} onAction={(key) => goTo(String(key))}>
+      {item}
+    </Tree>
+  );
+}

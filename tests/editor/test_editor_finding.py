@@ -1,0 +1,297 @@
+"""Something is looked for in the workplace: by the cross, in the list, at the edge of the view, behind other things."""
+
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+import pytest_asyncio
+from playwright.async_api import Browser, Locator, expect
+
+from arcor2_hw.client import Client
+from arcor2_hw.data import rpc
+from arcor2_hw.data.editor import ViewScope
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.project import ActionPoint, Project
+from arcor2_hw.data.scene import Scene
+from tests.e2e.harness import Cell, until
+from tests.editor.screen import VIEWPORTS, Screen, screen_of
+
+pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(120)]
+
+
+@dataclass
+class Place:
+    cell: Cell
+    client: Client
+    scene: Scene
+    project: Project
+
+    def object(self, name: str) -> str:
+        return next(each.id for each in self.scene.objects if each.name == name)
+
+    def point(self, name: str) -> ActionPoint:
+        return next(each for each in self.project.action_points if each.name == name)
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def place(cell: Cell) -> AsyncIterator[Place]:
+    """The project is open; who comes in stands before it. Each test is somebody else's, with views of his own."""
+    client = await cell.client("colleague")
+    yield Place(cell, client, *await cell.open(client))
+
+
+async def _came_in(screen: Screen, name: str, place: Place) -> None:
+    await screen.join(name)
+    await screen.item(place.object("robot"))
+    await screen.page.locator(".view-controls").wait_for()
+
+
+async def _tool(screen: Screen, name: str) -> None:
+    await screen.page.get_by_role("navigation").get_by_role("button").filter(has_text=name).click()
+
+
+async def _headed(screen: Screen, name: str) -> None:
+    """The panel is about a thing of this name."""
+    await screen.page.get_by_role("complementary").get_by_role("heading", name=name, exact=True).wait_for()
+
+
+async def test_the_cross_picks_what_it_is_near_and_what_is_behind(place: Place, browser: Browser) -> None:
+    client = place.client
+    await client.call("SubscribeEvents", rpc.SubscribeEventsArgs({"UserPresence"}))
+    point = place.point("feeder")
+    async with screen_of(browser, place.cell.url) as screen:
+        page = screen.page
+        await _came_in(screen, "Iris", place)
+        await page.keyboard.press("x")
+        bar = page.get_by_role("group", name="At the cross")
+        # From below, through the table: what is aimed at need not be in front.
+        at = (await screen.item(point.id))["pose"]["position"]
+        below = [[at["x"] - 0.5, at["y"] - 0.5, at["z"] - 0.5], [at["x"], at["y"], at["z"]]]
+        await page.evaluate("([from, to]) => __engine.view.set(from, to)", below)
+        await bar.get_by_role("button", name="Select feeder", exact=True).wait_for()
+        # The others are told what is aimed at, before anything is selected.
+        told = await _presence(client, lambda told: told.aimed == point.id)
+        assert list(told.selected) == []
+        assert await page.evaluate(_UNDER_THE_MIDDLE) != point.id, "nothing is in front"
+
+        # Two keys select what is next best; the same as taps.
+        count = await page.evaluate("__engine.candidates().length")
+        assert 3 <= count <= 8
+        await page.keyboard.press("n")
+        await bar.get_by_role("button", name=f"Next 2/{count}, of what is at the cross").wait_for()
+        second = await page.evaluate("__engine.candidates()[1].id")
+        await page.keyboard.press("Enter")
+        assert await page.evaluate("__engine.item(__engine.candidates()[1].id).name") in await _heading(screen)
+        await _presence(client, lambda told: list(told.selected) == [second])
+        await page.keyboard.press("Shift+N")
+        await bar.get_by_role("button", name="Select feeder", exact=True).click()
+        await _headed(screen, "feeder")
+        await screen.picture("cross")
+        await page.keyboard.press("x")
+        await bar.wait_for(state="detached")
+
+        # The list of the same, best first; what is hidden is not in it.
+        await _tool(screen, "Things")
+        await page.get_by_role("radio", name="At the cross").click()
+        listed = page.get_by_role("listbox", name="At the cross").get_by_role("option")
+        await expect(listed.first).to_contain_text("feederAction point")
+        near = listed.filter(has_text="feeder_box")
+        await near.wait_for()
+        await near.click()
+        await page.get_by_role("complementary").get_by_text("Hide it, and aim through it").click()
+        await _tool(screen, "Things")
+        await page.get_by_role("radio", name="At the cross").click()
+        await expect(listed.first).to_contain_text("feederAction point")
+        assert await near.count() == 0
+        await listed.nth(1).click()
+        await page.get_by_role("radio", name="At the cross").wait_for(state="detached")
+        assert not await screen.faults()
+
+
+async def _presence(client: Client, fits: Callable[[Any], bool]) -> Any:
+    """Wait until a user tells that he is at something that fits; gives what he told."""
+    while not ((told := (await client.next_event("UserPresence", timeout=10)).data.presence) and fits(told)):
+        pass
+    return told
+
+
+_UNDER_THE_MIDDLE = """() => {
+    const { clientWidth, clientHeight } = document.querySelector(".view");
+    return __engine.pick(clientWidth / 2, clientHeight / 2, 0)[0].id;
+}"""
+
+
+async def _heading(screen: Screen) -> str:
+    return await screen.page.get_by_role("complementary").get_by_role("heading", level=2).inner_text()
+
+
+async def test_the_list_is_narrowed_folded_and_gone_through(place: Place, browser: Browser) -> None:
+    client = place.client
+    actions = [action.name for point in place.project.action_points for action in point.actions]
+
+    async def kept(key: str) -> Any:
+        state = await client.call("GetViewState", rpc.GetViewStateArgs(ViewScope.USER, place.project.id, "Ida"))
+        return state.values.get(key)
+
+    async with screen_of(browser, place.cell.url) as screen:
+        page = screen.page
+        await _came_in(screen, "Ida", place)
+        await _tool(screen, "Things")
+        tree = page.get_by_role("treegrid", name="Things")
+        # What has no place stands by itself, below a heading that says so.
+        await page.get_by_role("heading", name="Without a place").wait_for()
+        unplaced = page.get_by_role("treegrid", name="Without a place").get_by_role("row")
+        without = sorted(each.name for each in place.scene.objects if not isinstance(each.pose, Pose))
+        assert without
+        assert [row.split()[0] for row in await _labels(unplaced)] == without
+
+        # Only actions, with what they are on: and so on the next tablet.
+        chips = page.get_by_role("toolbar", name="Only these kinds")
+        robots = chips.get_by_role("button", name="Robots 1")
+        await robots.wait_for()
+        await chips.get_by_role("button", name=f"Actions {len(actions)}").click()
+        await unplaced.first.wait_for(state="detached")
+        shown = await _labels(tree.get_by_role("row"))
+        assert sorted(name for name in shown if name.endswith(" Action")) == sorted(
+            f"{name} Action" for name in actions
+        )
+        assert "feeder Action point" in shown
+        assert "robot UR5e" not in shown
+        await until(lambda: _is(kept, "filters", ["actions"]), "the server keeps the filter")
+        await page.get_by_label("Search").fill("pick")
+        await expect(tree.get_by_role("row")).to_have_count(2)  # and the point that it is on
+        await page.get_by_label("Search").fill("")
+        await chips.get_by_role("button", name=f"Actions {len(actions)}").click()
+
+        # Folded by its key, and so when the page is read anew.
+        tester = tree.get_by_role("row", name="tester FunctionalTester")
+        await tester.focus()
+        await page.keyboard.press("ArrowLeft")
+        await tree.get_by_role("row", name="fixture Action point").wait_for(state="detached")
+        assert await tester.get_attribute("aria-expanded") == "false"
+        await until(lambda: _is(kept, "collapsed", [place.object("tester")]), "the server keeps what is folded")
+        await page.reload()
+        await screen.item(place.object("robot"))
+        await _tool(screen, "Things")
+        await tester.wait_for()
+        assert await tester.get_attribute("aria-expanded") == "false"
+        assert await tree.get_by_role("row", name="fixture Action point").count() == 0
+        await tester.get_by_role("button").click()
+        await tree.get_by_role("row", name="fixture Action point").wait_for()
+        assert not await screen.faults()
+        assert not await screen.barriers()
+
+        # From one to the next in the panel, and back to where it was; narrowed, to the next of that kind.
+        await tree.get_by_role("row", name="robot UR5e").click()
+        await _headed(screen, "robot")
+        await screen.press("To the thing after, table")
+        await _headed(screen, "table")
+        await screen.press("To the thing before, robot")
+        await _headed(screen, "robot")
+        await _tool(screen, "Things")
+        await chips.get_by_role("button", name="Points").click()
+        await tree.get_by_role("row", name="fixture Action point").click()
+        await screen.press("To the thing after, feeder")
+        await _headed(screen, "feeder")
+
+
+async def _labels(rows: Locator) -> list[str]:
+    return [await row.get_attribute("aria-label") or "" for row in await rows.all()]
+
+
+async def _is(ask: Any, key: str, expected: Any) -> bool:
+    return bool(await ask(key) == expected)
+
+
+async def test_the_selected_is_found_again_and_things_are_seen_through(place: Place, browser: Browser) -> None:
+    point, table = place.point("fixture"), place.object("table")
+    async with screen_of(browser, place.cell.url, touch=True) as screen:
+        page = screen.page
+        await _came_in(screen, "Olga", place)
+        # A point stays as large as is seen, from anywhere, and as large as the user likes.
+        far, near = [[0, -9, 5], [0, 0, 0]], [[0.3, -0.3, 0.5], [0, 0, 0]]
+        assert await _drawn(screen, point.id, far) > 3 * await _drawn(screen, point.id, near)
+        before = await _drawn(screen, point.id, near)
+        await _tool(screen, "Points")
+        await page.get_by_role("slider", name="Size of points in the view").press("End")
+        await screen.until(_SCALE_OVER, [point.id, 3.9 * before])
+
+        # All that is not looked for fades, and objects are seen through: drawn so, not only told.
+        await _tool(screen, "Things")
+        assert await page.evaluate("__engine.ties.count") == 0
+        await page.get_by_text("Lines from points to what they hang on").click()
+        hanging = sum(1 for each in place.project.action_points if each.parent)
+        await screen.until("count => __engine.ties.count === count", hanging)
+        await page.evaluate("__engine.view.look('top')")
+        opaque = await _colour_of(screen, table)
+        await page.get_by_role("slider", name="All objects but robots seen through").press("End")
+        await screen.until("id => __engine.item(id).faint === 0.95", table)
+        assert await page.evaluate("id => __engine.item(id).faint", place.object("robot")) == 0
+        through = await _colour_of(screen, table)
+        assert max(abs(a - b) for a, b in zip(opaque, through, strict=True)) > 20, (opaque, through)
+        await page.get_by_role("toolbar", name="Only these kinds").get_by_role("button", name="Points").click()
+        await page.get_by_text("Fade what is not of the chosen kinds").click()
+        await screen.until("id => __engine.item(id).faint === 0.85", place.object("robot"))
+        action = place.project.action_points[0].actions[0].id
+        assert not (await screen.item(action))["visible"] or (await screen.item(action))["faint"] == 1
+        assert (await screen.item(point.id))["faint"] == 0
+        await screen.picture("points alone")
+
+        # What is selected and out of the view: an arrow at the edge, and a tap looks there.
+        await page.get_by_role("row", name=f"{point.name} Action point").click()
+        arrow = page.get_by_role("button", name=f"Look at {point.name}, which is out of the view")
+        assert await arrow.count() == 0
+        for size in ("phone", "tablet"):
+            await page.set_viewport_size(VIEWPORTS[size])  # type: ignore[arg-type]
+            for away in ([[1, 1, 1], [3, 3, 1]], [[-1, -1, 0.5], [-3, -3, 0]]):
+                await page.evaluate("([from, to]) => __engine.view.set(from, to)", away)
+                await arrow.wait_for()
+                await screen.settle()
+                assert not await screen.faults(), (size, away)
+        await arrow.click()
+        await arrow.wait_for(state="detached")
+        assert (await screen.item(point.id))["visible"]
+
+
+_SCALE = """id => {
+    for (const mesh of __engine.scene.children) {
+        for (let index = 0; index < (mesh.userData.batch ? mesh.count : 0); index++) {
+            if (mesh.userData.batch(index) !== id) continue;
+            const [x, y, z] = mesh.instanceMatrix.array.slice(index * 16, index * 16 + 3);
+            return Math.hypot(x, y, z);
+        }
+    }
+}"""
+_SCALE_OVER = f"([id, least]) => ({_SCALE})(id) > least"
+
+
+async def _drawn(screen: Screen, item: str, view: Any) -> float:
+    """How large a point is drawn, of what it is by itself, from somewhere."""
+    frames = await screen.frames()
+    await screen.page.evaluate("([from, to]) => __engine.view.set(from, to)", view)
+    await screen.until("frames => __engine.frames > frames", frames)
+    return float(await screen.page.evaluate(_SCALE, item))
+
+
+async def _colour_of(screen: Screen, item: str) -> list[int]:
+    """The colour of the picture at a free corner of a thing that lies flat, seen from above."""
+    return list(
+        await screen.page.evaluate(
+            """async (id) => {
+                const picture = await createImageBitmap(await __engine.picture("image/png"));
+                const { clientWidth, clientHeight } = document.querySelector(".view");
+                const pen = new OffscreenCanvas(picture.width, picture.height).getContext("2d");
+                pen.drawImage(picture, 0, 0);
+                for (let y = 8; y < clientHeight; y += 8) {
+                    for (let x = 8; x < clientWidth; x += 8) {
+                        const [first] = __engine.pick(x, y, 0);
+                        if (first?.id !== id || __engine.pick(x, y, 12).length > 1) continue;
+                        const scale = picture.width / clientWidth;
+                        return [...pen.getImageData(x * scale, y * scale, 1, 1).data.slice(0, 3)];
+                    }
+                }
+            }""",
+            item,
+        )
+    )
