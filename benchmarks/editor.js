@@ -1,9 +1,9 @@
 // Looks on from inside the page: when things are first there, and from a message to the picture that shows it.
 (() => {
-  const seen = { items: 0, robot: 0, joints: [], edits: [], taps: [] };
+  const seen = { items: 0, robot: 0, joints: [], edits: [], previews: [], taps: [], enters: [] };
   window.__bench = seen;
   const epoch = () => performance.timeOrigin + performance.now();
-  const waiting = { joints: [], edits: [] };
+  const waiting = { joints: [] };
   const Plain = window.WebSocket;
   window.WebSocket = class extends Plain {
     constructor(...given) {
@@ -12,10 +12,12 @@
         const head = String(data).slice(0, 60);
         if (head.includes('"RobotJoints"')) waiting.joints.push(performance.now());
         if (head.includes('"ActionPointChanged"')) seen.edits.push(epoch());
+        if (head.includes('"MovePreview"')) seen.previews.push(epoch());
       });
     }
   };
   addEventListener("click", () => seen.taps.push(epoch()), true);
+  addEventListener("keydown", ({ key }) => key === "Enter" && seen.enters.push(epoch()), true);
   let hooked = null;
   const look = () => {
     const engine = window.__engine;

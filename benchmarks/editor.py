@@ -6,9 +6,11 @@ error measures nothing.
 
 import asyncio
 import json
+import re
 import sys
 import tempfile
 import time
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import urlsplit
@@ -33,7 +35,7 @@ IDLE_S: Final = 5.0
 EDITS: Final = 60
 STOPS: Final = 10
 RESTARTS: Final = 3
-SLOW: Final = 0.02
+SLOW: Final = 0.015
 """Fraction of the robot's speed."""
 _INSIDE: Final = Path(__file__).with_suffix(".js").read_text()
 
@@ -82,7 +84,7 @@ async def _at_rest(cell: Cell) -> bool:
 
 
 async def drawing(report: Report, screen: Screen, client: Client, cell: Cell, robot: str) -> None:
-    """Frames while the robot moves slowly, from an event of it to pixels, and frames while it stands."""
+    """Frames while the robot moves slowly, and from an event of it to pixels."""
     await _move(client, robot, -0.2)
     await until(lambda: _not(_at_rest(cell)), "it moves")
     await asyncio.sleep(0.5)
@@ -97,10 +99,14 @@ async def drawing(report: Report, screen: Screen, client: Client, cell: Cell, ro
     report.add(Figure("editor_event_to_pixels_ms", percentile(joints, 95), len(joints), f"p95; {note}"))
     await client.call("StopRobot", rpc.StopRobotArgs(robot))
     await until(lambda: _at_rest(cell), "it rests")
+
+
+async def _idle(screen: Screen) -> int:
+    """Frames drawn while nothing moves, after what came last was drawn."""
     await asyncio.sleep(2)
     frames = await screen.frames()
     await asyncio.sleep(IDLE_S)
-    report.add(Figure("editor_idle_frames", await screen.frames() - frames, 1, f"in {IDLE_S:g} s"))
+    return await screen.frames() - frames
 
 
 async def _not(answer: Any) -> bool:
@@ -127,7 +133,7 @@ async def stopping(report: Report, screen: Screen, client: Client, cell: Cell, r
 
 
 async def editing(report: Report, browser: Browser, one: Screen, cell: Cell, project: Project) -> None:
-    """From a tap on one screen to the event of it on another."""
+    """From a typed number on one screen to the event of it on another; and from a step to where others see it."""
     point = project.action_points[0]
     async with screen_of(browser, cell.url, "small tablet") as two:
         await two.page.add_init_script(_INSIDE)
@@ -135,17 +141,34 @@ async def editing(report: Report, browser: Browser, one: Screen, cell: Cell, pro
         await two.item(point.id)
         await one.press("Things")
         await one.page.get_by_role("row", name=f"{point.name} Action point").click()
-        took = []
-        for number in range(EDITS):
-            before = len((await _inside(two))["edits"])
-            way = "less" if number % 2 else "more"
-            await one.page.get_by_role("button", name=f"Z 1 cm {way}").click()
-            tapped = (await _inside(one))["taps"][-1]
-            await two.until("before => window.__bench.edits.length > before", before)
-            took.append((await _inside(two))["edits"][before] - tapped)
-            await asyncio.sleep(0.05)
+
+        async def heard(what: str, acts: str, act: Callable[[int], Awaitable[None]]) -> list[float]:
+            took = []
+            for number in range(EDITS):
+                before = len((await _inside(two))[what])
+                await act(number)
+                acted = (await _inside(one))[acts][-1]
+                await two.until("([what, before]) => window.__bench[what].length > before", [what, before])
+                took.append((await _inside(two))[what][before] - acted)
+                await asyncio.sleep(0.05)
+            return took
+
+        async def type_it(number: int) -> None:
+            await one.page.get_by_role("button", name=re.compile("^Z .*type it")).click()
+            await one.page.get_by_label("Z to").fill(f"{100 + number % 7 * 10}mm")
+            await one.page.keyboard.press("Enter")
+
+        async def step(number: int) -> None:
+            await one.page.get_by_role("button", name=f"Z 1 cm {'less' if number % 2 else 'more'}").click()
+
+        took = await heard("edits", "enters", type_it)
         note = f"p50 {median(took):.0f} ms; with its lock, kept in the journal"
         report.add(Figure("editor_edit_ms", percentile(took, 95), len(took), f"p95; {note}"))
+        edits = len((await _inside(two))["edits"])
+        took = await heard("previews", "taps", step)
+        await two.until("edits => window.__bench.edits.length > edits", edits)
+        note = f"p50 {median(took):.0f} ms; the edit itself follows when no further step does"
+        report.add(Figure("editor_step_ms", percentile(took, 95), len(took), f"p95; {note}"))
 
 
 async def returning(report: Report, screen: Screen, cell: Cell) -> None:
@@ -175,6 +198,10 @@ async def measure(report: Report, directory: Path) -> None:
         for number in range(POINTS - len(project.action_points)):
             place = Position(-0.4 + 0.08 * (number % 10), -0.4 + 0.08 * (number // 10), 0.05)
             await client.call("AddActionPoint", rpc.AddActionPointArgs(f"p{number}", place))
+        async with screen_of(browser, cell.url) as screen:
+            await screen.join("Eva")
+            await screen.item(robot)
+            offline = await _idle(screen)
         await client.call("StartScene")
         await scene_state(client, SceneStateEnum.STARTED, 30)
         await loading(report, browser, cell)
@@ -183,6 +210,9 @@ async def measure(report: Report, directory: Path) -> None:
             await screen.join("Eva")
             await screen.until("id => window.__engine?.item(id)?.endEffectors.length > 0", robot)
             await drawing(report, screen, client, cell, robot)
+            online = await _idle(screen)
+            note = f"in {IDLE_S:g} s each: offline {offline}, online with the arm at rest {online}"
+            report.add(Figure("editor_idle_frames", offline + online, 2, note))
             await stopping(report, screen, client, cell, robot)
             await editing(report, browser, screen, cell, project)
             await returning(report, screen, cell)

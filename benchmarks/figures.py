@@ -104,6 +104,7 @@ GOALS: Final[dict[str, tuple[str, str]]] = {
     "editor_idle_frames": ("frames", "<= 0"),
     "editor_stop_ms": ("ms", "<= 100"),
     "editor_edit_ms": ("ms", "<= 150"),
+    "editor_step_ms": ("ms", "<= 150"),
     "editor_back_s": ("s", "<= 2"),
     "kinematics_plans_found": ("of 20", ">= 20"),
     "kinematics_plan_ms": ("ms", "<= 50"),
