@@ -285,6 +285,11 @@ class Rest:
         """Delete an asset."""
         await self.request("DELETE", f"/assets/{_part(key)}")
 
+    # ------------------------------------------------------------------------------------------------ diagnosis
+    async def diagnosis(self, target: Path) -> None:
+        """Write a zip of what is open, types, devices and the log's last lines, without secrets, into a file."""
+        await self._file("/api/diagnosis", target)
+
     # ------------------------------------------------------------------------------------------------ packages
     async def publish(self, project_id: str, target: Path, package_name: str = "") -> None:
         """Build a saved project and write its package into a file."""

@@ -7,6 +7,8 @@ from typing import Any
 import msgspec
 import structlog
 
+from arcor2_server.recent_log import RECENT
+
 
 def set_up(level: str = "info") -> None:
     """Send what the server and its libraries log to standard error. KeyError for a level that is none."""
@@ -15,6 +17,7 @@ def set_up(level: str = "info") -> None:
         structlog.contextvars.merge_contextvars,
         structlog.processors.add_log_level,
         structlog.processors.TimeStamper(fmt="iso", utc=True),
+        RECENT,
     ]
     last: structlog.typing.Processor
     if sys.stderr.isatty():

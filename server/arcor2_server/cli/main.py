@@ -34,6 +34,7 @@ app.command("arcor2_server.cli.device:app", name="device", help="List, find, che
 app.command(
     "arcor2_server.cli.calibrate:app", name="calibrate", help="Find out where cameras, robots and tools really are."
 )
+app.command("arcor2_server.cli.diagnosis:diagnosis", help="Write what somebody who helps has to know into one file.")
 app.command("arcor2_server.cli.fake:app", name="fake", help="List and run simulated devices, and let them fail.")
 app.command("arcor2_server.cli.analyse:analyse", help="Show what an object type offers, and what is wrong with it.")
 

@@ -12,6 +12,7 @@ from arcor2_server.rest import (  # noqa: F401
     calibration,
     calibration_records,
     calibrations,
+    diagnosis,
     documents,
     execution,
     general,

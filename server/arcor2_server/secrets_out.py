@@ -1,0 +1,65 @@
+"""Takes secrets out of what leaves the workplace for somebody who helps."""
+
+import re
+from collections.abc import Iterator
+from typing import Any, Final
+
+HIDDEN: Final = "***"
+SHORTEST: Final = 4
+"""Characters of a secret that is looked for in other texts: a shorter one stands in too many words."""
+
+_NAMES: Final = re.compile(
+    r"(?i)password|passwd|passphrase|secret|token|credential|api_?key|private_?key|(^|_)(pass|pin)($|_)"
+)
+_FILE: Final = re.compile(r"(?i)_(file|path)$")
+_VALUES: Final = ("value", "default_value")
+_IN_TEXT: Final = (
+    (re.compile(r"(?<=://)[^/@\s:\"]*:[^/@\s\"]*(?=@)"), HIDDEN),
+    (re.compile(r"(?i)(?<=bearer )[\w.~+/=-]+"), HIDDEN),
+    (re.compile(r"(?i)(\btoken=)[^&\s\"]+"), rf"\g<1>{HIDDEN}"),
+    # What `arcor2-hw token add` makes.
+    (re.compile(r"(?<![\w-])[\w-]{43}(?![\w-])"), HIDDEN),
+)
+
+
+def is_secret(name: str) -> bool:
+    """Tell whether a setting of this name holds a secret; one that names a file only says where it is."""
+    return _NAMES.search(name) is not None and _FILE.search(name) is None
+
+
+def hide(value: Any) -> Any:
+    """Give JSON data with the values of secrets hidden: by the key, or by the `name` that stands beside a `value`."""
+    if isinstance(value, list):
+        return [hide(item) for item in value]
+    if not isinstance(value, dict):
+        return value
+    named = is_secret(str(value.get("name", "")))
+    return {key: HIDDEN if item and _holds(key, item, named=named) else hide(item) for key, item in value.items()}
+
+
+def secrets_in(value: Any) -> Iterator[str]:
+    """Give the secrets that `hide` hides, where they are texts."""
+    if isinstance(value, list):
+        for item in value:
+            yield from secrets_in(item)
+    elif isinstance(value, dict):
+        named = is_secret(str(value.get("name", "")))
+        for key, item in value.items():
+            if not _holds(key, item, named=named):
+                yield from secrets_in(item)
+            elif isinstance(item, str):
+                yield item.strip('"')  # settings are JSON
+
+
+def clean(text: str, secrets: set[str]) -> str:
+    """Give a text without these secrets, and without what looks like a token or the password of an address."""
+    for secret in sorted(secrets, key=len, reverse=True):
+        if len(secret) >= SHORTEST:
+            text = text.replace(secret, HIDDEN)
+    for pattern, instead in _IN_TEXT:
+        text = pattern.sub(instead, text)
+    return text
+
+
+def _holds(key: str, item: Any, *, named: bool) -> bool:
+    return not isinstance(item, dict | list) and ((named and key in _VALUES) or is_secret(key))
