@@ -4,18 +4,20 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Annotated, Final
+from urllib.parse import quote
 
 from cyclopts import App, Parameter
+from rich.markup import escape
 from rich.table import Table
 
 from arcor2_hw.calibration.configuration import read_configuration
-from arcor2_hw.calibration.records import CalibrationRecord
+from arcor2_hw.calibration.records import CalibrationCheck, CalibrationRecord
 from arcor2_hw.client import Client
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.scene import Scene, SceneObject
-from arcor2_hw.exceptions import Conflict, ConnectionLost, DeviceTimeout, NotFound
-from arcor2_server.cli.calibrating import calibrated, pose_table, progress
+from arcor2_hw.exceptions import Conflict, ConnectionLost, DeviceTimeout, InvalidData, NotFound
+from arcor2_server.cli.calibrating import calibrated, pose_table, progress, read_as
 from arcor2_server.cli.reaching import HERE, Failed, Server
 from arcor2_server.cli.status import ExitStatus
 from arcor2_server.cli.tables import console
@@ -104,8 +106,66 @@ def records(
     return calibrated("online records", work)
 
 
+@app.command
+def check(
+    name: Name,
+    *,
+    pose: Annotated[Path | None, Parameter(help="Pose to compare (YAML); else that of the scene that is open.")] = None,
+    record: Annotated[str, Parameter(help="Id of the calibration; else the newest of the object with a pose.")] = "",
+    distance: Annotated[float, Parameter(help="How far it may be off, m.")] = 0.002,
+    angle: Annotated[float, Parameter(help="How far it may be turned, rad.")] = 0.0035,
+    server: Server = HERE,
+) -> int:
+    """Compare where an object is with what a calibration of it found; the status tells whether it still holds.
+
+    A pose is {position: {x, y, z}, orientation: {x, y, z, w}}, in m, in the frame that the record names.
+    """
+
+    async def work() -> None:
+        given = None if pose is None else read_as(pose, Pose)
+        async with server.client() as client:
+            chosen = await _record(client, name, record)
+            present = given or await _present(client, chosen)
+            body = {"pose": present, "distance_limit": distance, "angle_limit": angle}
+            path = f"/api/calibrations/{quote(chosen.id, safe='')}/check"
+            told: CalibrationCheck = await client.rest.request("PUT", path, CalibrationCheck, body=body)
+        if not told.passed:
+            raise Failed(ExitStatus.DIFFERENT, told.verdict)
+        console().print(escape(told.verdict), soft_wrap=True)
+
+    return calibrated("online check", work)
+
+
+async def _record(client: Client, name: str, key: str) -> CalibrationRecord:
+    """Give the record that is meant. NotFound; InvalidData for one without a pose, or of another object."""
+    if key:
+        path = f"/api/calibrations/{quote(key, safe='')}"
+        found: CalibrationRecord = await client.rest.request("GET", path, CalibrationRecord)
+        if found.object_name != name:
+            raise InvalidData(f"The calibration {key} is one of {found.object_name}, not of {name}.")
+        return found
+    listed: list[CalibrationRecord] = await client.rest.request(
+        "GET", "/api/calibrations", list[CalibrationRecord], params={"limit": 1000}
+    )
+    for one in listed:
+        if one.object_name == name and not isinstance(one.after, Unset):
+            return one
+    raise NotFound(f"There is no calibration of {name!r} that found a pose.")
+
+
+async def _present(client: Client, record: CalibrationRecord) -> Pose:
+    """Give where the object of a record is in the open scene. Conflict, NotFound, InvalidData."""
+    if record.parent != "world":
+        raise InvalidData(f"The calibration {record.id} is stated in {record.parent}: give a pose in that with --pose.")
+    scene = await _open_scene(client)
+    found = next((each for each in scene.objects if each.id == record.object_id), None)
+    if found is None or isinstance(found.pose, Unset):
+        raise NotFound(f"{record.object_name} of the calibration {record.id} is not in the scene {scene.name}.")
+    return found.pose
+
+
 def _show(found: list[CalibrationRecord]) -> None:
-    table = Table("date", "object", "kind", "by", "residual", "moved", "verdict", box=None, pad_edge=False)
+    table = Table("date", "object", "kind", "by", "residual", "moved", "verdict", "id", box=None, pad_edge=False)
     for one in found:
         residual = ""
         if not isinstance(one.residual, Unset):
@@ -114,7 +174,7 @@ def _show(found: list[CalibrationRecord]) -> None:
         moved = ""
         if not isinstance(one.before, Unset) and not isinstance(one.after, Unset):
             moved = f"{1e3 * one.before.position.distance_to(one.after.position):.1f} mm"
-        table.add_row(one.date[:19], one.object_name, one.kind.value, one.person, residual, moved, one.verdict)
+        table.add_row(one.date[:19], one.object_name, one.kind.value, one.person, residual, moved, one.verdict, one.id)
     console().print(table if found else "Nothing was calibrated yet.")
 
 

@@ -201,6 +201,23 @@ def test_a_running_server_is_told_and_asked(files: Path, tmp_path: Path, calibra
             assert "Nothing was calibrated" in calibrate("online", "records", "other", *url).out
             checked = httpx.put(f"{base}/api/calibrations/{kept['id']}/check", json={"pose": {"position": {"x": 0.26}}})
             assert checked.json()["passed"] is False
+            near, far = tmp_path / "near.yaml", tmp_path / "far.yaml"
+            near.write_text("position: {x: 0.2515}")
+            far.write_text("position: {x: 0.26}")
+            ran = calibrate("online", "check", "cam", "--pose", near, *url)
+            assert (ran.status, "cam still stands as calibrated" in ran.out, "1.5 mm" in ran.out) == (0, True, True)
+            ran = calibrate("online", "check", "cam", "--pose", far, "--record", kept["id"], *url)
+            assert (ran.status, ran.out) == (ExitStatus.DIFFERENT, "")
+            assert "cam is 10.0 mm" in ran.err
+            ran = calibrate("online", "check", "cam", "--pose", far, "--distance", "0.011", *url)
+            assert ran.status == 0
+            for words, status in (
+                (("other", "--pose", near), ExitStatus.NOT_FOUND),
+                (("other", "--pose", near, "--record", kept["id"]), ExitStatus.DOCUMENT_PROBLEMS),
+                (("cam", "--pose", near, "--record", "cal_none"), ExitStatus.NOT_FOUND),
+                (("cam",), ExitStatus.CONFLICT),
+            ):
+                assert calibrate("online", "check", *words, *url).status == status, words
             ran = calibrate("online", "camera", "cam", *url)
             assert (ran.status, ran.out) == (ExitStatus.CONFLICT, "")
             assert "No scene is open" in ran.err
