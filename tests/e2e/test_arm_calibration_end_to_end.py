@@ -76,8 +76,8 @@ class Place:
         await self.client.call("StopScene")
         await scene_state(self.client, SceneStateEnum.STOPPED)
 
-    async def set_host(self, host: str) -> None:
-        parameters = [Parameter("host", "string", msgspec.json.encode(host).decode())]
+    async def set_host(self, host: str, *more: Parameter) -> None:
+        parameters = [Parameter("host", "string", msgspec.json.encode(host).decode()), *more]
         await self.client.call("WriteLock", rpc.WriteLockArgs(self.robot))
         await self.client.call("UpdateObjectParameters", rpc.UpdateObjectParametersArgs(self.robot, parameters))
         await self.client.call("WriteUnlock", rpc.WriteUnlockArgs(self.robot))
@@ -130,6 +130,56 @@ async def test_what_the_controller_tells_is_in_force_from_then_on_also_offline_a
     assert (await place.forward()).distance_to(tip()) < 1e-6
     await place.set_host(place.cell.robot_host)
     assert (await place.told())["in_force"] == "measured"
+
+
+async def test_the_arm_is_led_safely_past_what_was_put_in_over_rest_and_what_it_holds(place: Place) -> None:
+    client, robot = place.client, place.robot
+    await place.set_host(place.cell.robot_host, Parameter("payload_mass", "double", "0.0"))
+    await place.cell.tell("robot", "place", q=[0.4, -1.3, 1.5, -1.77, -1.57, 0.3])
+    await client.call("StartScene")
+    await scene_state(client, SceneStateEnum.STARTED)
+    tip = await client.get_end_effector_pose(robot_id=robot, end_effector_id="tcp")
+
+    async def line(by: Position) -> str:
+        """Move the tip in a line; gives why not."""
+        await client.move_to_pose(
+            robot_id=robot,
+            end_effector_id="tcp",
+            speed=0.5,
+            position=tip.position + by,
+            orientation=tip.orientation,
+            linear=True,
+        )
+        while (told := (await client.next_event("RobotMoveToPose", timeout=20)).data).move_event_type == "start":
+            pass
+        return told.message if told.move_event_type == "failed" else ""
+
+    async with httpx.AsyncClient(base_url=place.cell.url.replace("ws", "http", 1)) as http:
+
+        async def put(key: str, at: Position, x: float, y: float, z: float) -> None:
+            size = {"boxId": key, "sizeX": x, "sizeY": y, "sizeZ": z}
+            answer = await http.put("/collisions/box", params=size, json={"position": msgspec.to_builtins(at)})
+            assert answer.status_code == 200, answer.text
+
+        up, back = Position(0.0, 0.0, 0.1), Position()
+        assert await line(up) == ""
+        await put("crate", tip.position, 0.1, 0.1, 0.1)
+        assert "crate" in await line(back)
+        assert (await http.delete("/collisions/crate")).status_code == 200
+        # A rod that it holds meets a table, which the arm alone does not.
+        await put("table", tip.position - Position(0.0, 0.0, 0.27), 0.4, 0.4, 0.02)
+        assert await line(back) == ""
+        assert await line(up) == ""
+        await put("rod", tip.position + up - Position(0.0, 0.0, 0.15), 0.03, 0.03, 0.26)
+        answer = await http.put("/collisions/rod/attach", params={"robotId": robot, "link": "tcp"})
+        assert answer.status_code == 200, answer.text
+        met = await line(back)
+        assert "rod" in met
+        assert "table" in met
+        assert await line(up + Position(0.0, 0.05, 0.0)) == "", "what it holds is no obstacle to itself"
+        assert (await http.delete("/collisions/rod")).status_code == 200
+        assert await line(back) == ""
+    await place.go_offline()
 
 
 async def test_what_is_of_another_arm_is_not_used_and_what_is_not_told_leaves_what_was(place: Place) -> None:
