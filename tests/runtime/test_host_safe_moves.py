@@ -215,6 +215,50 @@ def test_another_arm_is_in_the_way_where_it_is_now(host: HostProcess) -> None:
     collision(go(host, MEETING), "arm/", "beam")
 
 
+PAIR = """
+from arcor2_hw.objects import MultiArmRobot
+
+class Pair(MultiArmRobot):
+    _ABSTRACT = False
+    urdf_package_name = "arm.urdf"
+    told = 6
+
+    def get_arm_ids(self) -> set[str]:
+        return {"left"}
+
+    def get_end_effectors_ids(self, arm_id: str | None = None) -> set[str]:
+        return {"tcp"}
+
+    def get_end_effector_pose(self, end_effector: str, arm_id: str | None = None) -> Pose:
+        return Pose()
+
+    def robot_joints(self, include_gripper: bool = False, arm_id: str | None = None) -> list[Joint]:
+        return [Joint(f"{n}_joint", v) for n, v in START][: self.told]
+
+    def grippers(self, arm_id: str | None = None) -> set[str]:
+        return set()
+
+    def suctions(self, arm_id: str | None = None) -> set[str]:
+        return set()
+
+    def tell(self, count: int) -> None:
+        self.told = count
+""".replace("START", repr(list(zip(NAMES, (-1.57, *READY[1:]), strict=True))))
+
+
+def test_a_robot_with_several_arms_is_in_the_way_when_all_of_it_is_known(host: HostProcess) -> None:
+    objects = [placed("arm", "Arm", Pose()), placed("pair", "Pair", Pose(Position(0.0, 1.0, 0.0)))]
+    host.send(open_scene([type_code("Arm", ARM), type_code("Pair", PAIR)], *objects, assets={"arm.urdf": str(URDF)}))
+    host.expect(m.SceneOpened)
+    collision(go(host, MEETING), "arm/", "pair/")
+    host.call("obj_pair", "tell", count=3)
+    error = go(host, MEETING)
+    assert isinstance(error, m.ErrorData)
+    assert error.code == "refused"
+    assert "where pair stands is not known" in error.message
+    assert "wrist_1_joint" in error.message
+
+
 # ---------------------------------------------------------------------------------------------------- the very arm
 def calibration(longer: float) -> KinematicCalibration:
     """That of an arm whose upper arm is longer by so much."""
