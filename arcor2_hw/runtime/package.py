@@ -5,7 +5,6 @@ import sys
 from pathlib import Path
 from typing import Any, TypeVar
 
-import humps
 import msgspec
 
 from arcor2_hw.data.geometry import Pose, Position
@@ -14,26 +13,12 @@ from arcor2_hw.data.package import CollisionModels
 from arcor2_hw.data.project import ActionPoint, Project, ProjectRobotJoints
 from arcor2_hw.data.project_index import ProjectIndex, global_pose
 from arcor2_hw.data.scene import Scene
-from arcor2_hw.exceptions import InvalidPackage, NotFound
+from arcor2_hw.exceptions import NotFound
 from arcor2_hw.runtime.creation import prepare_for_sources
+from arcor2_hw.runtime.documents import read_document
 from arcor2_hw.runtime.program import POINT
 
 T = TypeVar("T")
-
-
-def read_document(path: Path, kind: type[T]) -> T:
-    """Read a JSON document in snake_case or camelCase; InvalidPackage names the file."""
-    try:
-        raw = path.read_bytes()
-    except OSError as error:
-        raise InvalidPackage(f"the package has no readable {path.name}", str(error)) from error
-    try:
-        return msgspec.json.decode(raw, type=kind)
-    except msgspec.MsgspecError as error:
-        try:
-            return msgspec.convert(humps.decamelize(msgspec.json.decode(raw)), kind)
-        except (msgspec.MsgspecError, ValueError):
-            raise InvalidPackage(f"{path.name} of the package is damaged: {error}", str(path)) from error
 
 
 def package_name(directory: Path, default: str) -> str:

@@ -13,7 +13,7 @@ from arcor2_hw.data.robot import KinematicCalibration
 from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.exceptions import InvalidPackage
 from arcor2_hw.runtime import messages as m
-from arcor2_hw.runtime.package import read_document
+from arcor2_hw.runtime.documents import read_document
 from arcor2_server.collisions import Placed
 
 if TYPE_CHECKING:
