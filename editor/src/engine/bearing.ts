@@ -1,6 +1,7 @@
-/** Where a place is, seen from the view: in it, or which way to turn. */
+/** Where something is, seen from the view: in it, or which way to turn. Beside the engine, which loads without it. */
 
 import { type PerspectiveCamera, Vector3 } from "three";
+import type { Engine } from "./engine";
 
 export interface Bearing {
   /** Pixels from the view's upper left corner; where it is not in view, on the line there, outside of the view. */
@@ -10,6 +11,25 @@ export interface Bearing {
 }
 
 const at = new Vector3();
+
+/** Where a thing is in the view; null: it is not shown. */
+export function bearingOf(engine: Engine, id: string): Bearing | null {
+  const { things, width, height } = engine.shown();
+  const thing = things.get(id);
+  if (!thing || thing.item.faint >= 1) return null;
+  return bearing(thing.anchor(new Vector3()), engine.view.camera, width, height);
+}
+
+/** Bring a thing into the middle of the view, as far away as what is looked at now. */
+export function lookAt(engine: Engine, id: string): void {
+  const thing = engine.shown().things.get(id);
+  if (!thing) return;
+  if (engine.view.mode === "fly") return engine.focus(id);
+  const { position, target } = engine.view.viewpoint;
+  const to = thing.anchor(new Vector3());
+  const moved = to.clone().sub(new Vector3(...target)).add(new Vector3(...position));
+  engine.view.set(moved.toArray(), to.toArray());
+}
 
 export function bearing(place: Vector3, camera: PerspectiveCamera, width: number, height: number): Bearing {
   camera.updateMatrixWorld();

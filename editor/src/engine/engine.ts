@@ -15,9 +15,7 @@ import {
 } from "three";
 import type { Pose } from "../protocol/types";
 import type { Telemetry } from "../store/telemetry";
-import { type Candidate, aimed, middle, targetsOf } from "./aiming";
 import { Batches } from "./batches";
-import { type Bearing, bearing } from "./bearing";
 import { View } from "./camera";
 import { DropLine, heightWords } from "./drop";
 import { Gizmo } from "./gizmo/gizmo";
@@ -222,31 +220,10 @@ export class Engine {
     });
   }
 
-  /** What the cross in the middle of the view may mean, the likeliest first; `before` is what it meant last. */
-  candidates(before = ""): Candidate[] {
+  /** What is shown, where it is drawn, and how large the view is in pixels: for what is laid over it. */
+  shown(): { things: ReadonlyMap<string, Thing>; width: number; height: number } {
     this.place();
-    const { ray, cone } = middle(this.view.camera, this.height);
-    return aimed(targetsOf(this.things.values()), ray, cone, before);
-  }
-
-  /** Where a thing is in the view, or which way to turn for it; null: it is not shown. */
-  bearing(id: string): Bearing | null {
-    const thing = this.things.get(id);
-    if (!thing || thing.item.faint >= 1) return null;
-    this.place();
-    return bearing(thing.anchor(new Vector3()), this.view.camera, this.width, this.height);
-  }
-
-  /** Bring a thing into the middle of the view, as far away as what is looked at now. */
-  lookAt(id: string): void {
-    const thing = this.things.get(id);
-    if (!thing) return;
-    this.place();
-    if (this.view.mode === "fly") return this.focus(id);
-    const { position, target } = this.view.viewpoint;
-    const to = thing.anchor(new Vector3());
-    const moved = to.clone().sub(new Vector3(...target)).add(new Vector3(...position));
-    this.view.set(moved.toArray(), to.toArray());
+    return { things: this.things, width: this.width, height: this.height };
   }
 
   /** Be called after each drawn frame; gives what ends that. */

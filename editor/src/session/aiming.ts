@@ -1,6 +1,7 @@
 /** The cross in the middle of the view: what it may mean, and which of that is taken next. */
 
 import { create } from "zustand";
+import { aimed, middle, targetsOf } from "../engine/aiming";
 import type { Engine } from "../engine/engine";
 import type { State } from "../store/state";
 import { setUi } from "../store/store";
@@ -41,7 +42,9 @@ export function followCross(engine: Engine, drawn: () => void): () => void {
   let best = "";
   let told = "";
   const look = () => {
-    const ids = engine.candidates(best).map((each) => each.id);
+    const { things, height } = engine.shown();
+    const { ray, cone } = middle(engine.view.camera, height);
+    const ids = aimed(targetsOf(things.values()), ray, cone, best).map((each) => each.id);
     const { candidates, chosen } = useAiming.getState();
     const stays = chosen !== best && ids.includes(chosen);
     best = ids[0] ?? "";

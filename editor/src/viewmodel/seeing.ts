@@ -1,7 +1,10 @@
 /** How the user sees things: what he hides, what he sees through, what fades beside what he looks for. */
 
 import type { OpenDocument, State } from "../store/state";
-import { GROUPS, type Group } from "./things";
+
+/** Kinds of things to look for; `program`: its start, its end and the steps between. */
+export const GROUPS = ["robots", "objects", "points", "actions", "program", "others"] as const;
+export type Group = (typeof GROUPS)[number];
 
 /** How much is seen through what is not looked for. */
 const FADED = 0.85;

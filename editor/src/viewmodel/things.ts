@@ -1,10 +1,8 @@
 /** All that is in the workplace, as the list of things shows it: what hangs on what, by kinds, found by words. */
 
 import type { Kind, State } from "../store/state";
+import { type Group, GROUPS } from "./seeing";
 
-/** What the list is narrowed to; `program`: its start, its end and the steps between. */
-export const GROUPS = ["robots", "objects", "points", "actions", "program", "others"] as const;
-export type Group = (typeof GROUPS)[number];
 
 export interface Row {
   id: string;

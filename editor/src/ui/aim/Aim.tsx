@@ -1,6 +1,7 @@
 /** The cross in the middle of the view, what it means, and the next that it may mean. */
 
 import { useEffect, useRef } from "react";
+import { bearingOf } from "../../engine/bearing";
 import type { Engine } from "../../engine/engine";
 import { keepGeneral } from "../../commands/viewstate";
 import { followCross, nextCandidate, useAiming } from "../../session/aiming";
@@ -25,7 +26,7 @@ export function Aim({ engine }: { engine: Engine }) {
     () =>
       followCross(engine, () => {
         const { chosen: at } = useAiming.getState();
-        const place = at ? engine.bearing(at) : null;
+        const place = at ? bearingOf(engine, at) : null;
         if (!mark.current) return;
         mark.current.style.visibility = place?.inView ? "visible" : "hidden";
         if (place) mark.current.style.transform = `translate(${place.x.toFixed(1)}px, ${place.y.toFixed(1)}px) translate(-50%, -50%)`;

@@ -1,6 +1,7 @@
 /** An arrow at the edge of the view to what is selected and not in it; a tap turns there. */
 
 import { useLayoutEffect, useRef, useState } from "react";
+import { bearingOf, lookAt } from "../../engine/bearing";
 import type { Engine } from "../../engine/engine";
 import { useEditor } from "../../store/store";
 import { nameOf } from "../names";
@@ -16,7 +17,7 @@ export function OffScreen({ engine }: { engine: Engine }) {
   const button = useRef<HTMLButtonElement>(null);
   useLayoutEffect(() => {
     const look = () => {
-      const at = id ? engine.bearing(id) : null;
+      const at = id ? bearingOf(engine, id) : null;
       const shown = at !== null && !at.inView;
       setAway(shown);
       const view = button.current?.closest(".view")?.getBoundingClientRect();
@@ -30,7 +31,7 @@ export function OffScreen({ engine }: { engine: Engine }) {
   }, [engine, id, away]);
   if (!away) return null;
   return (
-    <button ref={button} type="button" className="off-screen" aria-label={`Look at ${name || "what is selected"}, which is out of the view`} title={name} onClick={() => engine.lookAt(id)}>
+    <button ref={button} type="button" className="off-screen" aria-label={`Look at ${name || "what is selected"}, which is out of the view`} title={name} onClick={() => lookAt(engine, id)}>
       <svg width="26" height="26" viewBox="0 0 24 24" fill="none" stroke="currentColor" strokeWidth="2.500" strokeLinecap="round" strokeLinejoin="round" aria-hidden="true">
         <path d="M3 12h17M13 5l7 7-7 7" />
       </svg>

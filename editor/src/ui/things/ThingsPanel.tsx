@@ -5,7 +5,8 @@ import { Input, Label, SearchField, ToggleButton, ToggleButtonGroup } from "reac
 import { keepView } from "../../commands/viewstate";
 import { asideOf } from "../scene/seeing";
 import { useEditor } from "../../store/store";
-import { allOf, counts, fitting, GROUPS, type Group, narrowed, type Row, thingsOf } from "../../viewmodel/things";
+import { type Group, GROUPS } from "../../viewmodel/seeing";
+import { allOf, counts, fitting, narrowed, type Row, thingsOf } from "../../viewmodel/things";
 import { OneOf } from "../kit/fields";
 import { AtTheCross } from "./AtTheCross";
 import { InTheView } from "./InTheView";

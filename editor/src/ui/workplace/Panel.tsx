@@ -10,7 +10,7 @@ import { TOOLS } from "./tools";
 
 const Neighbours = lazily(() => import("../things/Neighbours"));
 
-export function Panel() {
+export default function Panel() {
   const toolId = useEditor((state) => state.ui.tool);
   const selection = useEditor((state) => state.ui.selection);
   const title = useEditor((state) => (selection ? nameOf(state, selection.id) : ""));

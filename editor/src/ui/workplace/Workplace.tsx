@@ -1,13 +1,17 @@
 /** The frame around the open workplace: bar above, tools at the left, the view, a panel at the right, the stop. */
 
+import { Suspense } from "react";
 import { useEditor } from "../../store/store";
+import { lazily } from "../kit/lazily";
 import { Notices } from "../notices/Notices";
 import { Centre } from "./Centre";
-import { Panel } from "./Panel";
 import { Rail } from "./Rail";
 import { StopMotion } from "./StopMotion";
 import { TopBar } from "./TopBar";
 import "./workplace.css";
+
+/** Loaded soon after the view, before a hand can open it. */
+const Panel = lazily(() => import("./Panel"));
 
 export function Workplace() {
   const panel = useEditor((state) => state.ui.tool !== "" || state.ui.selection !== null);
@@ -16,7 +20,11 @@ export function Workplace() {
       <TopBar />
       <Rail />
       <Centre />
-      {panel && <Panel />}
+      {panel && (
+        <Suspense fallback={<aside className="panel" aria-busy="true" />}>
+          <Panel />
+        </Suspense>
+      )}
       <Notices />
       <StopMotion />
     </div>

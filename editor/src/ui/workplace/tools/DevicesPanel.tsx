@@ -6,7 +6,6 @@ import { useEditor } from "../../../store/store";
 import { serves } from "../../../session/session";
 import { Button } from "../../kit/kit";
 import { TONE } from "../sections/about";
-import type { Tool } from "../tools";
 
 const STATES: Record<string, string> = {
   offline: "offline",
@@ -17,7 +16,7 @@ const STATES: Record<string, string> = {
   failed: "not reached",
 };
 
-function Panel() {
+export default function Panel() {
   const live = useEditor((state) => state.live);
   const doc = useEditor((state) => state.doc);
   const cannot = useEditor((state) => barred(state, "RetryObject"));
@@ -57,5 +56,3 @@ function Panel() {
     </>
   );
 }
-
-export const devices: Tool = { id: "devices", label: "Devices", icon: "plug", Panel };
