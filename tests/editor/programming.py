@@ -9,7 +9,7 @@ from typing import Any
 from playwright.async_api import Browser, Locator
 
 from arcor2_hw.client import Client
-from arcor2_hw.client.errors import LockedByOther
+from arcor2_hw.client.errors import LockedByOther, RequestFailed
 from arcor2_hw.data import rpc
 from arcor2_hw.data.events import Event
 from arcor2_hw.data.project import Action, ActionParameter, Flow, FlowTypes, Project
@@ -80,17 +80,24 @@ class Work:
         added_id: str = added.data.id
         return added_id
 
+    async def saved(self) -> Project:
+        """The project as the server has it."""
+        await until(self._saved, "nobody holds anything, so that the project can be saved")
+        stored: Project = await self.client.call("GetProject", rpc.IdArgs(self.project.id))
+        return stored
+
     async def _saved(self) -> bool:
         try:
             await self.client.call("SaveProject")
         except LockedByOther:  # the screen has not given its lock back yet
             return False
+        except RequestFailed as refused:
+            return "no changes to save" in str(refused)
         return True
 
     async def parameters(self, action_id: str) -> dict[str, ActionParameter]:
         """What the server knows that an action is told."""
-        await until(self._saved, "nobody holds anything, so that the project can be saved")
-        stored: Project = await self.client.call("GetProject", rpc.IdArgs(self.project.id))
+        stored = await self.saved()
         actions = (action for point in stored.action_points for action in point.actions)
         return {each.name: each for each in next(one for one in actions if one.id == action_id).parameters}
 

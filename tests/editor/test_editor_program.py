@@ -12,8 +12,9 @@ from playwright.async_api import Browser, expect
 from arcor2_hw.data import rpc
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.events import ChangeType
-from arcor2_hw.data.project import ActionParameter
-from tests.e2e.harness import Cell
+from arcor2_hw.data.geometry import Position
+from arcor2_hw.data.project import ActionParameter, Flow, FlowTypes
+from tests.e2e.harness import Cell, until
 from tests.editor.programming import Work, at_work
 
 pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(180)]
@@ -177,6 +178,140 @@ async def test_a_branch_takes_four_taps_and_a_step_two(work: Work) -> None:
     await work.mode("3D")
 
 
+async def test_a_tap_on_a_graph_that_changes_meanwhile_is_not_lost(work: Work) -> None:
+    """What somebody else adds is laid out when the finger is off."""
+    screen, page = work.screen, work.screen.page
+    await work.add("surely", "robot/get_digital_input", "good", "sure", number=number(2))
+    await page.get_by_role("button", name="Close the panel").click()
+    await work.mode("Flow")
+    graph = page.get_by_role("region", name="The program as a graph")
+    way = graph.get_by_role("button", name="surely: yes", exact=True)
+    await way.hover()
+    await page.mouse.down()
+    at = await way.bounding_box()
+    meanwhile = await work.add("meanwhile", "flow/wait", "bad")
+    await screen.item(meanwhile)
+    await screen.settle()
+    assert await way.bounding_box() == at
+    await page.mouse.up()
+    await page.get_by_role("status").filter(has_text="Tap what follows surely").wait_for()
+    await graph.locator('.react-flow__node[aria-label^="meanwhile,"]').wait_for()
+    await page.keyboard.press("Escape")
+
+
+async def test_a_straight_run_is_folded_into_one_and_open_where_something_is_to_be_seen(work: Work) -> None:
+    """X8."""
+    screen, page = work.screen, work.screen.page
+    names = ("first", "second", "third")
+    first, second, third = [await work.add(name, "flow/wait", "good") for name in names]
+    lead = await work.add("lead", "flow/wait", "bad")
+    head = work.action("into_bad_box").id
+    last = next(each for each in work.project.logic if each.start == head)
+    ways = [(first, second), (second, third), (third, "END")]
+    for start, end in ways:
+        await work.client.call("AddLogicItem", rpc.AddLogicItemArgs(start, end))
+    await work.client.call("UpdateLogicItem", rpc.UpdateLogicItemArgs(last.id, last.start, first))
+    await work.mode("Flow")
+    graph = page.get_by_role("region", name="The program as a graph")
+    await graph.get_by_role("button", name="Fold the 4 actions from into_bad_box on into one").click()
+    one = graph.locator('.react-flow__node[aria-label="4 actions folded into one, into_bad_box, first, second, third"]')
+    await one.wait_for()
+    inner = graph.locator('.react-flow__node[aria-label^="second,"]')
+    await expect(inner).to_have_count(0)
+    await screen.picture("program folded")
+    # What is selected elsewhere is seen, and folded again when it is not selected any more.
+    await work.select("second")
+    await inner.wait_for()
+    await expect(one).to_have_count(0)
+    await page.get_by_role("button", name="Close the panel").click()
+    await one.wait_for()
+    # A step that leads there leads to its first action.
+    await work.tap_button("lead: next", graph)
+    await one.locator(".flow-name").click()
+    step = await work.told("LogicItemChanged", lambda event: event.data.start == lead)
+    assert step.data.end == head
+    # A fault is seen as well: a way out of it that was taken away.
+    out = next(each for each in (await work.saved()).logic if each.start == third)
+    await work.client.call("RemoveLogicItem", rpc.RemoveLogicItemArgs(out.id))
+    await page.get_by_role("button", name="Close the panel").click()
+    await inner.wait_for()
+    await work.client.call("AddLogicItem", rpc.AddLogicItemArgs(third, "END"))
+    await one.wait_for()
+    # As this user has it on all tablets, until he opens it.
+    await work.mode("3D")
+    await work.mode("Flow")
+    await one.locator(".flow-name").click()
+    await inner.wait_for()
+    await work.mode("3D")
+
+
+async def test_an_action_is_renamed_and_duplicated(work: Work) -> None:
+    """E-06."""
+    page = work.screen.page
+    look = await work.add("look_there", "robot/get_digital_input", "good", "seen", number=number(3))
+    await work.select("look_there")
+    await work.tap_button("Rename", work.panel)
+    name = work.panel.get_by_label("New name")
+    await name.fill("scan")
+    await name.press("Enter")
+    await expect(work.panel.get_by_role("alert")).to_contain_text("scan already")
+    await name.fill("look_here")
+    await name.press("Enter")
+    renamed = await work.told("ActionChanged", lambda event: event.data.name == "look_here")
+    assert renamed.change_type is ChangeType.UPDATE_BASE
+    await work.panel.get_by_role("heading", name="look_here", exact=True).wait_for()
+    await work.tap_button("Duplicate", work.panel)
+    copy = (await work.told("ActionChanged", lambda event: event.change_type is ChangeType.ADD)).data
+    saved = {each.id: each for point in (await work.saved()).action_points for each in point.actions}
+    assert (saved[copy.id].type, saved[copy.id].parameters) == (saved[look].type, [number(3)])
+    assert saved[copy.id].flows[0].outputs not in ([], ["seen"]), "each result has a name of its own"
+    await work.panel.get_by_role("heading", name=copy.name, exact=True).wait_for()
+    await work.tap_button("Remove", work.panel)
+    await work.told("ActionChanged", lambda event: event.change_type is ChangeType.REMOVE)
+    await expect(page.get_by_role("option", name=f"{copy.name} Action")).to_have_count(0)
+
+
+async def test_an_action_goes_with_its_steps_and_comes_back_by_one_undo(work: Work) -> None:
+    """U-09: what led to it leads on meanwhile."""
+    page = work.screen.page
+    before = await work.saved()
+    close, test, after = (work.action(name).id for name in ("close", "test", "open_again"))
+    await work.select("test")
+    await work.tap_button("Remove", work.panel)
+    # It is needed: who asks whether it passed is named, and nothing is gone.
+    await work.screen.sees("A result of test is used by a condition of the logic")
+    assert (await work.saved()).logic == before.logic
+    await work.select("close")
+    work.taps = 0
+    await work.tap_button("Remove", work.panel)
+    await work.told("ActionChanged", lambda event: event.change_type is ChangeType.REMOVE)
+    now = await work.saved()
+    assert {(each.start, each.end) for each in now.logic if each.end == test} == {(work.action("insert").id, test)}
+    assert not [each for each in now.logic if close in (each.start, each.end)]
+    await page.get_by_role("button", name="Undo removing the action close and 2 more").click()
+    await work.told("ActionChanged", lambda event: event.change_type is ChangeType.ADD)
+
+    async def back() -> bool:
+        return bool((await work.saved()).logic == before.logic)
+
+    await until(back, "all of it is back by one undo")
+    assert after in {each.end for each in before.logic}
+
+
+async def test_the_steps_are_drawn_in_the_view_or_not(work: Work) -> None:
+    """E-10."""
+    step = work.project.logic[0].id
+    await work.screen.item(step)
+    await work.tool("Program")
+    await work.mode("Actions")
+    drawn = work.panel.get_by_label("Steps are drawn in the 3D view")
+    await drawn.click()
+    await work.screen.until("id => window.__engine.item(id) === undefined", step)
+    await work.screen.item(work.action("scan").id)
+    await drawn.click()
+    await work.screen.item(step)
+
+
 async def test_a_step_in_the_view_and_a_condition_on_an_integer_with_else(work: Work) -> None:
     screen, page = work.screen, work.screen.page
     await work.mode("3D")
@@ -294,3 +429,30 @@ async def test_nothing_of_it_is_too_small_covered_or_off_the_screen(work: Work) 
                 found[f"{tab}, {name}"] = faults
             await screen.picture(f"program {tab} {name}")
     assert found == {}
+
+
+async def test_a_project_without_logic_has_actions_and_no_program(work: Work) -> None:
+    """E-16: its actions are run by themselves, or by a script; nothing asks for steps."""
+    page = work.screen.page
+    await work.screen.page.set_viewport_size({"width": 1280, "height": 800})
+    await work.saved()
+    await work.client.call("CloseProject")
+    await work.client.call("NewProject", rpc.NewProjectArgs(work.scene.id, "Loose actions", has_logic=False))
+    await page.get_by_role("heading", name="Loose actions").wait_for()
+    await work.client.call("AddActionPoint", rpc.AddActionPointArgs("here", Position(0.4, 0.0, 0.2)))
+    point = (await work.told("ActionPointChanged")).data.id
+    flows = [Flow(FlowTypes.DEFAULT, [])]
+    args = rpc.AddActionArgs(point, "alone", f"{work.object('flow')}/wait", [], flows)
+    await work.client.call("AddAction", args)
+    alone = (await work.told("ActionChanged")).data.id
+    await work.screen.item(alone)
+    assert await page.evaluate("['START', 'END'].map((id) => __engine.item(id) ?? null)") == [None, None]
+    modes = page.get_by_role("radiogroup", name="How it is shown").get_by_role("radio")
+    assert await modes.all_inner_texts() == ["3D", "Code"]
+    await work.select("alone")
+    assert await work.panel.get_by_text("What follows", exact=True).count() == 0
+    await work.panel.get_by_role("button", name="Run to here").click(force=True)
+    await work.screen.sees("The project has no program.")
+    await work.tool("Program")
+    await work.mode("Check")
+    await work.panel.get_by_text("Nothing is wrong: it can be run.").wait_for()

@@ -8,12 +8,13 @@ import type { OpenDocument, State } from "../store/state";
 import { initialState } from "../store/state";
 import { textOfZip } from "../ui/code/package";
 import { pieces } from "../ui/code/python";
-import { graphOf } from "../ui/flow/graph";
+import { firstIn, graphOf, lastIn } from "../ui/flow/graph";
 import { against } from "../commands/aimed";
 import { cannotLead, conditionWords, freeStep, usable } from "./logic";
 import { freeName, newOutputs } from "./naming";
 import { problemsOf, usersOf } from "./problems";
 import { reachOfAction } from "./reach";
+import { foldedRuns, runsOf } from "./runs";
 import { double, extraOf, initial, rangeWords, read, textOf } from "./values";
 
 const meta = (name: string, returns: string[], parameters: ObjectAction["parameters"] = []): ObjectAction => ({
@@ -130,6 +131,32 @@ test("the graph goes from top to bottom, and offers the ways that are free", () 
   expect(of("START")?.ways).toEqual([]);
   expect(of("c")?.ways.map((each) => each.id)).toEqual(["next"]);
   expect(lines.map((each) => [each.words, each.branch])).toEqual([["", "always"], ["yes", "true"], ["", "always"]]);
+});
+
+describe("straight runs", () => {
+  const doc = program({ a: "ask", b: "act", c: "act", d: "act", e: "act", f: "act" }, [["START", "a"], ["a", "b", "true"], ["b", "c"], ["c", "d"], ["d", "e"], ["a", "f", "false"], ["f", "e"], ["e", "END"]]);
+
+  test("end where ways part or meet, and are of three actions at least", () => {
+    expect(runsOf(doc)).toEqual([["b", "c", "d"]]);
+    // A condition, or a second way in, ends one.
+    expect(runsOf(program({ a: "act", b: "ask", c: "act", d: "act" }, [["a", "b"], ["b", "c", "true"], ["c", "d"]]))).toEqual([]);
+    expect(runsOf(program({ a: "act", b: "act" }, [["a", "b"]]))).toEqual([]);
+  });
+
+  test("are one node with a count, which steps lead to and from as to and from its ends", () => {
+    const folded = foldedRuns(doc, new Set(["c"]), new Set());
+    const { boxes, lines } = graphOf(doc, TYPES, folded);
+    const one = boxes.find((each) => each.kind === "fold");
+    expect([one?.name, one?.detail]).toEqual(["3 actions", "b, c, d"]);
+    expect(boxes.map((each) => each.id)).toEqual(["START", "a", "e", "f", "fold/b", "END"]);
+    expect(lines.map((each) => [each.from, each.to])).toEqual([["START", "a"], ["a", "fold/b"], ["fold/b", "e"], ["a", "f"], ["f", "e"], ["e", "END"]]);
+    expect(one && [firstIn(one), lastIn(one)]).toEqual(["b", "d"]);
+  });
+
+  test("are open where something in them is to be seen", () => {
+    expect(foldedRuns(doc, new Set(["b", "c", "d"]), new Set(["d"]))).toEqual([]);
+    expect(foldedRuns(doc, new Set(), new Set())).toEqual([]);
+  });
 });
 
 describe("values", () => {

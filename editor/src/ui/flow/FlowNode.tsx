@@ -5,7 +5,8 @@ import { beginStep, notEditable } from "../../commands/program";
 import { now, tell } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { ReachBadge } from "../points/Reach";
-import type { Box, Way } from "./graph";
+import { fold } from "./folding";
+import { type Box, lastIn, type Way } from "./graph";
 
 export type FlowNodeType = Node<{ box: Box; running: boolean; breakpoint: boolean; paused: boolean; trouble: string; target: boolean; from: boolean }, "box">;
 
@@ -15,6 +16,7 @@ export function FlowNode({ data }: NodeProps<FlowNodeType>) {
     <div className={`flow-node ${box.kind}`} data-running={running} data-target={target} data-from={from}>
       {box.kind !== "start" && <Handle type="target" position={Position.Top} className="flow-into" isConnectableStart={false} aria-hidden />}
       <div className="flow-name">
+        {box.kind === "fold" && <Icon name="list" size={18} />}
         {breakpoint && <span className="breakpoint-dot" data-on="true" role="img" aria-label="pauses before it" />}
         {box.name}
         {box.kind === "action" && <ReachBadge id={box.id} />}
@@ -25,6 +27,20 @@ export function FlowNode({ data }: NodeProps<FlowNodeType>) {
           </span>
         )}
       </div>
+      {box.kind === "action" && box.run.length > 0 && (
+        <button
+          type="button"
+          className="flow-fold nodrag nopan"
+          aria-label={`Fold the ${box.run.length} actions from ${box.name} on into one`}
+          onClick={(event) => {
+            event.stopPropagation();
+            fold(box.run);
+          }}
+          onKeyDown={(event) => event.stopPropagation()}
+        >
+          Fold {box.run.length}
+        </button>
+      )}
       {box.detail && <div className="quiet small flow-detail">{box.detail}</div>}
       <div className="flow-ways">
         {box.ways.map((way) => (
@@ -39,12 +55,12 @@ export function FlowNode({ data }: NodeProps<FlowNodeType>) {
             aria-label={`${box.name}: ${way.label}`}
             onClick={(event) => {
               event.stopPropagation();
-              begin(box.id, way);
+              begin(lastIn(box), way);
             }}
             onKeyDown={(event) => {
               if (event.key !== "Enter" && event.key !== " ") return;
               event.stopPropagation();
-              begin(box.id, way);
+              begin(lastIn(box), way);
             }}
           >
             {way.label}

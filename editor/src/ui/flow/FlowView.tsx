@@ -1,15 +1,18 @@
 /** The program as a graph. What is selected here is selected everywhere; a program that runs is followed. */
 
-import { useEffect, useMemo } from "react";
-import { Background, Controls, type Edge, MarkerType, ReactFlow, ReactFlowProvider, useReactFlow } from "@xyflow/react";
+import { useEffect, useMemo, useRef } from "react";
+import { Background, Controls, type Edge, MarkerType, Panel, ReactFlow, ReactFlowProvider, useReactFlow } from "@xyflow/react";
 import "@xyflow/react/dist/base.css";
 import { connect, endStep, notEditable, removeAction, removeStep } from "../../commands/program";
 import { cannotLead } from "../../program/logic";
 import { problemsOf } from "../../program/problems";
 import { now, select, setUi, tell, useEditor } from "../../store/store";
+import { ToggleButton } from "react-aria-components";
 import { selectionOf } from "../names";
 import { conditionOf, FlowNode, type FlowNodeType } from "./FlowNode";
-import { graphOf } from "./graph";
+import { foldAll, unfold, useFolds } from "./folding";
+import { type Box, firstIn, graphOf, lastIn } from "./graph";
+import { usePressed } from "./usePressed";
 import "../program/program.css";
 import "./flow.css";
 
@@ -38,8 +41,12 @@ function Flow() {
   const connecting = useEditor((state) => state.ui.connecting);
   const follow = useEditor((state) => state.ui.follow);
   const dark = useEditor((state) => state.ui.theme === "dark" || (state.ui.theme === "system" && state.ui.systemDark));
-  const graph = useMemo(() => (doc ? graphOf(doc, types) : { boxes: [], lines: [] }), [doc, types]);
-  const problems = useMemo(() => (doc ? problemsOf(doc, types) : []), [doc, types]);
+  const reach = useEditor((state) => state.reach);
+  const problems = useMemo(() => (doc ? problemsOf(doc, types, reach) : []), [doc, types, reach]);
+  const folds = useFolds(problems);
+  const latest = useMemo(() => (doc ? graphOf(doc, types, folds.folded) : { boxes: [], lines: [] }), [doc, types, folds.folded]);
+  const host = useRef<HTMLDivElement>(null);
+  const graph = usePressed(host, latest);
   const { fitView } = useReactFlow();
 
   const nodes = graph.boxes.map(
@@ -50,15 +57,15 @@ function Flow() {
       width: box.width,
       height: box.height,
       selected: box.id === selected,
-      ariaLabel: `${box.name}${box.detail ? `, ${box.detail}` : ""}`,
+      ariaLabel: `${box.name}${box.kind === "fold" ? " folded into one" : ""}${box.detail ? `, ${box.detail}` : ""}`,
       data: {
         box,
         running: running.includes(box.id) || executing === box.id,
         paused,
         breakpoint: box.id in breakpoints,
         trouble: problems.find((each) => each.id === box.id)?.text ?? "",
-        target: connecting !== null && doc !== null && cannotLead(doc, connecting.from, box.id, connecting.item) === "",
-        from: connecting?.from === box.id,
+        target: connecting !== null && doc !== null && cannotLead(doc, connecting.from, firstIn(box), connecting.item) === "",
+        from: connecting?.from === lastIn(box),
       },
     }),
   );
@@ -80,17 +87,20 @@ function Flow() {
   });
 
   const last = running.at(-1);
+  const known = graph.boxes.some((each) => each.id === last);
   useEffect(() => {
-    if (follow && last !== undefined) void fitView({ nodes: [{ id: last }], maxZoom: 1, duration: 200 });
-  }, [follow, last, fitView]);
+    if (follow && last !== undefined && known) void fitView({ nodes: [{ id: last }], maxZoom: 1, duration: 200 });
+  }, [follow, last, known, fitView]);
   // A graph that grew is seen whole again.
   const size = graph.boxes.length;
   useEffect(() => {
     void fitView(WHOLE);
   }, [size, fitView]);
 
+  const box = (id: string): Pick<Box, "id" | "kind" | "run" | "ways"> => graph.boxes.find((each) => each.id === id) ?? { id, kind: "action", run: [], ways: [] };
+
   return (
-    <div className="flow" role="region" aria-label="The program as a graph">
+    <div className="flow" role="region" aria-label="The program as a graph" ref={host}>
       <ReactFlow
         nodes={nodes}
         edges={edges}
@@ -103,35 +113,51 @@ function Flow() {
         maxZoom={2}
         fitView
         fitViewOptions={WHOLE}
-        isValidConnection={({ source, target }) => doc !== null && cannotLead(doc, source, target) === ""}
+        isValidConnection={({ source, target }) => doc !== null && cannotLead(doc, lastIn(box(source)), firstIn(box(target))) === ""}
         onConnect={({ source, target, sourceHandle }) => {
           const why = notEditable(now(), "AddLogicItem");
           if (why) return tell("info", why);
-          const way = graph.boxes.find((each) => each.id === source)?.ways.find((each) => each.id === sourceHandle);
-          void connect(source, target, way && conditionOf(way));
+          const way = box(source).ways.find((each) => each.id === sourceHandle);
+          void connect(lastIn(box(source)), firstIn(box(target)), way && conditionOf(way));
         }}
-        onNodeClick={(_, { id }) => choose(id)}
-        onEdgeClick={(_, { id }) => choose(id)}
+        onNodeClick={(_, { id }) => choose(box(id))}
+        onEdgeClick={(_, { id }) => choose({ id, kind: "action", run: [] })}
         onPaneClick={() => (now().ui.connecting ? setUi({ connecting: null }) : select(null))}
         onNodesChange={(changes) => {
           // By the keyboard: Enter on a node that has the focus.
-          for (const change of changes) if (change.type === "select" && change.selected && change.id !== now().ui.selection?.id) choose(change.id);
+          for (const change of changes) if (change.type === "select" && change.selected && change.id !== now().ui.selection?.id) choose(box(change.id));
         }}
         onDelete={({ nodes: gone, edges: lines }) => void remove(gone.map((each) => each.id), lines.map((each) => each.id))}
         proOptions={{ hideAttribution: true }}
       >
         <Background gap={24} />
         <Controls showInteractive={false} position="bottom-left" />
+        {folds.runs > 0 && (
+          <Panel position="bottom-center">
+            <ToggleButton className="button" isSelected={folds.wished} onChange={(on) => foldAll(on)}>
+              {folds.wished ? "Unfold all" : "Fold straight runs"}
+            </ToggleButton>
+          </Panel>
+        )}
       </ReactFlow>
     </div>
   );
 }
 
-function choose(id: string): void {
+/** What ended a step just now: the graph tells of one tap twice, as a tap and as another selection. */
+let ended = "";
+
+function choose(box: Pick<Box, "id" | "kind" | "run">): void {
+  const id = firstIn(box);
   if (now().ui.connecting) {
-    if (selectionOf(now(), id)?.kind !== "logic") void endStep(id);
+    if (selectionOf(now(), id)?.kind === "logic") return;
+    ended = id;
+    setTimeout(() => (ended = ""));
+    void endStep(id);
     return;
   }
+  if (ended === id) return;
+  if (box.kind === "fold") return unfold(box.run);
   select(selectionOf(now(), id));
   setUi({ tool: "" });
 }

@@ -2,6 +2,7 @@
 
 import { Graph, layout } from "@dagrejs/dagre";
 import { conditionWords, END, outgoing, placeOf, resultsOf, START } from "../../program/logic";
+import { runsOf } from "../../program/runs";
 import type { OpenDocument, State } from "../../store/state";
 
 const NODE = { width: 230, height: 64 };
@@ -19,10 +20,12 @@ export interface Way {
 
 export interface Box {
   id: string;
-  kind: "action" | "start" | "end";
+  kind: "action" | "start" | "end" | "fold";
   name: string;
   detail: string;
   ways: Way[];
+  /** Actions that are folded into it, or can be, of which it is the first; in their order. */
+  run: string[];
   x: number;
   y: number;
   width: number;
@@ -37,31 +40,55 @@ export interface Line {
   branch: "always" | "true" | "false" | "value";
 }
 
-export function graphOf(doc: OpenDocument, types: State["types"]): { boxes: Box[]; lines: Line[] } {
-  const lines = Object.values(doc.logic).map((item): Line => {
-    const { value } = item.condition ?? {};
-    return {
-      id: item.id,
-      from: placeOf(item.start),
-      to: placeOf(item.end),
-      words: conditionWords(doc, types, item),
-      branch: value === undefined ? "always" : value === "true" || value === "false" ? value : "value",
-    };
-  });
+/** As which node a folded run stands in the graph; no action has such an id. */
+export const foldOf = (run: readonly string[]): string => `fold/${run[0] ?? ""}`;
+
+/** `folded` are the runs that are one node each. */
+export function graphOf(doc: OpenDocument, types: State["types"], folded: readonly string[][] = []): { boxes: Box[]; lines: Line[] } {
+  const into = new Map(folded.flatMap((run) => run.map((id) => [id, foldOf(run)] as const)));
+  const shown = (id: string) => into.get(id) ?? id;
+  const lines = Object.values(doc.logic)
+    .map((item): Line => {
+      const { value } = item.condition ?? {};
+      return {
+        id: item.id,
+        from: shown(placeOf(item.start)),
+        to: shown(placeOf(item.end)),
+        words: conditionWords(doc, types, item),
+        branch: value === undefined ? "always" : value === "true" || value === "false" ? value : "value",
+      };
+    })
+    .filter(({ from, to }) => from !== to);
+  const runs = new Map(runsOf(doc).map((run) => [run[0] ?? "", run]));
   const bare: Omit<Box, "x" | "y">[] = [
-    { id: START, kind: "start", name: "Start", detail: "", ways: lines.some((each) => each.from === START) ? [] : [{ id: "next", label: "next" }], ...BORDER },
-    ...Object.values(doc.actions).map((action) => ({
-      id: action.id,
-      kind: "action" as const,
-      name: action.name,
-      detail: `${doc.objects[action.type.split("/")[0] ?? ""]?.name ?? "?"} at ${doc.points[action.pointId]?.name ?? "?"}`,
-      ...sized(waysOf(doc, types, action.id)),
+    { id: START, kind: "start", name: "Start", detail: "", ways: lines.some((each) => each.from === START) ? [] : [{ id: "next", label: "next" }], run: [], ...BORDER },
+    ...Object.values(doc.actions)
+      .filter((action) => !into.has(action.id))
+      .map((action) => ({
+        id: action.id,
+        kind: "action" as const,
+        name: action.name,
+        detail: `${doc.objects[action.type.split("/")[0] ?? ""]?.name ?? "?"} at ${doc.points[action.pointId]?.name ?? "?"}`,
+        run: runs.get(action.id) ?? [],
+        ...sized(waysOf(doc, types, action.id)),
+      })),
+    ...folded.map((run) => ({
+      id: foldOf(run),
+      kind: "fold" as const,
+      name: `${run.length} actions`,
+      detail: run.map((id) => doc.actions[id]?.name ?? "").join(", "),
+      run,
+      ...sized(waysOf(doc, types, run.at(-1) ?? "")),
     })),
-    { id: END, kind: "end", name: "End", detail: "", ways: [], ...BORDER },
+    { id: END, kind: "end", name: "End", detail: "", ways: [], run: [], ...BORDER },
   ];
   const places = placed(bare, lines);
   return { boxes: bare.map((box) => ({ ...box, ...(places.get(box.id) ?? { x: 0, y: 0 }) })), lines };
 }
+
+/** The action from which steps lead on from a node, and the one to which they lead. */
+export const lastIn = (box: Pick<Box, "id" | "kind" | "run">): string => (box.kind === "fold" ? (box.run.at(-1) ?? box.id) : box.id);
+export const firstIn = (box: Pick<Box, "id" | "kind" | "run">): string => (box.kind === "fold" ? (box.run[0] ?? box.id) : box.id);
 
 function sized(ways: Way[]): Pick<Box, "ways" | "width" | "height"> {
   return { ways, width: NODE.width, height: NODE.height + (ways.length > 0 ? WAYS : 0) };
