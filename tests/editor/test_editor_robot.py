@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import itertools
 import math
 import re
 import time
@@ -233,6 +234,87 @@ async def test_a_goal_is_shown_by_a_ghost_and_told_in_words_before_the_robot_mov
     await page.keyboard.press("Enter")
     await place.robot_panel("Tool")
     await place.screen.until("id => window.__engine.item(id).ghost === null", place.robot)
+
+
+async def test_a_goal_is_dragged_and_the_ghost_follows(place: Place) -> None:
+    """R-09: asked at most ten times a second, and of the newest goal alone; the way there is shown."""
+    page, screen = place.screen.page, place.screen
+    before = await place.stands()
+    await place.robot_panel("Go to")
+    await place.button("Back to the tool").click()
+    await page.evaluate("id => __engine.focus(id)", place.robot)
+    await page.evaluate(
+        """() => {
+            const send = WebSocket.prototype.send;
+            window.questions = [];
+            WebSocket.prototype.send = function (text) {
+                const { request, args } = JSON.parse(text);
+                if (request === 'InverseKinematics' && args.avoid_collisions) window.questions.push(performance.now());
+                return send.call(this, text);
+            };
+        }"""
+    )
+    handle = await _handle(place, "axis z")
+    await page.mouse.move(*handle)
+    await page.mouse.down()
+    for step in range(1, 31):
+        await page.mouse.move(handle[0], handle[1] - step)
+        await asyncio.sleep(0.02)
+    await page.mouse.up()
+    await screen.sees("It can go there: the ghost shows how.")
+    move = place.button("Move there")
+    await expect(move).to_be_enabled()
+    asked = await page.evaluate("window.questions")
+    assert len(asked) >= 3, "it follows while it is dragged"
+    assert min(b - a for a, b in itertools.pairwise(asked)) > 90
+    goal = float((await page.get_by_label("Z mm").input_value()).replace(",", "")) / 1000
+    assert goal > before.z + 0.01
+    ghost = await screen.until("id => window.__engine.item(id).ghost", place.robot)
+    real = (await screen.item(place.robot))["joints"]
+    assert max(abs(ghost[name] - real[name]) for name in real) > 0.01
+    assert math.dist(tuple(await place.tool()), tuple(before)) < AT_REST, "the robot waits"
+    way = await page.evaluate("__engine.way")
+    assert way["state"] == "free"
+    assert way["to"]["z"] - way["from"]["z"] == pytest.approx(goal - before.z, abs=2e-3)
+    await screen.picture("robot goal dragged")
+    await move.click()
+    await until(_higher(place, goal - 1e-3), "it went there", 15)
+    await place.stands()
+    assert await page.evaluate("__engine.way") is None, "there is no way left"
+    # Dragged where it cannot be: told why, the ghost stays behind, and it is given up by one tap.
+    await place.choose("Drag the goal in the view", "Move it")
+    handle = await _handle(place, "axis z")
+    await page.mouse.move(*handle)
+    await page.mouse.down()
+    await page.mouse.move(handle[0], handle[1] - 600, steps=5)
+    await page.mouse.up()
+    await expect(page.locator("p.error[role=status]")).to_be_visible()
+    assert (await page.evaluate("__engine.way"))["state"] == "blocked"
+    await screen.picture("robot goal out of reach")
+    await place.button("Back to the tool").click()
+    await screen.until("id => window.__engine.item(id).ghost === null && window.__engine.way === null", place.robot)
+    await expect(page.locator("p.error[role=status]")).to_have_count(0)
+    await place.robot_panel("Tool")
+    assert await page.evaluate("__engine.gizmo.shown") is False
+
+
+async def _handle(place: Place, name: str) -> tuple[float, float]:
+    """Where a handle of the gizmo is on the page, once it stays there."""
+    box = await place.screen.page.locator(".view canvas").bounding_box()
+    assert box is not None
+    last: dict[str, float] = {}
+
+    async def rest() -> dict[str, float] | None:
+        nonlocal last
+        at: dict[str, float] | None = await place.screen.page.evaluate(
+            "async (name) => { await new Promise(requestAnimationFrame); return __engine.gizmo.places()[name]; }", name
+        )
+        still = at is not None and at == last
+        last = at or {}
+        return at if still else None
+
+    at = await until(rest, f"the handle {name} stands", 15)
+    return box["x"] + at["x"], box["y"] + at["y"]
 
 
 @pytest.mark.parametrize("by", ["tap", "keys"])

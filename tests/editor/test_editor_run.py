@@ -3,6 +3,7 @@
 from collections.abc import AsyncIterator
 from typing import Any
 
+import httpx
 import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, expect
@@ -20,9 +21,35 @@ BEGUN = 60_000
 """ms until a program that was started is there: it is built, and its host started, on a busy machine."""
 
 
+STORE = '''
+from arcor2_hw.actions import action
+from arcor2_hw.objects import Generic
+
+
+class Store(Generic):
+    """Shelves whose content is known to nobody but themselves."""
+
+    _ABSTRACT = False
+    DYNAMIC_PARAMS = {"shelf": ("shelves", set()), "board": ("boards", {"shelf"})}
+
+    def shelves(self) -> set[str]:
+        return {"upper", "lower"}
+
+    def boards(self, shelf: str) -> set[str]:
+        return {f"{shelf} board {number}" for number in range(4)}
+
+    @action
+    def fetch(self, shelf: str, board: str, *, an: str | None = None) -> None:
+        """Fetch a board."""
+'''
+
+
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def work(cell: Cell, browser: Browser) -> AsyncIterator[Work]:
-    async with at_work(cell, browser) as open_project:
+    async with httpx.AsyncClient(base_url=cell.url.replace("ws", "http", 1)) as rest:
+        answer = await rest.put("/object-types", json={"id": "Store", "name": "Store", "source": STORE})
+        assert answer.status_code == 200, answer.text
+    async with at_work(cell, browser, ("store", "Store")) as open_project:
         yield open_project
 
 
@@ -39,6 +66,11 @@ async def test_runs_to_an_action_in_two_taps_steps_and_tells_where_it_failed(wor
     """U-08. The reader has no code in front of it: scanning fails, which is what somebody has to understand."""
     screen, page = work.screen, work.screen.page
     scan = work.action("scan").id
+    # In the graph, beside the view: its run of actions is folded, until one of them runs.
+    await work.mode("Both")
+    graph = page.get_by_role("region", name="The program as a graph")
+    await graph.get_by_role("button", name="Fold straight runs").click()
+    await graph.locator('.react-flow__node[aria-label^="8 actions folded into one, scan, open"]').wait_for()
     await work.select("scan")
     looked_from = await page.evaluate("__engine.view.camera.position.toArray()")
     work.taps = 1  # what selected it
@@ -56,7 +88,11 @@ async def test_runs_to_an_action_in_two_taps_steps_and_tells_where_it_failed(wor
     await expect(trace).to_contain_text("times")
     await expect(trace).to_contain_text("boards_left")
     await expect(trace.get_by_role("button", name="scan")).to_contain_text("waits")
+    await page.get_by_role("button", name="Close the panel").click()
+    here = graph.locator('.react-flow__node[aria-label^="scan,"]')
+    await expect(here).to_contain_text("next")
     await screen.picture("run paused")
+    await work.tool("Run")
 
     # Somebody who comes now sees all of it.
     async with screen_of(browser, work.cell.url) as other:
@@ -120,6 +156,33 @@ async def test_one_action_is_tried_with_its_result_and_another_is_cancelled(work
     await work.tap_button("Cancel", work.panel)
     await work.told("ActionCancelled")
     await work.panel.get_by_role("button", name="Try it").wait_for()
+
+
+async def test_what_there_is_to_choose_is_asked_of_the_device_and_kept_when_it_is_offline(work: Work) -> None:
+    """E-05: the second choice depends on the first one."""
+    page = work.screen.page
+    fetch = await work.add(
+        "fetch_one",
+        "store/fetch",
+        "fixture",
+        shelf=ActionParameter("shelf", "string", '"upper"'),
+        board=ActionParameter("board", "string", '""'),
+    )
+    await work.select("fetch_one")
+    shelf, board = work.panel.get_by_label("shelf", exact=True), work.panel.get_by_label("board", exact=True)
+    await shelf.get_by_text("lower").click()
+    await work.told("ActionChanged", lambda event: event.data.name == "fetch_one")
+    await board.select_option(label="lower board 2")
+    await work.told("ActionChanged", lambda event: event.data.name == "fetch_one")
+    told = await work.parameters(fetch)
+    assert (told["shelf"].value, told["board"].value) == ('"lower"', '"lower board 2"')
+    await work.screen.press("Online. Press to go offline")
+    await page.get_by_role("button", name="Go online", exact=True).wait_for()
+    await expect(work.panel.get_by_text("as the device told last")).to_have_count(2)
+    assert await board.locator("option").all_inner_texts() == [f"lower board {number}" for number in range(4)]
+    # Of another shelf nobody has told anything.
+    await shelf.get_by_text("upper").click()
+    await work.panel.get_by_text("go online to choose from what the device has").wait_for()
 
 
 async def test_a_package_is_built_under_the_name_that_is_proposed(work: Work) -> None:

@@ -3,7 +3,7 @@
 import type { Joint, Pose, RobotArg, RobotFeatures, StepAxis, StepMode, StepWhat } from "../protocol/types";
 import { call } from "../session/session";
 import { robotsOf } from "../session/streams";
-import type { Arm, State } from "../store/state";
+import type { Arm, Ghost, State } from "../store/state";
 import { now, setUi } from "../store/store";
 import { telemetry } from "../store/telemetry";
 import { barred, held, refusal, sentence } from "./asking";
@@ -126,20 +126,30 @@ export function acknowledgeStop(object_id: string): Promise<string> {
 }
 
 // ------------------------------------------------------------------------------------------------ ghost
+export interface Showing {
+  /** Whether it is still wanted when the answer is there. */
+  current?: () => boolean;
+  /** Where nobody knows joints for it: leave the ghost that there is, marked as impossible. */
+  keep?: boolean;
+}
+
 /**
  * Show the robot where it would be at a pose in the world. Gives what stands against it as a sentence, empty when
  * nothing does; what would collide is shown all the same, as far as there are joints for it.
  */
-export async function showAt(chosen: Chosen, pose: Pose): Promise<string> {
+export async function showAt(chosen: Chosen, pose: Pose, { current = () => true, keep = false }: Showing = {}): Promise<string> {
   const ask = (avoid_collisions: boolean) =>
     call("InverseKinematics", { robot_id: chosen.robotId, end_effector_id: chosen.effector, pose, avoid_collisions, ...ofArm(chosen.armId) });
+  const show = (ghost: Ghost | null) => current() && setUi({ ghost });
   try {
-    setUi({ ghost: { robotId: chosen.robotId, joints: await ask(true), problem: "" } });
+    show({ robotId: chosen.robotId, joints: await ask(true), problem: "" });
     return "";
   } catch (error) {
     const problem = sentence(error);
     const joints = await ask(false).catch(() => null);
-    setUi({ ghost: joints ? { robotId: chosen.robotId, joints, problem } : null });
+    const before = now().ui.ghost;
+    if (joints) show({ robotId: chosen.robotId, joints, problem });
+    else show(keep && before?.robotId === chosen.robotId ? { ...before, problem } : null);
     return problem;
   }
 }

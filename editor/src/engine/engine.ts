@@ -29,6 +29,7 @@ import { worldPose } from "./poses";
 import { type Context, type Quality, type Thing, trianglesOf } from "./thing";
 import { Ties } from "./ties";
 import { make } from "./things/make";
+import { type Way, WayLine } from "./way";
 import { type JointLimit, RobotThing } from "./things/robot";
 
 export type { Quality };
@@ -103,6 +104,7 @@ export class Engine {
   private readonly drop: DropLine;
   /** Lines from points to what they hang on. */
   readonly ties: Ties;
+  private readonly wayLine: WayLine;
   private readonly ends: (() => void)[] = [];
   private down: { x: number; y: number; time: number } | null = null;
 
@@ -134,6 +136,7 @@ export class Engine {
     };
     this.drop = new DropLine(this.scene);
     this.ties = new Ties(this.scene);
+    this.wayLine = new WayLine(this.scene);
     this.gizmo = new Gizmo({
       canvas,
       scene: this.scene,
@@ -186,6 +189,15 @@ export class Engine {
   note(id: string, text: string): void {
     this.said = { id: text ? id : "", text };
     this.draw();
+  }
+
+  /** Show the straight way to somewhere, in place of another; null: none. */
+  showWay(way: Way | null): void {
+    if (this.wayLine.show(way, this.palette)) this.draw();
+  }
+
+  get way(): Way | null {
+    return this.wayLine.shown;
   }
 
   /** Show the label of what the pointer is on. */
@@ -318,6 +330,7 @@ export class Engine {
     this.gizmo.dispose();
     this.drop.dispose();
     this.ties.dispose();
+    this.wayLine.dispose();
     this.grid?.dispose();
     this.view.dispose();
     this.renderer.dispose();

@@ -1,13 +1,12 @@
 /** The program as a graph. What is selected here is selected everywhere; a program that runs is followed. */
 
 import { useEffect, useMemo, useRef } from "react";
-import { Background, Controls, type Edge, MarkerType, Panel, ReactFlow, ReactFlowProvider, useReactFlow } from "@xyflow/react";
+import { Background, ControlButton, Controls, type Edge, MarkerType, ReactFlow, ReactFlowProvider, useReactFlow } from "@xyflow/react";
 import "@xyflow/react/dist/base.css";
 import { connect, endStep, notEditable, removeAction, removeStep } from "../../commands/program";
 import { cannotLead } from "../../program/logic";
 import { problemsOf } from "../../program/problems";
 import { now, select, setUi, tell, useEditor } from "../../store/store";
-import { ToggleButton } from "react-aria-components";
 import { selectionOf } from "../names";
 import { conditionOf, FlowNode, type FlowNodeType } from "./FlowNode";
 import { foldAll, unfold, useFolds } from "./folding";
@@ -131,14 +130,13 @@ function Flow() {
         proOptions={{ hideAttribution: true }}
       >
         <Background gap={24} />
-        <Controls showInteractive={false} position="bottom-left" />
-        {folds.runs > 0 && (
-          <Panel position="bottom-center">
-            <ToggleButton className="button" isSelected={folds.wished} onChange={(on) => foldAll(on)}>
-              {folds.wished ? "Unfold all" : "Fold straight runs"}
-            </ToggleButton>
-          </Panel>
-        )}
+        <Controls showInteractive={false} position="bottom-left">
+          {folds.runs > 0 && (
+            <ControlButton className="flow-fold-all" aria-label={folds.wished ? "Unfold all" : "Fold straight runs"} onClick={() => foldAll(!folds.wished)}>
+              {folds.wished ? "Unfold" : "Fold"}
+            </ControlButton>
+          )}
+        </Controls>
       </ReactFlow>
     </div>
   );

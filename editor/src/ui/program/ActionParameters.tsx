@@ -147,25 +147,39 @@ function placesFor(state: State, actionId: string, type: string): Choice[] | und
   }
 }
 
+interface Known {
+  id: string;
+  value: string;
+}
+
+/** What a parameter is given, where that is known before it runs; null for the result of another action. */
+function knownValue(state: State, parameter: ActionParameter | undefined): string | null {
+  if (!parameter || parameter.type === "link") return null;
+  if (parameter.type !== "project_parameter") return parameter.value;
+  return state.doc?.parameters[String(decoded(parameter.value))]?.value ?? null;
+}
+
 /** The values of a dynamic parameter: asked of the device while it is online, else as they were last. */
 function useDynamic(state: State, actionId: string, wanted: ParameterMeta): { choices?: Choice[]; note?: string } {
   const action = state.doc?.actions[actionId];
   const objectId = action?.type.split("/")[0] ?? "";
   const online = state.live.state === "started";
-  const parents = (wanted.dynamic_value_parents ?? []).map((id) => ({ id, value: action?.parameters.find((each) => each.name === id)?.value ?? "" }));
+  const parents = (wanted.dynamic_value_parents ?? []).map((id) => ({ id, value: knownValue(state, action?.parameters.find((each) => each.name === id)) }));
+  const missing = parents.filter((each) => each.value === null).map((each) => words(each.id));
   const key = JSON.stringify([objectId, wanted.name, parents]);
   const [asked, setAsked] = useState<{ key: string; values: string[] } | null>(null);
   useEffect(() => {
-    if (!wanted.dynamic_value || !online) return;
+    if (!wanted.dynamic_value || !online || missing.length > 0) return;
     let ended = false;
-    dynamicValues(objectId, wanted.name, parents).then((values) => ended || setAsked({ key, values }), () => {});
+    dynamicValues(objectId, wanted.name, parents as Known[]).then((values) => ended || setAsked({ key, values }), () => {});
     return () => {
       ended = true;
     };
   }, [key, online, wanted.dynamic_value]);
   if (!wanted.dynamic_value) return {};
+  if (missing.length > 0) return { note: `what there is depends on ${missing.join(" and ")}, which is found out when it runs` };
   const fresh = asked?.key === key && online;
-  const values = fresh ? asked.values : lastDynamicValues(objectId, wanted.name, parents);
+  const values = fresh ? asked.values : lastDynamicValues(objectId, wanted.name, parents as Known[]);
   if (!values) return { note: online ? "asking the device…" : "go online to choose from what the device has" };
   const choices = values.map((each) => ({ json: wanted.type.startsWith("integer") ? each : JSON.stringify(each), label: each }));
   return { choices, note: fresh ? undefined : "as the device told last" };

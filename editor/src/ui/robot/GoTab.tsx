@@ -1,38 +1,58 @@
-/** A pose that is typed, tapped or taken over, shown by a ghost before the robot goes there. */
+/** A pose that is dragged in the view, typed, tapped or taken over, shown by a ghost before the robot goes there. */
 
-import { useCallback, useEffect, useState } from "react";
-import { type Chosen, effectorPose, hideGhost, moveToPose, notReady, showAt } from "../../commands/robot";
+import { useCallback, useEffect, useRef, useState } from "react";
+import { type Chosen, effectorPose, hideGhost, moveToPose, notReady } from "../../commands/robot";
+import type { WayState } from "../../engine/way";
 import type { Pose } from "../../protocol/types";
+import { theEngine } from "../../session/engine";
 import { now, useEditor } from "../../store/store";
 import { alongZ, fromRollPitchYaw, worldOf } from "../../viewmodel/frames";
 import { rollPitchYaw } from "../../viewmodel/rotations";
-import { Amount, OnOff } from "../kit/fields";
+import { Amount, OneOf, OnOff } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { nameOf } from "../names";
-import { mannerNow } from "./manner";
+import { type GoalAnswer, LiveGoal } from "./liveGoal";
+import { mannerNow, useManner } from "./manner";
+import { useGoalGizmo } from "./useGoalGizmo";
 import { usePlaceTap } from "./usePlaceTap";
+import { useTelemetry } from "./useTelemetry";
 
 const AXES = ["x", "y", "z"] as const;
 const ANGLES = ["Roll", "Pitch", "Yaw"] as const;
 
 export function GoTab({ chosen }: { chosen: Chosen }) {
   const why = useEditor((state) => notReady(state, chosen));
+  const { safe } = useManner();
   const selection = useEditor((state) => state.ui.selection);
   const selected = useEditor((state) => (selection && selection.kind !== "logic" && selection.kind !== "joints" && selection.id !== chosen.robotId ? nameOf(state, selection.id) : ""));
   const [goal, setGoal] = useState<Pose | null>(() => effectorPose(chosen) ?? null);
   const [tapping, setTapping] = useState(true);
-  const [answer, setAnswer] = useState<string | null>(null);
+  const [turning, setTurning] = useState(false);
+  const [answer, setAnswer] = useState<GoalAnswer | null>(null);
   const [refused, setRefused] = useState("");
-  const show = useCallback(
-    (next: Pose) => {
-      setGoal(next);
-      setAnswer(null);
-      setRefused("");
-      void showAt(chosen, next).then(setAnswer);
-    },
-    [chosen],
-  );
-  useEffect(() => hideGhost, []);
+  const live = useRef<LiveGoal | null>(null);
+  useEffect(() => {
+    const one = new LiveGoal(chosen, () => mannerNow().linear, setAnswer);
+    live.current = one;
+    return () => {
+      one.forget();
+      hideGhost();
+    };
+  }, [chosen]);
+  const show = useCallback((next: Pose) => {
+    setGoal(next);
+    setRefused("");
+    live.current?.ask(next);
+  }, []);
+  const giveUp = () => {
+    live.current?.forget();
+    hideGhost();
+    setAnswer(null);
+    setRefused("");
+    setGoal(effectorPose(chosen) ?? goal);
+  };
+  useGoalGizmo(goal, turning ? "turn" : "move", turning ? "goal" : "world", show);
+  useWay(chosen, goal, answer);
   usePlaceTap(tapping, ({ position, normal }) => {
     const turned = goal?.orientation ?? { x: 1, y: 0, z: 0, w: 0 };
     show({ position, orientation: normal ? alongZ({ x: -normal.x, y: -normal.y, z: -normal.z }, turned) : turned });
@@ -45,11 +65,18 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
     );
   }
   const angles = rollPitchYaw(goal.orientation);
+  const notYet = answer === null ? "Set a goal first: it is shown before the robot goes there." : answer.goal !== goal ? "It is asked whether it can go there." : safe ? answer.problem : "";
   return (
     <>
       <OnOff isSelected={tapping} onChange={setTapping}>
         A tap in the view puts the ghost there
       </OnOff>
+      <OneOf
+        label="Drag the goal in the view"
+        value={turning ? "turn" : "move"}
+        choices={[["move", "Move it"], ["turn", "Turn it"]]}
+        onChange={(next) => setTurning(next === "turn")}
+      />
       <div className="amounts">
         {AXES.map((axis) => (
           <Amount key={axis} label={axis.toUpperCase()} unit="mm" value={goal.position[axis] * 1000} step={10} onChange={(next) => show({ ...goal, position: { ...goal.position, [axis]: next / 1000 } })} />
@@ -70,14 +97,7 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
         ))}
       </div>
       <div className="actions start">
-        <Button
-          onPress={() => {
-            const pose = effectorPose(chosen);
-            if (pose) show(pose);
-          }}
-        >
-          Where the tool is
-        </Button>
+        <Button onPress={giveUp}>Back to the tool</Button>
         {selected && (
           <Button
             onPress={() => {
@@ -89,8 +109,9 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
           </Button>
         )}
       </div>
-      <Answer answer={answer} />
-      <Button look="primary" why={why || (answer === null ? "Set a goal first: it is shown before the robot goes there." : "")} onPress={() => void moveToPose(chosen, goal, mannerNow()).then(setRefused)}>
+      <Answer answer={answer && answer.problem} />
+      <WayWords answer={answer} />
+      <Button look="primary" why={why || notYet} onPress={() => void moveToPose(chosen, goal, mannerNow()).then(setRefused)}>
         Move there
       </Button>
       {refused && (
@@ -100,6 +121,28 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
       )}
     </>
   );
+}
+
+/** How the straight way to the goal is, in words. */
+function WayWords({ answer }: { answer: GoalAnswer | null }) {
+  const { linear } = useManner();
+  const name = useEditor((state) => (answer?.met ? nameOf(state, answer.met) : ""));
+  if (!answer || answer.problem) return null;
+  if (!linear) return <p className="quiet small">It will not go straight: how it goes is not shown.</p>;
+  if (answer.way === "unknown") return <p className="quiet small">The straight way there was not looked at.</p>;
+  if (answer.way === "free") return <p className="small good">Nothing is on the straight way of the tool.</p>;
+  return <p className="small warn">On the straight way of the tool is {name || "something"}, or it passes close by.</p>;
+}
+
+/** The straight way from where the tool is now, in the view. */
+function useWay(chosen: Chosen, goal: Pose | null, answer: GoalAnswer | null): void {
+  const { linear } = useManner();
+  const tool = useTelemetry(chosen.robotId, () => effectorPose(chosen));
+  const state: WayState = !answer ? "unknown" : linear || answer.problem ? answer.way : "unknown";
+  useEffect(() => {
+    theEngine()?.showWay(goal && answer && tool ? { from: tool.position, to: goal.position, state } : null);
+  }, [goal, tool, answer, state]);
+  useEffect(() => () => theEngine()?.showWay(null), []);
 }
 
 /** What stands against a goal; null while nothing was asked. */

@@ -1,0 +1,83 @@
+/** The straight way from one place to another, before somebody goes it: unbroken where it is free, else dashed. */
+
+import { type BufferGeometry, CylinderGeometry, Mesh, MeshBasicMaterial, type Scene, SphereGeometry, Vector3 } from "three";
+import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
+import type { Position } from "../protocol/types";
+import type { Palette } from "./palette";
+
+/** `unknown`: nobody has looked, or it will not be straight. */
+export type WayState = "free" | "blocked" | "unknown";
+
+export interface Way {
+  from: Position;
+  to: Position;
+  state: WayState;
+}
+
+/** m: half of its thickness, what is shorter is not drawn, lengths of a dash and of what is between. */
+const RADIUS = 0.003;
+const SHORTEST = 0.005;
+const DASHES: Record<WayState, readonly [number, number] | null> = { free: null, unknown: [0.02, 0.012], blocked: [0.008, 0.012] };
+const MOST_DASHES = 60;
+const up = new Vector3(0, 1, 0);
+
+export class WayLine {
+  shown: Way | null = null;
+  private wanted: Way | null = null;
+  private readonly material = new MeshBasicMaterial({ transparent: true, opacity: 0.85 });
+  private readonly mesh = new Mesh<BufferGeometry, MeshBasicMaterial>(undefined, this.material);
+
+  constructor(scene: Scene) {
+    this.mesh.userData["ground"] = true; // not to be picked
+    this.mesh.visible = false;
+    scene.add(this.mesh);
+  }
+
+  /** Gives whether it looks another way now. */
+  show(way: Way | null, palette: Palette): boolean {
+    if (same(way, this.wanted)) return false;
+    this.wanted = way;
+    const from = way && new Vector3(way.from.x, way.from.y, way.from.z);
+    const to = way && new Vector3(way.to.x, way.to.y, way.to.z);
+    const length = from && to ? from.distanceTo(to) : 0;
+    this.shown = length > SHORTEST ? way : null;
+    this.mesh.visible = this.shown !== null;
+    if (!this.shown || !from || !to) return true;
+    const { state } = this.shown;
+    this.material.color.copy(state === "free" ? palette.reach.reachable : state === "blocked" ? palette.trouble : palette.locked);
+    this.mesh.geometry.dispose();
+    this.mesh.geometry = pieces(length, DASHES[state]);
+    this.mesh.position.copy(from);
+    this.mesh.quaternion.setFromUnitVectors(up, to.sub(from).normalize());
+    return true;
+  }
+
+  dispose(): void {
+    this.mesh.removeFromParent();
+    this.mesh.geometry.dispose();
+    this.material.dispose();
+  }
+}
+
+/** m: a robot that stands is reported a little elsewhere each time. */
+const STILL = 2e-4;
+
+function same(a: Way | null, b: Way | null): boolean {
+  if (!a || !b) return a === b;
+  const apart = (p: Position, q: Position) => Math.hypot(p.x - q.x, p.y - q.y, p.z - q.z);
+  return a.state === b.state && apart(a.from, b.from) < STILL && apart(a.to, b.to) < STILL;
+}
+
+/** Along y, from the origin; a ball at its end. */
+function pieces(length: number, dash: readonly [number, number] | null): BufferGeometry {
+  const found: BufferGeometry[] = [new SphereGeometry(RADIUS * 3, 12, 8).translate(0, length, 0)];
+  const [on, off] = dash ?? [length, 0];
+  const step = Math.max(on + off, length / MOST_DASHES); // of a long way the dashes grow, not their number
+  for (let at = 0; at < length - 1e-6; at += step) {
+    const piece = Math.min((step * on) / (on + off), length - at);
+    found.push(new CylinderGeometry(RADIUS, RADIUS, piece, 6, 1, true).translate(0, at + piece / 2, 0));
+  }
+  const whole = mergeGeometries(found);
+  for (const each of found) each.dispose();
+  return whole;
+}
