@@ -144,9 +144,10 @@ export function lastDynamicValues(objectId: string, name: string, parents: { id:
   return dynamicKnown.get(dynamicKey(objectId, name, parents));
 }
 
-/** The values that a parameter may take now, as the live device knows them. Rejects when it cannot be asked. */
+/** The values that a parameter may take now, as the live device knows them: a set, given in order. Rejects when it cannot be asked. */
 export async function dynamicValues(objectId: string, name: string, parents: { id: string; value: string }[]): Promise<string[]> {
-  const values = await call("ActionParamValues", { id: objectId, param_id: name, parent_params: parents });
+  const found = await call("ActionParamValues", { id: objectId, param_id: name, parent_params: parents });
+  const values = [...found].sort((a, b) => a.localeCompare(b, undefined, { numeric: true }));
   dynamicKnown.set(dynamicKey(objectId, name, parents), values);
   return values;
 }
