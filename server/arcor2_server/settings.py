@@ -35,6 +35,8 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     port: int = 6789
     insecure: bool = False
     """Ask nobody for a token, wherever the server listens."""
+    fingerprint: str = ""
+    """SHA-256 of the certificate that the server shows; empty without TLS."""
     classic_ports: dict[str, int] = {}
     """Further ports by the name of the service that the original has there; empty: all is on one port."""
     legacy: "LegacyListener | None" = None

@@ -2,18 +2,22 @@
 
 import asyncio
 import hashlib
+import json
 import re
 import ssl
+import zipfile
 from collections.abc import AsyncIterator
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, expect
 
 from arcor2_hw.data.role import Role
 from arcor2_server.tokens import TokenFile
-from tests.editor.screen import Screen, screen_of
+from tests.editor.screen import VIEWPORTS, Screen, screen_of
 from tests.server.core.serving import ServerProcess, running
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
@@ -29,7 +33,8 @@ async def server(tmp_path_factory: pytest.TempPathFactory, built_editor: Path) -
 
 
 def secret(server: ServerProcess, role: Role) -> str:
-    return TokenFile(server.data_dir).add(role.name.lower(), role)[1]
+    tokens = TokenFile(server.data_dir)
+    return tokens.add(f"{role.name.lower()} {len(tokens.all())}", role)[1]
 
 
 async def home(screen: Screen) -> None:
@@ -85,15 +90,41 @@ async def test_a_name_that_somebody_has_is_refused_with_the_reason(server: Serve
         assert await one.page.get_by_role("img", name="Adam (you)").is_visible()
 
 
+async def test_a_file_for_diagnosis_is_saved_by_one_press(server: ServerProcess, browser: Browser) -> None:
+    async with screen_of(browser, server.url) as screen:
+        key = secret(server, Role.TECHNICIAN)
+        await screen.page.goto(f"{screen.url}/?token={key}&q=low")
+        await screen.page.get_by_label("Your name").fill("Dora")
+        await screen.press("Join")
+        await home(screen)
+        await screen.page.get_by_role("radio", name="Scenes").click()
+        await screen.page.keyboard.press("?")
+        await screen.sees("Only this machine reaches the server")
+        async with screen.page.expect_download() as downloading:
+            await screen.press("Save a file for diagnosis")
+        saved = await downloading.value
+        assert re.fullmatch(r"diagnosis-[\dT-]+\.zip", saved.suggested_filename)
+        with zipfile.ZipFile(await saved.path()) as files:
+            told = json.loads(files.read("client.json"))
+            assert {"README.txt", "about.json", "types.json", "log.jsonl"} <= set(files.namelist())
+            assert all(key.encode() not in files.read(name) for name in files.namelist())
+        assert (told["user"], told["status"]) == ("Dora", "ready")
+        # What the page has seen: that it came in, and the first that it was told.
+        assert {"event ShowMainScreen", "connection open"} <= {
+            f"{e['what']} {e['text'].split()[0]}" for e in told["seen"]
+        }
+        assert await screen.barriers() == []
+
+
 async def test_over_tls_with_a_certificate_made_here_whose_fingerprint_is_told(
     tmp_path: Path, built_editor: Path, browser: Browser
 ) -> None:
-    """What a tablet on the network gets, but for the address."""
+    """What a tablet on the network gets, but for the address; and what invites the next one."""
     data_dir = tmp_path / "data"
     key = TokenFile(data_dir).add("tablet", Role.TECHNICIAN)[1]
-    async with running(data_dir, "--self-signed") as server:
-        assert server.url.startswith("wss://")
-        address = server.url.replace("wss", "https", 1)
+    async with running(data_dir, "--host", "0.0.0.0") as server:
+        assert server.url.startswith("wss://0.0.0.0:")
+        address = server.url.replace("wss://0.0.0.0", "https://127.0.0.1", 1)
         context = await browser.new_context(ignore_https_errors=True, service_workers="block")
         try:
             screen = Screen(await context.new_page(), address)
@@ -104,12 +135,39 @@ async def test_over_tls_with_a_certificate_made_here_whose_fingerprint_is_told(
             await home(screen)
             await screen.page.keyboard.press("?")
             about = screen.page.get_by_role("dialog", name="About")
-            await about.get_by_text(address.rstrip("/")).wait_for()
+            invitation = about.get_by_role("region", name="How others join")
+            shown = (await invitation.locator(".fingerprint code").inner_text()).replace(":", "")
+            told = await _joining(screen)
+            code = invitation.get_by_role("img")
+            if told["addresses"]:  # this machine is on a network
+                picture = cv2.imdecode(np.frombuffer(await code.screenshot(), np.uint8), cv2.IMREAD_COLOR)
+                assert picture is not None
+                read, _, _ = cv2.QRCodeDetector().detectAndDecode(picture)
+                assert read == told["addresses"][0]
+                assert read.startswith("https://")
+            else:
+                await invitation.get_by_text("Only this machine reaches the server").wait_for()
+            assert await screen.faults() == []
+            assert await screen.barriers() == []
+            for name in ("tablet", "phone"):
+                await screen.page.set_viewport_size(VIEWPORTS[name])  # type: ignore[arg-type]
+                await screen.settle()
+                assert await screen.faults() == [], name
+                await screen.picture(f"invitation {name}")
             assert screen.unexpected() == []
         finally:
             await context.close()
         # The one that a browser shows of the certificate is the one that the server told.
         host, _, port = address.removeprefix("https://").rstrip("/").rpartition(":")
         seen = ssl.PEM_cert_to_DER_cert(await asyncio.to_thread(ssl.get_server_certificate, (host, int(port))))
-        told = re.sub(r"[^0-9A-F]", "", server.log.read_text().upper())
-        assert hashlib.sha256(seen).hexdigest().upper() in told
+        logged = re.sub(r"[^0-9A-F]", "", server.log.read_text().upper())
+        assert hashlib.sha256(seen).hexdigest().upper() == shown
+        assert shown in logged
+
+
+async def _joining(screen: Screen) -> dict[str, list[str]]:
+    """What the server says of how others join."""
+    ask = "key => fetch('/api/joining', {headers: {Authorization: `Bearer ${key}`}}).then(found => found.json())"
+    key = await screen.page.evaluate("localStorage.getItem('arcor2-hw.token')")
+    found: dict[str, list[str]] = await screen.page.evaluate(ask, key)
+    return found

@@ -4,6 +4,7 @@ import { refusedWith } from "../session/assets";
 import { remembered } from "../session/memory";
 import { now } from "../store/store";
 import { refusal } from "./asking";
+import { saveAs } from "./files";
 
 const headers = (): HeadersInit => {
   const token = remembered("token");
@@ -29,10 +30,6 @@ export function downloadPackage(id: string, name: string): Promise<string> {
   return refusal(async () => {
     const response = await fetch(`/packages/${encodeURIComponent(id)}`, { headers: headers() });
     if (!response.ok) throw new Error(await refusedWith(response, `The server does not give ${name}`));
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(await response.blob());
-    link.download = `${name.replace(/[^\w-]+/g, "_")}.zip`;
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+    saveAs(await response.blob(), `${name.replace(/[^\w-]+/g, "_")}.zip`);
   });
 }

@@ -10,6 +10,7 @@ import { OFFLINE } from "../store/state";
 import { applyEvent, now, setConnection, store, tell } from "../store/store";
 import { telemetry } from "../store/telemetry";
 import { followArms, forgetArms } from "./arms";
+import { note } from "./diary";
 import { followDocument, forgetFollowed } from "./following";
 import { forgetPresence, tellPresence } from "./presence";
 import { followPrograms, forgetPrograms } from "./programs";
@@ -23,7 +24,9 @@ export function call<N extends keyof Requests>(
   args?: Requests[N]["args"],
   options?: CallOptions,
 ): Promise<Requests[N]["data"]> {
-  return (client.call as (...given: unknown[]) => Promise<Requests[N]["data"]>).call(client, request, args, options);
+  const answer = (client.call as (...given: unknown[]) => Promise<Requests[N]["data"]>).call(client, request, args, options);
+  if (!options?.dryRun) answer.catch((error) => note("refused", `${request}: ${error instanceof Error ? error.message : error}`));
+  return answer;
 }
 
 /** Tell whether the server serves a request of ours. */
@@ -55,11 +58,16 @@ export function leave(): void {
 client.onEvent = (event: ServerEvent) => {
   if (event.event === "RobotJoints") telemetry.takeJoints(event.data);
   else if (event.event === "RobotEef") telemetry.takeEef(event.data);
-  else applyEvent(event);
+  else {
+    // Of a stream nobody wants to read each.
+    if (event.event !== "MovePreview" && event.event !== "UserPresence") note("event", `${event.event} ${event.change_type ?? ""}`);
+    applyEvent(event);
+  }
 };
 
 client.onState = (state, reason, code) => {
   epoch++;
+  note("connection", `${state} ${reason ?? ""} ${code ?? ""}`);
   if (state === "open") {
     forgetStreams();
     forgetArms();
@@ -89,7 +97,10 @@ client.onState = (state, reason, code) => {
   }
 };
 
-client.onOddity = (text) => console.warn("not understood:", text);
+client.onOddity = (text) => {
+  note("fault", `not understood: ${text}`);
+  console.warn("not understood:", text);
+};
 
 async function enter(mine: number): Promise<void> {
   const current = () => mine === epoch;

@@ -138,7 +138,7 @@ def serve(
             listener = sockets.enter_context(contextlib.closing(listen(settings.host, settings.port)))
             settings, classic_listeners = _bind_classic(settings, sockets)
             settings, legacy_listener = _bind_legacy(settings, sockets)
-            certificate = _certificate(settings, tls, self_signed)
+            settings, certificate = _certificate(settings, tls, self_signed)
             with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
                 runner.run(run(settings, [listener, *classic_listeners], legacy_listener, certificate))
     except CannotServe as error:
@@ -216,18 +216,22 @@ def _bind_legacy(
 
 def _certificate(
     settings: ServerSettings, given: tuple[Path, Path] | None, self_signed: bool
-) -> tuple[Path, Path] | None:
-    """Give the files of certificate and key, None for no TLS. CannotServe when they cannot be used."""
+) -> tuple[ServerSettings, tuple[Path, Path] | None]:
+    """Give the files of certificate and key, None for no TLS, and settings that know the fingerprint.
+
+    CannotServe when they cannot be used.
+    """
     if given is None and not self_signed and (settings.insecure or is_loopback(settings.host)):
-        return None
+        return settings, None
     from arcor2_server import certificate  # only here: it costs time that a server without TLS does not have
 
     try:
         files = given or certificate.self_signed(settings.data_dir, settings.host)
-        log.info("certificate", sha256=certificate.fingerprint(files), file=str(files[0]))
+        sha256 = certificate.fingerprint(files)
+        log.info("certificate", sha256=sha256, file=str(files[0]))
     except certificate.CertificateProblem as error:
         raise CannotServe(ExitStatus.CERTIFICATE_UNUSABLE, str(error)) from error
-    return files
+    return msgspec.structs.replace(settings, fingerprint=sha256), files
 
 
 async def run(

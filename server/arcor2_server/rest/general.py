@@ -1,7 +1,10 @@
 """Routes of no service: readiness, devices."""
 
+import asyncio
+
 from arcor2_hw.data.role import Role
 from arcor2_server.cell.devices import DeviceStatus
+from arcor2_server.joining import Joining, joining
 from arcor2_server.rest.operations import operation
 from arcor2_server.services import Services
 
@@ -12,6 +15,13 @@ SERVER = "ARCOR2-HW"
 async def ready() -> str:
     """Answer 200 as soon as requests are served."""
     return ""
+
+
+@operation("GET", "/api/joining", SERVER, Role.OPERATOR, plain=True)
+async def how_to_join(services: Services, port: int) -> Joining:
+    """Give the addresses at which others reach this server, and the fingerprint of its certificate."""
+    # Names are looked up, which may take its time.
+    return await asyncio.to_thread(joining, services.settings, port)
 
 
 @operation("GET", "/api/devices", SERVER, Role.OPERATOR, plain=True)

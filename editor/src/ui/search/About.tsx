@@ -4,6 +4,8 @@ import { version } from "../../../package.json";
 import { useEditor } from "../../store/store";
 import { Window } from "../kit/dialogs";
 import { Button } from "../kit/kit";
+import { Invitation } from "../join/Invitation";
+import { SaveDiagnosis } from "./SaveDiagnosis";
 import "./search.css";
 
 const KEYS: readonly (readonly [string, string])[] = [
@@ -25,11 +27,11 @@ export default function About({ onClose }: { onClose: () => void }) {
         <dd>ARCOR2-HW {version}</dd>
         <dt>Server</dt>
         <dd>{server ? `${server.version}, protocol ${server.api_version}` : "no connection"}</dd>
-        <dt>Others join at</dt>
-        <dd>{location.origin}</dd>
         <dt>You are</dt>
         <dd>{user}</dd>
       </dl>
+      <Invitation />
+      <SaveDiagnosis />
       <h3>Keys</h3>
       <dl className="facts">
         {KEYS.map(([key, does]) => (

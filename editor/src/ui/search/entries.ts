@@ -98,7 +98,7 @@ function everywhere(state: State): Entry[] {
         remember("hand", leftHanded ? "" : "left");
       },
     },
-    { id: "about", words: "About, and keys", detail: "help", why: "", act: () => openOverlay("about") },
+    { id: "about", words: "About, keys, invite others, diagnosis", detail: "help", why: "", act: () => openOverlay("about") },
     { id: "leave", words: "Leave", detail: "command", why: "", act: leave },
   ];
 }

@@ -55,7 +55,7 @@ export function Settings() {
         remember("hand", leftHanded ? "" : "left");
       },
     },
-    { id: "about", label: "About, and keys ( ? )", icon: "info", act: () => openOverlay("about") },
+    { id: "about", label: "Invite others, about, keys ( ? )", icon: "info", act: () => openOverlay("about") },
     { id: "leave", label: `Leave (you are ${user})`, icon: "close", act: leave },
   ];
   return <More label="Settings" icon="settings" choices={choices} />;

@@ -1,0 +1,40 @@
+/** A file for whoever helps: what the server has for it, and what this page has seen. Sent to nobody. */
+
+import { version } from "../../package.json";
+import { refusedWith } from "../session/assets";
+import { diary } from "../session/diary";
+import { remembered } from "../session/memory";
+import { now } from "../store/store";
+import { refusal } from "./asking";
+import { saveAs } from "./files";
+
+/** Save it on this device; gives why not. */
+export function saveDiagnosis(): Promise<string> {
+  return refusal(async () => {
+    const token = remembered("token");
+    const headers = { "Content-Type": "application/json", ...(token ? { Authorization: `Bearer ${token}` } : {}) };
+    const response = await fetch("/api/diagnosis", { method: "POST", headers, body: JSON.stringify({ client: seen() }) });
+    if (!response.ok) throw new Error(await refusedWith(response, "The server gives no diagnosis"));
+    saveAs(await response.blob(), `diagnosis-${new Date().toISOString().slice(0, 19).replaceAll(":", "-")}.zip`);
+  });
+}
+
+function seen() {
+  const { connection, ui, notices, tasks, live } = now();
+  return {
+    editor: version,
+    browser: navigator.userAgent,
+    screen: `${innerWidth} × ${innerHeight} at ${devicePixelRatio}`,
+    address: location.origin + location.hash,
+    user: connection.user,
+    status: connection.status,
+    reason: connection.reason,
+    mode: ui.mode,
+    tool: ui.tool,
+    selection: ui.selection,
+    live: live.state,
+    notices: notices.map(({ level, text, time }) => ({ level, text, time: new Date(time).toISOString() })),
+    tasks: Object.values(tasks),
+    seen: diary(),
+  };
+}

@@ -1,0 +1,63 @@
+/** How others join: the address, as a code that a tablet's camera reads, and the fingerprint to compare. */
+
+import encodeQR from "qr";
+import { useEffect, useState } from "react";
+import { howToJoin, type Joining } from "../../commands/joining";
+import { Waiting } from "../kit/kit";
+import "./invitation.css";
+
+/** Modules left white around a code, as its standard asks. */
+const QUIET = 4;
+
+export function Invitation() {
+  const [joining, setJoining] = useState<Joining | null>(null);
+  useEffect(() => {
+    let over = false;
+    void howToJoin().then((found) => over || setJoining(found));
+    return () => {
+      over = true;
+    };
+  }, []);
+  if (!joining) return <Waiting>Asking how others join…</Waiting>;
+  const { addresses, fingerprint } = joining;
+  const [best, ...others] = addresses;
+  return (
+    <section className="invitation" aria-label="How others join">
+      <h3>Others join at</h3>
+      {best === undefined ? (
+        <p className="small">
+          Only this machine reaches the server, at {location.origin}. For others, start it with <code>arcor2-hw serve --host 0.0.0.0</code>.
+        </p>
+      ) : (
+        <>
+          <Code text={best} />
+          <div>
+            <p>
+              <strong>{best}</strong>
+            </p>
+            {others.length > 0 && <p className="quiet small">or at {others.join(", ")}</p>}
+            <p className="quiet small">Point a tablet’s camera at the code. Where the server asks for a token, each has one of his own.</p>
+          </div>
+        </>
+      )}
+      {fingerprint && (
+        <p className="small fingerprint">
+          A browser that does not know the certificate shows its SHA-256 fingerprint, which has to be:
+          <code>{fingerprint}</code>
+        </p>
+      )}
+    </section>
+  );
+}
+
+/** Black on white in dark colours, too: not every camera reads it the other way round. */
+function Code({ text }: { text: string }) {
+  const rows = encodeQR(text, "raw", { ecc: "medium", border: QUIET });
+  const path = rows.flatMap((row, y) => row.map((black, x) => (black ? `M${x} ${y}h1v1h-1z` : ""))).join("");
+  return (
+    <svg className="join-code" viewBox={`0 0 ${rows.length} ${rows.length}`} role="img" aria-label={`A code with the address ${text}`} shapeRendering="crispEdges">
+      <path className="paper" d={`M0 0h${rows.length}v${rows.length}h-${rows.length}z`} />
+      <path d={path} />
+    </svg>
+  );
+}

@@ -1,0 +1,23 @@
+/** One press: a file for whoever helps. */
+
+import { barred } from "../../commands/asking";
+import { saveDiagnosis } from "../../commands/diagnosis";
+import { useEditor } from "../../store/store";
+import { Button } from "../kit/kit";
+import { RefusedText, useAsking } from "../points/Doing";
+
+export function SaveDiagnosis() {
+  // The role of who changes scenes: addresses and settings of devices are in it.
+  const why = useEditor((state) => barred(state, "SaveScene"));
+  const { refused, busy, ask } = useAsking();
+  return (
+    <section aria-label="Diagnosis">
+      <h3>Something went wrong?</h3>
+      <p className="quiet small">A file with what is open, devices, versions and the last lines of the log, without secrets, for whoever helps you. It is saved here and sent to nobody.</p>
+      <Button icon="save" why={why} isDisabled={busy} onPress={() => void ask(saveDiagnosis())}>
+        {busy ? "Gathering…" : "Save a file for diagnosis"}
+      </Button>
+      <RefusedText>{refused}</RefusedText>
+    </section>
+  );
+}

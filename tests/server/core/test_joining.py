@@ -1,0 +1,45 @@
+"""The addresses by which others are invited."""
+
+from pathlib import Path
+
+import pytest
+
+from arcor2_server import joining as module
+from arcor2_server.joining import joining
+from arcor2_server.settings import ServerSettings
+
+
+@pytest.fixture(autouse=True)
+def machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A machine with two addresses on networks, whose own name leads to itself, too."""
+    monkeypatch.setattr(module, "_way_out", lambda: "192.0.2.7")
+    monkeypatch.setattr(module, "_of_name", lambda: ["127.0.1.1", "192.0.2.7", "198.51.100.4"])
+
+
+@pytest.mark.parametrize(
+    ("host", "addresses"),
+    [
+        ("127.0.0.1", []),
+        ("localhost", []),
+        ("::1", []),
+        ("0.0.0.0", ["http://192.0.2.7:6789", "http://198.51.100.4:6789"]),
+        ("::", ["http://192.0.2.7:6789", "http://198.51.100.4:6789"]),
+        ("192.0.2.9", ["http://192.0.2.9:6789"]),
+        ("2001:db8::1", ["http://[2001:db8::1]:6789"]),
+        ("cell-7.example", ["http://cell-7.example:6789"]),
+    ],
+)
+def test_others_are_told_what_they_reach(tmp_path: Path, host: str, addresses: list[str]) -> None:
+    assert joining(ServerSettings(data_dir=tmp_path, host=host), 1).addresses == addresses
+
+
+def test_of_any_free_port_the_one_is_told_at_which_it_was_asked(tmp_path: Path) -> None:
+    settings = ServerSettings(data_dir=tmp_path, host="192.0.2.9", port=0, fingerprint="AB:CD")
+    found = joining(settings, 41234)
+    assert (found.addresses, found.fingerprint) == (["https://192.0.2.9:41234"], "AB:CD")
+
+
+def test_without_a_network_there_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_way_out", str)
+    monkeypatch.setattr(module, "_of_name", list)
+    assert joining(ServerSettings(data_dir=tmp_path, host="0.0.0.0"), 1).addresses == []
