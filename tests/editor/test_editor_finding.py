@@ -208,8 +208,14 @@ async def test_the_selected_is_found_again_and_things_are_seen_through(place: Pl
         page = screen.page
         await _came_in(screen, "Olga", place)
         # A point stays as large as is seen, from anywhere, and as large as the user likes.
-        far, near = [[0, -9, 5], [0, 0, 0]], [[0.3, -0.3, 0.5], [0, 0, 0]]
+        at = list((await screen.item(point.id))["pose"]["position"].values())
+        far, near = [[0, -9, 5], [0, 0, 0]], [[at[0] + 0.3, at[1] - 0.3, at[2] + 0.3], at]
         assert await _drawn(screen, point.id, far) > 3 * await _drawn(screen, point.id, near)
+        # Names of points and actions come with nearness, the nearest eight at most.
+        close_by = {action.name for each in place.project.action_points for action in each.actions}
+        assert close_by & set(await _names(screen))
+        await _drawn(screen, point.id, far)
+        assert not close_by & set(await _names(screen))
         before = await _drawn(screen, point.id, near)
         await _tool(screen, "Points")
         await page.get_by_role("slider", name="Size of points in the view").press("End")
@@ -262,6 +268,13 @@ _SCALE = """id => {
     }
 }"""
 _SCALE_OVER = f"([id, least]) => ({_SCALE})(id) > least"
+
+
+async def _names(screen: Screen) -> list[str]:
+    """The names that stand in the view."""
+    names = await screen.page.locator(".view-label:visible > span").all_inner_texts()
+    assert 0 < len(names) <= 8
+    return names
 
 
 async def _drawn(screen: Screen, item: str, view: Any) -> float:

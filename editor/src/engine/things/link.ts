@@ -30,6 +30,10 @@ const DASHES: Record<LinkItem["branch"], [number, number] | null> = {
   value: [0.03, 0.02],
 };
 const Z = new Vector3(0, 1, 0);
+/** Height of the plate with the word, m; and in pixels, so that it is read from afar and covers nothing close by. */
+const PLATE = 0.036;
+const LEAST = 14;
+const MOST = 30;
 
 export class LinkThing extends Thing<LinkItem> {
   readonly root = new Group();
@@ -84,6 +88,14 @@ export class LinkThing extends Thing<LinkItem> {
     this.line.geometry.dispose();
     this.line.geometry = this.bow();
     this.label?.position.copy(this.middle);
+  }
+
+  override resized(): boolean {
+    if (!this.label) return false;
+    const pixel = this.context.metresPerPixel(this.middle);
+    const height = Math.min(MOST * pixel, Math.max(LEAST * pixel, PLATE));
+    this.label.scale.multiplyScalar(height / this.label.scale.y).setZ(1);
+    return false; // nothing else stands where it does
   }
 
   override anchor(target: Vector3): Vector3 {
@@ -157,7 +169,7 @@ function text(word: string, ink: string, plate: string): Sprite {
   map.minFilter = LinearFilter;
   map.colorSpace = SRGBColorSpace;
   const sprite = new Sprite(new SpriteMaterial({ map, depthTest: false, transparent: true }));
-  sprite.scale.set((canvas.width / canvas.height) * 0.036, 0.036, 1);
+  sprite.scale.set((canvas.width / canvas.height) * PLATE, PLATE, 1);
   sprite.renderOrder = 5;
   return sprite;
 }
