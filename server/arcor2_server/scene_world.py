@@ -105,9 +105,11 @@ def things(services: "Services", chosen: list[SceneObject], joints: Joints | Non
 def in_names(services: "Services", text: str) -> str:
     """Give a sentence of the worker, which knows ids, with the names by which people know the objects."""
     scene = services.session.scene
-    for obj in () if scene is None else scene.objects:
-        if obj.id in text:
-            text = text.replace(obj.id, obj.name)
+    if not text or scene is None:
+        return text
+    met = [obj for obj in scene.objects if obj.id in text]
+    for obj in sorted(met, key=lambda obj: len(obj.id), reverse=True):  # an id may begin as another one does
+        text = text.replace(obj.id, obj.name)
     return text
 
 
