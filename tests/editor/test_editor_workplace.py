@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 import pytest_asyncio
-from playwright.async_api import Browser
+from playwright.async_api import Browser, expect
 
-from arcor2_hw.client import Client
+from arcor2_hw.client import Client, RequestFailed
 from arcor2_hw.data import rpc
 from arcor2_hw.data.editor import ViewScope
 from arcor2_hw.data.geometry import Pose
@@ -225,6 +225,49 @@ async def test_an_edit_of_somebody_else_is_seen_and_a_tap_selects(closed: Place,
         await client.call("WriteUnlock", rpc.WriteUnlockArgs(new))
         await screen.until("id => window.__engine.item(id).badge === ''", new)
         await screen.sees("lonely is free now.")
+
+
+async def test_what_was_held_when_a_page_died_is_free_when_its_user_is_back(closed: Place, browser: Browser) -> None:
+    place, client = closed, closed.client
+    await client.call("OpenProject", rpc.IdArgs(place.project.id))
+    point = rpc.WriteLockArgs(place.project.action_points[0].id)
+    async with Client(place.cell.url, "Kim", reconnect=False) as before:
+        await before.call("WriteLock", point)
+    with pytest.raises(RequestFailed, match="Kim"):
+        await client.call("WriteLock", point)
+    async with screen_of(browser, place.cell.url) as screen:
+        await screen.join("Kim")
+        await screen.item(place.robot)
+        await until(lambda: _granted(client, "WriteLock", point), "the lock is given back")
+        await client.call("WriteUnlock", rpc.WriteUnlockArgs(point.object_id))
+
+
+async def test_online_without_a_device_which_is_tried_again_by_itself(closed: Place, browser: Browser) -> None:
+    place = closed
+    async with screen_of(browser, place.cell.url) as screen:
+        page = screen.page
+        await screen.join("Rita")
+        await screen.press(f"Open {place.project.name}")
+        await screen.item(place.robot)
+        await _tool(screen, "Devices")
+        await screen.sees("The workplace is offline.")
+        await place.cell.tell("tester", "refuse")
+        try:
+            await screen.press("Go online")
+            tester = page.get_by_role("listitem").filter(has=page.get_by_text("tester", exact=True))
+            await expect(tester).to_contain_text("not reached", timeout=40_000)
+            # The others are there, and what is not stands first, with the reason.
+            robot = page.get_by_role("listitem").filter(has=page.get_by_text("robot", exact=True))
+            await expect(robot).to_contain_text("online", timeout=40_000)
+            await page.get_by_role("button", name="Online 1 in trouble. Press to go offline").wait_for()
+            assert (await page.get_by_role("listitem").first.inner_text()).startswith("tester")
+            assert place.cell.at["tester"]["modbus"].split(":")[0] in await tester.inner_text()
+        finally:
+            await place.cell.tell("tester", "heal")
+        await screen.press("Try tester again")
+        await expect(tester).not_to_contain_text("not reached", timeout=40_000)
+        await page.get_by_role("button", name="Online. Press to go offline").wait_for()
+        await screen.picture("devices")
 
 
 async def _tool(screen: Screen, name: str) -> None:

@@ -115,6 +115,8 @@ async function enter(mine: number): Promise<void> {
     setConnection({ server });
     await Promise.all([subscribe(), loadTypes(), loadLists()]);
     if (!current()) return;
+    await letGo();
+    if (!current()) return;
     setConnection({ status: "ready", reason: "" });
   } catch (error) {
     if (!current()) return; // the connection is lost again: it will be tried anew
@@ -125,6 +127,13 @@ async function enter(mine: number): Promise<void> {
       tell("error", error instanceof Error ? error.message : String(error));
     }
   }
+}
+
+/** Give back what the user still held when his connection was lost or his page ended: nobody has it in hand any more. */
+async function letGo(): Promise<void> {
+  const { locks, connection } = now();
+  const mine = Object.keys(locks).filter((id) => locks[id] === connection.user);
+  await Promise.allSettled(mine.map((object_id) => call("WriteUnlock", { object_id })));
 }
 
 /** An older server knows fewer events, and refuses all when it does not know one. */
