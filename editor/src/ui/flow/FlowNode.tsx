@@ -5,7 +5,6 @@ import { beginStep, notEditable } from "../../commands/program";
 import { now, tell } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { ReachBadge } from "../points/Reach";
-import { fold } from "./folding";
 import { type Box, lastIn, type Way } from "./graph";
 
 export type FlowNodeType = Node<{ box: Box; running: boolean; breakpoint: boolean; paused: boolean; trouble: string; target: boolean; from: boolean }, "box">;
@@ -27,20 +26,6 @@ export function FlowNode({ data }: NodeProps<FlowNodeType>) {
           </span>
         )}
       </div>
-      {box.kind === "action" && box.run.length > 0 && (
-        <button
-          type="button"
-          className="flow-fold nodrag nopan"
-          aria-label={`Fold the ${box.run.length} actions from ${box.name} on into one`}
-          onClick={(event) => {
-            event.stopPropagation();
-            fold(box.run);
-          }}
-          onKeyDown={(event) => event.stopPropagation()}
-        >
-          Fold {box.run.length}
-        </button>
-      )}
       {box.detail && <div className="quiet small flow-detail">{box.detail}</div>}
       <div className="flow-ways">
         {box.ways.map((way) => (

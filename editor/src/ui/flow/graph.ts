@@ -2,7 +2,6 @@
 
 import { Graph, layout } from "@dagrejs/dagre";
 import { conditionWords, END, outgoing, placeOf, resultsOf, START } from "../../program/logic";
-import { runsOf } from "../../program/runs";
 import type { OpenDocument, State } from "../../store/state";
 
 const NODE = { width: 230, height: 64 };
@@ -24,7 +23,7 @@ export interface Box {
   name: string;
   detail: string;
   ways: Way[];
-  /** Actions that are folded into it, or can be, of which it is the first; in their order. */
+  /** Actions that are folded into it, in their order. */
   run: string[];
   x: number;
   y: number;
@@ -59,7 +58,6 @@ export function graphOf(doc: OpenDocument, types: State["types"], folded: readon
       };
     })
     .filter(({ from, to }) => from !== to);
-  const runs = new Map(runsOf(doc).map((run) => [run[0] ?? "", run]));
   const bare: Omit<Box, "x" | "y">[] = [
     { id: START, kind: "start", name: "Start", detail: "", ways: lines.some((each) => each.from === START) ? [] : [{ id: "next", label: "next" }], run: [], ...BORDER },
     ...Object.values(doc.actions)
@@ -69,7 +67,7 @@ export function graphOf(doc: OpenDocument, types: State["types"], folded: readon
         kind: "action" as const,
         name: action.name,
         detail: `${doc.objects[action.type.split("/")[0] ?? ""]?.name ?? "?"} at ${doc.points[action.pointId]?.name ?? "?"}`,
-        run: runs.get(action.id) ?? [],
+        run: [],
         ...sized(waysOf(doc, types, action.id)),
       })),
     ...folded.map((run) => ({

@@ -2,8 +2,10 @@
 
 import { beginStep, endStep, notEditable, removeStep } from "../../commands/program";
 import { cannotLead, conditionsOf, conditionWords, END, linkTo, outgoing, placeOf, resultAt, START } from "../../program/logic";
+import { runsOf } from "../../program/runs";
 import type { ProjectLogicIf } from "../../protocol/types";
 import { select, useEditor } from "../../store/store";
+import { fold } from "../flow/folding";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
 import { nameOf } from "../names";
@@ -22,6 +24,7 @@ const Next: Section["Body"] = ({ selection: { id } }) => {
   const own = conditionsOf(doc, types, id)[0];
   const asked = ways.find((each) => each.condition)?.condition;
   const result = asked ? resultAt(doc, types, asked.what) : own?.action.id === id ? own : undefined;
+  const run = state.ui.mode === "flow" || state.ui.mode === "split" ? runsOf(doc).find((each) => each.includes(id)) : undefined;
   const free = (value: string) => !ways.some((each) => each.condition?.value === value);
   const on = (value: string): ProjectLogicIf => ({ what: asked?.what ?? linkTo(result as NonNullable<typeof result>), value });
   return (
@@ -64,6 +67,18 @@ const Next: Section["Body"] = ({ selection: { id } }) => {
           </Button>
         )}
       </div>
+      {run && (
+        <Button
+          look="plain"
+          icon="list"
+          onPress={() => {
+            fold(run);
+            select(null); // what is selected is seen
+          }}
+        >
+          Fold {run.length} actions in the graph
+        </Button>
+      )}
     </>
   );
 };
