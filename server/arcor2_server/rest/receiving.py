@@ -38,7 +38,7 @@ def receiving(request: Request[Any, Any, Any], title: str, told_from: int) -> It
     except Arcor2Error as error:
         task.fail(str(error))
         raise
-    except HTTPException as error:  # too much, or the sender has gone
+    except HTTPException as error:  # too much, for one; what is said after an end is dropped
         task.fail(error.detail)
         raise
     except BaseException:
@@ -60,6 +60,10 @@ def _count(request: Request[Any, Any, Any], task: Task, size: int | None) -> Non
                 task.at(RECEIVED if size else None, "All has come: it is checked and kept.")
             elif size:
                 task.at(RECEIVED * received / size, f"{received / 1e6:.1f} of {size / 1e6:.1f} MB have come.")
+            else:
+                task.at(None, f"{received / 1e6:.1f} MB have come.")
+        elif message["type"] == "http.disconnect":
+            task.cancel(f"Who sent it has gone after {received / 1e6:.1f} MB.")
         return message
 
     request.receive = counted

@@ -303,6 +303,20 @@ async def test_an_upload_of_a_hundred_megabytes_does_not_stop_the_others(server:
         assert answer.status_code == 400
         told = await _told_of_uploads(follower)
         assert (told[-1].state, told[-1].message) == ("failed", answer.json()["message"])
+        # Who goes away in the middle has given it up.
+        _, writer = await asyncio.open_connection(*base(server).removeprefix("http://").split(":"))
+        writer.write(
+            b"POST /packages/pkg_cut HTTP/1.1\r\nHost: x\r\nContent-Length: 5000000\r\n"
+            b"Content-Type: multipart/form-data; boundary=cut\r\n\r\n--cut\r\n"
+            b'Content-Disposition: form-data; name="executionPackage"; filename="a.zip"\r\n\r\n' + bytes(1_000_000)
+        )
+        await writer.drain()
+        assert (await follower.next_event("TaskState", timeout=10)).data.state == "running"
+        writer.close()
+        await writer.wait_closed()
+        told = await _told_of_uploads(follower)
+        assert told[-1].state == "cancelled"
+        assert "has gone" in told[-1].message
         await follower.close()
         with zipfile.ZipFile(io.BytesIO((await http.get("/packages/pkg_big")).content)) as back:
             assert back.getinfo("data/mesh.bin").file_size == len(mesh)
