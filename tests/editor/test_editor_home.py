@@ -1,11 +1,13 @@
 """The home screen: lists that follow the server, names where they stand, what a deletion needs, packages as files."""
 
 import asyncio
+import io
 from collections.abc import AsyncIterator
 
 import httpx
 import pytest
 import pytest_asyncio
+from PIL import Image
 from playwright.async_api import Browser, expect
 
 from arcor2_hw.client import Client
@@ -148,6 +150,41 @@ async def test_what_belongs_together_is_found_and_a_saved_workplace_has_a_pictur
         kept = await client.call("GetViewState", rpc.GetViewStateArgs(ViewScope.SHARED, project.id))
         assert kept.values["thumbnail"].startswith("data:image/")
 
+        # One's own picture takes its place for all, also when it is saved again, until it is taken away.
+        red = Image.new("RGB", (640, 480), (200, 30, 30))
+        with io.BytesIO() as content:
+            red.save(content, "PNG")
+            brought = content.getvalue()
+        own = screen.page.get_by_label(f"Picture of {project.name}")
+        await own.set_input_files({"name": "cell.png", "mimeType": "image/png", "buffer": brought})
+        shown = "id => document.querySelector(`.card[data-id='${id}'] img`)?.src"
+        await until(lambda: _own_is_shown(client, screen, project.id, shown), "the own picture is shown")
+        kept = await client.call("GetViewState", rpc.GetViewStateArgs(ViewScope.SHARED, project.id))
+        assert await screen.page.evaluate(_COLOUR, kept.values["picture"]) == pytest.approx([200, 30, 30], abs=6)
+        await own.set_input_files({"name": "letter.png", "mimeType": "image/png", "buffer": b"no picture"})
+        await screen.sees("This file is no picture that the browser can read.")
+        await more(screen, project.name, "Its picture from the view again")
+        await screen.until(f"([id, taken]) => ({shown})(id) === taken", [project.id, kept.values["thumbnail"]])
+
+        # What serves as a template is offered to everybody as a beginning.
+        await more(screen, project.name, "Use as a template")
+        await screen.page.locator(f".card[data-id='{project.id}']").get_by_text("template", exact=True).wait_for()
+        await screen.press("New project")
+        await screen.page.get_by_label("Start from").select_option(label=f"a copy of {project.name}")
+        await screen.page.get_by_label("Name").fill("From a template")
+        await screen.picture("home template")
+        await screen.press("Make and open")
+        await screen.page.get_by_role("heading", name="From a template").wait_for()
+        made_of_it = next(each for each in await client.call("ListProjects") if each.name == "From a template")
+        copy = await client.call("GetProject", rpc.IdArgs(made_of_it.id))
+        source = await client.call("GetProject", rpc.IdArgs(project.id))
+        assert [each.name for each in copy.action_points] == [each.name for each in source.action_points]
+        await screen.press("Close, and go to the lists")
+        await screen.page.get_by_label("Sort by").select_option("recent")
+        await until(lambda: _are(screen, ["From a template", project.name]), "the last opened first")
+        await client.call("DeleteProject", rpc.IdArgs(made_of_it.id))
+        await until(lambda: _are(screen, [project.name]), "deleted")
+
         await screen.press(f"Scene of {project.name}")
         await screen.page.get_by_role("button", name=f"Open {scene.name}").wait_for()
         await more(screen, scene.name, "New project on it…")
@@ -157,6 +194,23 @@ async def test_what_belongs_together_is_found_and_a_saved_workplace_has_a_pictur
         await screen.press("Close, and go to the lists")
         await screen.press("Throw the changes away")
         await screen.page.get_by_role("radio", name="Projects").wait_for()
+
+
+_COLOUR = """async (address) => {
+  const image = Object.assign(new Image(), { src: address });
+  await image.decode();
+  const canvas = Object.assign(document.createElement("canvas"), { width: 1, height: 1 });
+  const context = canvas.getContext("2d");
+  context.drawImage(image, 0, 0, 1, 1);
+  return [...context.getImageData(0, 0, 1, 1).data].slice(0, 3);
+}"""
+"""The colour of a picture, in the middle of it all."""
+
+
+async def _own_is_shown(client: Client, screen: Screen, document: str, shown: str) -> bool:
+    kept = await client.call("GetViewState", rpc.GetViewStateArgs(ViewScope.SHARED, document))
+    own: str | None = kept.values.get("picture")
+    return own is not None and await screen.page.evaluate(shown, document) == own
 
 
 async def test_packages_come_live_and_go_as_files(

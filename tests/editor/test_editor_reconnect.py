@@ -39,14 +39,22 @@ async def test_the_view_stays_without_the_server_and_it_comes_back_by_itself(
             assert port is not None
             await cell.kill("server")
             await screen.sees("No connection to the server.")
+            await screen.sees("What was changed and not saved, the server keeps.")
             assert (await screen.item(table))["name"] == "table"
             assert await screen.page.get_by_role("button", name="Save").is_disabled()
 
             await cell.start_server(port)
             await screen.until("() => !document.querySelector('.lost')")
+            await screen.sees("What was changed and not saved is still here")
             # The same thing is selected, from the journal of the server that was killed.
             assert (await screen.item(table))["pose"]["position"]["x"] == 0.2
             await screen.page.get_by_role("complementary").get_by_role("heading", name="table").wait_for()
+            # So it is for who has lost the page as well: a new tab finds it.
+            async with screen_of(browser, cell.url) as again:
+                await again.join("Eva's other tab")
+                await again.sees("What was changed and not saved is still here")
+                await again.sees("not saved")
+                assert (await again.item(table))["name"] == "table"
             await screen.press("Save")
             await screen.sees("saved")
             await screen.until("() => !document.querySelector('.document').textContent.includes('not saved')")

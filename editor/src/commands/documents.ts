@@ -1,7 +1,7 @@
 /** Scenes, projects and packages as wholes: open, make, save, close, copy, rename, delete. */
 
 import { call } from "../session/session";
-import { now } from "../store/store";
+import { now, store } from "../store/store";
 import { ask, held, refusal } from "./asking";
 import { keepThumbnail } from "./thumbnail";
 
@@ -10,6 +10,33 @@ export const openProject = (id: string) => ask("OpenProject", { id });
 export const newScene = (name: string, description = "") => ask("NewScene", { name, description });
 export const newProject = (scene_id: string, name: string, description = "", has_logic = true) =>
   ask("NewProject", { scene_id, name, description, has_logic });
+
+/** Make a copy under another name and open it; gives whether it was made. */
+export async function fromTemplate(kind: "scene" | "project", source: string, name: string): Promise<boolean> {
+  const made = await (kind === "scene" ? duplicateScene(source, name) : duplicateProject(source, name));
+  if (!made) return false;
+  // Its id comes with the list.
+  const id = await listed(kind, name);
+  if (id) await (kind === "scene" ? openScene(id) : openProject(id));
+  return true;
+}
+
+/** ms until a list has what was made. */
+const LISTED = 10_000;
+
+function listed(kind: "scene" | "project", name: string): Promise<string> {
+  const find = () => (kind === "scene" ? now().lists.scenes : now().lists.projects)?.find((each) => each.name === name)?.id ?? "";
+  return new Promise((resolve) => {
+    const end = (id: string) => {
+      clearTimeout(late);
+      stop();
+      resolve(id);
+    };
+    const stop = store.subscribe(() => find() && end(find()));
+    const late = setTimeout(() => end(""), LISTED);
+    if (find()) end(find());
+  });
+}
 
 export async function save() {
   const saved = await (now().doc?.project ? ask("SaveProject") : ask("SaveScene"));

@@ -17,13 +17,13 @@ export function keepView(scope: ViewScope, values: Record<string, unknown>): voi
   call("SetViewState", { scope, document: openId(now()), values }).catch(() => {});
 }
 
-/** Keep values of the user that belong to no document, by their keys: stars, how he likes his tools. */
-export function keepGeneral(values: Record<string, unknown>): void {
+/** Keep values that belong to no document, by their keys: of the user, as stars and how he likes his tools, or of all. */
+export function keepGeneral(values: Record<string, unknown>, scope: ViewScope = "user"): void {
   store.setState((state) => {
     const kept = { ...state.view.general, ...values };
     for (const [key, value] of Object.entries(values)) if (value === null) delete kept[key];
     return { view: { ...state.view, general: kept } };
   });
   if (!serves("SetViewState")) return;
-  call("SetViewState", { scope: "user", values }).catch(() => {}); // as above
+  call("SetViewState", { scope, values }).catch(() => {}); // as above
 }

@@ -19,9 +19,10 @@ export interface Entry {
   executed?: string;
 }
 
-export type Sort = "changed" | "created" | "name" | "name down" | "oldest";
+export type Sort = "changed" | "recent" | "created" | "name" | "name down" | "oldest";
 export const SORTS: readonly (readonly [Sort, string])[] = [
   ["changed", "changed last"],
+  ["recent", "opened by you last"],
   ["oldest", "changed first"],
   ["created", "made last"],
   ["name", "name, A to Z"],
@@ -80,13 +81,17 @@ function from(id: string, of: { id: string; name: string }[] | null): Entry["fro
 }
 
 /** Those that are looked for, sorted; starred ones are not before others unless asked for alone. */
-export function chosen(entries: Entry[], search: string, sort: Sort, stars: ReadonlySet<string> | null): Entry[] {
+export function chosen(entries: Entry[], search: string, sort: Sort, stars: ReadonlySet<string> | null, recent: readonly string[] = []): Entry[] {
   const wanted = search.trim().toLowerCase();
   const found = entries.filter(
     (each) => (!stars || stars.has(each.id)) && `${each.name} ${each.description} ${each.from?.name ?? ""}`.toLowerCase().includes(wanted),
   );
+  const opened = new Map(recent.map((id, n) => [id, n]));
+  const last = ({ id }: Entry) => opened.get(id) ?? recent.length;
   const by: Record<Sort, (a: Entry, b: Entry) => number> = {
     changed: (a, b) => b.time.localeCompare(a.time),
+    // What was never opened follows, as it was changed.
+    recent: (a, b) => last(a) - last(b) || b.time.localeCompare(a.time),
     oldest: (a, b) => a.time.localeCompare(b.time),
     created: (a, b) => b.created.localeCompare(a.created),
     name: (a, b) => a.name.localeCompare(b.name, "en", { numeric: true }),

@@ -23,8 +23,9 @@ export function followDocument(state: State): void {
 
 async function general(still: () => boolean): Promise<void> {
   if (!serves("GetViewState")) return;
-  const { values } = await call("GetViewState", { scope: "user" }).catch(() => ({ values: {} }));
-  if (still()) store.setState((state) => ({ view: { ...state.view, general: values } }));
+  const read = (scope: "user" | "shared") => call("GetViewState", { scope }).then(({ values }) => values, () => ({}));
+  const [shared, own] = await Promise.all([read("shared"), read("user")]);
+  if (still()) store.setState((state) => ({ view: { ...state.view, general: { ...shared, ...own } } }));
 }
 
 async function ofDocument(document: string, project: boolean, still: () => boolean): Promise<void> {

@@ -1,12 +1,14 @@
 /** Which screen is shown: to join, what there is, or the workplace that is open. */
 
-import { Suspense, useState, useSyncExternalStore } from "react";
+import { Suspense, useEffect, useState, useSyncExternalStore } from "react";
+import { isRunning, openId } from "../store/selectors";
 import { useEditor } from "../store/store";
 import { Join } from "./join/Join";
 import { Waiting } from "./kit/kit";
 import { lazily } from "./kit/lazily";
 import { LostConnection } from "./connection/LostConnection";
 import { Overlays } from "./search/Overlays";
+import { keepRecent } from "./home/kept";
 import { useScreenSettings } from "./settings/Settings";
 import { Workplace } from "./workplace/Workplace";
 
@@ -30,6 +32,10 @@ export function App() {
   useScreenSettings();
   const status = useEditor((state) => state.connection.status);
   const open = useEditor((state) => state.doc !== null);
+  const document = useEditor((state) => (state.connection.status === "ready" && !isRunning(state) ? openId(state) : ""));
+  useEffect(() => {
+    if (document) keepRecent(document);
+  }, [document]);
   // Who has been in stays on his screen when the connection is lost.
   const [been, setBeen] = useState(false);
   if (status === "ready" && !been) setBeen(true);

@@ -1,13 +1,19 @@
 /** Says that the server is away. The view stays, and can be looked at; it comes back by itself. */
 
+import { useEffect } from "react";
 import { client } from "../../session/session";
-import { useEditor } from "../../store/store";
+import { now, tell, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
 import "./lost.css";
 
 export function LostConnection() {
   const { status, reason } = useEditor((state) => state.connection);
+  const unsaved = useEditor((state) => state.doc?.unsaved ?? false);
+  useEffect(() => {
+    // What is open is told before anybody is let in.
+    if (status === "ready" && now().doc?.unsaved) tell("info", "What was changed and not saved is still here: the server has kept it.");
+  }, [status]);
   if (status === "ready") return null;
   return (
     <div className="lost" role="alert">
@@ -16,7 +22,7 @@ export function LostConnection() {
         <strong>{status === "joining" ? "The server is back." : "No connection to the server."}</strong>{" "}
         {status === "joining"
           ? "Reading what has changed…"
-          : `What you see is as it was. ${reason ? `${reason} ` : ""}Trying again…`}
+          : `What you see is as it was. ${reason ? `${reason} ` : ""}${unsaved ? "What was changed and not saved, the server keeps. " : ""}Trying again…`}
       </p>
       {status === "lost" && (
         <Button look="plain" onPress={() => client.hurry()}>

@@ -1,6 +1,6 @@
 /** One scene, project or package, with what can be done to it. */
 
-import { useState } from "react";
+import { useRef, useState } from "react";
 import { barred } from "../../commands/asking";
 import * as documents from "../../commands/documents";
 import { downloadPackage } from "../../commands/packages";
@@ -8,6 +8,7 @@ import { runPackage } from "../../commands/run";
 import { keepGeneral } from "../../commands/viewstate";
 import { count, type Entry } from "../../home/entries";
 import type { Requests } from "../../protocol/types";
+import { keepOwnPicture, useOwn } from "../../commands/thumbnail";
 import { isRunning } from "../../store/selectors";
 import { now, tell, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
@@ -15,6 +16,7 @@ import { AskName, Button, type Choice, More } from "../kit/kit";
 import { ago } from "../times";
 import { Deleting } from "./Deleting";
 import { Inline } from "./Inline";
+import { isTemplate, keepRecent, keepTemplate } from "./kept";
 import { Problems } from "./Problems";
 import { starsOf } from "./stars";
 import { Thumbnail } from "./Thumbnail";
@@ -51,7 +53,14 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
   };
   const whyOpen = why("open") || (running ? "A program runs: stop it first." : "");
   const whyThis = whyOpen || (problems.length > 0 ? "Something is wrong with it, see its problems: it can be opened once they are mended." : "");
-  const open = (paused = false) => void (kind === "scene" ? documents.openScene(id) : kind === "project" ? documents.openProject(id) : runPackage(id, paused));
+  const template = useEditor((state) => isTemplate(state, id));
+  const own = useOwn((all) => all[id] ?? false);
+  const picture = useRef<HTMLInputElement>(null);
+  const keepPicture = (file: File | null) => void keepOwnPicture(id, file).then((wrong) => wrong && tell("error", wrong));
+  const open = (paused = false) => {
+    if (kind === "package") keepRecent(id);
+    void (kind === "scene" ? documents.openScene(id) : kind === "project" ? documents.openProject(id) : runPackage(id, paused));
+  };
   const star = () => {
     const others = [...starsOf(now())].filter((each) => each !== id);
     keepGeneral({ stars: starred ? others : [...others, id] });
@@ -65,6 +74,9 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
       : [
           { id: "copy", label: "Duplicate…", not: why("copy"), act: () => setDoing("copy") },
           { id: "describe", label: "Describe…", not: why("describe"), act: () => setDoing("describe") },
+          { id: "picture", label: "A picture of your own…", not: why("describe"), act: () => picture.current?.click() },
+          ...(own ? [{ id: "view", label: "Its picture from the view again", not: why("describe"), act: () => keepPicture(null) }] : []),
+          { id: "template", label: template ? "No template any more" : "Use as a template", not: why("describe"), act: () => keepTemplate(id, !template) },
         ]),
     { id: "rename", label: "Rename…", not: why("rename"), act: () => setDoing("rename") },
     { id: "remove", label: "Delete…", not: why("remove"), act: () => setDoing("remove") },
@@ -72,6 +84,22 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
   return (
     <li className="card" data-marked={marked} data-id={id}>
       {kind !== "package" && <Thumbnail id={id} time={entry.time} />}
+      {kind !== "package" && (
+        <input
+          ref={picture}
+          type="file"
+          accept="image/*"
+          className="hidden-but-read"
+          tabIndex={-1}
+          aria-hidden="true"
+          aria-label={`Picture of ${name}`}
+          onChange={(event) => {
+            const file = event.target.files?.[0];
+            if (file) keepPicture(file);
+            event.target.value = "";
+          }}
+        />
+      )}
       <div className="card-text">
         <div className="card-name">
           {doing === "rename" ? (
@@ -87,6 +115,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
           {detail(entry)}
           {entry.time && ` · ${kind === "package" ? "built" : "changed"} ${ago(entry.time)}`}
         </p>
+        {template && <p className="tag">template</p>}
         {owner && owner !== connection.user && (
           <p className="tag warn">
             <Icon name="lock" size={16} /> {owner} works on it

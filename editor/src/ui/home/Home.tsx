@@ -2,17 +2,18 @@
 
 import { useState } from "react";
 import { Input, Label, SearchField, ToggleButton, ToggleButtonGroup } from "react-aria-components";
-import * as documents from "../../commands/documents";
 import { barred } from "../../commands/asking";
 import { keepGeneral } from "../../commands/viewstate";
 import { chosen, entriesOf, type Entry, type Sort, SORTS } from "../../home/entries";
 import type { State } from "../../store/state";
 import { useEditor } from "../../store/store";
-import { AskName, Button, Waiting } from "../kit/kit";
+import { Button, Waiting } from "../kit/kit";
 import { People } from "../people/People";
 import { Settings } from "../settings/Settings";
 import { Notices } from "../notices/Notices";
+import { recentOf } from "./kept";
 import { NewProject } from "./NewProject";
+import { NewScene } from "./NewScene";
 import { Card } from "./Card";
 import { starsOf } from "./stars";
 import { UploadPackage } from "./UploadPackage";
@@ -41,6 +42,7 @@ export function Home() {
   const [onlyStars, setOnlyStars] = useState(false);
   const stars = useEditor(starsOf);
   const sort = useEditor(sortOf);
+  const recent = useEditor(recentOf);
   const entries = Object.fromEntries(TABS.map((each) => [each, entriesOf(lists, KINDS[each])])) as Record<TabName, Entry[] | null>;
   const here = entries[tab];
   const noProject = noRight || (lists.scenes?.length ? "" : "Make a scene first: a project is a program for a scene.");
@@ -110,7 +112,7 @@ export function Home() {
         <section aria-label={TITLES[tab]}>
           <Cards
             entries={here}
-            found={chosen(here ?? [], search, sort, onlyStars ? stars : null)}
+            found={chosen(here ?? [], search, sort, onlyStars ? stars : null, recent)}
             search={search}
             empty={EMPTY[tab]}
             highlight={lists.highlight}
@@ -127,9 +129,7 @@ export function Home() {
         </section>
       </main>
       <Notices />
-      {asking === "scene" && (
-        <AskName title="New scene" yes="Make and open" taken={lists.scenes?.map((each) => each.name) ?? []} onYes={(name) => void documents.newScene(name)} onClose={() => setAsking("")} />
-      )}
+      {asking === "scene" && <NewScene onClose={() => setAsking("")} />}
       {asking === "project" && <NewProject initial={scene} onClose={() => setAsking("")} />}
     </div>
   );

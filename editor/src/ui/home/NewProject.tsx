@@ -4,6 +4,7 @@ import { useState } from "react";
 import * as documents from "../../commands/documents";
 import { useEditor } from "../../store/store";
 import { AskName } from "../kit/kit";
+import { StartFrom } from "./StartFrom";
 
 export function NewProject({ initial = "", onClose }: { initial?: string; onClose: () => void }) {
   const scenes = useEditor((state) => state.lists.scenes) ?? [];
@@ -11,25 +12,32 @@ export function NewProject({ initial = "", onClose }: { initial?: string; onClos
   const newest = [...scenes].sort((a, b) => (b.modified ?? "").localeCompare(a.modified ?? ""))[0];
   const [scene, setScene] = useState(initial || (newest?.id ?? ""));
   const [logic, setLogic] = useState(true);
+  const [from, setFrom] = useState("");
+  const make = (name: string) => void (from ? documents.fromTemplate("project", from, name) : documents.newProject(scene, name, "", logic));
   return (
-    <AskName title="New project" yes="Make and open" taken={projects.map((each) => each.name)} onYes={(name) => void documents.newProject(scene, name, "", logic)} onClose={onClose}>
-      <div className="field">
-        <label htmlFor="scene-of-project">Scene</label>
-        <select id="scene-of-project" value={scene} onChange={(event) => setScene(event.target.value)}>
-          {scenes.map((each) => (
-            <option key={each.id} value={each.id}>
-              {each.name}
-            </option>
-          ))}
-        </select>
-      </div>
-      <label className="check">
-        <input type="checkbox" checked={logic} onChange={(event) => setLogic(event.target.checked)} />
-        <span>
-          Steps are connected here
-          <span className="quiet small"> – without, the project holds points for a script written by hand</span>
-        </span>
-      </label>
+    <AskName title="New project" yes="Make and open" taken={projects.map((each) => each.name)} onYes={make} onClose={onClose}>
+      <StartFrom of={projects} value={from} onChange={setFrom} />
+      {!from && (
+        <>
+          <div className="field">
+            <label htmlFor="scene-of-project">Scene</label>
+            <select id="scene-of-project" value={scene} onChange={(event) => setScene(event.target.value)}>
+              {scenes.map((each) => (
+                <option key={each.id} value={each.id}>
+                  {each.name}
+                </option>
+              ))}
+            </select>
+          </div>
+          <label className="check">
+            <input type="checkbox" checked={logic} onChange={(event) => setLogic(event.target.checked)} />
+            <span>
+              Steps are connected here
+              <span className="quiet small"> – without, the project holds points for a script written by hand</span>
+            </span>
+          </label>
+        </>
+      )}
     </AskName>
   );
 }

@@ -1,0 +1,18 @@
+/** Asks for the name of a new scene, and what it begins with. */
+
+import { useState } from "react";
+import * as documents from "../../commands/documents";
+import { useEditor } from "../../store/store";
+import { AskName } from "../kit/kit";
+import { StartFrom } from "./StartFrom";
+
+export function NewScene({ onClose }: { onClose: () => void }) {
+  const scenes = useEditor((state) => state.lists.scenes) ?? [];
+  const [from, setFrom] = useState("");
+  const make = (name: string) => void (from ? documents.fromTemplate("scene", from, name) : documents.newScene(name));
+  return (
+    <AskName title="New scene" yes="Make and open" taken={scenes.map((each) => each.name)} onYes={make} onClose={onClose}>
+      <StartFrom of={scenes} value={from} onChange={setFrom} />
+    </AskName>
+  );
+}

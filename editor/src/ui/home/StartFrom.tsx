@@ -1,0 +1,29 @@
+/** What a new scene or project begins with: nothing, or a copy of a template; not there where there is no template. */
+
+import { useEditor } from "../../store/store";
+import { isTemplate } from "./kept";
+
+interface StartFromProps {
+  of: readonly { id: string; name: string }[];
+  value: string;
+  onChange: (id: string) => void;
+}
+
+export function StartFrom({ of, value, onChange }: StartFromProps) {
+  const state = useEditor((each) => each);
+  const templates = of.filter(({ id }) => isTemplate(state, id));
+  if (templates.length === 0) return null;
+  return (
+    <div className="field">
+      <label htmlFor="start-from">Start from</label>
+      <select id="start-from" value={value} onChange={(event) => onChange(event.target.value)}>
+        <option value="">nothing</option>
+        {templates.map(({ id, name }) => (
+          <option key={id} value={id}>
+            a copy of {name}
+          </option>
+        ))}
+      </select>
+    </div>
+  );
+}
