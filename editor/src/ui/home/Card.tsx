@@ -115,7 +115,11 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
           {detail(entry)}
           {entry.time && ` · ${kind === "package" ? "built" : "changed"} ${ago(entry.time)}`}
         </p>
-        {template && <p className="tag">template</p>}
+        {template && (
+          <p>
+            <span className="tag">template</span>
+          </p>
+        )}
         {owner && owner !== connection.user && (
           <p className="tag warn">
             <Icon name="lock" size={16} /> {owner} works on it
