@@ -11,9 +11,6 @@ from arcor2_server.editor import FILES
 from tests.e2e.harness import Cell, running_cell
 from tests.editor.screen import running_browser
 
-BEHIND = 10
-"""Niceness of the browser: other modules' devices and drivers keep their times beside its drawing."""
-
 
 @pytest.fixture(scope="session")
 def built_editor() -> Path:
@@ -30,5 +27,5 @@ async def cell(tmp_path_factory: pytest.TempPathFactory, built_editor: Path) -> 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def browser() -> AsyncIterator[Browser]:
-    async with running_browser(BEHIND) as running:
+    async with running_browser(behind=True) as running:
         yield running

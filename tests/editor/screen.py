@@ -8,7 +8,6 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any, Final
 
-import psutil
 from playwright.async_api import Browser, ConsoleMessage, Error, Page, async_playwright, expect
 
 ARGUMENTS: Final = [
@@ -31,6 +30,7 @@ SEEN_WITHIN: Final = 30.0
 SMALLEST: Final = 44
 """CSS pixels of the smaller side of what is touched."""
 
+_BEHIND: Final = Path(__file__).with_name("behind.sh")
 _LAYOUT: Final = Path(__file__).with_name("layout.js").read_text()
 _AXE: Final = Path(__file__).resolve().parents[2] / "editor" / "node_modules" / "axe-core" / "axe.min.js"
 _RULES: Final = """async () => {
@@ -50,13 +50,11 @@ def chromium() -> str:
 
 
 @asynccontextmanager
-async def running_browser(niceness: int = 0) -> AsyncIterator[Browser]:
-    """Chromium; with a niceness, what it draws in software waits for others that are at work."""
+async def running_browser(*, behind: bool = False) -> AsyncIterator[Browser]:
+    """Chromium; `behind`: what it draws in software waits for others that are at work."""
     async with async_playwright() as playwright:
-        browser = await playwright.chromium.launch(executable_path=chromium(), args=ARGUMENTS)
-        for each in psutil.Process().children(recursive=True) if niceness else ():
-            if "chrom" in each.name():
-                each.nice(niceness)
+        path = _BEHIND if behind else chromium()
+        browser = await playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
         try:
             yield browser
         finally:
