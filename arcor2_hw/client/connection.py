@@ -34,7 +34,8 @@ FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
 """Seconds between attempts to connect again: doubled each time, and spread so that many clients don't come at once."""
 READING: Final = frozenset(
     {
-        *("GetActions", "GetObjectTypes", "GetProject", "GetRobotMeta", "GetScene", "History", "ListPackages"),
+        *("GetActions", "GetObjectTypes", "GetProject", "GetRobotMeta", "GetScene", "History"),
+        *("ListCalibrations", "ListPackages"),
         *("ListProjects", "ListScenes", "ObjectTypeUsage", "ProjectsWithScene", "SceneObjectUsage", "SystemInfo"),
     }
 )

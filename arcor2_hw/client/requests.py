@@ -8,6 +8,7 @@ from typing import Any, Literal, overload
 
 from arcor2_hw.client.stream import LIMIT, EventStream, Told
 from arcor2_hw.data.base import UNSET, Unset
+from arcor2_hw.data.calibration import CalibrationCheck, CalibrationKind
 from arcor2_hw.data.camera import CameraParameters, EstimatedPose, MarkerCorners
 from arcor2_hw.data.editor import (
     HistoryChangedData,
@@ -88,6 +89,7 @@ from arcor2_hw.data.rpc.action_points import (
     UpdateActionPointPositionArgs,
     UpdateActionPointUsingRobotArgs,
 )
+from arcor2_hw.data.rpc.calibrations import CheckCalibrationArgs, ListCalibrationsArgs, ListCalibrationsData
 from arcor2_hw.data.rpc.editor import (
     GetBreakpointsArgs,
     GetExecutionTraceArgs,
@@ -484,6 +486,26 @@ class Requests(ABC):
         """CancelAction. Needs the role operator."""
         await self.call("CancelAction", timeout=timeout)
 
+    async def check_calibration(
+        self,
+        id: str,
+        *,
+        pose: Pose | Unset = UNSET,
+        distance_limit: float = 0.002,
+        angle_limit: float = 0.0035,
+        timeout: float | None = None,
+    ) -> CalibrationCheck:
+        """CheckCalibration: a record, a pose in its frame, and how far that may be off (m, rad).
+
+        Needs the role operator.
+        """
+        answer: CalibrationCheck = await self.call(
+            "CheckCalibration",
+            CheckCalibrationArgs(id=id, pose=pose, distance_limit=distance_limit, angle_limit=angle_limit),
+            timeout=timeout,
+        )
+        return answer
+
     async def close_project(self, *, force: bool = False, dry_run: bool = False, timeout: float | None = None) -> None:
         """CloseProject. Needs the role standard user."""
         await self.call("CloseProject", CloseProjectArgs(force=force), dry_run=dry_run, timeout=timeout)
@@ -791,6 +813,26 @@ class Requests(ABC):
                 end_effector_id=end_effector_id,
                 arm_id=arm_id,
             ),
+            timeout=timeout,
+        )
+        return answer
+
+    async def list_calibrations(
+        self,
+        *,
+        limit: int = 100,
+        object_id: str | Unset = UNSET,
+        kind: CalibrationKind | Unset = UNSET,
+        before: str | Unset = UNSET,
+        timeout: float | None = None,
+    ) -> ListCalibrationsData:
+        """ListCalibrations: at most so many, the newest ones before a date, of an object, of a kind.
+
+        Needs the role operator.
+        """
+        answer: ListCalibrationsData = await self.call(
+            "ListCalibrations",
+            ListCalibrationsArgs(limit=limit, object_id=object_id, kind=kind, before=before),
             timeout=timeout,
         )
         return answer

@@ -32,6 +32,7 @@ from arcor2_server.rpc import (  # noqa: F401
     aiming,
     build,
     calibration,
+    calibration_records,
     cameras,
     copying,
     editor,

@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from arcor2_hw.data.calibration import CalibrationCheck
 from arcor2_hw.data.camera import CameraParameters, EstimatedPose, MarkerCorners
 from arcor2_hw.data.editor import MovePreview, Presence, ProjectBreakpoints, ReachabilityData, ViewState
 from arcor2_hw.data.geometry import Pose
@@ -34,6 +35,9 @@ from arcor2_hw.data.rpc.action_points import (
 from arcor2_hw.data.rpc.action_points import UpdateActionPointParentArgs as UpdateActionPointParentArgs
 from arcor2_hw.data.rpc.action_points import UpdateActionPointPositionArgs as UpdateActionPointPositionArgs
 from arcor2_hw.data.rpc.action_points import UpdateActionPointUsingRobotArgs as UpdateActionPointUsingRobotArgs
+from arcor2_hw.data.rpc.calibrations import CheckCalibrationArgs as CheckCalibrationArgs
+from arcor2_hw.data.rpc.calibrations import ListCalibrationsArgs as ListCalibrationsArgs
+from arcor2_hw.data.rpc.calibrations import ListCalibrationsData as ListCalibrationsData
 from arcor2_hw.data.rpc.editor import GetBreakpointsArgs as GetBreakpointsArgs
 from arcor2_hw.data.rpc.editor import GetExecutionTraceArgs as GetExecutionTraceArgs
 from arcor2_hw.data.rpc.editor import GetExecutionTraceData as GetExecutionTraceData
@@ -187,6 +191,7 @@ RPCS: Final = {
         Rpc("CameraColorImage", CameraColorImageArgs, str, Role.OPERATOR),
         Rpc("CameraColorParameters", CameraColorParametersArgs, CameraParameters, Role.OPERATOR),
         Rpc("CancelAction", None, None, Role.OPERATOR),
+        Rpc("CheckCalibration", CheckCalibrationArgs, CalibrationCheck, Role.OPERATOR, additional=True),
         Rpc("CloseProject", CloseProjectArgs, None, Role.STANDARD_USER, args_optional=True, dry_run=True),
         Rpc("CloseScene", CloseSceneArgs, None, Role.STANDARD_USER, args_optional=True, dry_run=True),
         Rpc("CopyActionPoint", CopyActionPointArgs, None, Role.STANDARD_USER, dry_run=True),
@@ -235,6 +240,14 @@ RPCS: Final = {
         Rpc("HoldHandTeaching", HoldHandTeachingArgs, None, Role.STANDARD_USER, additional=True),
         Rpc("InverseKinematics", InverseKinematicsArgs, list[Joint], Role.STANDARD_USER),
         Rpc("JogRobot", JogRobotArgs, JogRobotData, Role.STANDARD_USER, additional=True),
+        Rpc(
+            "ListCalibrations",
+            ListCalibrationsArgs,
+            ListCalibrationsData,
+            Role.OPERATOR,
+            args_optional=True,
+            additional=True,
+        ),
         Rpc("ListPackages", None, list[PackageSummary], Role.OPERATOR),
         Rpc("ListProjects", None, list[ListProjectsData], Role.OPERATOR),
         Rpc("ListRuns", ListRunsArgs, ListRunsData, Role.OPERATOR, args_optional=True, additional=True),

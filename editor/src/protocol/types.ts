@@ -257,6 +257,57 @@ export interface CalibrateRobotArgs {
   move_to_calibration_pose?: boolean;
 }
 
+/** A later measurement compared with a record: distance (m), angle (rad), and whether both are within limits. */
+export interface CalibrationCheck {
+  record_id: string;
+  date: string;
+  distance: number;
+  angle: number;
+  distance_limit: number;
+  angle_limit: number;
+  passed: boolean;
+  verdict: string;
+}
+
+/** Something a calibration was computed from: sha256 in hex and size in bytes; file: where it is kept, if it is. */
+export interface CalibrationInput {
+  name: string;
+  sha256: string;
+  size: number;
+  file?: string;
+}
+
+/** What was calibrated, and how. */
+export type CalibrationKind = "camera_pose" | "robot_pose" | "hand_eye" | "intrinsics" | "base_frame" | "user_frame" | "tool_tip" | "tool_orientation" | "by_hand";
+
+/**
+ * One calibration.
+ *
+ * person: user name of whoever did it. object_id and object_name: of the scene object whose pose, lens or tool it is;
+ * parent: name of the frame in which the poses are stated ("world", a robot's base or flange). inputs: pictures and
+ * tables it was computed from; parameters: what else went in (joints, markers, options), as JSON values. residual: in
+ * residual_unit ("m", "rad" or "px"); result: the whole result, as JSON values. before and after: pose of the object
+ * until then and since, where the result is a pose; applied: whether the object was given it.
+ */
+export interface CalibrationRecord {
+  kind: CalibrationKind;
+  person: string;
+  object_id: string;
+  object_name: string;
+  parent: string;
+  verdict: string;
+  residual?: number;
+  residual_unit: string;
+  inputs: CalibrationInput[];
+  parameters: Record<string, unknown>;
+  result: Record<string, unknown>;
+  before?: Pose;
+  after?: Pose;
+  applied: boolean;
+  id: string;
+  date: string;
+}
+
 /** Arguments of CameraColorImage. */
 export interface CameraColorImageArgs {
   id: string;
@@ -282,6 +333,18 @@ export interface CameraParameters {
 
 /** What happened to the item that an event carries. */
 export type ChangeType = "add" | "update" | "remove" | "update_base";
+
+/**
+ * Arguments of CheckCalibration: a record, a pose in its frame, and how far that may be off (m, rad).
+ *
+ * pose: one that was measured, or a reference; left out, that of the object in the open scene.
+ */
+export interface CheckCalibrationArgs {
+  id: string;
+  pose?: Pose;
+  distance_limit?: number;
+  angle_limit?: number;
+}
 
 /** Arguments of CloseProject. */
 export interface CloseProjectArgs {
@@ -602,6 +665,19 @@ export interface JogRobotData {
 export interface Joint {
   name: string;
   value: number;
+}
+
+/** Arguments of ListCalibrations: at most so many, the newest ones before a date, of an object, of a kind. */
+export interface ListCalibrationsArgs {
+  limit?: number;
+  object_id?: string;
+  kind?: CalibrationKind;
+  before?: string;
+}
+
+/** What ListCalibrations answers: records, newest first. */
+export interface ListCalibrationsData {
+  records: CalibrationRecord[];
 }
 
 /** What ListProjects answers. */
@@ -1738,6 +1814,7 @@ export interface Requests {
   CameraColorImage: { args: CameraColorImageArgs; data: string };
   CameraColorParameters: { args: CameraColorParametersArgs; data: CameraParameters };
   CancelAction: { args: undefined; data: undefined };
+  CheckCalibration: { args: CheckCalibrationArgs; data: CalibrationCheck };
   CloseProject: { args: CloseProjectArgs | undefined; data: undefined };
   CloseScene: { args: CloseSceneArgs | undefined; data: undefined };
   CopyActionPoint: { args: CopyActionPointArgs; data: undefined };
@@ -1770,6 +1847,7 @@ export interface Requests {
   HoldHandTeaching: { args: HoldHandTeachingArgs; data: undefined };
   InverseKinematics: { args: InverseKinematicsArgs; data: Joint[] };
   JogRobot: { args: JogRobotArgs; data: JogRobotData };
+  ListCalibrations: { args: ListCalibrationsArgs | undefined; data: ListCalibrationsData };
   ListPackages: { args: undefined; data: PackageSummary[] };
   ListProjects: { args: undefined; data: ListProjectsData[] };
   ListRuns: { args: ListRunsArgs | undefined; data: ListRunsData };
@@ -1955,6 +2033,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   CameraColorImage: 1,
   CameraColorParameters: 1,
   CancelAction: 1,
+  CheckCalibration: 1,
   CloseProject: 2,
   CloseScene: 2,
   CopyActionPoint: 2,
@@ -1987,6 +2066,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   HoldHandTeaching: 2,
   InverseKinematics: 2,
   JogRobot: 2,
+  ListCalibrations: 1,
   ListPackages: 1,
   ListProjects: 1,
   ListRuns: 1,

@@ -13,9 +13,10 @@ from PIL import Image
 from arcor2_hw.calibration.camera_results import CameraPose
 from arcor2_hw.calibration.configuration import CalibrationConfiguration
 from arcor2_hw.calibration.layout import Marker
-from arcor2_hw.calibration.records import CalibrationKind
+from arcor2_hw.calibration.records import CalibrationKind, CalibrationRecord
 from arcor2_hw.calibration.results import Grade, RobotPose
 from arcor2_hw.compute.world import RobotModel
+from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.camera import CameraParameters, Corner, MarkerCorners
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.exceptions import Arcor2Error, NotFound
@@ -303,3 +304,61 @@ async def test_a_robot_is_put_where_a_camera_sees_it(tmp_path: Path) -> None:
         failed = await happens(alice, "ProcessState", state="failed")
         assert failed == {"id": "RobotCalibration", "state": "failed", "message": "The robot is not seen."}
         await bob.lock(eye)
+
+
+async def test_records_of_calibrations_are_listed_and_compared(tmp_path: Path) -> None:
+    async with open_stage(tmp_path, "Eye", "Part") as stage:
+        alice, stranger = await stage.person("alice"), await stage.person()
+        await stage.place(alice, eye="Eye", part="Part")
+        eye, part = stage.ids["eye"], stage.ids["part"]
+        records = stage.services.calibration_records
+
+        def record(
+            date: str, where: Pose | Unset, parent: str = "world", kind: str = "camera_pose"
+        ) -> CalibrationRecord:
+            return CalibrationRecord(
+                CalibrationKind(kind),
+                "alice",
+                eye,
+                "eye",
+                parent,
+                "It is so.",
+                after=where,
+                date=f"2026-01-{date}T00:00:00Z",
+            )
+
+        far, near = record("01", FOUND), record("02", Pose(Position(0.001)))
+        lens, held = record("03", UNSET, kind="intrinsics"), record("04", Pose(), "the flange of arm", "hand_eye")
+        for one in (far, near, lens, held):
+            await records.put(one)
+        listed = (await stranger.ask("ListCalibrations"))["records"]
+        assert [one["id"] for one in listed] == [held.id, lens.id, near.id, far.id]
+        assert listed[-1]["after"] == msgspec.to_builtins(FOUND)
+        for args, expected in (
+            ({"limit": 1}, [held]),
+            ({"kind": "camera_pose"}, [near, far]),
+            ({"before": "2026-01-02T00:00:00Z"}, [far]),
+            ({"object_id": part}, []),
+        ):
+            found = (await stranger.ask("ListCalibrations", **args))["records"]  # type: ignore[arg-type]
+            assert [one["id"] for one in found] == [one.id for one in expected]
+
+        # Where it is in the open scene, else a pose that was measured.
+        told = await stranger.ask("CheckCalibration", id=near.id)
+        assert (told["passed"], told["record_id"]) == (True, near.id)
+        assert told["distance"] == pytest.approx(0.001)
+        told = await stranger.ask("CheckCalibration", id=near.id, distance_limit=0.0005)
+        assert (told["passed"], "1.0 mm" in told["verdict"]) == (False, True)
+        told = await stranger.ask("CheckCalibration", id=far.id, pose=msgspec.to_builtins(FOUND))
+        assert (told["passed"], told["distance"]) == (True, 0.0)
+        assert (await stranger.ask("CheckCalibration", id=far.id))["passed"] is False
+        assert (await stranger.ask("CheckCalibration", id=held.id, pose={}))["passed"] is True
+        for args, words in (
+            ({"id": held.id}, "frame of the flange of arm"),
+            ({"id": lens.id, "pose": {}}, "gave no pose"),
+            ({"id": "cal_none"}, "cal_none"),
+            ({"id": near.id, "angle_limit": 0}, "angle_limit"),
+        ):
+            assert words in await refused(stranger, "CheckCalibration", **args)
+        await alice.ask("CloseScene", force=True)
+        assert "No scene is open" in await refused(stranger, "CheckCalibration", id=near.id)
