@@ -241,6 +241,16 @@ async def test_the_selected_is_found_again_and_things_are_seen_through(place: Pl
         assert not (await screen.item(action))["visible"] or (await screen.item(action))["faint"] == 1
         assert (await screen.item(point.id))["faint"] == 0
         await screen.picture("points alone")
+        await page.get_by_text("Fade what is not of the chosen kinds").click()
+        steps = [item.id for item in place.project.logic]
+        await screen.until("id => __engine.ids().includes(id)", steps[0])
+        await page.get_by_text("Steps of the program").click()
+        await screen.until("ids => !__engine.ids().some((id) => ids.includes(id))", steps)
+        assert (await screen.item(point.orientations[0].id))["faint"] == 0
+        await page.get_by_text("Arrows of orientations").click()
+        await screen.until("id => __engine.item(id).faint === 1", point.orientations[0].id)
+        kept = await place.client.call("GetViewState", rpc.GetViewStateArgs(ViewScope.USER, place.project.id, "Olga"))
+        assert (kept.values["hide_steps"], kept.values["hide_orientations"]) == (True, True)
 
         # What is selected and out of the view: an arrow at the edge, and a tap looks there.
         await page.get_by_role("row", name=f"{point.name} Action point").click()

@@ -1,6 +1,7 @@
 """Somebody joins, opens the project, sees the robot move, stops it, selects things: in Chromium, on fakes."""
 
 import math
+import re
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from typing import Any
@@ -260,7 +261,8 @@ async def test_online_without_a_device_which_is_tried_again_by_itself(closed: Pl
             robot = page.get_by_role("listitem").filter(has=page.get_by_text("robot", exact=True))
             await expect(robot).to_contain_text("online", timeout=40_000)
             await page.get_by_role("button", name="Online 1 in trouble. Press to go offline").wait_for()
-            assert (await page.get_by_role("listitem").first.inner_text()).startswith("tester")
+            listed = await page.get_by_role("list").get_by_role("listitem").all_inner_texts()
+            assert [text.split()[0] for text in listed] == ["tester", "flow", "reader", "robot"]  # no boxes
             assert place.cell.at["tester"]["modbus"].split(":")[0] in await tester.inner_text()
         finally:
             await place.cell.tell("tester", "heal")
@@ -268,6 +270,16 @@ async def test_online_without_a_device_which_is_tried_again_by_itself(closed: Pl
         await expect(tester).not_to_contain_text("not reached", timeout=40_000)
         await page.get_by_role("button", name="Online. Press to go offline").wait_for()
         await screen.picture("devices")
+
+        # What went by itself is found again, with its time.
+        await screen.press("Settings")
+        await page.get_by_role("menuitem", name="Messages, with times").click()
+        messages = page.get_by_role("dialog", name="Messages").get_by_role("listitem")
+        began = messages.filter(has_text="Starting the scene")
+        await expect(began).to_have_text(re.compile(r"^\d\d:\d\d:\d\dtold: .*: finished\. Not there: tester\.$"))
+        assert not await screen.faults()
+        assert not await screen.barriers()
+        await screen.picture("messages")
 
 
 async def _tool(screen: Screen, name: str) -> None:

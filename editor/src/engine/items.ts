@@ -34,6 +34,8 @@ export interface RobotItem extends Base {
   pose: Pose;
   /** Asset of its URDF package; empty where it has none. */
   urdf: string;
+  /** The axes of its end effectors are drawn. */
+  axes: boolean;
   /** Joints are expected; where none come it is marked as stale. */
   online: boolean;
   trouble: boolean;

@@ -1,6 +1,6 @@
 /** What an event makes of the state: a pure function; what is not named stays. */
 
-import type { ServerEvent } from "../protocol/types";
+import type { ServerEvent, TaskStateData } from "../protocol/types";
 import { changed, opened } from "./document";
 import { put, without } from "./records";
 import { NO_PROGRAM, OFFLINE, type Notice, type State } from "./state";
@@ -11,9 +11,9 @@ const TRACE = 1000;
 const TRIED = 50;
 let numberOfNotice = 0;
 
-export function notice(state: State, level: Notice["level"], text: string): Pick<State, "notices"> {
+export function notice(state: State, level: Notice["level"], text: string): Pick<State, "notices" | "said"> {
   const added = { id: ++numberOfNotice, level, text, time: Date.now() };
-  return { notices: [...state.notices, added].slice(-NOTICES) };
+  return { notices: [...state.notices, added].slice(-NOTICES), said: [...state.said, added].slice(-NOTICES) };
 }
 
 /** Forget what belongs to the document that was open. */
@@ -98,10 +98,17 @@ export function reduce(state: State, event: ServerEvent): Partial<State> {
       return notice(state, level, event.data.message);
     }
     case "TaskState":
-      return { tasks: put(state.tasks, event.data.id, event.data) };
+      return { tasks: put(state.tasks, event.data.id, event.data), ...over(state, event.data) };
     default:
       return live(state, event) ?? program(state, event) ?? {};
   }
+}
+
+/** Work that is over is remembered among what was told. */
+function over(state: State, { title, state: how, message }: TaskStateData): Pick<State, "said"> | object {
+  if (how === "running") return {};
+  const { said } = notice(state, how === "failed" ? "error" : "info", `${title}: ${how}.${message ? ` ${message}` : ""}`);
+  return { said };
 }
 
 function open(state: State, doc: NonNullable<State["doc"]>): Partial<State> {

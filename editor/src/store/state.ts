@@ -233,6 +233,8 @@ export interface State {
   tried: Tried[];
   tasks: Record<string, TaskStateData>;
   notices: Notice[];
+  /** All that was told since the page is open, also what is dismissed and work that is over; the newest last. */
+  said: Notice[];
   ui: Ui;
 }
 
@@ -279,6 +281,7 @@ export function initialState(): State {
     tried: [],
     tasks: {},
     notices: [],
+    said: [],
     ui: { selection: null, mode: "3d", connecting: null, follow: false, ghost: null, tool: "", theme: "system", systemDark: false, leftHanded: false, quality: "auto" },
   };
 }

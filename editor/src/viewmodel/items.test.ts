@@ -61,7 +61,10 @@ test("each thing with a place has an item, and what has none is left to the list
   const made = items(workplace());
   expect(Object.keys(made).sort()).toEqual(["END", "START", "a1", "a2", "acp", "box", "l1", "l2", "l3", "ori", "ur"]);
   expect(made["box"]).toMatchObject({ kind: "object", shape: { kind: "box", size: [1, 2, 3] } });
-  expect(made["ur"]).toMatchObject({ kind: "robot", urdf: "ur5e.zip", online: false });
+  expect(made["ur"]).toMatchObject({ kind: "robot", urdf: "ur5e.zip", online: false, axes: true });
+  const plain = workplace();
+  plain.view.user = { hide_axes: true };
+  expect(items(plain)["ur"]).toMatchObject({ axes: false });
   expect(made["acp"]).toMatchObject({ kind: "point", parent: "box" });
   expect(made["a2"]).toMatchObject({ level: 1, parent: "acp" });
 });

@@ -47,6 +47,7 @@ export class ItemMaker {
     });
     const tell = (id: string) => [selection?.id === id, lockedBy(state, id, me), faint(id)];
 
+    const axes = state.view.user["hide_axes"] !== true;
     for (const object of Object.values(doc.objects)) {
       const type = state.types.byName[object.type];
       const robot = state.types.robots[object.type];
@@ -56,13 +57,13 @@ export class ItemMaker {
       const preview = drafted(draft, object) ?? state.previews[object.id];
       const model = type && draft?.type === type ? draft.model : undefined;
       const ghost = state.ui.ghost?.robotId === object.id ? state.ui.ghost : null;
-      add(object.id, [object, type, robot, trouble, robot && online, preview, model, ghost, ...tell(object.id)], () => {
+      add(object.id, [object, type, robot, trouble, robot && online, preview, model, ghost, robot && axes, ...tell(object.id)], () => {
         const pose = {
           position: preview?.position ?? object.pose?.position ?? NO_PLACE,
           orientation: preview?.orientation ?? object.pose?.orientation ?? UPRIGHT.orientation,
         };
         const base = { ...common(object.id, object.name), pose, trouble };
-        if (robot) return { ...base, kind: "robot", urdf: robot.urdf_package_filename ?? "", online, ghost: ghost ? ghostOf(ghost) : undefined };
+        if (robot) return { ...base, kind: "robot", urdf: robot.urdf_package_filename ?? "", online, axes, ghost: ghost ? ghostOf(ghost) : undefined };
         return { ...base, kind: "object", shape: shapeOf(type && model ? { ...type, object_model: model } : type) };
       });
     }

@@ -32,8 +32,9 @@ export function faintness(state: State): (id: string) => number {
   const own = (opacity ?? {}) as Record<string, unknown>;
   const all = 1 - opacityOfAll(state);
   const groups = new Set<Group>(fadesOthers(state) ? groupsOf(state) : []);
+  const arrows = state.view.user["hide_orientations"] !== true;
   return (id) => {
-    if (hidden.has(id)) return 1;
+    if (hidden.has(id) || (!arrows && doc && id in doc.orientations && ui.selection?.id !== id)) return 1;
     const object = doc?.objects[id];
     const robot = object !== undefined && object.type in state.types.robots;
     const given = own[id];

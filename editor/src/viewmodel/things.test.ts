@@ -87,6 +87,7 @@ test("what is hidden, seen through by itself or with all others, and what fades 
   expect(seen({ opacity_all: 0.5, opacity: { table: 0.75 } }, all)[0]).toBe(0.5);
   expect(seen({ filters: ["points", "no such"], fade_others: true }, all)).toEqual([0.85, 0.85, 0, 1, 1]);
   expect(seen({ filters: ["points"] }, all)).toEqual([0, 0, 0, 0, 0]);
+  expect(seen({ hide_orientations: true }, ["down", "pick"])).toEqual([1, 0]);
   expect(seen({ filters: "points", opacity_all: "half", opacity: { arm: "much" }, blocklist: 3, fade_others: true }, all)).toEqual([0, 0, 0, 0, 0]);
   state.ui.selection = { kind: "action", id: "grip" };
   expect(seen({ filters: ["points"], fade_others: true }, all)[3]).toBe(0); // what is selected stays

@@ -59,6 +59,7 @@ export class RobotThing extends Thing<RobotItem> {
       void this.load(item.urdf);
     }
     this.root.visible = item.faint < 1;
+    for (const frame of this.tips.values()) frame.visible = item.axes;
     this.ghost.show(item.ghost, this.robot, this.context.palette);
     this.checkAge();
     this.paint();
@@ -170,6 +171,7 @@ export class RobotThing extends Thing<RobotItem> {
         this.tips.set(key, frame);
         this.root.add(frame);
       }
+      frame.visible = this.item.axes;
       // Reported in the world; the robot's own frame may be another.
       setPose(frame, pose);
       frame.updateMatrix();

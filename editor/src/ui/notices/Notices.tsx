@@ -9,6 +9,7 @@ import { without } from "../../store/records";
 import type { TaskStateData } from "../../protocol/types";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
+import { openOverlay } from "../search/Overlays";
 import "./notices.css";
 
 /** s that what is no error stays. */
@@ -39,7 +40,11 @@ export function Notices() {
           <Button look="plain" icon="close" aria-label="Dismiss" onPress={() => dismiss(each.id)} />
         </div>
       ))}
-      {notices.length > SHOWN && <p className="quiet small">and {notices.length - SHOWN} before</p>}
+      {notices.length > SHOWN && (
+        <Button className="notices-before" onPress={() => openOverlay("messages")}>
+          and {notices.length - SHOWN} before
+        </Button>
+      )}
     </section>
   );
 }

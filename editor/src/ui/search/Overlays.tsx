@@ -1,4 +1,4 @@
-/** What opens over every screen: the search for commands and things, by "/", and what this is and which keys there are, by "?". */
+/** What opens over every screen: the search for commands and things, by "/"; what this is and which keys there are, by "?"; what was told. */
 
 import { Suspense, useEffect } from "react";
 import { create } from "zustand";
@@ -6,8 +6,9 @@ import { lazily } from "../kit/lazily";
 
 const Palette = lazily(() => import("./Palette"));
 const About = lazily(() => import("./About"));
+const Messages = lazily(() => import("../notices/Messages"));
 
-type Open = "" | "search" | "about";
+type Open = "" | "search" | "about" | "messages";
 const useOpen = create<{ open: Open }>(() => ({ open: "" }));
 
 export function openOverlay(open: Open): void {
@@ -33,5 +34,5 @@ export function Overlays() {
   }, []);
   if (!open) return null;
   const close = () => openOverlay("");
-  return <Suspense fallback={null}>{open === "search" ? <Palette onClose={close} /> : <About onClose={close} />}</Suspense>;
+  return <Suspense fallback={null}>{open === "search" ? <Palette onClose={close} /> : open === "about" ? <About onClose={close} /> : <Messages onClose={close} />}</Suspense>;
 }

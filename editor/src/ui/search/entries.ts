@@ -98,6 +98,7 @@ function everywhere(state: State): Entry[] {
         remember("hand", leftHanded ? "" : "left");
       },
     },
+    { id: "messages", words: "Messages: what was told, with times", detail: "help", why: "", act: () => openOverlay("messages") },
     { id: "about", words: "About, keys, invite others, diagnosis", detail: "help", why: "", act: () => openOverlay("about") },
     { id: "leave", words: "Leave", detail: "command", why: "", act: leave },
   ];

@@ -55,6 +55,7 @@ export function Settings() {
         remember("hand", leftHanded ? "" : "left");
       },
     },
+    { id: "messages", label: "Messages, with times", icon: "list", act: () => openOverlay("messages") },
     { id: "about", label: "Invite others, about, keys ( ? )", icon: "info", act: () => openOverlay("about") },
     { id: "leave", label: `Leave (you are ${user})`, icon: "close", act: leave },
   ];

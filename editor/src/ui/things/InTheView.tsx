@@ -7,10 +7,18 @@ import { parentLines } from "../../viewmodel/items";
 import { fadesOthers, opacityOfAll } from "../../viewmodel/seeing";
 import { MoreOrLess, OnOff } from "../kit/fields";
 
+/** What is drawn unless the user hides it, by the key under which the server keeps that. */
+const SIGHTS = [
+  ["hide_orientations", "Arrows of orientations"],
+  ["hide_axes", "Axes at end effectors"],
+  ["hide_steps", "Steps of the program"],
+] as const;
+
 export function InTheView({ narrowed }: { narrowed: boolean }) {
   const opacity = useEditor(opacityOfAll);
   const fades = useEditor(fadesOthers);
   const lines = useEditor(parentLines);
+  const view = useEditor((state) => state.view.user);
   const [moved, setMoved] = useState<number | null>(null);
   return (
     <section className="section" aria-label="In the view">
@@ -32,6 +40,11 @@ export function InTheView({ narrowed }: { narrowed: boolean }) {
           setMoved(null);
         }}
       />
+      {SIGHTS.map(([key, words]) => (
+        <OnOff key={key} isSelected={view[key] !== true} onChange={(on) => keepView("user", { [key]: on ? null : true })}>
+          {words}
+        </OnOff>
+      ))}
       <OnOff isSelected={lines} onChange={(on) => keepGeneral({ parent_lines: on || null })}>
         Lines from points to what they hang on
       </OnOff>

@@ -2,6 +2,7 @@
 
 import { barred } from "../../../commands/asking";
 import { retryObject } from "../../../commands/operation";
+import { derivesFrom } from "../../../store/selectors";
 import { useEditor } from "../../../store/store";
 import { serves } from "../../../session/session";
 import { Button } from "../../kit/kit";
@@ -21,8 +22,11 @@ export default function Panel() {
   const doc = useEditor((state) => state.doc);
   const cannot = useEditor((state) => barred(state, "RetryObject"));
   const troubled = (id: string) => live.objects[id]?.state === "failed" || live.objects[id]?.state === "lost";
+  // Boxes and tables are no devices.
+  const inert = useEditor((state) => Object.values(state.doc?.objects ?? {}).filter((each) => derivesFrom(state, each.type, "VirtualCollisionObject")).map((each) => each.id).join());
+  const devices = Object.values(doc?.objects ?? {}).filter((each) => troubled(each.id) || !inert.split(",").includes(each.id));
   // What is in trouble stands first.
-  const objects = Object.values(doc?.objects ?? {}).sort((a, b) => Number(troubled(b.id)) - Number(troubled(a.id)) || a.name.localeCompare(b.name));
+  const objects = devices.sort((a, b) => Number(troubled(b.id)) - Number(troubled(a.id)) || a.name.localeCompare(b.name));
   return (
     <>
       {live.state === "stopped" && <p className="quiet">The workplace is offline. {live.message}</p>}
