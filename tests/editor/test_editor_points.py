@@ -210,10 +210,10 @@ async def test_a_point_goes_where_the_robot_is_by_a_tap_and_by_hand(place: Place
     async def apart() -> float:
         drawn = (await screen.item(point))["pose"]["position"]
         tool = (await screen.item(place.robot))["endEffectors"][0]["position"]
-        return math.dist(drawn.values(), tool.values())
+        return float(math.dist(drawn.values(), tool.values()))
 
     async def there() -> bool:
-        return await apart() < 1e-3
+        return bool(await apart() < 1e-3)
 
     await place.select("point_3")
     assert await apart() > 1
@@ -233,7 +233,7 @@ async def test_a_point_goes_where_the_robot_is_by_a_tap_and_by_hand(place: Place
 
     async def guided() -> bool:
         actual = (await place.cell.tell("robot", "truth"))["q"]
-        return max(abs(a - b) for a, b in zip(actual, goal, strict=True)) < 1e-3
+        return bool(max(abs(a - b) for a, b in zip(actual, goal, strict=True)) < 1e-3)
 
     await until(guided, "the arm was moved by hand")
     assert await apart() > 0.02, "it waits until the arm is let go"

@@ -77,6 +77,29 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
         choices={[["move", "Move it"], ["turn", "Turn it"]]}
         onChange={(next) => setTurning(next === "turn")}
       />
+      <div className="actions start">
+        <Button look="primary" why={why || notYet} onPress={() => void moveToPose(chosen, goal, mannerNow()).then(setRefused)}>
+          Move there
+        </Button>
+        <Button onPress={giveUp}>Back to the tool</Button>
+        {selected && (
+          <Button
+            onPress={() => {
+              const { doc, ui } = now();
+              if (doc) show(ui.selection?.kind === "orientation" ? worldOf(doc, ui.selection.id) : { ...goal, position: worldOf(doc, ui.selection?.id).position });
+            }}
+          >
+            At {selected}
+          </Button>
+        )}
+      </div>
+      {refused && (
+        <p className="error small" role="alert">
+          {refused}
+        </p>
+      )}
+      <Answer answer={answer && answer.problem} />
+      <WayWords answer={answer} />
       <div className="amounts">
         {AXES.map((axis) => (
           <Amount key={axis} label={axis.toUpperCase()} unit="mm" value={goal.position[axis] * 1000} step={10} onChange={(next) => show({ ...goal, position: { ...goal.position, [axis]: next / 1000 } })} />
@@ -96,29 +119,6 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
           />
         ))}
       </div>
-      <div className="actions start">
-        <Button onPress={giveUp}>Back to the tool</Button>
-        {selected && (
-          <Button
-            onPress={() => {
-              const { doc, ui } = now();
-              if (doc) show(ui.selection?.kind === "orientation" ? worldOf(doc, ui.selection.id) : { ...goal, position: worldOf(doc, ui.selection?.id).position });
-            }}
-          >
-            At {selected}
-          </Button>
-        )}
-      </div>
-      <Answer answer={answer && answer.problem} />
-      <WayWords answer={answer} />
-      <Button look="primary" why={why || notYet} onPress={() => void moveToPose(chosen, goal, mannerNow()).then(setRefused)}>
-        Move there
-      </Button>
-      {refused && (
-        <p className="error small" role="alert">
-          {refused}
-        </p>
-      )}
     </>
   );
 }
