@@ -335,8 +335,11 @@ async def test_copies_in_a_row_and_what_others_hold(place: Place) -> None:
     await place.button("Make 2 copies").click()
     first = await place.point("feeder_copy")
     assert first.position.x - source.position.x == pytest.approx(0.05)
-    count = len([each for each in (await place.saved()).action_points if each.name.startswith("feeder_copy")])
-    assert count == 2
+
+    async def both() -> bool:
+        return sum(each.name.startswith("feeder_copy") for each in (await place.saved()).action_points) == 2
+
+    await until(both, "the second, which is made after the first")
     # What somebody else holds cannot be changed, and says by whom.
     await place.client.call("WriteLock", rpc.WriteLockArgs(source.id))
     why = page.get_by_role("button", name=re.compile("^Put it where the robot is.*colleague works on it"))
