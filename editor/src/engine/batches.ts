@@ -1,7 +1,7 @@
 /** Many equal small things drawn in one go: points, pucks, arrows. Each keeps its frame in the scene graph. */
 
 import { type BufferGeometry, Color, DynamicDrawUsage, InstancedMesh, type Material, Matrix4, type Object3D, type Scene } from "three";
-import { cheapen, discOf } from "./surface";
+import { Baked } from "./baked";
 
 export interface Instance {
   id: string;
@@ -15,17 +15,16 @@ export interface Instance {
 const FIRST_SIZE = 64;
 const matrix = new Matrix4();
 
-/** One geometry and material, drawn at every instance. */
+/** One geometry and material, drawn at every instance; where there is `baked`, by that, and the instances are only met by who points at them. */
 export class Batch {
   private mesh: InstancedMesh;
   private readonly instances: Instance[] = [];
 
-  /** `geometry` is what is met by who points at it; drawn is `drawn`. */
   constructor(
     private readonly scene: Scene,
     private readonly geometry: BufferGeometry,
     private readonly material: Material,
-    private readonly drawn = geometry,
+    private readonly baked: Baked | null,
   ) {
     this.mesh = this.made(FIRST_SIZE);
   }
@@ -49,36 +48,30 @@ export class Batch {
       this.mesh = this.made(this.instances.length * 2);
     }
     this.mesh.count = this.instances.length;
-    this.mesh.visible = this.mesh.count > 0;
+    this.mesh.visible = this.mesh.count > 0 && !this.baked;
     this.instances.forEach((each, index) => {
       this.mesh.setMatrixAt(index, matrix.multiplyMatrices(each.frame.matrixWorld, each.offset));
       this.mesh.setColorAt(index, each.color);
     });
     this.mesh.instanceMatrix.needsUpdate = true;
     if (this.mesh.instanceColor) this.mesh.instanceColor.needsUpdate = true;
-    this.mesh.geometry = this.geometry;
     this.mesh.computeBoundingSphere();
-    this.mesh.geometry = this.drawn;
+    this.baked?.refresh(this.instances);
   }
 
   dispose(): void {
     this.scene.remove(this.mesh);
     this.mesh.dispose();
+    this.baked?.dispose();
     this.geometry.dispose();
-    this.drawn.dispose();
     this.material.dispose();
   }
 
   private made(size: number): InstancedMesh {
-    const mesh = new InstancedMesh(this.drawn, this.material, size);
+    const mesh = new InstancedMesh(this.geometry, this.material, size);
     mesh.instanceMatrix.setUsage(DynamicDrawUsage);
     mesh.setColorAt(0, new Color(1, 1, 1)); // makes the attribute, so that the shader is compiled once
     mesh.count = 0;
-    mesh.raycast = (...given) => {
-      mesh.geometry = this.geometry;
-      InstancedMesh.prototype.raycast.apply(mesh, given);
-      mesh.geometry = this.drawn;
-    };
     mesh.userData["batch"] = (index: number) => this.instances[index]?.id;
     this.scene.add(mesh);
     return mesh;
@@ -94,14 +87,12 @@ export class Batches {
     private readonly cheap: boolean,
   ) {}
 
-  /** Where every triangle costs, balls of a radius of `ball` m are drawn as discs. */
+  /** Where it is to be cheap, balls of a radius of `ball` m are painted instead of modelled. */
   of(name: string, make: () => [BufferGeometry, Material], ball = 0): Batch {
     let batch = this.byName.get(name);
     if (!batch) {
       const [geometry, material] = make();
-      const discs = this.cheap && ball > 0;
-      if (this.cheap) cheapen(material, discs);
-      batch = new Batch(this.scene, geometry, material, discs ? discOf(ball) : geometry);
+      batch = new Batch(this.scene, geometry, material, this.cheap ? new Baked(this.scene, geometry, ball) : null);
       this.byName.set(name, batch);
     }
     return batch;

@@ -1,6 +1,6 @@
 /** What solid things are made of, and how they are drawn where each triangle and each pixel costs. */
 
-import { BufferAttribute, BufferGeometry, type Material, MeshLambertMaterial, type MeshLambertMaterialParameters } from "three";
+import { MeshLambertMaterial, type MeshLambertMaterialParameters } from "three";
 import type { Context } from "./thing";
 
 /** As the Lambert material of three.js does it, with lights of the two kinds that there are. */
@@ -30,7 +30,7 @@ vec3 lit( vec3 color, vec3 normal, float far ) {
   #endif
   return shade;
 }
-#if defined( USE_COLOR ) || defined( USE_INSTANCING_COLOR )
+#ifdef USE_COLOR
 #define OWN vColor.rgb
 #else
 #define OWN vec3( 1.0 )
@@ -58,7 +58,7 @@ varying vec3 vShade;
 void main() { gl_FragColor = vec4( vShade, opacity ); }`,
 };
 
-/** Instances of a square that faces the eye, on which a ball is painted. */
+/** Squares that face the eye, on which a ball is painted: in place of a normal they have the corner and half of the edge, m. */
 const DISCS = {
   vertexShader: `
 #include <common>
@@ -66,9 +66,9 @@ const DISCS = {
 varying vec3 vPlace;
 void main() {
   #include <color_vertex>
-  vec4 middle = modelViewMatrix * instanceMatrix * vec4( 0.0, 0.0, 0.0, 1.0 );
-  vPlace = vec3( position.xy, - middle.z );
-  middle.xy += position.xy * position.z * length( instanceMatrix[ 0 ].xyz );
+  vec4 middle = modelViewMatrix * vec4( position, 1.0 );
+  vPlace = vec3( normal.xy, - middle.z );
+  middle.xy += normal.xy * normal.z;
   gl_Position = projectionMatrix * middle;
 }`,
   fragmentShader: `
@@ -82,19 +82,11 @@ void main() {
 }`,
 };
 
-/** Have a dull material drawn at little cost: as it is, or as balls on the squares of `discOf`. */
-export function cheapen(material: Material, discs = false): void {
-  if (!(material instanceof MeshLambertMaterial)) return;
+/** Have a dull material drawn at little cost: as it is, or as balls on squares. */
+export function cheapen(material: MeshLambertMaterial, discs = false): void {
   const shaders = discs ? DISCS : CORNERS;
   material.onBeforeCompile = (shader) => void Object.assign(shader, shaders);
   material.customProgramCacheKey = () => (discs ? "discs" : "corners");
-}
-
-/** A square for a ball of a radius in m, which stands in its third coordinate. */
-export function discOf(radius: number): BufferGeometry {
-  const corners = [-1, -1, 1, -1, 1, 1, -1, 1].flatMap((each, n) => (n % 2 ? [each, radius] : [each]));
-  const square = new BufferGeometry().setAttribute("position", new BufferAttribute(new Float32Array(corners), 3));
-  return square.setIndex([0, 1, 2, 0, 2, 3]);
 }
 
 /** A dull material, of a colour that can be set. */

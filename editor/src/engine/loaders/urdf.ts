@@ -49,7 +49,7 @@ function joinShapes(link: URDFLink): void {
   if (pieces.length === 0) return;
   const shapes = pieces.map(({ geometry, matrixWorld }) => {
     // The loader's balls have as many triangles as a whole robot needs.
-    const shape = geometry instanceof SphereGeometry ? new SphereGeometry(1, 18, 12) : geometry;
+    const shape = geometry instanceof SphereGeometry ? new SphereGeometry(1, 18, 10) : geometry;
     shape.deleteAttribute("uv");
     return shape.applyMatrix4(base.clone().multiply(matrixWorld));
   });

@@ -140,7 +140,7 @@ function Cube({ engine, onLook }: { engine: Engine; onLook: (from: ViewName) => 
         const transform = towards ? `matrix(${parts.map((each) => each.toFixed(3)).join()})` : "";
         if (face.style.transform === transform) return;
         face.style.transform = transform;
-        face.style.visibility = towards ? "visible" : "hidden";
+        face.style.display = towards ? "grid" : "none";
       });
     };
     turn();

@@ -1,0 +1,90 @@
+/**
+ * Instances as one mesh: what draws in software goes through instances one by one, and takes as long for each as for a
+ * hundred triangles. Nothing is done per frame; all is written anew when something changed its place or its colour.
+ */
+
+import { BufferAttribute, BufferGeometry, DynamicDrawUsage, Matrix4, Mesh, MeshLambertMaterial, type Scene, Vector3 } from "three";
+import type { Instance } from "./batches";
+import { cheapen } from "./surface";
+
+const matrix = new Matrix4();
+const place = new Vector3();
+const normal = new Vector3();
+/** Of a square that faces the eye. */
+const CORNERS = [-1, -1, 1, -1, 1, 1, -1, 1];
+
+export class Baked {
+  private readonly mesh: Mesh;
+  private readonly material = new MeshLambertMaterial({ vertexColors: true });
+  private room = 0;
+
+  /** Draws `shape` at every instance; balls of a radius of `ball` m, where that is not 0, as squares on which they are painted. */
+  constructor(
+    private readonly scene: Scene,
+    private readonly shape: BufferGeometry,
+    private readonly ball: number,
+  ) {
+    cheapen(this.material, ball > 0);
+    this.mesh = new Mesh(new BufferGeometry(), this.material);
+    this.mesh.frustumCulled = false;
+    this.mesh.raycast = () => {};
+    scene.add(this.mesh);
+  }
+
+  refresh(instances: readonly Instance[]): void {
+    if (instances.length > this.room) this.makeRoom(instances.length * 2);
+    this.mesh.visible = instances.length > 0;
+    if (instances.length === 0) return;
+    const { geometry } = this.mesh;
+    const [places, normals, colors] = ["position", "normal", "color"].map((name) => geometry.getAttribute(name) as BufferAttribute) as [BufferAttribute, BufferAttribute, BufferAttribute];
+    let at = 0;
+    for (const { frame, offset, color } of instances) {
+      matrix.multiplyMatrices(frame.matrixWorld, offset);
+      const first = at;
+      if (this.ball > 0) {
+        const size = this.ball * matrix.getMaxScaleOnAxis();
+        place.setFromMatrixPosition(matrix);
+        for (let n = 0; n < 8; n += 2, at++) {
+          places.setXYZ(at, place.x, place.y, place.z);
+          normals.setXYZ(at, CORNERS[n] as number, CORNERS[n + 1] as number, size);
+        }
+      } else {
+        const { position: its, normal: facing } = this.shape.attributes as { position: BufferAttribute; normal: BufferAttribute };
+        for (let n = 0; n < its.count; n++, at++) {
+          place.fromBufferAttribute(its, n).applyMatrix4(matrix);
+          normal.fromBufferAttribute(facing, n).transformDirection(matrix);
+          places.setXYZ(at, place.x, place.y, place.z);
+          normals.setXYZ(at, normal.x, normal.y, normal.z);
+        }
+      }
+      for (let n = first; n < at; n++) colors.setXYZ(n, color.r, color.g, color.b);
+    }
+    for (const each of [places, normals, colors]) each.needsUpdate = true;
+    geometry.setDrawRange(0, instances.length * this.corners);
+  }
+
+  dispose(): void {
+    this.scene.remove(this.mesh);
+    this.mesh.geometry.dispose();
+    this.material.dispose();
+  }
+
+  /** Corners of triangles of an instance. */
+  private get corners(): number {
+    return this.ball > 0 ? 6 : (this.shape.index?.count ?? this.shape.getAttribute("position").count);
+  }
+
+  private makeRoom(instances: number): void {
+    this.room = instances;
+    const index = this.ball > 0 ? [0, 1, 2, 0, 2, 3] : this.shape.index ? [...this.shape.index.array] : [...Array(this.corners).keys()];
+    const vertices = this.ball > 0 ? 4 : this.shape.getAttribute("position").count;
+    this.mesh.geometry.dispose();
+    this.mesh.geometry = new BufferGeometry();
+    for (const name of ["position", "normal", "color"]) {
+      this.mesh.geometry.setAttribute(name, new BufferAttribute(new Float32Array(instances * vertices * 3), 3).setUsage(DynamicDrawUsage));
+    }
+    const all = new Uint32Array(instances * index.length);
+    for (let n = 0; n < instances; n++) index.forEach((each, m) => (all[n * index.length + m] = n * vertices + each));
+    this.mesh.geometry.setIndex(new BufferAttribute(all, 1));
+  }
+}
