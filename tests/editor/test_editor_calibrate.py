@@ -25,7 +25,7 @@ from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.scene import Scene, SceneObject
 from tests.e2e.harness import Cell, scene_state, until
 from tests.e2e.seen_workplace import CAMERA, MARKERS, ROBOT, SIZE, Q, in_view, off, pose, tilted
-from tests.editor.screen import Screen, screen_of
+from tests.editor.screen import VIEWPORTS, Screen, screen_of
 
 pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(180)]
 
@@ -144,6 +144,17 @@ async def _stands(screen: Screen, id: str) -> Pose:  # noqa: A002
     return Pose(Position(**shown["position"]), Orientation(**shown["orientation"]))
 
 
+async def _on_a_phone_in_the_dark(screen: Screen, name: str) -> None:
+    page = screen.page
+    await page.emulate_media(color_scheme="dark")
+    await page.set_viewport_size(VIEWPORTS["phone"])  # type: ignore[arg-type]
+    await screen.settle()
+    assert await screen.faults() == []
+    await screen.picture(name)
+    await page.set_viewport_size(VIEWPORTS["tablet"])  # type: ignore[arg-type]
+    await page.emulate_media(color_scheme="light")
+
+
 async def _choose(screen: Screen, name: str) -> None:
     page = screen.page
     tool = page.get_by_role("navigation").get_by_role("button").filter(has_text="Things")
@@ -218,6 +229,7 @@ async def test_camera_and_robot_are_found_by_what_is_seen(
         # Where it stood is seen through, until somebody says that it is well; it cannot be put back while online.
         assert (await screen.item(ids["arm"]))["ghost"]
         await screen.picture("calibrated robot")
+        await _on_a_phone_in_the_dark(screen, "calibrated robot phone")
         back = change.get_by_role("button", name="Put it back")
         await expect(back).to_have_attribute("aria-disabled", "true")
         assert await screen.faults() == []

@@ -19,7 +19,7 @@ from arcor2_hw.data.project import Project
 from arcor2_hw.data.rpc import ListScenesData
 from arcor2_hw.data.scene import Scene
 from tests.e2e.harness import Cell, until
-from tests.editor.screen import Screen, screen_of
+from tests.editor.screen import VIEWPORTS, Screen, screen_of
 
 pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(120)]
 
@@ -334,6 +334,12 @@ async def test_what_is_wrong_stands_on_the_tiles_and_is_mended_from_there(
             await expect(card.get_by_role("button", name="Open lighting")).to_have_attribute("aria-disabled", "true")
             assert await screen.faults() == []
             await screen.picture("home problems")
+            await screen.page.emulate_media(color_scheme="dark")
+            await screen.page.set_viewport_size(VIEWPORTS["phone"])  # type: ignore[arg-type]
+            await screen.settle()
+            assert await screen.faults() == []
+            assert await screen.barriers() == []
+            await screen.picture("home problems phone")
             await screen.press("Show the scene of lighting to mend it")
             card = screen.page.locator(".card").filter(has=screen.page.get_by_role("heading", name="lamps"))
             await card.get_by_text("2 problems").click()

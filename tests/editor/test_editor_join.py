@@ -88,6 +88,15 @@ async def test_a_name_that_somebody_has_is_refused_with_the_reason(server: Serve
         await home(two)
         await one.page.get_by_role("img", name="Berta").wait_for()
         assert await one.page.get_by_role("img", name="Adam (you)").is_visible()
+        # Who shares a tablet chooses his name from those that were here, by one tap.
+        await two.press("Settings")
+        await two.page.get_by_role("menuitem", name="Leave (you are Berta)").click()
+        people = two.page.get_by_role("group", name="Who was here with this device")
+        assert await people.get_by_role("button").all_inner_texts() == ["Berta"]  # and not who was refused
+        assert await two.faults() == []
+        await two.picture("who was here")
+        await two.press("Join as Berta")
+        await home(two)
 
 
 async def test_a_file_for_diagnosis_is_saved_by_one_press(server: ServerProcess, browser: Browser) -> None:

@@ -1,6 +1,6 @@
 /** What this browser remembers: who uses it, the token, and how it likes the screen. The rest is kept by the server. */
 
-const KEYS = { name: "arcor2-hw.name", token: "arcor2-hw.token", theme: "arcor2-hw.theme", hand: "arcor2-hw.left-handed" };
+const KEYS = { name: "arcor2-hw.name", token: "arcor2-hw.token", names: "arcor2-hw.names", theme: "arcor2-hw.theme", hand: "arcor2-hw.left-handed" };
 
 export function remembered(key: keyof typeof KEYS): string {
   try {
@@ -17,6 +17,18 @@ export function remember(key: keyof typeof KEYS, value: string): void {
   } catch {
     // as above
   }
+}
+
+/** So many people of one tablet are remembered. */
+const PEOPLE = 6;
+
+/** Who has come in with this browser, the last first. */
+export function peopleHere(): string[] {
+  return remembered("names").split("\n").filter(Boolean);
+}
+
+export function rememberPerson(name: string): void {
+  remember("names", [name, ...peopleHere().filter((each) => each !== name)].slice(0, PEOPLE).join("\n"));
 }
 
 /** Take a token out of the address, where it would be seen and kept, into memory. */

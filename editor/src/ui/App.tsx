@@ -2,7 +2,8 @@
 
 import { Suspense, useEffect, useState, useSyncExternalStore } from "react";
 import { isRunning, openId } from "../store/selectors";
-import { useEditor } from "../store/store";
+import { rememberPerson } from "../session/memory";
+import { now, useEditor } from "../store/store";
 import { Join } from "./join/Join";
 import { Waiting } from "./kit/kit";
 import { lazily } from "./kit/lazily";
@@ -36,6 +37,9 @@ export function App() {
   useEffect(() => {
     if (document) keepRecent(document);
   }, [document]);
+  useEffect(() => {
+    if (status === "ready") rememberPerson(now().connection.user);
+  }, [status]);
   // Who has been in stays on his screen when the connection is lost.
   const [been, setBeen] = useState(false);
   if (status === "ready" && !been) setBeen(true);

@@ -34,16 +34,16 @@ export function Problems({ entry: { kind, id, name, problems, from }, whyOpen, o
       </ul>
       {kind === "project" && from && !from.gone && (ofScene ? (
         <Button aria-label={`Show the scene of ${name} to mend it`} onPress={onScene}>
-          To its scene, to mend it
+          Show the scene
         </Button>
       ) : (
         <Button why={whyOpen} aria-label={`Open the scene of ${name} to mend it`} onPress={() => void documents.openScene(from.id)}>
-          Open its scene
+          Open the scene
         </Button>
       ))}
       {kind === "scene" && (
         <Button why={noScene} aria-label={`Mend ${name}`} onPress={() => void faultyObjects(id, problems).then(setFaulty, (error) => tell("error", sentence(error)))}>
-          Mend it…
+          Mend
         </Button>
       )}
       {faulty && (

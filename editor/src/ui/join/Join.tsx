@@ -1,7 +1,7 @@
 /** The first screen: a name, and a token where the server asks for one. The name is remembered. */
 
 import { type FormEvent, useState } from "react";
-import { remember, remembered } from "../../session/memory";
+import { peopleHere, remember, remembered } from "../../session/memory";
 import { join } from "../../session/session";
 import { useEditor } from "../../store/store";
 import { Button, Field, Waiting } from "../kit/kit";
@@ -13,13 +13,18 @@ export function Join() {
   const [token, setToken] = useState(() => remembered("token"));
   const asksForToken = status === "refused" && /token/i.test(reason);
   const trying = status === "connecting" || status === "joining";
-  const submit = (event: FormEvent) => {
-    event.preventDefault();
-    const clean = name.trim();
+  const [people] = useState(peopleHere);
+  const enter = (who: string) => {
+    const clean = who.trim();
     if (!clean) return;
+    setName(clean);
     remember("name", clean);
     remember("token", token.trim());
     join(clean, token.trim());
+  };
+  const submit = (event: FormEvent) => {
+    event.preventDefault();
+    enter(name);
   };
   return (
     <main className="join">
@@ -27,6 +32,15 @@ export function Join() {
         <h1>ARCOR2-HW</h1>
         <p className="quiet">Set up, program and run this workplace, together with everyone who is here.</p>
         <Field label="Your name" value={name} onChange={setName} autoFocus autoComplete="nickname" maxLength={60} hint="Others see it beside what you work on." />
+        {people.length > 0 && (
+          <div className="people-here" role="group" aria-label="Who was here with this device">
+            {people.map((each) => (
+              <Button key={each} aria-label={`Join as ${each}`} isDisabled={status === "joining"} onPress={() => enter(each)}>
+                {each}
+              </Button>
+            ))}
+          </div>
+        )}
         {(asksForToken || token) && (
           <Field label="Token" type="password" value={token} onChange={setToken} autoComplete="off" hint="Who looks after the server makes it: arcor2-hw token add" />
         )}

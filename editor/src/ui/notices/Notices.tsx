@@ -28,7 +28,7 @@ export function Notices() {
   }, [passing]);
   return (
     <section className="tray" aria-label="Tasks and messages" aria-live="polite">
-      {Object.values(tasks)
+      {current(Object.values(tasks))
         .filter((each) => each.state !== "cancelled")
         .map((each) => (
           <Task key={each.id} task={each} />
@@ -47,6 +47,11 @@ export function Notices() {
       )}
     </section>
   );
+}
+
+/** What was begun anew takes the place of what has failed before, or is over. */
+function current(tasks: TaskStateData[]): TaskStateData[] {
+  return tasks.filter((each, n) => each.state === "running" || !tasks.slice(n + 1).some(({ kind, title }) => kind === each.kind && title === each.title));
 }
 
 function Task({ task }: { task: TaskStateData }) {
