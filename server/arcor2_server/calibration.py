@@ -79,8 +79,7 @@ class CalibrationService:
         configuration = self._services.markers.configuration
         if not configuration.markers and not configuration.boards:
             raise CalibrationRefused(
-                "No markers are configured: say which stand where (serve --markers, or PUT "
-                "/api/calibration/markers).",
+                "No markers are configured: say which stand where (serve --markers, or PUT /api/calibration/markers).",
                 reason=Reason.NO_MARKER,
             )
         task = FindCameraPose(pictures, parameters, configuration.layout, configuration.options)
