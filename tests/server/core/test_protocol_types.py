@@ -29,7 +29,7 @@ ADDED = {
     "RunPackage.Request.Args": {"shared_breakpoints"},
     "TemporaryPackage.Request.Args": {"shared_breakpoints"},
 }
-"""What we tell, or take, beside the protocol (docs/protocol.md), by the type's name there or here; it may be left out."""
+"""What we tell, or take, beside the protocol (docs/protocol.md), by the name of the type; it may be left out."""
 
 
 class Comparison:
