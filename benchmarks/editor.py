@@ -5,6 +5,7 @@ error measures nothing.
 """
 
 import asyncio
+import contextlib
 import json
 import re
 import sys
@@ -35,6 +36,7 @@ IDLE_S: Final = 5.0
 EDITS: Final = 60
 STOPS: Final = 10
 RESTARTS: Final = 3
+ATTEMPTS: Final = 4
 SLOW: Final = 0.015
 """Fraction of the robot's speed."""
 _INSIDE: Final = Path(__file__).with_suffix(".js").read_text()
@@ -79,20 +81,33 @@ async def _move(client: Client, robot: str, height: float) -> None:
     await client.call("MoveToPose", rpc.MoveToPoseArgs(robot, tool, SLOW, to, at.orientation, safe=False))
 
 
+async def _moving(client: Client, cell: Cell, robot: str, height: float) -> None:
+    """Have it move; on a busy machine the robot's watchdog ends a motion at times, and it is asked for again."""
+    for _ in range(ATTEMPTS):
+        await _move(client, robot, height)
+        with contextlib.suppress(AssertionError):
+            await until(lambda: _not(_at_rest(cell)), "it moves", 3)
+            return
+    raise AssertionError("it does not move")
+
+
 async def _at_rest(cell: Cell) -> bool:
     return not (await cell.tell("robot", "truth"))["moving"]
 
 
 async def drawing(report: Report, screen: Screen, client: Client, cell: Cell, robot: str) -> None:
     """Frames while the robot moves slowly, and from an event of it to pixels."""
-    await _move(client, robot, -0.2)
-    await until(lambda: _not(_at_rest(cell)), "it moves")
-    await asyncio.sleep(0.5)
-    await screen.page.evaluate("() => { window.__bench.joints = []; }")
-    begin, frames = time.perf_counter(), await screen.frames()
-    await asyncio.sleep(MOVING_S)
-    rate = (await screen.frames() - frames) / (time.perf_counter() - begin)
-    assert not await _at_rest(cell), "it did not move all the time"
+    for attempt in range(ATTEMPTS):
+        await _moving(client, cell, robot, 0.2 if attempt % 2 else -0.2)
+        await asyncio.sleep(0.5)
+        await screen.page.evaluate("() => { window.__bench.joints = []; }")
+        begin, frames = time.perf_counter(), await screen.frames()
+        await asyncio.sleep(MOVING_S)
+        rate = (await screen.frames() - frames) / (time.perf_counter() - begin)
+        if not await _at_rest(cell):
+            break
+    else:
+        raise AssertionError("it did not move all the time: the robot's watchdog ends motions on a busy machine")
     joints = (await _inside(screen))["joints"]
     report.add(Figure("editor_frames_per_s", rate, round(rate * MOVING_S), f"one robot moves, {POINTS} points"))
     note = f"p50 {median(joints):.0f} ms, {len(joints) / MOVING_S:.0f} events/s"
@@ -120,8 +135,7 @@ async def stopping(report: Report, screen: Screen, client: Client, cell: Cell, r
     note_time = "window.__tap = performance.timeOrigin + performance.now();"
     await screen.page.evaluate(f"() => addEventListener('pointerdown', () => {{ {note_time} }}, true)")
     for number in range(STOPS):
-        await _move(client, robot, 0.1 if number % 2 else -0.1)
-        await until(lambda: _not(_at_rest(cell)), "it moves")
+        await _moving(client, cell, robot, 0.1 if number % 2 else -0.1)
         offset = time.time() - time.monotonic()
         await button.click()
         await until(lambda: _at_rest(cell), "it rests")

@@ -37,7 +37,7 @@ export class Moving {
     const decided = new Promise<boolean>((resolve) => (this.end = resolve));
     const work = async () => {
       this.held = true;
-      this.tell();
+      if (!this.finishing) this.tell(); // else the edit itself tells
       return !(await decided) || (await this.store());
     };
     const before = latest;
