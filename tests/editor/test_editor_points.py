@@ -15,7 +15,7 @@ import pytest_asyncio
 from playwright.async_api import Browser, Locator, expect
 
 from arcor2_hw.client import Client
-from arcor2_hw.client.errors import RequestFailed
+from arcor2_hw.client.errors import LockedByOther, RequestFailed
 from arcor2_hw.data import rpc
 from arcor2_hw.data.events import SceneStateEnum
 from arcor2_hw.data.geometry import Orientation
@@ -222,20 +222,28 @@ async def test_a_point_goes_where_the_robot_is_by_a_tap_and_by_hand(place: Place
     joints = await place.client.call("GetRobotJoints", rpc.GetRobotJointsArgs(place.robot))
     goal = [each.value for each in joints]
     goal[1] += 0.1
-    await page.get_by_role("button", name=re.compile("^Hold: by hand")).hover()
-    await page.mouse.down()
+    button = page.get_by_role("button", name=re.compile("^Hold: by hand"))
 
     async def free() -> bool:
         return bool((await place.cell.tell("robot", "truth"))["freedrive"])
 
-    await until(free, "the arm is free")
-    await place.cell.tell("robot", "guide", q=goal, speed=0.5)
-
     async def guided() -> bool:
-        actual = (await place.cell.tell("robot", "truth"))["q"]
-        return bool(max(abs(a - b) for a, b in zip(actual, goal, strict=True)) < 1e-3)
+        """By a hand that takes the button again when its hold ended by itself, as it may on a busy machine."""
+        if await button.get_attribute("data-held") != "true":
+            await page.mouse.up()
+            await button.hover()
+            await page.mouse.down()
+        truth = await place.cell.tell("robot", "truth")
+        if not truth["freedrive"]:
+            return False
+        if max(abs(a - b) for a, b in zip(truth["q"], goal, strict=True)) < 1e-3:
+            return await button.get_attribute("data-held") == "true"
+        if not any(truth["qd"]):
+            with contextlib.suppress(AssertionError):  # stiff again meanwhile
+                await place.cell.tell("robot", "guide", q=goal, speed=0.5)
+        return False
 
-    await until(guided, "the arm was moved by hand")
+    await until(guided, "the arm was moved by hand", 20)
     assert await apart() > 0.02, "it waits until the arm is let go"
     await page.mouse.up()
     await until(there, "the point followed", 15)
@@ -286,9 +294,14 @@ async def test_the_robot_is_shown_at_what_is_taught_goes_there_and_turns_as_it_i
 
     async def reached() -> bool:
         found = await page.evaluate(as_taught, [place.robot, down])
-        return bool(found["turned"] < 2e-3 and found["apart"] < 1e-3)
+        return bool(found["turned"] < 2e-3 and found["apart"] < 2e-3)
 
     await until(reached, "the tool is as it is taught", 20)
+
+    async def rests() -> bool:
+        return not any((await place.cell.tell("robot", "truth"))["qd"])
+
+    await until(rests, "the arm rests")
     # The tool turns as another orientation, and stays where it is.
     await place.client.call("WriteLock", rpc.WriteLockArgs(down))
     yawed = Orientation(math.cos(0.5), math.sin(0.5), 0.0, 0.0)
@@ -341,7 +354,14 @@ async def test_copies_in_a_row_and_what_others_hold(place: Place) -> None:
 
     await until(both, "the second, which is made after the first")
     # What somebody else holds cannot be changed, and says by whom.
-    await place.client.call("WriteLock", rpc.WriteLockArgs(source.id))
+
+    async def locked() -> bool:
+        with contextlib.suppress(LockedByOther):  # until the screen has given its own lock back
+            await place.client.call("WriteLock", rpc.WriteLockArgs(source.id))
+            return True
+        return False
+
+    await until(locked, "the colleague has the point in hand")
     why = page.get_by_role("button", name=re.compile("^Put it where the robot is.*colleague works on it"))
     await expect(why).to_have_attribute("aria-disabled", "true")
     await place.client.call("WriteUnlock", rpc.WriteUnlockArgs(source.id))
