@@ -89,6 +89,8 @@ export class Engine {
   private palette: Palette = LIGHT;
   private scheduled = 0;
   private last = 0;
+  /** When the next frame may be drawn, ms. */
+  private due = 0;
   /** Frames of things may have changed since the last drawn frame. */
   private dirty = true;
   /** Robots whose joints have changed since then, and nothing else. */
@@ -376,11 +378,14 @@ export class Engine {
     this.scheduled = requestAnimationFrame((time) => {
       this.scheduled = 0;
       const seconds = (time - this.last) / 1000;
-      if (this.options.quality === "low" && seconds < this.context.period * 0.9) {
+      if (this.options.quality === "low" && time < this.due - 3) {
         this.draw();
         return;
       }
       this.last = time;
+      // A frame that came late does not keep the next one back.
+      const period = this.context.period * 1000;
+      this.due = Math.max(this.due + period, time + period / 2);
       const flying = this.view.fly(seconds);
       this.render();
       if (flying) this.draw();
