@@ -18,7 +18,7 @@ run: .make/run .make/editor
 # is tried once more with the machine to itself, as the whole cell is, a dozen processes; both outcomes are shown.
 test: .make/dev .make/editor .make/browser
 	$(BIN)/python editor/build.py test
-	$(BIN)/python -m pytest --numprocesses 3 --dist loadgroup -m "not alone" $(ARGS) || test $$? = 5 || \
+	$(BIN)/python -m pytest --numprocesses 3 --dist loadgroup --no-loadscope-reorder -m "not alone" $(ARGS) || test $$? = 5 || \
 	$(BIN)/python -m pytest --once-more -m "not alone" $(ARGS)
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup -m alone $(ARGS) || test $$? = 5 || \
 	$(BIN)/python -m pytest --once-more -m alone $(ARGS)

@@ -25,15 +25,18 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if config.getoption("once_more"):
         _keep_what_failed(config, items)
     elif hasattr(config, "workerinput"):
-        items[:] = _spread(items, "tests/editor/")
+        items[:] = _spread(items)
 
 
-def _spread(items: list[pytest.Item], heavy: str) -> list[pytest.Item]:
-    """Spread the modules of a folder over the others: neither shall three browsers draw at once, nor one last alone."""
+HEAVY = ("tests/editor/", "tests/e2e/", "tests/testing/", "tests/calibration/")
+
+
+def _spread(items: list[pytest.Item]) -> list[pytest.Item]:
+    """Spread modules that take long over the others: neither shall three browsers draw at once, nor one last alone."""
     modules: dict[str, list[pytest.Item]] = {}
     others = []
     for each in items:
-        if each.nodeid.startswith(heavy):
+        if each.nodeid.startswith(HEAVY):
             modules.setdefault(each.nodeid.partition("::")[0], []).append(each)
         else:
             others.append(each)
