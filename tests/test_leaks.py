@@ -5,6 +5,12 @@ import pytest
 CONFTEST = 'pytest_plugins = ["tests.leaks"]\nimport tests.leaks\ntests.leaks.GRACE = 0.2\n'
 
 
+@pytest.fixture(autouse=True)
+def no_other_plugins(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those that happen to be installed take seconds to load."""
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+
+
 @pytest.mark.parametrize(
     ("body", "named"),
     [
@@ -17,7 +23,7 @@ CONFTEST = 'pytest_plugins = ["tests.leaks"]\nimport tests.leaks\ntests.leaks.GR
 def test_a_leak_fails_the_test_that_made_it(pytester: pytest.Pytester, body: str, named: str) -> None:
     pytester.makeconftest(CONFTEST)
     pytester.makepyfile("import threading\nKEEP = []\nEVENT = threading.Event()\n" + body + TIDY)
-    result = pytester.runpytest_subprocess("-p", "asyncio", "--asyncio-mode=auto", "-W", "ignore")
+    result = pytester.runpytest_subprocess("-p", "pytest_asyncio.plugin", "--asyncio-mode=auto", "-W", "ignore")
     text = result.stdout.str()
     assert f"left behind: {named}" in text, text
     outcomes = result.parseoutcomes()
@@ -74,5 +80,5 @@ def test_what_is_tidied_up_or_of_wider_scope_passes(pytester: pytest.Pytester) -
             await task
         """
     )
-    result = pytester.runpytest_subprocess("-p", "asyncio", "--asyncio-mode=auto")
+    result = pytester.runpytest_subprocess("-p", "pytest_asyncio.plugin", "--asyncio-mode=auto")
     result.assert_outcomes(passed=4)
