@@ -137,6 +137,7 @@ def live(device: Device, event: str) -> None:
             if life.state is C.LOST:
                 device.until(lambda: life.state is C.BACK)
         case "settle":
+            device.until(lambda: not device.path or device.path[-1] is life.state)  # it is told after it is so
             was = life.state
             life.settled()
             assert life.state is (C.ONLINE if was is C.BACK else was)
