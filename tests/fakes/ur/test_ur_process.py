@@ -218,7 +218,7 @@ def test_does_not_outlive_its_parent():
             " stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)\n"
             "print(p.pid, p.stdout.readline(), flush=True)\n"
             "time.sleep(60)",
-            *("--rtde-port", "0", "--script-port", "0", "--dashboard-port", "0"),
+            *("--rtde-port", "0", "--script-port", "0", "--dashboard-port", "0", "--primary-port", "0"),
         ],
         stdout=subprocess.PIPE,
         text=True,
