@@ -23,8 +23,8 @@ from .socketcand import SocketcandBus
 
 LOOK: Final = 0.05
 """s the receiver waits for a frame before it looks whether it should end."""
-WRITE_TIMEOUT: Final = 0.1
-"""s the adapter has to take a frame."""
+WRITE_TIMEOUT: Final = 0.5
+"""s the adapter has to take a frame. When this process stands still for that long in sending, pyserial raises, too."""
 NMT_START: Final = 1
 HEARTBEAT: Final = 0x700
 EMCY: Final = 0x80
