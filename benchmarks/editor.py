@@ -173,7 +173,7 @@ async def editing(report: Report, browser: Browser, one: Screen, cell: Cell, pro
             await one.page.keyboard.press("Enter")
 
         async def step(number: int) -> None:
-            await one.page.get_by_role("button", name=f"Z 1 cm {'less' if number % 2 else 'more'}").click()
+            await one.page.get_by_role("button", name=f"Z 1 cm {'less' if number % 3 else 'more'}").click()
 
         took = await heard("edits", "enters", type_it)
         note = f"p50 {median(took):.0f} ms; with its lock, kept in the journal"
