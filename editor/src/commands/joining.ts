@@ -15,6 +15,7 @@ export async function howToJoin(): Promise<Joining> {
   const here = isHere(location.hostname) ? [] : [location.origin];
   try {
     const response = await fetch("/api/joining", { headers: token ? { Authorization: `Bearer ${token}` } : {} });
+    if (!response.ok) throw new Error(`${response.status}`);
     const { addresses, fingerprint } = (await response.json()) as Partial<Joining>;
     // How this page was reached is known to work.
     return { addresses: [...new Set([...here, ...(addresses ?? [])])], fingerprint: fingerprint ?? "" };
@@ -23,4 +24,6 @@ export async function howToJoin(): Promise<Joining> {
   }
 }
 
-const isHere = (host: string) => host === "localhost" || host === "[::1]" || host.startsWith("127.") || host === "0.0.0.0";
+/** Whether a host is this machine to itself, so that nobody else gets anywhere by it. A name may begin with digits, too. */
+export const isHere = (host: string) =>
+  host === "localhost" || host.endsWith(".localhost") || host === "[::1]" || host === "0.0.0.0" || /^127(\.\d{1,3}){3}$/.test(host);

@@ -26,7 +26,8 @@ export function Invitation() {
       <h3>Others join at</h3>
       {best === undefined ? (
         <p className="small">
-          Only this machine reaches the server, at {location.origin}. For others, start it with <code>arcor2-hw serve --host 0.0.0.0</code>.
+          Only this machine reaches the server, at {location.origin}. For others, start it with <code>arcor2-hw serve --host 0.0.0.0</code>: it
+          then speaks TLS alone, and asks each for a token made by <code>arcor2-hw token add</code>.
         </p>
       ) : (
         <>
