@@ -18,6 +18,7 @@ _BINARY: Final[dict[type[ast.operator], Callable[[Any, Any], Any]]] = {
     ast.Div: operator.truediv,
 }
 _EXTERNAL: Final = {"math.pi": math.pi, "math.tau": math.tau, "math.e": math.e, "math.inf": math.inf}
+_SETS: Final[dict[str, Callable[..., Any]]] = {"builtins.set": set, "builtins.frozenset": frozenset}
 _DEPTH: Final = 40
 
 
@@ -104,12 +105,12 @@ def constant(
                 return {again(element) for element in elements}
             case ast.Dict(keys=keys, values=values) if None not in keys:
                 return {again(key): again(value) for key, value in zip(keys, values, strict=True) if key is not None}
-            case ast.Call(func=ast.Name(id="set" | "frozenset"), args=[]):
-                return set()
-            case ast.Call(func=ast.Name(id="set" | "frozenset" as kind), args=[argument]):
-                return set(again(argument)) if kind == "set" else frozenset(again(argument))
-            case ast.Call(func=func, args=arguments) if _last(func) == "DynamicParamTuple":
-                return tuple(again(argument) for argument in arguments)
+            case ast.Call(func=func, args=arguments, keywords=[]):
+                symbol = resolver.expression(func, module, owner)
+                if framework_name(symbol) == "DynamicParamTuple":
+                    return tuple(again(argument) for argument in arguments)
+                if isinstance(symbol, External) and symbol.dotted in _SETS:
+                    return _SETS[symbol.dotted](*(again(argument) for argument in arguments))
             case ast.Attribute(value=function, attr="__name__") if _last(function):
                 return _last(function)
             case ast.Attribute(value=inner, attr="value"):

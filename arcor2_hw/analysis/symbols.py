@@ -104,7 +104,7 @@ class Resolver:
         return External(f"builtins.{name}") if hasattr(builtins, name) else None
 
     def _own(self, name: str, module: Module, depth: int) -> Symbol | None:
-        """Give what a module itself binds, or takes over by `from x import *`."""
+        """Return what a module itself binds, or imports with `from x import *`."""
         if depth <= 0:
             return None
         if name in module.bindings:
@@ -113,6 +113,8 @@ class Resolver:
             source = self._load(star.module)
             if source is not None and (found := self._own(name, source, depth - 1)) is not None:
                 return found
+            if name in OLDER_NAMES.get(star.module, ()):
+                return self._member(star.module, name, depth - 1)
         return None
 
     def _bound(

@@ -400,6 +400,7 @@ def test_dynamic_values_and_cancelling() -> None:
     ):
         action = the_action(
             "@action\ndef act(self, store: str, item: str, *, an: str | None = None) -> None: ...",
+            head="from arcor2 import DynamicParamTuple",
             attributes=attributes,
         )
         assert action.meta.cancellable
@@ -415,6 +416,51 @@ def test_dynamic_values_and_cancelling() -> None:
         T.CANCEL_MAPPING = {T.act.__name__: T.halt.__name__}
     """)
     assert after.actions[0].meta.cancellable
+
+
+@pytest.mark.parametrize(
+    ("imports", "common", "dynamic"),
+    [
+        ("from arcor2 import DynamicParamTuple as DPT\nfrom arcor2.data import common as c", "c.", "DPT"),
+        ("import arcor2 as a2", "a2.data.common.", "a2.DynamicParamTuple"),
+        ("import arcor2.data.common", "arcor2.data.common.", "arcor2.DynamicParamTuple"),
+        ("import arcor2\nimport arcor2.data.common as c", "c.", "arcor2.DynamicParamTuple"),
+        ("from arcor2 import *\nfrom arcor2.data.common import *", "", "DynamicParamTuple"),
+        (
+            "from arcor2 import DynamicParamTuple\nDynamic = DynamicParamTuple\nimport arcor2.data as d",
+            "d.common.",
+            "Dynamic",
+        ),
+    ],
+)
+def test_every_form_of_import_is_followed(imports: str, common: str, dynamic: str) -> None:
+    source = f"""{imports}
+import arcor2_object_types.abstract as bases
+import builtins as b
+import typing as t
+
+class Level(AC.IntEnum):
+    LOW = 1
+
+class T(bases.Generic):
+    _ABSTRACT = False
+    def act(
+        self, store: str, item: str, at: AC.Pose, level: Level = Level.LOW, *, an: t.Optional[str] = None
+    ) -> bool: ...
+    def stores(self) -> set[str]: ...
+    def items(self, store: str) -> set[str]: ...
+    DYNAMIC_PARAMS = {{"store": DPT("stores", b.set()), "item": DPT(items.__name__, {{"store"}})}}
+    act.__action__ = AC.ActionMetadata()
+""".replace("AC.", common).replace("DPT(", f"{dynamic}(")
+    (act,) = Library([SourceFile("T", "T", source)]).analyse("T").actions
+    assert not act.disabled, act.problem
+    assert [(p.name, p.type, p.dynamic_value_parents) for p in act.parameters] == [
+        ("store", "string", msgspec.UNSET),
+        ("item", "string", {"store"}),
+        ("at", "pose", msgspec.UNSET),
+        ("level", "integer_enum", msgspec.UNSET),
+    ]
+    assert [p.dynamic_value for p in act.parameters] == [True, True, False, False]
 
 
 AN = "*, an: str | None = None"

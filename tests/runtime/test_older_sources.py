@@ -409,8 +409,10 @@ def test_an_installed_package_of_that_name_is_never_looked_at(tmp_path: Path) ->
     code = """
 from arcor2_hw.runtime.older import install
 install()
-from arcor2.data.common import Pose
+import arcor2 as peer
 from arcor2_hw.data import geometry
+assert peer.data.common.Pose is geometry.Pose
+from arcor2.data.common import Pose
 assert Pose is geometry.Pose
 import arcor2
 assert not hasattr(arcor2, "nothing")

@@ -37,10 +37,12 @@ class _Finder(MetaPathFinder, Loader):
         return None
 
     def exec_module(self, module: ModuleType) -> None:
-        """Let the module look up its names when they are asked for: not each needs all that ours import."""
+        """Make the module look up its names on first use, since not every source needs all that they import."""
         names = OLDER_NAMES[module.__name__]
 
         def look_up(name: str) -> Any:
+            if (submodule := f"{module.__name__}.{name}") in OLDER_NAMES:
+                return importlib.import_module(submodule)  # `arcor2.data.common.Pose` after `import arcor2`
             try:
                 place, ours = names[name]
             except KeyError:
