@@ -1,5 +1,6 @@
 """The mark that makes a method of an object type an action."""
 
+import builtins
 import enum
 from collections.abc import Callable
 from typing import Final, TypeVar, overload
@@ -18,9 +19,19 @@ F = TypeVar("F", bound=Callable[..., object])
 class StrEnum(enum.StrEnum):
     """Base of enumerations of text that an action parameter may have as its type."""
 
+    @classmethod
+    def set(cls) -> builtins.set[str]:
+        """Return the values of all members, as object types written for ARCOR2 expect."""
+        return {member.value for member in cls}
+
 
 class IntEnum(enum.IntEnum):
     """Base of enumerations of numbers that an action parameter may have as its type."""
+
+    @classmethod
+    def set(cls) -> builtins.set[int]:
+        """Return the values of all members, as object types written for ARCOR2 expect."""
+        return {member.value for member in cls}
 
 
 @overload

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from arcor2_hw.actions import PARAMETER_TYPES, by_annotation
+from arcor2_hw.actions import PARAMETER_TYPES, IntEnum, StrEnum, by_annotation
 from arcor2_hw.actions.json_values import decode_json, encode
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import ParameterMeta
@@ -257,3 +257,11 @@ def test_a_picture_travels_without_loss_where_it_must() -> None:
     assert text.encode("latin-1").startswith(b"\xff\xd8")
     with pytest.raises(InvalidData):
         kind.decode_json('"no picture"', None)
+
+
+def test_enumerations_return_the_set_of_their_values() -> None:
+    texts = StrEnum("Side", {"LEFT": "left", "RIGHT": "right"})
+    numbers = IntEnum("Level", {"LOW": 1, "HIGH": 2, "TOP": 2})
+    assert texts.set() == {"left", "right"}
+    assert {type(value) for value in texts.set()} == {str}
+    assert numbers.set() == {1, 2}
