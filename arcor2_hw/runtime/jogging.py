@@ -54,7 +54,7 @@ class Jog:
         self._arm: dict[str, Any] = dict(arm)
         self._limits = self._ask_limits()
         self._before: _Before | None = None
-        self._end_effectors = robot.get_end_effectors_ids(**arm)
+        self._end_effectors = robot.get_end_effectors_ids(*arm.values())
 
     def _ask_limits(self) -> dict[str, tuple[float, float]]:
         try:
@@ -67,7 +67,7 @@ class Jog:
 
         Raises OutOfRange at a joint's limit, InvalidData for names that the robot has not, what the driver raises.
         """
-        joints = self._robot.robot_joints(**self._arm)
+        joints = self._robot.robot_joints(False, *self._arm.values())
         self._check_end_effector(lease.end_effector_id)
         if lease.joints is not None:
             return self._drive_joints(lease, lease.joints, joints)

@@ -25,7 +25,7 @@ Send = Callable[[StreamEvent], None]
 
 
 def _joints(robot: Robot, time_ms: float | Unset) -> bytes:
-    joints = robot.robot_joints(include_gripper=True)
+    joints = robot.robot_joints(True)
     return _encode(Event("RobotJoints", data=RobotJointsData(robot.id, joints, time_ms)))
 
 

@@ -5,13 +5,16 @@ import inspect
 import sys
 import types
 import typing
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Final
 
 import msgspec
 
 from arcor2_hw.actions.json_values import decode_json, decode_picture, encode
 from arcor2_hw.exceptions import InvalidData
+
+OBJECTS: Final = "arcor2_hw.objects"
+"""The package of the base classes."""
 
 
 def encode_shown(value: Any) -> str:
@@ -70,13 +73,48 @@ def _decode(raw: bytes, hint: Any) -> Any:
     return decode_json(raw.decode(), Any if isinstance(hint, str) else hint)
 
 
+def _positions(cls: type, name: str, given: Iterable[str]) -> list[str]:
+    """Return the names by which a method is called, in the order of its parameters; none where only names count.
+
+    Methods that one of our bases declares have the order of that declaration. Methods that offer the values of a
+    parameter have the order of `given`, since nothing declares them.
+    """
+    for base in cls.__mro__:
+        declared = base.__dict__.get(name)
+        if base.__module__.startswith(OBJECTS) and isinstance(declared, types.FunctionType):
+            return list(_signature(declared)[0].parameters)[1:]
+    dynamic = getattr(cls, "DYNAMIC_PARAMS", {})
+    offers = any(isinstance(value, tuple) and value[:1] == (name,) for value in dynamic.values())
+    return list(given) if offers else []
+
+
+def _own_names(cls: type, function: Callable[..., Any], given: Iterable[str]) -> dict[str, str]:
+    """Return the parameter of a method for each argument that the method itself calls otherwise.
+
+    ARCOR2 calls the methods of its bases by position, so object types written for it may name parameters freely.
+    """
+    parameters = _signature(function)[0].parameters
+    places = [p.name for p in list(parameters.values())[1:] if p.kind is p.POSITIONAL_OR_KEYWORD]
+    called = _positions(cls, function.__name__, given)
+    pairs = zip(called, places, strict=False)
+    return {name: own for name, own in pairs if name not in parameters and own not in called}
+
+
 def decode_arguments(bound: Any, arguments: Mapping[str, bytes], whose: str) -> dict[str, Any]:
-    """Read the arguments of a bound method by its hints; InvalidData names `whose`, the method and the parameter."""
+    """Return the arguments of a bound method, read from JSON by its hints.
+
+    Raises:
+        InvalidData: An argument is unknown, missing or of the wrong type. The text names `whose`, the method and the
+            parameter.
+    """
     function = bound.__func__ if isinstance(bound, types.MethodType) else bound
     signature, hints = _signature(function)
     if function is not bound:
         cls: type = type(bound.__self__)
         hints = _inherited(cls, function.__name__)
+        own = _own_names(cls, function, arguments)
+        hints = {own.get(name, name): hint for name, hint in hints.items()} | dict(_signature(function)[1])
+        arguments = {own.get(name, name): raw for name, raw in arguments.items()}
     parameters = list(signature.parameters.values())
     takes_any = any(p.kind is p.VAR_KEYWORD for p in parameters)
     result: dict[str, Any] = {}

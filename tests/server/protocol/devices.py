@@ -253,3 +253,102 @@ class Chooser(Generic):
     def leave(self) -> None:
         self._left = True
 '''
+
+OLDER_ARM = '''
+from typing import Literal
+
+from arcor2 import DynamicParamTuple as DPT
+from arcor2.data.common import ActionMetadata, Joint, Orientation, Pose, Position
+from arcor2_object_types.abstract import Robot
+
+
+class OlderArm(Robot):
+    """Three joints that are the position. Its methods name their parameters otherwise than our bases do."""
+
+    _ABSTRACT = False
+
+    def __init__(self, obj_id: str, name: str, pose: Pose) -> None:
+        super().__init__(obj_id, name, pose)
+        self._tip = Pose(Position(0.4, 0.1, 0.3), Orientation())
+
+    def get_end_effectors_ids(self) -> set[str]:
+        return {"tip"}
+
+    def get_end_effector_pose(self, end_effector_id):
+        assert end_effector_id == "tip", end_effector_id
+        return self._tip
+
+    def robot_joints(self, with_gripper: bool = False) -> list[Joint]:
+        return [Joint(name, value) for name, value in zip("xyz", self._tip.position)]
+
+    def grippers(self) -> set[str]:
+        return set()
+
+    def suctions(self) -> set[str]:
+        return set()
+
+    def forward_kinematics(self, end_effector_id: str, joints: list[Joint]) -> Pose:
+        return Pose(Position(*(joint.value for joint in joints)), Orientation())
+
+    def move_to_pose(
+        self, end_effector_id: str, target_pose: Pose, speed: float, safe: bool = True, linear: bool = True
+    ) -> None:
+        self._tip = target_pose
+
+    def jog(
+        self,
+        twist: tuple[float, float, float, float, float, float] | None = None,
+        joint_velocities: list[float] | None = None,
+        frame: Literal["world", "base", "tool", "user"] = "world",
+        valid_for: float = 0.2,
+        end_effector_id: str | None = None,
+    ) -> None:
+        x, y, z = (place + rate * valid_for for place, rate in zip(self._tip.position, twist))
+        self._tip = Pose(Position(x, y, z), Orientation())
+
+    def stop(self) -> None:
+        pass
+
+    def programs(self, chosen_group: str) -> set[str]:
+        return {chosen_group + "1", chosen_group + "2"}
+
+    def run(self, group: str, program: str, *, an: None | str = None) -> None:
+        pass
+
+    run.__action__ = ActionMetadata()
+    DYNAMIC_PARAMS = {"program": DPT(programs.__name__, {"group"})}
+'''
+
+OLDER_ARMS = '''
+from arcor2.data.common import Joint, Orientation, Pose, Position, StrEnum
+from arcor2_object_types.abstract import MultiArmRobot
+
+
+class Arms(StrEnum):
+    LEFT: str = "left"
+    RIGHT: str = "right"
+
+
+class OlderArms(MultiArmRobot):
+    """Two arms, which it calls `arm`."""
+
+    _ABSTRACT = False
+
+    def get_arm_ids(self) -> set[str]:
+        return Arms.set()
+
+    def get_end_effectors_ids(self, arm: None | str = None) -> set[str]:
+        return {"tip"} if arm in Arms.set() else set()
+
+    def get_end_effector_pose(self, end_effector_id: str, arm: None | str = None) -> Pose:
+        return Pose(Position(0, 0.5 if Arms(arm) is Arms.LEFT else -0.5, 0.3), Orientation())
+
+    def robot_joints(self, with_gripper: bool = False, arm: None | str = None) -> list[Joint]:
+        return [Joint(f"{name}_1", 0.25) for name in sorted(Arms.set()) if arm in (None, name)]
+
+    def grippers(self, arm: None | str = None) -> set[str]:
+        return {f"{arm}_jaw"}
+
+    def suctions(self, arm: None | str = None) -> set[str]:
+        return {f"{arm}_cup"}
+'''

@@ -36,6 +36,8 @@ TYPES = {
     "Plain": devices.PART.replace("class Part", "class Plain"),
     "Thin": devices.PART.replace("class Part", "class Thin"),
     "Chooser": devices.CHOOSER,
+    "OlderArm": devices.OLDER_ARM,
+    "OlderArms": devices.OLDER_ARMS,
 }
 MODELS = {
     "Part": Mesh("Part", "part.stl", FOCUS_POINTS),
