@@ -1,8 +1,8 @@
 """Control of the arm while it is ours: the process that holds ur_rtde, and the guard over both.
 
-The guard kicks the controller's watchdog, through that process, as long as this process lives and the observed stream
-is fresh. It ends the session as soon as something is so that nothing may go on by itself: the process is killed, and
-the program is stopped on a connection of its own. An ended session never comes back; control is taken anew.
+The control process kicks the controller's watchdog as long as the guard here reports by pulses that it works. The guard
+ends the session when something is wrong, so that nothing goes on by itself: the process is killed, and the program is
+stopped on a connection of its own. An ended session never comes back; control is taken anew.
 """
 
 import contextlib
@@ -17,9 +17,8 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
-from concurrent.futures import TimeoutError as FutureTimeout
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NoReturn
 
 from arcor2_hw.data.robot import Safety
 from arcor2_hw.exceptions import (
@@ -31,6 +30,7 @@ from arcor2_hw.exceptions import (
     NotInControl,
     SafetyStop,
 )
+from arcor2_hw.keep_alive import FROZEN_AFTER, PULSE_PERIOD, TOO_SLOW, once_within, pulse, result_within
 
 from .dashboard import Dashboard
 from .library_words import refusal, says_broken
@@ -41,20 +41,22 @@ from .session_times import (
     CALL_TIMEOUT,
     GUARD_ENDS,
     GUARD_PERIOD,
-    KICKS_PER_PERIOD,
     LAST_STOP,
+    PROCESS_ENDS,
     PROGRAM_GONE,
     RESUME_TIMEOUT,
     SPEED_STOPPED,
     STOP_REACTION,
     STREAM_FREQUENCY,
-    UNHEALTHY,
 )
-from .states import MAY_MOVE, REMEDIES, program_plays, safety_of
+from .states import REMEDIES, program_plays, safety_of
 
-MOTIONS: Final = frozenset({"moveJ", "moveL", "teachMode", "ready"})
-"""Commands before which a jog is ended: two threads of the program may not both move the arm."""
 _SCRIPT: Final = Path(__file__).with_name("control_process.py")
+_TOO_SLOW: Final = {
+    3: "the watchdog was not kicked in time",
+    4: f"the cell host did not work for {FROZEN_AFTER:g} s",
+}
+"""What the exit status of the control process means when it ended because this computer was busy."""
 log = logging.getLogger(__name__)
 
 
@@ -76,7 +78,8 @@ class ControlSession:
         self._ending = threading.Event()
         self._released = False
         self._process: subprocess.Popen[bytes] | None = None
-        self._speed_until: float | None = None
+        self._jogs_until = 0.0
+        self._unsafe = observer.unsafe
         self._guard: threading.Thread | None = None
         self.registers = Registers.of(upper)
         self.own: int | None = None
@@ -102,11 +105,12 @@ class ControlSession:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
+            start_new_session=True,  # its own share of a busy computer
         )
         threading.Thread(target=self._listen, name=f"control answers {self.host}", daemon=True).start()
         try:
-            opened.result(timeout)
-        except FutureTimeout:
+            result_within(opened, timeout)
+        except TimeoutError:
             error = DeviceTimeout(f"{self.who} did not start the control program in {timeout:g} s")
             self.end(error)
             self._stop_line.close()
@@ -158,13 +162,10 @@ class ControlSession:
         Raises what ended the session, Cancelled when dropped, DeviceTimeout (and the session ends) when it takes longer
         than `timeout` s, DeviceFault when the library fails.
         """
-        if command in MOTIONS and self._speed_until is not None:
-            self._speed_until = None
-            self._send("the end of a jog", "speedStop", ())
         future = self._send(what, command, arguments, valid)
         try:
-            return future.result(timeout)
-        except FutureTimeout:
+            return result_within(future, timeout)
+        except TimeoutError:
             error = DeviceTimeout(f"{self.who} did not take {what} within {timeout:g} s")
             self.end(error)
             raise error from None
@@ -180,19 +181,24 @@ class ControlSession:
     def do(self, what: str, command: str, *arguments: Any, **options: Any) -> None:
         """As `call`, for a command that the library answers with true or false; DeviceFault on false."""
         if not self.call(what, command, *arguments, **options):
-            if self._ending.wait(2.0 * PROGRAM_GONE) and self.ended is not None:
-                raise self.ended  # the guard was about to see why
-            raise DeviceFault(f"{self.who} did not accept {what}")
+            self._not_accepted(what)
+
+    def _not_accepted(self, what: str) -> NoReturn:
+        once_within(self._ending.is_set, 2.0 * PROGRAM_GONE, GUARD_PERIOD)
+        if self.ended is not None:
+            raise self.ended  # the guard was about to see why
+        raise DeviceFault(f"{self.who} did not accept {what}")
 
     def speed(
         self, command: str, velocities: list[float], acceleration: float, valid_for: float, valid: Callable[[], bool]
     ) -> None:
-        """Begin or renew a motion by speed that the guard ends `valid_for` s from now unless it is renewed."""
-        until = time.monotonic() + valid_for
-        self._speed_until = until
+        """Start or renew a motion by speed that the control process ends `valid_for` s from now unless renewed."""
+        self._jogs_until = until = time.monotonic() + valid_for
         in_time: Callable[[], bool] = lambda: valid() and time.monotonic() < until  # noqa: E731
-        # Without the library's own time: its call would last that long, and kicks and a stop would wait behind it.
-        self.do("a jog", command, velocities, acceleration, valid=in_time)
+        if not self.call("a jog", command, velocities, acceleration, until, valid=in_time):
+            if time.monotonic() >= until:
+                raise Cancelled(f"a jog of {self.who} came too late: it was valid for {valid_for:g} s")
+            self._not_accepted("a jog")
 
     def set_output(self, number: int, on: bool) -> None:
         """Switch an output: 0 to 7 standard, 8 to 15 configurable, 16 and 17 of the tool."""
@@ -200,35 +206,25 @@ class ControlSession:
         self.do(f"digital output {number}", command, number % 8, on)
 
     def stop_motion(self, deceleration: float) -> None:
-        """Stop what moves; by the dashboard, which ends the session, when the program does not react in time.
-
-        Always the asynchronous stopL, the only one of the four that is run as what it is called: ur_rtde 1.6.5 runs a
-        synchronous stopL as stopj until the first asynchronous stop, and stopJ as stopl from then on.
-        """
-        jogs, self._speed_until = self._speed_until is not None, None
+        """Stop what moves; by the dashboard, which ends the session, when the program does not react in time."""
+        jogs, self._jogs_until = time.monotonic() < self._jogs_until + SPEED_STOPPED, 0.0
+        own = self.own
         try:
-            if jogs:  # a stopL beside the thread that holds the velocity is no stop
-                self._send("a stop", "speedStop", ()).result(SPEED_STOPPED)
-            elif (own := self.own) is not None:
-                self._send("a stop", "halt", ())
-                self._await_reaction(own)
-            else:
-                self._send("a stop", "stopL", (deceleration, True)).result(STOP_REACTION)
-        except (FutureTimeout, DeviceFault):
+            stopping = self._send("a stop", "stop", (deceleration,))
+            if own is None:
+                result_within(stopping, SPEED_STOPPED if jogs else STOP_REACTION)
+            elif not once_within(lambda: self._reacted(own), STOP_REACTION, GUARD_PERIOD / 4.0):
+                self.stop_by_dashboard()
+        except (TimeoutError, DeviceFault):
             self.stop_by_dashboard()
         except DeviceError as e:
             log.debug("%s: control ended while stopping: %s", self.who, e)
 
-    def _await_reaction(self, number: int) -> None:
-        """Return when the run of that number stops or has ended. Raises FutureTimeout when it does not react."""
-        until = time.monotonic() + STOP_REACTION
-        while True:
-            newest = self._observer.newest()
-            if newest is None or newest.run(self.upper) != (number, RunState.RUNNING):
-                return  # also before its first line: it looks at the register before it moves
-            if time.monotonic() > until:
-                raise FutureTimeout
-            time.sleep(GUARD_PERIOD / 4.0)
+    def _reacted(self, number: int) -> bool:
+        """Return whether the run of that number stops or has ended."""
+        newest = self._observer.newest()
+        # Also before its first line: it reads the register before it moves.
+        return newest is None or newest.run(self.upper) != (number, RunState.RUNNING)
 
     # -------------------------------------------------------------------------------- programs of our own
     def play(self, number: int, program: str, valid: Callable[[], bool]) -> ScriptPort:
@@ -237,14 +233,15 @@ class ControlSession:
         Gives the connection it was sent on, to be drained and closed. `resume` follows in any case.
         """
         port = ScriptPort.open(self.host, CALL_TIMEOUT)
-        self.own = number  # from here on the other kicks: the library's own would wait for its program without end
+        self.own = number
         try:
-            self.do("a program", "ready")  # behind the last of those; a wish to stop from now on is met by the program
+            self.do("a program", "own")  # a request to stop from now on is met by the program
             if not valid():
                 raise Cancelled("a motion was stopped before it began")
             port.send(program, CALL_TIMEOUT)
         except Cancelled:
             port.close()
+            self.do("the control program", "control")
             self.own = None
             raise
         except DeviceError as e:
@@ -278,7 +275,7 @@ class ControlSession:
     ) -> "Future[Any]":
         future: Future[Any] = Future()
         number = next(self._numbers)
-        line = json.dumps({"n": number, "do": command, "args": arguments})
+        line = json.dumps({"n": number, "do": command, "args": arguments}).encode() + b"\n"
         with self._order:
             if self.ended is not None:
                 raise self.ended
@@ -288,11 +285,11 @@ class ControlSession:
             self._write(line)
         return future
 
-    def _write(self, line: str) -> None:
+    def _write(self, line: bytes) -> None:
         assert self._process is not None
         assert self._process.stdin is not None
-        with contextlib.suppress(OSError):  # gone: the listening thread sees it
-            os.write(self._process.stdin.fileno(), line.encode() + b"\n")
+        with contextlib.suppress(OSError, ValueError):  # gone: the listening thread notices
+            os.write(self._process.stdin.fileno(), line)
 
     # -------------------------------------------------------------------------------- answers of the process
     def _listen(self) -> None:
@@ -315,7 +312,11 @@ class ControlSession:
                     for line in lines:
                         self._answered(line) if pipe is process.stdout else self._said(line)
         status = process.wait()
-        self.end(ConnectionLost(f"the control process of {self.who} ended with status {status}"))
+        detail = f"the control process of {self.who} ended with status {status}"
+        if status in _TOO_SLOW:
+            self.end(ConnectionLost(f"{self.who}: {TOO_SLOW.format('robot')}", f"{_TOO_SLOW[status]}; {detail}"))
+        else:
+            self.end(ConnectionLost(detail))
         assert process.stdin is not None
         process.stdin.close()
         process.stdout.close()
@@ -345,32 +346,23 @@ class ControlSession:
 
     # -------------------------------------------------------------------------------- the guard
     def _watch(self) -> None:
-        period = 1.0 / (KICKS_PER_PERIOD * self._watchdog)
-        kick: Future[Any] | None = None
-        due = gone_since = 0.0
-        while True:
-            now = time.monotonic()
-            newest = self._observer.newest()
-            if newest is None or newest.age > UNHEALTHY or not self._observer.observing.online:
-                self.end(ConnectionLost(f"nothing is heard of {self.who}"))
-            elif (safety := safety_of(newest.safety_mode)) not in MAY_MOVE:
-                self._stopped_by_safety(safety)
+        observer, due = self._observer, 0.0
+        gone_since: float | None = None
+        while not self._ending.is_set():
+            newest = observer.newest()
+            if newest is None or not observer.observing.online:
+                self.end(ConnectionLost(f"{self.who} sends no state"))
+            elif (unsafe := observer.unsafe) is not None and unsafe is not self._unsafe:
+                self._stopped_by_safety(safety_of(unsafe.safety_mode))
             elif program_plays(newest.runtime) or self.own is not None:
-                gone_since = 0.0
-            elif gone_since == 0.0:  # by the samples' time: an old one was taken before the program was sent
-                gone_since = newest.monotonic
-            elif newest.monotonic - gone_since > PROGRAM_GONE:
+                gone_since = None
+            elif gone_since is None:  # by the controller's time: an old sample was taken before the program was sent
+                gone_since = newest.timestamp
+            elif newest.timestamp - gone_since > PROGRAM_GONE and not self._ending.wait(PROCESS_ENDS):
                 self.end(NotInControl(f"the control program was stopped at {self.who}, not by this driver"))
-            if self._ending.is_set():
-                break
-            if self._speed_until is not None and now >= self._speed_until:
-                self._speed_until = None
-                with contextlib.suppress(DeviceError):
-                    self._send("the end of a jog", "speedStop", ())
-            if now >= due and (kick is None or kick.done()):  # on a busy computer they must not pile up before a stop
-                due = now + period
-                with contextlib.suppress(DeviceError):
-                    kick = self._send("a kick", "kickWatchdog" if self.own is None else "kick", ())
+            if not self._ending.is_set() and (now := time.monotonic()) >= due:
+                due = now + PULSE_PERIOD
+                self._write(pulse())
             self._ending.wait(GUARD_PERIOD)
         self._last_stop()
 

@@ -6,10 +6,12 @@ import time
 from typing import Final, NamedTuple
 
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected, Stale
+from arcor2_hw.keep_alive import RunningTime
 from arcor2_hw.objects.observing import Observing
 
 from .program import STATES
 from .rtde import PORT, RtdeStream, Version
+from .states import MAY_MOVE_MODES
 
 FIELDS: Final = [
     "timestamp",
@@ -29,12 +31,12 @@ FIELDS: Final = [
     "output_int_register_42",
 ]
 """The handful that is used, in the order in which `Sample` has them."""
-STALLED: Final = 0.5
+STALLED: Final = 0.8
 """Seconds without a new sample after which the connection is given up; the library itself needs 2.5 to notice."""
 FRESH: Final = 0.1
 """Seconds: how old a sample may be by default; 50 samples of an e-series, 12 of a CB3."""
-AWAITED: Final = 0.2
-"""Seconds that one who asks waits for a fresh sample: the process may just not have had its turn."""
+AWAITED: Final = 0.5
+"""Seconds that a caller waits for a fresh sample: this process, or the observing thread, may not have had its turn."""
 KEPT: Final = 1024
 """Samples in the ring: two seconds."""
 _LOOK: Final = 0.1
@@ -101,6 +103,8 @@ class Observer:
         self.samples_received = 0
         self.samples_missed = 0
         self.ring: collections.deque[Sample] = collections.deque(maxlen=KEPT)
+        self.unsafe: Sample | None = None
+        """The newest sample in which the safety system forbade motion; a short stop is not missed by a slow reader."""
         self._newest: Sample | None = None
         self._stream: RtdeStream | None = None
         self.observing = Observing(f"{name} at {self.address}", self._open, self._watch, self._close)
@@ -125,7 +129,7 @@ class Observer:
         newest = self.newest()
         if newest is not None and newest.age <= max_age and self.observing.online:
             return newest
-        until = time.monotonic() + AWAITED
+        clock = RunningTime()
         while True:
             self.observing.check()
             newest = self.newest()  # it may have come, and the connection back with it, since the first look
@@ -133,7 +137,7 @@ class Observer:
                 raise NotConnected(f"{self.who} has sent no sample yet")
             if newest.age <= max_age:
                 return newest
-            if time.monotonic() > until:
+            if clock() > AWAITED:
                 break
             time.sleep(self.period)
         raise Stale(f"the newest sample of {self.who} is {newest.age:.2f} s old, {max_age:g} s asked for")
@@ -162,8 +166,10 @@ class Observer:
     def _watch(self, stopping: threading.Event) -> None:
         stream = self._stream
         assert stream is not None
+        empty = 0  # looks, not seconds: while this process stands still nothing is missed
         while not stopping.is_set():
-            if not self._take(stream, _LOOK) and self.ring[-1].age > STALLED:
+            empty = 0 if self._take(stream, _LOOK) else empty + 1
+            if empty * _LOOK >= STALLED:
                 raise ConnectionLost(f"{self.who} has sent nothing for {STALLED:g} s")
 
     def _take(self, stream: RtdeStream, wait: float) -> bool:
@@ -175,6 +181,8 @@ class Observer:
             last = self.ring[-1].timestamp if self.ring else timestamp - self.period
             parts = row[1:7], row[7:13], row[13:19], row[19:25]
             self._newest = Sample(timestamp, now, *parts, *row[25:])  # type: ignore[arg-type]
+            if self._newest.safety_mode not in MAY_MOVE_MODES:
+                self.unsafe = self._newest
             self.ring.append(self._newest)
             self.samples_received += 1
             if timestamp > last:

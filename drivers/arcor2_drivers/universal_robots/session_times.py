@@ -4,19 +4,18 @@ from typing import Final
 
 STREAM_FREQUENCY: Final = 100.0
 """Hz of the library's own stream: a command takes 20 ms instead of 4, the process 5 % of a core instead of 10."""
-KICKS_PER_PERIOD: Final = 4.0
-"""Kicks within one period of the watchdog: three may be late."""
-UNHEALTHY: Final = 0.3
-"""Seconds without an observed sample after which the session ends; the library itself needs 2.5 to notice."""
 GUARD_PERIOD: Final = 0.01
 RESUME_TIMEOUT: Final = 4.0
 """Seconds for the control program to play again after a program of our own; it takes 0.1."""
-CALL_TIMEOUT: Final = 1.0
-"""Seconds for a command that moves nothing; the library itself waits 4 to 300."""
+CALL_TIMEOUT: Final = 2.0
+"""Seconds for a command that moves nothing; it takes 0.03 on an idle computer, the library itself waits 4 to 300."""
 STOP_REACTION: Final = 0.08
 """Seconds the control program may take to react to a stop before the dashboard is used: two commands, and as much."""
 PROGRAM_GONE: Final = 0.1
-"""Seconds our program may be seen not playing before the session ends: two streams tell of it, not at one instant."""
+"""Seconds, of the controller's time, that our program may be seen not playing before the session ends: two streams
+report it, not at one instant."""
+PROCESS_ENDS: Final = 0.2
+"""Seconds for the control process to end with its reason when our program was seen not playing."""
 SPEED_STOPPED: Final = 0.4
 """Seconds in which a jog is stopped: the command is done when the arm stands."""
 GUARD_ENDS: Final = 1.0

@@ -7,6 +7,8 @@ from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
 
+SLOWEST_WATCHDOG = 2.5
+"""Hz: with less the arm could not stop within the time that the type declares (`loss_reaction`)."""
 MANUAL_TCP_SPEED = 0.25
 """m/s: the most a client may ask for in manual mode (ISO 10218-1, reduced speed)."""
 
@@ -37,7 +39,7 @@ class UrSettings(Settings):
     :param tcp_acceleration: acceleration of linear moves, m/s²
     :param joint_acceleration: acceleration of joint moves, rad/s²
     :param stop_deceleration: deceleration of a stop, m/s²
-    :param watchdog_frequency: the controller stops when it is not called that often, Hz; more needs a quiet computer
+    :param watchdog_frequency: the controller stops when it is not kicked that often, Hz; more needs an idle computer
     :param use_upper_range_registers: leave registers 0 to 23 to a fieldbus, where ur_rtde can
     :param gripper_output: digital output of the gripper, 0 to 17; -1: there is none
     :param part_sensor_input: digital input that tells of a held part, 0 to 17; -1: there is none
@@ -60,7 +62,7 @@ class UrSettings(Settings):
     tcp_acceleration: float = 1.2
     joint_acceleration: float = 1.4
     stop_deceleration: float = 5.0
-    watchdog_frequency: float = 5.0
+    watchdog_frequency: float = SLOWEST_WATCHDOG
     use_upper_range_registers: bool = True
     gripper_output: int = 0
     part_sensor_input: int = -1
@@ -80,8 +82,7 @@ class UrSettings(Settings):
         within("tcp_acceleration", self.tcp_acceleration, 0.05, 15.0)
         within("joint_acceleration", self.joint_acceleration, 0.05, 40.0)
         within("stop_deceleration", self.stop_deceleration, 0.5, 15.0)
-        # Below 5 Hz the arm could not rest within the 0.5 s that the type declares.
-        within("watchdog_frequency", self.watchdog_frequency, 5.0, 50.0)
+        within("watchdog_frequency", self.watchdog_frequency, SLOWEST_WATCHDOG, 50.0)
         if self.gripper_output != -1:
             within("gripper_output", self.gripper_output, 0, 17)
         if self.part_sensor_input != -1:

@@ -53,6 +53,8 @@ _SAFETY: Final = {
 }
 
 MAY_MOVE: Final = frozenset({Safety.NORMAL, Safety.REDUCED})
+MAY_MOVE_MODES: Final = frozenset(mode for mode, safety in _SAFETY.items() if safety in MAY_MOVE)
+"""The numbers of safety_mode in which the arm may move."""
 
 REMEDIES: Final = {
     Safety.PROTECTIVE_STOP: "look why the arm was stopped, then acknowledge the protective stop",

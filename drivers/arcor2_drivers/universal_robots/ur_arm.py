@@ -39,6 +39,8 @@ LOWER_ONLY: Final = ((5, 23), (10, 0))
 
 SAME_TOOL: Final = (0.005, 0.02)
 """m and rad: by how much less the nominal model differs from the controller's TCP when both have the same tool."""
+STOPS_WITHIN: Final = 1.5
+"""Seconds to standstill when this computer freezes: FROZEN_AFTER, one period of the watchdog, and braking."""
 TOLD_WITHIN: Final = 0.2
 """Seconds for a sample that knows the tool; the stream's own watch tells when none comes at all."""
 
@@ -49,7 +51,7 @@ class UrArm(UrObserved):
     """A Universal Robots arm under control."""
 
     _ABSTRACT = True
-    loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(0.5)
+    loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(STOPS_WITHIN)
 
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: UrSettings) -> None:
         super().__init__(obj_id, name, pose, settings)
@@ -308,7 +310,8 @@ class UrArm(UrObserved):
         budget: float,
         reached: Callable[[Sample], bool],
     ) -> None:
-        last = standing = time.monotonic()
+        last = time.monotonic()
+        standing: float | None = None  # by the controller's time: this process may be held up
         while True:
             if self._stops != stops:
                 raise Cancelled(f"{what} of {self.name} was stopped")
@@ -320,9 +323,9 @@ class UrArm(UrObserved):
             if begun != number and not running and not sample.moving and reached(sample):
                 return
             now = time.monotonic()
-            if sample.moving or running:
-                standing = now
-            elif now - standing > STANDING:
+            if sample.moving or running or standing is None:
+                standing = sample.timestamp
+            elif sample.timestamp - standing > STANDING:
                 raise DeviceFault(f"{what} of {self.name} ended before its target")
             budget -= (now - last) * max(sample.speed_fraction, SLOWEST_FRACTION)
             last = now

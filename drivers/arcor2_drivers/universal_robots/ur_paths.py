@@ -203,7 +203,8 @@ class UrPathed(UrServiced):
     ) -> RunState:
         """Return how the run ended, once nothing plays and the arm stands."""
         began = last = time.monotonic()
-        gone_since = stopped_at = 0.0
+        stopped_at = 0.0
+        gone_since: float | None = None  # by the controller's time
         timed_out = False
         while True:
             time.sleep(POLL)
@@ -224,8 +225,9 @@ class UrPathed(UrServiced):
                 error = DeviceFault(f"the controller of {self.name} did not start the program of {what}")
                 session.end(error)
                 raise error
-            gone_since = now if plays or run != number or gone_since == 0.0 else gone_since
-            if now - gone_since > PROGRAM_GONE + (REST_WITHIN if state in ENDED else 0.0):
+            if plays or run != number or gone_since is None:
+                gone_since = sample.timestamp
+            if sample.timestamp - gone_since > PROGRAM_GONE + (REST_WITHIN if state in ENDED else 0.0):
                 session.end(NotInControl(f"{what} of {self.name} was stopped at the controller, not by this driver"))
                 continue
             if self._stops != stops and stopped_at == 0.0:

@@ -20,7 +20,7 @@ import sys
 from arcor2_drivers.universal_robots.settings import UrSettings
 from arcor2_drivers.universal_robots.ur5e import UR5e
 from arcor2_hw.data.geometry import Pose
-robot = UR5e("id", "orphan", Pose(), UrSettings(sys.argv[1], payload_mass=1.0, tcp_z=0.1, watchdog_frequency=5.0))
+robot = UR5e("id", "orphan", Pose(), UrSettings(sys.argv[1], payload_mass=1.0, tcp_z=0.1))
 robot.connect()
 robot.take_control()
 joints = robot.robot_joints()
@@ -53,7 +53,7 @@ class UR5eBench(Bench):
         return self.fake.host
 
     def _build(self, host: str) -> UR5e:
-        return UR5e("robot_id", "arm", Pose(), UrSettings(host, payload_mass=1.0, tcp_z=0.1, watchdog_frequency=5.0))
+        return UR5e("robot_id", "arm", Pose(), UrSettings(host, payload_mass=1.0, tcp_z=0.1))
 
     def make(self) -> UR5e:
         return self._build(self.address)

@@ -3,6 +3,9 @@
 import contextlib
 import itertools
 import os
+import subprocess
+import sys
+import textwrap
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -68,8 +71,8 @@ def start_fake() -> Iterator[Callable[..., FakeUr]]:
 
 
 def make(host: str, pose: Pose | None = None, **settings: Any) -> UR5e:
-    """An arm brisker than as delivered, so that tests need not wait for it, whose watchdog bears a busy computer."""
-    brisk = {"max_joint_speed": 2.0, "joint_acceleration": 8.0, "tcp_acceleration": 4.0, "watchdog_frequency": 5.0}
+    """An arm brisker than as delivered, so that tests need not wait for it."""
+    brisk = {"max_joint_speed": 2.0, "joint_acceleration": 8.0, "tcp_acceleration": 4.0}
     return UR5e(
         "obj_1", "ur", pose or Pose(), UrSettings(host, **{"payload_mass": 1.0, "tcp_z": 0.1, **brisk, **settings})
     )
@@ -101,3 +104,33 @@ def wait(holds: Callable[[], bool], within: float = 5.0) -> None:
     while not holds():
         assert time.monotonic() < until, f"not within {within} s"
         time.sleep(0.005)
+
+
+@pytest.fixture
+def owner(fake: FakeUr) -> Iterator[Callable[[], "subprocess.Popen[bytes]"]]:
+    """``owner()`` starts another process, and returns it when it has a long move of the arm under way."""
+    started: list[subprocess.Popen[bytes]] = []
+    code = textwrap.dedent(
+        f"""
+        from arcor2_drivers.universal_robots.settings import UrSettings
+        from arcor2_drivers.universal_robots.ur5e import UR5e
+        from arcor2_hw.data.geometry import Pose
+        robot = UR5e("obj_1", "ur", Pose(), UrSettings({fake.host!r}, payload_mass=1.0))
+        robot.connect(3.0)
+        robot.take_control()
+        joints = robot.robot_joints()
+        joints[0].value += 3.0
+        robot.move_to_joints(joints, 1.0)
+        """
+    )
+
+    def start() -> "subprocess.Popen[bytes]":
+        started.append(subprocess.Popen([sys.executable, "-c", code]))
+        moving(fake)
+        return started[-1]
+
+    yield start
+    for process in started:
+        if process.poll() is None:
+            process.kill()
+        process.wait()

@@ -118,7 +118,7 @@ def test_the_time_of_a_motion_is_the_least_that_speed_and_acceleration_allow(d: 
         ("tcp_z", 1.5),
         ("max_tcp_speed", 0.0),
         ("max_joint_speed", 4.0),
-        ("watchdog_frequency", 4.0),
+        ("watchdog_frequency", 2.0),
         ("gripper_output", 18),
         ("part_sensor_input", -2),
         ("stop_deceleration", math.inf),

@@ -130,19 +130,17 @@ def test_a_path_stops_when_its_owner_is_killed(fake: FakeUr) -> None:
         from arcor2_drivers.universal_robots.settings import UrSettings
         from arcor2_drivers.universal_robots.ur5e import UR5e
         from arcor2_hw.data.geometry import Pose, Position
-        robot = UR5e("obj_1", "ur", Pose(), UrSettings({fake.host!r}, payload_mass=1.0, watchdog_frequency=5.0))
+        robot = UR5e("obj_1", "ur", Pose(), UrSettings({fake.host!r}, payload_mass=1.0))
         robot.connect(3.0)
         robot.take_control()
         here = robot.get_end_effector_pose("tcp")
         robot.move_path([Pose(here.position + Position(0.0, -0.4, 0.0), here.orientation)], speed=0.1)
         """
     )
-    trips = fake.truth()["watchdog_trips"]
     with subprocess.Popen([sys.executable, "-c", code]) as owner:
         moving(fake)
         owner.kill()
-        assert at_rest(fake, 2.0) < UR5e.loss_reaction.within
-        assert fake.truth()["watchdog_trips"] == trips + 1
+        assert at_rest(fake, 2.0) < 0.5
         assert fake.truth()["program"] is None
 
 

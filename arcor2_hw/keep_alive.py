@@ -1,0 +1,110 @@
+"""Keeping a device's watchdog quiet from a child process, so that a busy interpreter does not stop the device."""
+
+import contextlib
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+from arcor2_hw.keep_alive_process import FROZEN_AFTER as FROZEN_AFTER
+from arcor2_hw.keep_alive_process import PULSE
+
+PULSE_PERIOD: Final = 0.05
+"""Seconds between pulses, where a driver does not work at a rhythm of its own."""
+LONGEST_STEP: Final = 0.05
+"""Most seconds that `RunningTime` counts between two readings."""
+TOO_SLOW: Final = "this computer was too slow for the {}'s watchdog"
+"""What to report when a watchdog tripped because this computer was busy."""
+_SCRIPT: Final = Path(__file__).with_name("keep_alive_process.py")
+T = TypeVar("T")
+
+
+def pulse() -> bytes:
+    """Return the line that reports to a child process that the thread which supervises the device works."""
+    return PULSE + b"%.6f\n" % time.monotonic()
+
+
+class KeepAlive:
+    """A child process that writes `message` to the open line `fd` of a device each `period` s.
+
+    It stops when this process ends, when `close` is called, and when no `pulse` was sent for FROZEN_AFTER s. Pulses are
+    sent by the thread that supervises the device, only while all is well: the kicks stop when that thread does.
+
+    fd: file descriptor of the device's line; `message` must be taken by the device in the middle of other traffic.
+    quiet: seconds without a pulse before the first message, for lines where messages could collide with answers.
+    """
+
+    def __init__(self, fd: int, message: bytes, period: float, quiet: float = 0.0) -> None:
+        self._process = subprocess.Popen(  # noqa: S603 - our own script
+            [sys.executable, "-I", "-S", str(_SCRIPT), message.hex(), str(period), str(quiet)],
+            stdin=subprocess.PIPE,
+            stdout=fd,
+            start_new_session=True,  # its own share of a busy computer
+        )
+        assert self._process.stdin is not None
+        os.set_blocking(self._process.stdin.fileno(), False)
+
+    @property
+    def pid(self) -> int:
+        """Return the process id of the child."""
+        return self._process.pid
+
+    def pulse(self) -> None:
+        """Report that the device is supervised; to be called at least each 0.1 s."""
+        assert self._process.stdin is not None
+        with contextlib.suppress(OSError):  # a child that died leaves the device to its watchdog
+            os.write(self._process.stdin.fileno(), pulse())
+
+    def close(self) -> None:
+        """End the child process; does nothing the second time."""
+        if self._process.stdin is not None and not self._process.stdin.closed:
+            self._process.kill()
+            self._process.stdin.close()
+            self._process.wait()
+
+
+class RunningTime:
+    """A stopwatch of the time in which this process ran: a longer gap between two readings counts as LONGEST_STEP.
+
+    A deadline on another thread of this process is judged by it, which a stall of the process has delayed as well.
+    """
+
+    def __init__(self) -> None:
+        self._read = time.monotonic()
+        self._elapsed = 0.0
+
+    def __call__(self) -> float:
+        """Return the seconds since it was made."""
+        now = time.monotonic()
+        self._elapsed += min(now - self._read, LONGEST_STEP)
+        self._read = now
+        return self._elapsed
+
+
+def result_within(future: "Future[T]", timeout: float) -> T:
+    """Return the result of a future that a thread of this process sets, within `timeout` s of running time.
+
+    Raises:
+        TimeoutError: no result was set in time.
+    """
+    clock = RunningTime()
+    while True:
+        try:
+            return future.result(min(max(timeout - clock(), 0.0), LONGEST_STEP / 2.0))
+        except TimeoutError:
+            if future.done() or clock() >= timeout:
+                raise
+
+
+def once_within(holds: Callable[[], Any], timeout: float, pause: float) -> bool:
+    """Return whether `holds` becomes true within `timeout` s of running time; it is asked each `pause` s."""
+    clock = RunningTime()
+    while not holds():
+        if clock() >= timeout:
+            return False
+        time.sleep(pause)
+    return True
