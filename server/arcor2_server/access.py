@@ -15,13 +15,14 @@ from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_server.rest.answers import OPEN, PERSON, ROLE
 from arcor2_server.settings import ServerSettings
-from arcor2_server.tokens import Token, TokenFile
+from arcor2_server.tokens import FILE, Token, TokenFile
 
 log = structlog.get_logger(__name__)
 
 WRONG_TOKENS: Final = 10
 """Wrong tokens from one address within `WRONG_TOKENS_WITHIN` s, after which it has to wait."""
 WRONG_TOKENS_WITHIN: Final = 60.0
+REMEDY: Final = "Make new tokens on the server with `arcor2-hw token add`."
 REMEMBERED: Final = 1000
 """Addresses of which wrong tokens are counted."""
 PARAMETER: Final = "token"
@@ -67,8 +68,10 @@ class Access:
 
     @property
     def open_to_all(self) -> bool:
-        """Tell whether no token is asked for: so it is told, or only this machine reaches us and there is none."""
-        return self._settings.insecure or (is_loopback(self._settings.host) and not self._tokens.all())
+        """Whether no token is asked for: by a setting, or since only this machine reaches us and there is no token."""
+        if self._settings.insecure:
+            return True
+        return is_loopback(self._settings.host) and not self._tokens.all() and not self._tokens.unusable
 
     def by_token(self, secret: str, address: str) -> Admission:
         """Let in by a token. AccessRefused; TooManyAttempts before the token is even looked at."""
@@ -76,6 +79,8 @@ class Access:
         if len(attempts) >= WRONG_TOKENS:
             raise TooManyAttempts(f"Too many wrong tokens came from {address}: wait a minute.")
         token = self._tokens.find(secret)
+        if token is None and self._tokens.unusable:
+            raise AccessRefused(f"No token can be checked: the server's file {FILE} is damaged. {REMEDY}")
         if token is None:
             attempts.append(time.monotonic())
             self._wrong[address] = attempts
@@ -93,6 +98,15 @@ class Access:
         if self._by_legacy_listener(connection) and self._settings.legacy is not None:
             return Admission(self._settings.legacy.role)
         return Admission(self._settings.default_role if self.open_to_all else None)
+
+    @property
+    def damage(self) -> str:
+        """What is wrong with the file of tokens, empty when it is intact."""
+        return self._tokens.damage
+
+    def repair(self) -> str:
+        """Repair the file of tokens from its copy. Returns what was wrong with it, empty when it was intact."""
+        return self._tokens.repair()
 
     def valid(self, token: Token) -> bool:
         """Tell whether a token that let somebody in still would."""

@@ -91,7 +91,10 @@ async def running_services(settings: ServerSettings) -> AsyncIterator[Services]:
             execution=cast("Execution", None),
             build=cast("BuildService", None),
         )
-        services.markers.load()
+        services.damage.load()
+        if damage := services.access.repair():
+            services.damage.report(damage)
+        services.markers.load(services.damage)
         services.arm_calibrations.load()
         stack.push_async_callback(services.compute.close)
         services.session = Session(services)

@@ -7,11 +7,9 @@ for where its device is: another address may be that of another arm, of which no
 import asyncio
 import enum
 import hashlib
-import os
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import msgspec
 import structlog
@@ -24,6 +22,7 @@ from arcor2_hw.data.events import NotificationData, NotificationLevel
 from arcor2_hw.data.robot import KinematicCalibration
 from arcor2_hw.data.scene import SceneObject, SceneObjectOverride
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, StorageError
+from arcor2_server.private_files import write_private
 from arcor2_server.robot_models import model_of_type, settings_of
 from arcor2_server.rpc.registry import make_event
 
@@ -83,12 +82,16 @@ class ArmCalibrations:
         return bool(self._kept)
 
     def load(self) -> None:
-        """Read what was kept. StorageError naming the file when that is damaged."""
+        """Read what is stored; a damaged file is set aside and reported. StorageError when it cannot be read."""
         try:
             kept = msgspec.json.decode(self._path.read_bytes(), type=list[ArmCalibration])
         except FileNotFoundError:
             return
-        except (OSError, msgspec.DecodeError) as error:
+        except msgspec.DecodeError as error:
+            what = "Kinematics are nominal until each robot is connected again."
+            self._services.damage.set_aside(self._path, what, error)
+            return
+        except OSError as error:
             raise StorageError(f"The calibrations in {self._path} cannot be read: {error}") from error
         self._kept = {each.object_id: each for each in kept}
 
@@ -207,20 +210,6 @@ class ArmCalibrations:
         async with self._writing:
             content = msgspec.json.format(msgspec.json.encode(list(self._kept.values())))
             try:
-                await asyncio.to_thread(_write, self._path, content)
+                await asyncio.to_thread(write_private, self._path, content)
             except OSError as error:
                 log.error("calibrations not kept", file=str(self._path), reason=str(error))
-
-
-def _write(path: Path, content: Any) -> None:
-    """Put a file in its place in one step: a crash leaves the old one or the new one."""
-    descriptor, name = tempfile.mkstemp(dir=path.parent)
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        Path(name).replace(path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise

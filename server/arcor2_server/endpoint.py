@@ -162,7 +162,8 @@ class Endpoint:
             log.info("client disconnected", client=client.number, user=client.user)
 
     async def _watch_tokens(self) -> None:
-        """End the connections whose token is not valid any more."""
+        """End the connections whose token is not valid any more, and report damage of the file of tokens."""
+        reported = self._services.access.damage
         while True:
             await asyncio.sleep(TOKENS_PERIOD)
             for client in tuple(self._hub.clients):
@@ -173,6 +174,8 @@ class Endpoint:
                     break
                 if not valid:
                     client.close(CloseCode.NOT_ADMITTED, "the token is not valid any more")
+            if reported != (reported := self._services.access.damage) and reported:
+                self._services.damage.report(reported)
 
     async def close(self) -> None:
         """Cancel the requests that are still being worked on."""

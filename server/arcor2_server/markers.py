@@ -1,8 +1,6 @@
 """Which markers stand where in this workplace: from a file that the server was given, or as it was told over REST."""
 
 import asyncio
-import os
-import tempfile
 from pathlib import Path
 
 import msgspec
@@ -10,6 +8,8 @@ import structlog
 
 from arcor2_hw.calibration.configuration import CalibrationConfiguration
 from arcor2_hw.exceptions import Conflict, StorageError
+from arcor2_server.data_damage import DataDamage
+from arcor2_server.private_files import write_private
 
 log = structlog.get_logger(__name__)
 
@@ -28,13 +28,15 @@ class Markers:
         """Give what is in force."""
         return self._kept if self._given is None else self._given
 
-    def load(self) -> None:
-        """Read what was kept. StorageError naming the file when that is damaged."""
+    def load(self, damage: DataDamage) -> None:
+        """Read what is stored; a damaged file is set aside and reported. StorageError when it cannot be read."""
         try:
             self._kept = msgspec.json.decode(self._path.read_bytes(), type=CalibrationConfiguration)
         except FileNotFoundError:
             return
-        except (OSError, msgspec.DecodeError) as error:
+        except msgspec.DecodeError as error:
+            damage.set_aside(self._path, "The positions of the markers are lost: set them again.", error)
+        except OSError as error:
             raise StorageError(f"The markers in {self._path} cannot be read: {error}") from error
 
     async def set(self, configuration: CalibrationConfiguration) -> None:
@@ -43,22 +45,10 @@ class Markers:
             raise Conflict("The server was started with a file of markers: change them there.")
         async with self._changing:
             try:
-                await asyncio.to_thread(_write, self._path, msgspec.json.format(msgspec.json.encode(configuration)))
+                await asyncio.to_thread(
+                    write_private, self._path, msgspec.json.format(msgspec.json.encode(configuration))
+                )
             except OSError as error:
                 raise StorageError(f"The markers cannot be kept in {self._path}: {error.strerror}") from error
             self._kept = configuration
         log.info("markers set", markers=len(configuration.markers), boards=len(configuration.boards))
-
-
-def _write(path: Path, content: bytes) -> None:
-    """Put a file in its place in one step: a crash leaves the old one or the new one."""
-    descriptor, name = tempfile.mkstemp(dir=path.parent)
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        Path(name).replace(path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise

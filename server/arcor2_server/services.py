@@ -9,6 +9,7 @@ from arcor2_server.breakpoints import SharedBreakpoints
 from arcor2_server.calibration import Calibration, CalibrationService, RunningCalibrations
 from arcor2_server.collisions import CollisionWorld
 from arcor2_server.compute import Compute
+from arcor2_server.data_damage import DataDamage
 from arcor2_server.edit_news import EditNews
 from arcor2_server.kept import KeptAnswers
 from arcor2_server.markers import Markers
@@ -52,7 +53,7 @@ class Services:
     runs: their history. tasks: work under way. previews: what is dragged. views: what clients show, by user and shared.
     breakpoints: the shared ones. presence: who looks at what. edit_news: what follows from edits.
     reachability: what robots reach of the open project. prepared: meshes and robots as clients show them.
-    arm_calibrations: what controllers told of their very arms.
+    arm_calibrations: what controllers told of their very arms. damage: notices about damaged files.
     """
 
     settings: "ServerSettings"
@@ -86,9 +87,11 @@ class Services:
     reachability: ReachabilityBoard = field(init=False)
     prepared: PreparedAssets = field(init=False)
     arm_calibrations: ArmCalibrations = field(init=False)
+    damage: DataDamage = field(init=False)
 
     def __post_init__(self) -> None:
         """Make what needs no more than these."""
+        self.damage = DataDamage(self.settings.data_dir, self.hub)
         self.compute = Compute(self.settings.compute_idle)
         self.calibration = CalibrationService(self)
         self.calibration_records = Calibrations(self.storage)
@@ -122,5 +125,6 @@ class Services:
         await self.runs.close()
 
     def greeting(self) -> list["Event"]:
-        """Give what a client is sent when it is let in: what is open, what runs, or the main screen."""
-        return self.session.greeting() or self.execution.greeting() or [self.hub.main_screen]
+        """Return what a client is sent when it is let in: what is open, what runs, or the main screen; then notices."""
+        state = self.session.greeting() or self.execution.greeting() or [self.hub.main_screen]
+        return state + self.damage.greeting()

@@ -4,7 +4,6 @@ import contextlib
 import fcntl
 import hashlib
 import hmac
-import os
 import secrets
 from collections.abc import Generator
 from datetime import UTC, datetime, timedelta
@@ -16,8 +15,10 @@ import msgspec
 from arcor2_hw.data.base import Data, Timestamp, now
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Conflict, InvalidData, NotFound, StorageError
+from arcor2_server.private_files import aside, write_private
 
 FILE: Final = "tokens.json"
+COPY: Final = "tokens.copy.json"
 LONGEST_NAME: Final = 100
 
 
@@ -45,26 +46,61 @@ _decode = msgspec.json.Decoder(list[Token]).decode
 class TokenFile:
     """The tokens of one data directory. Methods raise StorageError naming the file.
 
-    Other processes may change the file at any time: it is read again when it is another one.
+    Other processes may change the file at any time: it is read again when it is another one. Each change is written to
+    a copy first, which is used when the file is damaged.
     """
 
     def __init__(self, data_dir: Path) -> None:
         self._path = data_dir / FILE
+        self._copy = data_dir / COPY
         self._seen: tuple[int, int, int] | None = None
         self._tokens: list[Token] = []
+        self.damage = ""
+        """What is wrong with the file and what to do, as sentences; empty when it is intact."""
+        self.unusable = False
+        """Whether neither the file nor its copy can be read, so that nobody can be admitted by a token."""
 
     def all(self) -> list[Token]:
-        """Give all tokens, the expired too; empty when there never was one."""
+        """Return all tokens, the expired too; empty when there never was one, or they are lost to damage."""
         try:
             status = self._path.stat()
             stamp = (status.st_mtime_ns, status.st_size, status.st_ino)
             if stamp != self._seen:
-                self._tokens, self._seen = _decode(self._path.read_bytes()), stamp
+                self._tokens, self._seen = self._read(), stamp
         except FileNotFoundError:
-            self._tokens, self._seen = [], None
-        except (OSError, msgspec.DecodeError) as error:
+            self._tokens, self._seen, self.damage, self.unusable = [], None, "", False
+        except OSError as error:
             raise StorageError(f"the file of tokens {self._path} cannot be used: {error}") from error
         return self._tokens
+
+    def _read(self) -> list[Token]:
+        self.damage, self.unusable = "", False
+        try:
+            return _decode(self._path.read_bytes())
+        except msgspec.DecodeError as error:
+            self.damage = f"The file of tokens {self._path} is damaged: {str(error).rstrip('.')}."
+        try:
+            tokens = _decode(self._copy.read_bytes())
+            self.damage += f" The tokens are those of its copy {self._copy}."
+        except (OSError, msgspec.DecodeError):
+            tokens, self.unusable = self._tokens, not self._tokens
+            self.damage += (
+                " Its copy cannot be used either, so nobody can connect with a token."
+                if self.unusable
+                else " The tokens that were read before it was damaged stay valid until the server ends."
+            )
+            self.damage += " Make new tokens with `arcor2-hw token add`; the damaged file is then stored aside."
+        return tokens
+
+    def repair(self) -> str:
+        """Replace a damaged file by its copy, or write the copy where it is missing. Returns what was wrong."""
+        tokens, damage = self.all(), self.damage
+        if self.unusable or not (tokens or damage):
+            return damage
+        if damage or not self._copy.exists():
+            with self._changing():
+                pass
+        return damage
 
     def find(self, secret: str) -> Token | None:
         """Give the token with this secret, None when there is none or its time is over."""
@@ -106,19 +142,17 @@ class TokenFile:
 
     @contextlib.contextmanager
     def _changing(self) -> Generator[list[Token], None, None]:
-        """Have the list to change; it is on disk, readable by its owner alone, when this ends."""
+        """Provide the list to change; it is on disk, readable by its owner alone, when this ends."""
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
             with self._path.with_suffix(".lock").open("ab") as lock:
                 fcntl.flock(lock, fcntl.LOCK_EX)
                 tokens = list(self.all())
                 yield tokens
-                fresh = self._path.with_suffix(".new")
-                fresh.unlink(missing_ok=True)
-                with open(os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:  # noqa: PTH123
-                    file.write(msgspec.json.format(msgspec.json.encode(tokens)))
-                    file.flush()
-                    os.fsync(file.fileno())
-                fresh.replace(self._path)
+                content = msgspec.json.format(msgspec.json.encode(tokens))
+                if self.damage:
+                    aside(self._path, now()).hardlink_to(self._path)
+                write_private(self._copy, content)
+                write_private(self._path, content)
         except OSError as error:
             raise StorageError(f"the file of tokens {self._path} cannot be written: {error.strerror}") from error

@@ -162,7 +162,8 @@ def _markers(given: Path | None, path: Path | None, cell: Cell | None) -> Calibr
 
 def check_access(settings: ServerSettings) -> None:
     """Refuse to be reached by other machines while nobody needs a token. CannotServe, StorageError."""
-    if is_loopback(settings.host) or settings.insecure or TokenFile(settings.data_dir).all():
+    tokens = TokenFile(settings.data_dir)
+    if is_loopback(settings.host) or settings.insecure or tokens.all() or tokens.unusable:
         return
     raise CannotServe(
         ExitStatus.NO_TOKENS,
@@ -247,6 +248,8 @@ async def run(
     from arcor2_server.app import create_app, running_services
 
     async with running_services(settings) as services:
+        for notice in services.damage.notices:
+            sys.stderr.write(f"arcor2-hw serve: {notice}\n")
 
         def when_ready() -> None:
             gc.freeze()

@@ -62,9 +62,14 @@ def add(
 def list_tokens(*, data_dir: DataDir = None) -> int:
     """List the tokens; what they are cannot be shown again."""
     try:
-        tokens = _file(data_dir).all()
+        file = _file(data_dir)
+        tokens = file.all()
     except Arcor2Error as error:
         return _failed(error)
+    if file.damage:
+        sys.stderr.write(f"arcor2-hw token: {file.damage}\n")
+        if file.unusable:
+            return ExitStatus.DATA_UNUSABLE
     if not tokens:
         sys.stdout.write("There is no token: the server serves this machine alone, and asks nobody.\n")
         return ExitStatus.OK

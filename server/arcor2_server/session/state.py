@@ -3,7 +3,7 @@
 import asyncio
 from collections import deque
 from collections.abc import Awaitable, Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import structlog
 from msgspec.structs import replace
@@ -26,7 +26,8 @@ from arcor2_server.session.changes import OF_SCENE, Change, Edit, How, Kind
 from arcor2_server.session.checks import project_problems, scene_problems
 from arcor2_server.session.document import Document
 from arcor2_server.session.history import History
-from arcor2_server.session.journal import ALL, Base, Journal, Recovered, Times
+from arcor2_server.session.journal import Journal
+from arcor2_server.session.journal_records import ALL, Base, Recovered, Times
 from arcor2_server.session.unsaved import Unsaved
 
 if TYPE_CHECKING:
@@ -35,26 +36,12 @@ if TYPE_CHECKING:
 log = structlog.get_logger(__name__)
 
 
-def _touched(times: Times, time: str, *, differs: bool) -> Times:
-    """Give the times after a change, which may have brought a document back to what is saved."""
-    return replace(times, changed=time if differs or not times.modified else "")
-
-
-def _settled(times: Times, *, differs: bool, saved: BareScene | BareProject | None = None) -> Times:
-    """Give the times of a document that was compared with what is saved, or was saved."""
-    changed = times.changed if differs or (saved is None and not times.modified) else ""
-    return replace(times if saved is None else Times.of(saved), changed=changed)
-
-
-class _Pending:
+class _Pending(NamedTuple):
     """An edit that is made but not yet on the disk, with the times that held before it."""
 
-    __slots__ = ("edit", "project", "scene")
-
-    def __init__(self, edit: Edit, scene: Times, project: Times) -> None:
-        self.edit = edit
-        self.scene = scene
-        self.project = project
+    edit: Edit
+    scene: Times
+    project: Times
 
 
 class Session:
@@ -82,23 +69,33 @@ class Session:
 
     # ------------------------------------------------------------------------------------------ life
     async def open(self) -> None:
-        """Go on with what the journal holds. Raises StorageError when it cannot be written."""
+        """Go on with what the journal holds. Raises StorageError when it cannot be written.
+
+        What a damaged journal lost is reported.
+        """
         recovered = await self._journal.open()
-        if recovered is None:
-            return
-        self._restore(recovered)
-        await self._find_unsaved()
-        log.info(
-            "reopened",
-            scene=self._name(Kind.SCENE),
-            project=self._name(Kind.PROJECT),
-            edits=self._number - recovered.number,
-            unsaved=self.has_changes,
-        )
+        if recovered is not None:
+            self._restore(recovered)
+            await self._find_unsaved()
+        if (loss := self._journal.loss) is not None:
+            notice = str(loss)
+            if loss.incomplete and await self._superseded():
+                await self.discard()
+                notice += " What was saved is newer than the rest of the journal: open it again."
+            self._services.damage.report(notice)
+        if scene := self._name(Kind.SCENE):
+            project = self._name(Kind.PROJECT)
+            log.info("reopened", scene=scene, project=project, edits=len(self.history), unsaved=self.has_changes)
 
     async def close(self) -> None:
         """Write what waits. What is open stays open for the next start."""
         await self._journal.close()
+
+    async def _superseded(self) -> bool:
+        """Whether the open document is older than what is saved: it was recovered from a damaged journal."""
+        newest = max((edit.time for edit in self.history), default="")
+        times = self._scene_times if self.project is None else self._project_times
+        return bool(times.modified) and newest < times.modified
 
     def _restore(self, recovered: Recovered) -> None:
         self.document = Document(recovered.items)
@@ -124,8 +121,8 @@ class Session:
         except StorageError as error:
             log.warning("what is open cannot be compared with what is saved", reason=str(error))
         self._unsaved = Unsaved.between(Document.of(saved, saved_project), self.document)
-        self._scene_times = _settled(self._scene_times, differs=self._unsaved.scene)
-        self._project_times = _settled(self._project_times, differs=self._unsaved.project)
+        self._scene_times = self._scene_times.settled(differs=self._unsaved.scene)
+        self._project_times = self._project_times.settled(differs=self._unsaved.project)
         self._forget_snapshots()
 
     def _name(self, kind: Kind) -> str | None:
@@ -262,9 +259,9 @@ class Session:
             self._unsaved.note(change)
         kinds = {change.kind for change in edit.changes}
         if kinds & OF_SCENE:
-            self._scene_times = _touched(self._scene_times, edit.time, differs=self._unsaved.scene)
+            self._scene_times = self._scene_times.touched(edit.time, differs=self._unsaved.scene)
         if kinds - OF_SCENE:
-            self._project_times = _touched(self._project_times, edit.time, differs=self._unsaved.project)
+            self._project_times = self._project_times.touched(edit.time, differs=self._unsaved.project)
         self._forget_snapshots()
 
     def _kept(self, future: "asyncio.Future[None]") -> None:
@@ -334,11 +331,11 @@ class Session:
         storage = self._services.storage
         if self.scene_changed:
             saved = await self._save(storage.put_scene(self.require_scene()), scene=True)
-            self._scene_times = _settled(self._scene_times, differs=self._unsaved.scene, saved=saved)
+            self._scene_times = self._scene_times.settled(differs=self._unsaved.scene, saved=saved)
             self._forget_snapshots()
         if self.project_changed:
             saved = await self._save(storage.put_project(self.require_project()), scene=False)
-            self._project_times = _settled(self._project_times, differs=self._unsaved.project, saved=saved)
+            self._project_times = self._project_times.settled(differs=self._unsaved.project, saved=saved)
             self._forget_snapshots()
         # Not waited for: what a restart finds saved is compared with what the journal leads to.
         self._shorten()

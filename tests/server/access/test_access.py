@@ -19,11 +19,12 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosedError
 
 from arcor2_hw.data.role import Role
-from arcor2_hw.exceptions import InvalidData, NotFound, StorageError
+from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_server import certificate
+from arcor2_server.access import Access, AccessRefused
 from arcor2_server.cli.status import ExitStatus
-from arcor2_server.settings import LegacyListener
-from arcor2_server.tokens import FILE, TokenFile
+from arcor2_server.settings import LegacyListener, ServerSettings
+from arcor2_server.tokens import COPY, FILE, TokenFile
 from tests.server.core.serving import COMMAND, ServerProcess, Talker, running, talking
 
 
@@ -91,10 +92,62 @@ def test_a_token_needs_a_name(tmp_path: Path, name: str) -> None:
         TokenFile(tmp_path).add(name, Role.OPERATOR)
 
 
-def test_a_damaged_file_is_named(tmp_path: Path) -> None:
+def test_a_damaged_file_is_repaired_from_its_copy(tmp_path: Path) -> None:
+    tokens = TokenFile(tmp_path)
+    made, secret = tokens.add("tablet", Role.OPERATOR)
     (tmp_path / FILE).write_text("{")
-    with pytest.raises(StorageError, match=FILE):
-        TokenFile(tmp_path).all()
+    assert tokens.find(secret) == made  # by a server that runs
+    assert TokenFile(tmp_path).find(secret) == made
+    damage = TokenFile(tmp_path).repair()
+    assert FILE in damage
+    assert json.loads((tmp_path / FILE).read_text())[0]["name"] == "tablet"
+    assert [path.read_text() for path in tmp_path.glob("tokens.damaged-*.json")] == ["{"]
+    assert TokenFile(tmp_path).repair() == ""
+    assert stat.S_IMODE((tmp_path / COPY).stat().st_mode) == 0o600
+
+
+def test_a_revoked_token_does_not_come_back_from_the_copy(tmp_path: Path) -> None:
+    _, secret = TokenFile(tmp_path).add("tablet", Role.OPERATOR)
+    TokenFile(tmp_path).revoke("tablet")
+    (tmp_path / FILE).write_text("{")
+    assert TokenFile(tmp_path).find(secret) is None
+
+
+def test_tokens_that_cannot_be_read_do_not_open_the_server(tmp_path: Path) -> None:
+    for name in (FILE, COPY):
+        (tmp_path / name).write_text("{")
+    access = Access(ServerSettings(data_dir=tmp_path))
+    assert not access.open_to_all
+    assert "arcor2-hw token add" in access.repair()
+    with pytest.raises(AccessRefused, match=r"tokens\.json is damaged.*arcor2-hw token add"):
+        access.by_token("secret", "127.0.0.1")
+    made, secret = TokenFile(tmp_path).add("new", Role.PROGRAMMER)
+    assert access.by_token(secret, "127.0.0.1").token == made
+    assert list(tmp_path.glob("tokens.damaged-*.json"))
+
+
+async def test_damaged_files_do_not_keep_the_server_from_starting(tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    _, secret = TokenFile(data).add("tablet", Role.PROGRAMMER)
+    damaged = [FILE, "markers.json", "arm-calibrations.json", "journal.sqlite"]
+    for name in damaged:
+        (data / name).write_text("{" * 10_000)
+    missing = {name: str(data / name).removesuffix(Path(name).suffix) for name in damaged}
+    async with running(data) as server:
+        async with connect(server.url, additional_headers=bearer(secret)) as socket, asyncio.timeout(15):
+            async for message in socket:
+                event = json.loads(message)
+                if event["event"] == "Notification":
+                    assert event["data"]["level"] == "Error"
+                    missing = {name: path for name, path in missing.items() if path not in event["data"]["message"]}
+                    if not missing:
+                        break
+        printed = (tmp_path / "data.log").read_text()
+    for name in damaged:
+        assert list(data.glob(name.replace(".", ".damaged-*."))), name
+        assert [
+            line for line in printed.splitlines() if line.startswith("arcor2-hw serve: ") and Path(name).stem in line
+        ]
 
 
 # ------------------------------------------------------------------------------------------------ the websocket

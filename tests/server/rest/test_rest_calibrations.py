@@ -18,6 +18,8 @@ from arcor2_hw.calibration.records import CalibrationKind, CalibrationRecord
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.exceptions import Conflict, StorageError
+from arcor2_server.data_damage import DataDamage
+from arcor2_server.hub import Hub
 from arcor2_server.markers import Markers
 from arcor2_server.services import Services
 from arcor2_server.storage.calibrations import Calibrations
@@ -215,7 +217,7 @@ async def test_markers_are_kept(http: httpx.AsyncClient, services: Services, tmp
     assert granted(await http.get("/api/calibration/markers"))["markers"] == []
     granted(await http.put("/api/calibration/markers", json=MARKERS | {"marker_size": 0.08}))
     again = Markers(services.settings.markers_file)
-    again.load()
+    again.load(damage(tmp_path))
     assert again.configuration == services.markers.configuration
     assert again.configuration.marker_size == 0.08
     twice = {"markers": [{"marker_id": 3, "pose": {}}] * 2}
@@ -225,16 +227,39 @@ async def test_markers_are_kept(http: httpx.AsyncClient, services: Services, tmp
     assert services.markers.configuration.marker_size == 0.08
 
 
+def damage(directory: Path) -> DataDamage:
+    return DataDamage(directory, Hub())
+
+
+async def test_damaged_markers_are_set_aside(tmp_path: Path) -> None:
+    path = tmp_path / "markers.json"
+    path.write_bytes(b"{")
+    notices = damage(tmp_path)
+    markers = Markers(path)
+    markers.load(notices)
+    assert markers.configuration == CalibrationConfiguration()
+    (stored,) = tmp_path.glob("markers.damaged-*.json")
+    assert stored.read_bytes() == b"{"
+    assert not path.exists()
+    (notice,) = notices.notices
+    assert str(path) in notice
+    assert str(stored) in notice
+    # A later run still has the notice, until a client has got it.
+    later = damage(tmp_path)
+    later.load()
+    assert [event.data.message for event in later.greeting()] == [notice]
+    afterwards = damage(tmp_path)
+    afterwards.load()
+    assert afterwards.greeting() == []
+
+
 async def test_markers_of_a_file_win(tmp_path: Path) -> None:
     given = CalibrationConfiguration(markers=[Marker(1, Pose())])
     markers = Markers(tmp_path / "markers.json", given)
-    markers.load()
+    markers.load(damage(tmp_path))
     with pytest.raises(Conflict, match="file of markers"):
         await markers.set(CalibrationConfiguration())
     assert markers.configuration == given
-    (tmp_path / "markers.json").write_bytes(b"{")
-    with pytest.raises(StorageError, match=r"markers\.json"):
-        markers.load()
     away = Markers(tmp_path / "none" / "markers.json")
     with pytest.raises(StorageError, match=r"markers\.json"):
         await away.set(given)

@@ -247,36 +247,44 @@ async def test_the_limit_bounds_what_can_be_taken_back(tmp_path: Path) -> None:
         assert "nothing" in await refused(alice)
 
 
-async def test_a_journal_of_the_first_format_is_taken_over(tmp_path: Path) -> None:
+@pytest.mark.parametrize("version", [1, 2])
+async def test_a_journal_of_an_earlier_format_is_taken_over(tmp_path: Path, version: int) -> None:
     async with open_desk(tmp_path) as desk:
         await Work(await desk.person("alice")).project("p")
     connection = sqlite3.connect(tmp_path / "journal.sqlite")
-    for column in ("request", "how", "target"):
-        connection.execute(f"alter table edit drop column {column}")
-    connection.execute("pragma user_version = 1")
+    columns = ["edit.sum", "base.sum"] + (["edit.request", "edit.how", "edit.target"] if version == 1 else [])
+    for table, column in (name.split(".") for name in columns):
+        connection.execute(f"alter table {table} drop column {column}")
+    connection.execute("drop table opening")
+    connection.execute(f"pragma user_version = {version}")
     connection.commit()
     connection.close()
+    (tmp_path / "journal.position").unlink()
     async with open_desk(tmp_path) as desk:
+        assert desk.services.damage.notices == []
         alice = await desk.person("alice")
         assert [point.name for point in desk.session.require_project().action_points] == ["p"]
         await alice.ask("Undo")
         assert not desk.session.require_project().action_points
+    async with open_desk(tmp_path) as desk:
+        assert not desk.session.require_project().action_points
+        assert desk.services.damage.notices == []
 
 
 async def test_an_undo_that_cannot_be_kept_is_taken_back(
     desk: Desk, alice: Person, work: Work, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from arcor2_server.session import journal as journal_module
+    from arcor2_server.session import journal_file
 
     await work.project("p")
     await alice.ask("SaveProject")
     before, told = shown(desk), await alice.ask("History")
 
-    def full(connection: sqlite3.Connection, job: object) -> None:
+    def full(connection: sqlite3.Connection, job: object, serial: int) -> None:
         raise sqlite3.OperationalError("database or disk is full")
 
     with monkeypatch.context() as patch:
-        patch.setattr(journal_module, "_write", full)
+        patch.setattr(journal_file, "write", full)
         assert "disk is full" in await refused(alice)
     assert shown(desk) == before
     assert not desk.session.has_changes
