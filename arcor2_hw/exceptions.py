@@ -103,6 +103,12 @@ class Cancelled(DeviceError):
     code = "cancelled"
 
 
+class PathBlocked(DeviceError):
+    """An obstacle came into the path of a robot during a safe move; the robot was stopped."""
+
+    code = "path_blocked"
+
+
 class KinematicsError(DeviceError):
     """There are no joints for the pose, or the numbers make no sense for the robot."""
 

@@ -20,7 +20,7 @@ from arcor2_hw.kinematics.model import RobotModel
 from arcor2_hw.kinematics.reach import Reach, Reachability
 from arcor2_hw.kinematics.shapes import Array, Box
 from arcor2_hw.kinematics.world import CollisionWorld
-from benchmarks import planning
+from benchmarks import planning, safe_moves
 from benchmarks.figures import Figure, Report, median, percentile
 
 UR5E: Final = Path(next(iter(arcor2_drivers.__path__))) / "universal_robots" / "urdf" / "ur5e"
@@ -40,7 +40,7 @@ async def run(report: Report) -> None:
     report.add(forward(model, chance))
     for figure in (*inverse(model, chance), *checks(model, chance), *reachability(model, chance)):
         report.add(figure)
-    for figure in planning.figures(model):
+    for figure in (*planning.figures(model), *safe_moves.figures()):
         report.add(figure)
 
 

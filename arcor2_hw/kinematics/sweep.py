@@ -3,7 +3,7 @@
 import functools
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -46,6 +46,7 @@ class Sweep:
         self._q = self._standing.q.copy()
         self.levers = levers(self._standing)[arm.indices]
         self.checks = 0
+        self._levels = int(np.log2(FARTHEST / resolution)) if resolution < FARTHEST else 0
 
     def travel(self, a: Array, b: Array) -> float:
         """Give a bound, m, on how far any point of the robot travels from `a` to `b`."""
@@ -84,18 +85,44 @@ class Sweep:
         standing = self._standing
         if any(standing.hits_itself(self._whole(a + number / count * way)) for number in _far_apart(count)):
             return False
-        levels = int(np.log2(FARTHEST / self.resolution)) if self.resolution < FARTHEST else 0
-        chunks = math.ceil(count / 2**levels)
-        return all(self._is_apart(a, way, (n - 0.5) / chunks, 0.5 / chunks, levels) for n in _far_apart(chunks))
+        chunks = self._chunks(count)
+        return self._first_near(a, way, _far_apart(chunks), chunks) is None
 
-    def _is_apart(self, a: Array, way: Array, middle: float, half: float, levels: int) -> bool:
+    def first_contact(self, waypoints: Sequence[Array]) -> Array | None:
+        """Return the first joint values on a path that collide with the surroundings, or None.
+
+        Collisions of the robot with itself are ignored.
+        """
+        self.checks += 1
+        if not self.world.is_free_around(self.robot, self._whole(waypoints[0])):
+            return waypoints[0]
+        for a, b in itertools.pairwise(waypoints):
+            chunks = self._chunks(self._count(a, b, self.resolution))
+            share = self._first_near(a, b - a, range(1, chunks + 1), chunks)
+            if share is not None:
+                return a + share * (b - a)
+        return None
+
+    def _chunks(self, count: int) -> int:
+        return math.ceil(count / (1 << self._levels))
+
+    def _first_near(self, a: Array, way: Array, order: Iterable[int], chunks: int) -> float | None:
+        """Return the first share, in the order of chunks, at which something is too near, or None."""
+        for number in order:
+            share = self._near(a, way, (number - 0.5) / chunks, 0.5 / chunks, self._levels)
+            if share is not None:
+                return share
+        return None
+
+    def _near(self, a: Array, way: Array, middle: float, half: float, levels: int) -> float | None:
         self.checks += 1
         more = self.resolution / 2.0 * 2.0**levels if levels else 0.0
         if self.world.is_free_around(self.robot, self._whole(a + middle * way), more):
-            return True
-        return bool(levels) and all(
-            self._is_apart(a, way, middle + side * half / 2.0, half / 2.0, levels - 1) for side in (-1.0, 1.0)
-        )
+            return None
+        if not levels:
+            return middle
+        before = self._near(a, way, middle - half / 2.0, half / 2.0, levels - 1)
+        return before if before is not None else self._near(a, way, middle + half / 2.0, half / 2.0, levels - 1)
 
     def _whole(self, q: Array) -> Array:
         self._q[self.arm.indices] = q

@@ -2,6 +2,7 @@
 
 import abc
 import threading
+from collections.abc import Callable
 from typing import ClassVar, Literal
 
 from arcor2_hw.data.geometry import Pose
@@ -9,7 +10,7 @@ from arcor2_hw.data.robot import Joint, KinematicCalibration, MoveResult, RobotS
 from arcor2_hw.exceptions import Arcor2NotImplemented, DeviceError, KinematicsError, Refused
 from arcor2_hw.objects.generic import GenericWithPose
 from arcor2_hw.objects.settings import Settings
-from arcor2_hw.objects.surroundings import Nothing, Surroundings
+from arcor2_hw.objects.surroundings import HeldPart, Nothing, Surroundings
 
 
 class RobotException(DeviceError):
@@ -48,6 +49,35 @@ class Robot(GenericWithPose):
     def surroundings(self) -> Surroundings:
         """Give what tells of the things around the robot: of nothing, where nobody told of any."""
         return self.__dict__.get("_around") or Nothing()
+
+    # -------------------------------------------------------------------------------- held parts
+    @property
+    def parts(self) -> dict[str, HeldPart]:
+        """Return the parts that the robot holds, by name."""
+        return dict(self.__dict__.get("_parts", {}))
+
+    def hold_part(self, part: HeldPart) -> None:
+        """Attach a part to the robot, in place of one of that name; safe moves keep it clear of obstacles."""
+        self._parts = self.parts | {part.name: part}
+        self._notify_parts()
+
+    def drop_part(self, name: str) -> HeldPart | None:
+        """Detach a part and return it; None when the robot does not hold it."""
+        parts = self.parts
+        part = parts.pop(name, None)
+        if part is not None:
+            self._parts = parts
+            self._notify_parts()
+        return part
+
+    def on_parts_changed(self, listener: Callable[[], None]) -> None:
+        """Call `listener` on any thread whenever the held parts change."""
+        self._parts_listener = listener
+
+    def _notify_parts(self) -> None:
+        listener: Callable[[], None] | None = self.__dict__.get("_parts_listener")
+        if listener is not None:
+            listener()
 
     @property
     def move_in_progress(self) -> bool:

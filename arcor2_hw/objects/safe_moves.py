@@ -14,14 +14,15 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import Models
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import Arcor2Error, KinematicsError, NotFound, Refused
+from arcor2_hw.objects.path_monitor import PathMonitor, PlannedPath
 from arcor2_hw.objects.robot import Robot
 from arcor2_hw.objects.robot_tools import RobotTools, package_of, settings_of
-from arcor2_hw.objects.surroundings import Holder
+from arcor2_hw.objects.snapshot import JOINT_TOLERANCE, Others, Snapshot, build_world
+from arcor2_hw.objects.surroundings import HeldPart, Holder, Obstacle
 
 if TYPE_CHECKING:
     from arcor2_hw.kinematics.arm import Arm
-    from arcor2_hw.kinematics.model import RobotModel
-    from arcor2_hw.kinematics.shapes import Array, Shape
+    from arcor2_hw.kinematics.shapes import Array
     from arcor2_hw.kinematics.sweep import Sweep
     from arcor2_hw.kinematics.timing import Timed
     from arcor2_hw.kinematics.world import CollisionWorld
@@ -33,8 +34,6 @@ RESOLUTION: Final = 0.01
 """m that no point of the robot travels farther between two configurations that are looked at."""
 WITHIN: Final = 2.0
 """s that is searched for a way."""
-STANDS: Final = 0.01
-"""rad, or m, by which a joint may have moved since its way was planned."""
 TCP_RAMP: Final = 4.0
 """1/s: acceleration along a line, by the speed along it."""
 
@@ -56,12 +55,13 @@ class Way:
     speed: float
     line: bool
     _timed: "Callable[[float | None], Timed]" = dataclasses.field(repr=False)
+    _planned: PlannedPath | None = dataclasses.field(default=None, repr=False)
 
     def require_begin(self, name: str, now: Sequence[Joint]) -> None:
         """Raise Refused unless the robot `name` still stands where the way begins: planning takes time."""
         present = {joint.name: joint.value for joint in now}
         for joint in self.waypoints[0]:
-            if abs(present[joint.name] - joint.value) > STANDS:
+            if abs(present[joint.name] - joint.value) > JOINT_TOLERANCE:
                 raise Refused(f"{name} was moved while its way was planned")
 
     def timed(self, tcp_speed: float | None = None) -> "Timed":
@@ -78,13 +78,6 @@ class Tool(NamedTuple):
 
     link: str
     shape: Models
-    in_link: Pose
-
-
-class Held(NamedTuple):
-    """That an object moves with a link, and where it is in that link's frame."""
-
-    link: str
     in_link: Pose
 
 
@@ -107,8 +100,6 @@ class SafeMoves:
         self.tool = tool
         self._settings = settings or (lambda: settings_of(robot))
         self._here = threading.local()
-        self.held: dict[str, Held] = {}
-        """What the robot holds, by the names of the objects."""
 
     def prepare(self) -> None:
         """Import and read what is needed, on this thread; what cannot be is told to who needs it first.
@@ -119,7 +110,9 @@ class SafeMoves:
         try:
             from arcor2_hw.kinematics import planning  # noqa: F401
 
-            self._world([], 0.0, alone=True)
+            tool = _tool_of(self._robot)
+            alone = Snapshot({} if tool is None else {tool.name: tool}, {})
+            build_world(self._robot, self._tools(), [], alone, 0.0)
         except (ImportError, Arcor2Error) as error:
             log.info("%s: no safe moves: %s", self._robot.name, error)
 
@@ -155,7 +148,7 @@ class SafeMoves:
                 return arm.named(tools.inverse(end_effector).solve(target, arm.values(near)))
             from arcor2_hw.kinematics.inverse import blocked_in
 
-            def solved(world: "CollisionWorld") -> list[Joint]:
+            def solved(world: "CollisionWorld", _: Snapshot) -> list[Joint]:
                 blocked = blocked_in(world, self._robot.name, arm)
                 return arm.named(tools.inverse(end_effector).solve(target, arm.values(near), blocked))
 
@@ -181,10 +174,10 @@ class SafeMoves:
             if not safe:
                 return self._way(arm, [arm.values(now), arm.values(goal)], speed)
 
-            def planned(world: "CollisionWorld") -> Way:
+            def planned(world: "CollisionWorld", around: Snapshot) -> Way:
                 planner = self._planner(world, arm)
                 way = planner.to_joints(arm.values(now), arm.values(goal), within=WITHIN, stopped=stopped)
-                return self._way(arm, way, speed)
+                return self._way(arm, way, speed, around, world.margin)
 
             return self._with_margin(now, planned)
 
@@ -206,9 +199,9 @@ class SafeMoves:
             if not safe:
                 return self._way(arm, [start, tools.inverse(end_effector).solve(target, start)], speed)
 
-            def planned(world: "CollisionWorld") -> Way:
+            def planned(world: "CollisionWorld", around: Snapshot) -> Way:
                 way = self._planner(world, arm).to_pose(start, target, within=WITHIN, stopped=stopped)
-                return self._way(arm, way, speed)
+                return self._way(arm, way, speed, around, world.margin)
 
             return self._with_margin(now, planned)
 
@@ -226,41 +219,63 @@ class SafeMoves:
             arm = self._tools().arm(end_effector)
             way = straight_line(arm, arm.values(now), self._target(pose), self._robot.name)
 
-            def looked_at(world: "CollisionWorld") -> None:
+            def checked(world: "CollisionWorld", around: Snapshot) -> Way:
                 sweep = self._sweep(world, arm)
                 if world.margin and not (sweep.is_free(way[0]) and sweep.is_free(way[-1])):
                     raise StartInCollision
                 require_free(sweep, way, self._robot.name)
+                return self._way(arm, way, speed, around, world.margin, line=True)
 
-            if safe:
-                self._with_margin(now, looked_at)
-            return self._way(arm, way, speed, line=True)
+            return self._with_margin(now, checked) if safe else self._way(arm, way, speed, line=True)
 
     def contacts(self, joints: Sequence[Joint]) -> list[str]:
         """Give what the robot would be in collision with in joints: pairs of names, none when it is free."""
         with self._named():
-            return [str(contact) for contact in self._world(joints, 0.0).contacts(self._robot.name, self._q(joints))]
+            world = build_world(self._robot, self._tools(), joints, self._snapshot(), 0.0)
+            return [str(contact) for contact in world.contacts(self._robot.name, self._q(joints))]
+
+    @contextlib.contextmanager
+    def monitored(self, way: Way) -> Iterator[None]:
+        """Watch the surroundings while the robot follows a safe way, and stop it when they block the rest of that.
+
+        The robot's `stop` is called, after which the motion in the context has to raise Cancelled.
+
+        Raises:
+            PathBlocked: The robot was stopped. The message names the obstacle.
+        """
+        if way._planned is None:
+            yield
+            return
+        tools = way._planned.tools
+        with PathMonitor(self._robot, way._planned, lambda others: self._look(tools, others)):
+            yield
 
     # -------------------------------------------------------------------------------- what is held
     def hold(self, name: str, link: str, joints: Sequence[Joint]) -> None:
-        """Let an object of the scene move with a link, from where both are now on: a part that was taken.
+        """Attach a collision object of the scene to a link of the robot, with the pose that both have now.
 
-        It is led past what is around from then on, and may touch that link. `joints`: where the robot stands. Raises
-        NotFound for an object that is no obstacle, or a link that is not there, Refused for what is held already.
+        Args:
+            name: The object.
+            link: Link of the robot's model; the object may touch it.
+            joints: Present joint values.
+
+        Raises:
+            NotFound: The object is no obstacle, or the model has no such link.
+            Refused: A robot holds the object already.
         """
         obstacle = next((each for each in self._robot.surroundings.obstacles() if each.name == name), None)
         if obstacle is None:
             raise NotFound(f"{self._robot.name} cannot hold {name}: it is no collision object of the scene")
         if obstacle.holder is not None:
             raise Refused(f"{self._robot.name} cannot hold {name}: {obstacle.holder.robot} holds it")
-        self.held[name] = Held(link, self._link_pose(link, joints).inverted() * obstacle.pose)
+        self._robot.hold_part(HeldPart(name, link, self._link_pose(link, joints).inverted() * obstacle.pose))
 
     def release(self, name: str, joints: Sequence[Joint]) -> Pose:
-        """Let go of an object where it is now; gives where, to be told to the object. Raises NotFound."""
-        if name not in self.held:
+        """Detach an object and return its present pose. Raises NotFound when the robot does not hold it."""
+        part = self._robot.drop_part(name)
+        if part is None:
             raise NotFound(f"{self._robot.name} does not hold {name}")
-        held = self.held.pop(name)
-        return self._link_pose(held.link, joints) * held.in_link
+        return self._link_pose(part.link, joints) * part.in_link
 
     def _link_pose(self, link: str, joints: Sequence[Joint]) -> Pose:
         frames = self._tools().model.link_poses(self._q(joints))
@@ -269,7 +284,18 @@ class SafeMoves:
         return self._robot.pose * Pose.from_matrix(frames[link])
 
     # -------------------------------------------------------------------------------- inside
-    def _way(self, arm: "Arm", points: "list[Array]", speed: float, *, line: bool = False) -> Way:
+    def _way(
+        self,
+        arm: "Arm",
+        points: "list[Array]",
+        speed: float,
+        around: Snapshot | None = None,
+        margin: float = 0.0,
+        *,
+        line: bool = False,
+    ) -> Way:
+        """Return a way through points; `around` is what it was checked against, None for an unsafe one."""
+
         def timed(tcp_speed: float | None) -> "Timed":
             from arcor2_hw.kinematics.timing import MotionLimits, led, with_stops
 
@@ -282,7 +308,8 @@ class SafeMoves:
             fastest = 100.0 if tcp_speed is None else tcp_speed
             return led(points, limits, lengths, fastest, TCP_RAMP * fastest)
 
-        return Way([arm.named(q) for q in points], speed, line, timed)
+        planned = None if around is None else PlannedPath(self._tools(), arm, points, around, margin)
+        return Way([arm.named(q) for q in points], speed, line, timed, planned)
 
     def _planner(self, world: "CollisionWorld", arm: "Arm") -> Any:
         from arcor2_hw.kinematics.planning import Planner
@@ -294,43 +321,22 @@ class SafeMoves:
 
         return Sweep(world, self._robot.name, arm, RESOLUTION)
 
-    def _with_margin(self, now: Sequence[Joint], ask: "Callable[[CollisionWorld], T]") -> T:
-        """Ask with the margin; where it stands, or shall stand, too near for that, without."""
+    def _with_margin(self, now: Sequence[Joint], ask: "Callable[[CollisionWorld, Snapshot], T]") -> T:
+        """Ask with the margin; where the start or the goal is too near to something for that, without."""
         from arcor2_hw.kinematics.errors import GoalInCollision, OnlyInCollision, StartInCollision
 
+        around, tools = self._snapshot(), self._tools()
         try:
-            return ask(self._world(now, MARGIN))
+            return ask(build_world(self._robot, tools, now, around, MARGIN), around)
         except (GoalInCollision, OnlyInCollision, StartInCollision):
-            return ask(self._world(now, 0.0))
+            return ask(build_world(self._robot, tools, now, around, 0.0), around)
 
-    def _world(self, now: Sequence[Joint], margin: float, *, alone: bool = False) -> "CollisionWorld":
-        """Give the robot in its joints among what stands around it now, or `alone`."""
-        from arcor2_hw.kinematics.world import CollisionWorld
+    def _snapshot(self) -> Snapshot:
+        return self._look(self._tools(), self._robot.surroundings.robots())
 
-        robot, tools = self._robot, self._tools()
-        world = CollisionWorld(margin=margin)
-        world.add_robot(robot.name, tools.model, robot.pose, self._q(now))
-        _put_tool(world, robot.name, self.tool())
-        if alone:
-            return world
-        held = {name: (Holder(robot.name, one.link), one.in_link) for name, one in self.held.items()}
-        for other, joints in robot.surroundings.robots():
-            model = tools.other(other)
-            if model is not None:
-                _require_told(other, model, joints)
-                world.add_robot(other.name, model, other.pose, model.values(joints, model.neutral()))
-                moves = getattr(other, "safe_moves", None)
-                if isinstance(moves, SafeMoves):
-                    _put_tool(world, other.name, moves.tool())
-                    held |= {name: (Holder(other.name, one.link), one.in_link) for name, one in moves.held.items()}
-        for obstacle in robot.surroundings.obstacles():
-            holder, pose = held.get(obstacle.name, (obstacle.holder, obstacle.pose))
-            shape = tools.shape(obstacle)
-            if holder is None:
-                world.put(obstacle.name, shape, pose)
-            else:
-                _put_held(world, obstacle.name, shape, holder, pose)
-        return world
+    def _look(self, tools: RobotTools, others: Others) -> Snapshot:
+        with_model = [(other, joints) for other, joints in others if tools.other(other) is not None]
+        return Snapshot.take(self._robot, with_model, _tool_of)
 
     def _q(self, joints: Sequence[Joint]) -> "Array":
         model = self._tools().model
@@ -367,31 +373,10 @@ class SafeMoves:
         return found
 
 
-def _put_tool(world: "CollisionWorld", robot: str, tool: Tool | None) -> None:
-    if tool is not None:
-        from arcor2_hw.kinematics.shapes import of_model
-
-        _put_held(world, f"tool of {robot}", of_model(tool.shape), Holder(robot, tool.link), tool.in_link)
-
-
-def _put_held(world: "CollisionWorld", name: str, shape: "Shape", holder: Holder, in_link: Pose) -> None:
-    """Let a robot hold something. Raises Refused for a robot or a link that is not there."""
-    if holder.robot not in world.robots:
-        raise Refused(f"where {holder.robot} stands, which holds {name}, is not known")
-    standing = world.robot(holder.robot)
-    frames = standing.link_frames(standing.q)
-    if holder.link not in frames:
-        raise Refused(f"{name} is held by {holder.link}, which is no link of {holder.robot}")
-    world.put(name, shape, Pose.from_matrix(frames[holder.link]) * in_link)
-    world.attach(name, holder.robot, holder.link, touching=holder.touching)
-
-
-def _require_told(robot: Robot, model: "RobotModel", joints: Sequence[Joint]) -> None:
-    """Raise Refused unless a robot has told all joints that lead to its end effectors: it may be in the way."""
-    told = {joint.name for joint in joints}
-    for name in model.end_effectors:
-        for joint in model.arm(name).joint_names:
-            if joint not in told:
-                raise Refused(
-                    f"where {robot.name} stands is not known, which may be in the way: it does not tell {joint}"
-                )
+def _tool_of(robot: Robot) -> Obstacle | None:
+    """Return the tool of a robot that its model does not contain."""
+    moves = getattr(robot, "safe_moves", None)
+    tool = moves.tool() if isinstance(moves, SafeMoves) else None
+    if tool is None:
+        return None
+    return Obstacle(f"tool of {robot.name}", tool.shape, tool.in_link, Holder(robot.name, tool.link))

@@ -20,6 +20,22 @@ class Holder(Data, frozen=True):
     touching: tuple[str, ...] = ()
 
 
+class HeldPart(Data, frozen=True):
+    """A part that a robot holds and moves with it.
+
+    Attributes:
+        name: Unique in the scene.
+        link: Link of the robot's model, such as its end effector.
+        in_link: Pose in the frame of that link.
+        model: Collision model; None for a collision object of the scene, which brings its own.
+    """
+
+    name: str
+    link: str
+    in_link: Pose
+    model: Models | None = None
+
+
 class Obstacle(Data, frozen=True):
     """A collision model that counts now, and where it stands in the world. name: of its object.
 

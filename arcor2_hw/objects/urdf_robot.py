@@ -100,8 +100,9 @@ class UrdfRobot(Robot):
     ) -> None:
         """Move an end effector to a pose in the world: in a line, else on a way that may be any.
 
-        With `safe` a line that meets something is refused, and another way leads around. Raises KinematicsException
-        naming why there is none, OutOfRange, Refused, Cancelled, and what `follow` does.
+        With `safe` a line that meets something is refused, and another way leads around; the robot stops when an
+        obstacle comes into its path meanwhile. Raises KinematicsException naming why there is no path, PathBlocked
+        naming the obstacle, OutOfRange, Refused, Cancelled, and what `follow` does.
         """
         self._check_end_effector(end_effector_id)
 
@@ -132,7 +133,8 @@ class UrdfRobot(Robot):
             if self._stops != stops:
                 raise Cancelled(f"a move of {self.name} was stopped before it began")
             way.require_begin(self.name, self.robot_joints())
-            self.follow(way)
+            with self.safe_moves.monitored(way):
+                self.follow(way)
 
     @contextlib.contextmanager
     def _moving(self) -> Iterator[None]:

@@ -2,138 +2,27 @@
 
 import importlib
 import itertools
-import shutil
-import sys
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-import arcor2_drivers
 from arcor2_hw.analysis.library import Library
 from arcor2_hw.analysis.source import SourceFile
 from arcor2_hw.data import object_type
 from arcor2_hw.data.geometry import Orientation, Pose, Position
-from arcor2_hw.data.robot import Joint, KinematicCalibration
+from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import Cancelled, InvalidData, NotFound, OutOfRange, Refused
 from arcor2_hw.kinematics.model import RobotModel
 from arcor2_hw.kinematics.shapes import Box
 from arcor2_hw.kinematics.world import CollisionWorld
-from arcor2_hw.objects import Robot, safe_moves
+from arcor2_hw.objects import safe_moves
 from arcor2_hw.objects.surroundings import Obstacle
 
-URDF = Path(next(iter(arcor2_drivers.__path__))) / "universal_robots" / "urdf" / "ur5e" / "ur5e.urdf"
-NAMES = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
-READY = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
-ACROSS = (np.pi - 0.4, -1.57, 1.57, -1.57, -1.57, 0.0)
-BASE = Pose(Position(0.5, -0.2, 0.1), Orientation.from_rotation_vector(0.0, 0.0, 0.7))
-SOURCE = '''"""A robot arm that goes from joint values to joint values."""
-
-from arcor2_hw.data.robot import Joint, KinematicCalibration
-from arcor2_hw.exceptions import Cancelled
-from arcor2_hw.objects.safe_moves import Way
-from arcor2_hw.objects.urdf_robot import UrdfRobot
-
-
-class PlainArm(UrdfRobot):
-    """A plain arm."""
-
-    _ABSTRACT = False
-    urdf_package_name = "plain_arm.zip"
-
-    def robot_joints(self, include_gripper: bool = False) -> list[Joint]:
-        """Give the present joint values."""
-        gripper = [Joint("finger", 0.01)] if include_gripper else []
-        return [*self.now, *gripper]
-
-    def follow(self, way: Way) -> None:
-        """Go from waypoint to waypoint."""
-        self.ways.append(way)
-        for waypoint in way.waypoints[1:]:
-            self.now = waypoint
-
-    def stop(self) -> None:
-        """Stop."""
-        super().stop()
-'''
-
-
-class Around:
-    """Surroundings that the test says."""
-
-    def __init__(self) -> None:
-        self.things: list[Obstacle] = []
-        self.others: list[tuple[Robot, list[Joint]]] = []
-        self.unknown = ""
-        self.files: dict[str, Path] = {}
-
-    def obstacles(self) -> list[Obstacle]:
-        return self.things
-
-    def robots(self) -> list[tuple[Robot, list[Joint]]]:
-        if self.unknown:
-            raise Refused(f"where {self.unknown} stands is not known")
-        return self.others
-
-    def asset(self, asset_id: str) -> Path | None:
-        return self.files.get(asset_id)
-
-    def calibration(self, robot_id: str) -> KinematicCalibration | None:
-        return None
-
-    def box(self, name: str, at: Position, *sizes: float) -> None:
-        self.things.append(Obstacle(name, object_type.Box(name, *sizes), BASE * Pose(at)))
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """The driver as it would lie in a distribution."""
-    root = tmp_path_factory.mktemp("plain")
-    package = root / "plain_driver"
-    (package / "urdf" / "plain_arm").mkdir(parents=True)
-    shutil.copy(URDF, package / "urdf" / "plain_arm" / "arm.urdf")
-    (package / "__init__.py").write_text("")
-    (package / "plain_arm.py").write_text(SOURCE)
-    sys.path.insert(0, str(root))
-    yield package
-    sys.path.remove(str(root))
-    for name in [name for name in sys.modules if name.startswith("plain_driver")]:
-        del sys.modules[name]
-
-
-@pytest.fixture
-def around() -> Around:
-    return Around()
-
-
-@pytest.fixture
-def arm(folder: Path, around: Around) -> Any:
-    return made(folder, around, "plain")
-
-
-def made(folder: Path, around: Around, name: str, pose: Pose = BASE) -> Any:
-    cls = importlib.import_module("plain_driver.plain_arm").PlainArm
-    device = cls("id", name, pose)
-    device.now, device.ways = joints(READY), []
-    device.surround(around)
-    return device
-
-
-def joints(values: tuple[float, ...]) -> list[Joint]:
-    return [Joint(f"{name}_joint", float(value)) for name, value in zip(NAMES, values, strict=True)]
-
-
-def values(found: list[Joint]) -> Any:
-    return np.array([joint.value for joint in found])
-
-
-def moved(pose: Pose, x: float, y: float, z: float) -> Pose:
-    """In the axes of the robot's base."""
-    return Pose(pose.position + Position(x, y, z).rotated(BASE.orientation), pose.orientation)
+from .conftest import ACROSS, BASE, READY, SOURCE, URDF, WALL, Around, joints, made, moved, values
 
 
 def assert_free(arm: Any, around: Around, way: list[list[Joint]]) -> None:
@@ -148,9 +37,6 @@ def assert_free(arm: Any, around: Around, way: list[list[Joint]]) -> None:
     for a, b in itertools.pairwise(values(waypoint) for waypoint in way):
         for share in np.linspace(0.0, 1.0, 2 + int(np.abs(b - a).max() / 0.005)):
             assert world.is_free("arm", a + share * (b - a)), world.contacts("arm", a + share * (b - a))
-
-
-WALL = (Position(0.0, 0.55, 0.5), 0.04, 0.5, 1.0)
 
 
 # ------------------------------------------------------------------------------------------------ what a type can do
@@ -314,8 +200,9 @@ def test_what_it_holds_goes_with_it_and_is_led_past(folder: Path, arm: Any, arou
     second.surround(around)
     world.set_joints("arm", values(arm.now))
     assert world.pose("rod").position.distance_to(rod.position) < 0.01
-    assert any("rod" in pair for pair in second.safe_moves._world(second.now, 0.0).ids())
-    assert second.safe_moves._world(second.now, 0.0).pose("rod").position.distance_to(rod.position) < 0.01
+    seen = second.safe_moves._snapshot().obstacles["rod"]
+    assert seen.holder is not None
+    assert seen.holder.robot == "plain"
     # Let go, it is where it was let go.
     at = arm.safe_moves.release("rod", arm.now)
     assert at.position.distance_to(rod.position) < 0.01

@@ -10,11 +10,12 @@ import trimesh
 import arcor2_drivers
 from arcor2_hw.data import object_type
 from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.project import Project
 from arcor2_hw.data.robot import DhParameters, Joint, KinematicCalibration
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.runtime import messages as m
 
-from .conftest import HostProcess, open_scene, type_code
+from .conftest import HostProcess, Package, open_scene, type_code
 
 URDF = Path(next(iter(arcor2_drivers.__path__))) / "universal_robots" / "urdf" / "ur5e" / "ur5e.urdf"
 NAMES = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
@@ -53,6 +54,25 @@ class Arm(UrdfRobot):
     def fall_silent(self) -> None:
         self.silent = True
 """.replace("START", repr(list(zip(NAMES, READY, strict=True))))
+SLOW_ARM = f"""
+{ARM}
+class SlowArm(Arm):
+    def stop(self) -> None:
+        super().stop()
+        self.stopped = True
+
+    def follow(self, way: Way) -> None:
+        self.stopped = False
+        goal = way.waypoints[-1]
+        while abs(goal[0].value - self.now[0].value) > 0.01:
+            if self.stopped:
+                raise Cancelled(f"a move of {{self.name}} was stopped")
+            time.sleep(0.01)
+            turned = self.now[0].value + 0.01 * (1 if goal[0].value > self.now[0].value else -1)
+            self.now = [Joint(goal[0].name, turned), *goal[1:]]
+        self.now = goal
+"""
+"""An arm that turns its first joint at 1 rad/s, some 0.5 m/s at the tip."""
 WALL = """
 class Wall(CollisionObject):
     _ABSTRACT = False
@@ -169,6 +189,53 @@ def test_what_was_put_in_stands_in_the_way_until_it_is_taken_out(scene: HostProc
     assert go(scene, READY) is None
     assert scene.call("obj_arm", "waypoints") == 2
     assert line(scene, up) is None
+
+
+def pan(host: HostProcess) -> float:
+    return float(host.call("obj_arm", "robot_joints")[0]["value"])
+
+
+def test_a_move_stops_before_what_is_put_into_its_path_meanwhile(host: HostProcess) -> None:
+    objects = [placed("arm", "SlowArm", Pose()), placed("wall", "Wall", Pose(Position(0.0, 9.0, 0.0)))]
+    types = [type_code("SlowArm", SLOW_ARM), type_code("Wall", WALL)]
+    host.send(open_scene(types, *objects, models=MODELS, assets={"arm.urdf": str(URDF)}))
+    host.expect(m.SceneOpened)
+    # Put in over REST, and moved by an edit of the scene.
+    box_put_in = box("crate", Position(-0.1334, 0.4922, 0.4878), 0.1, 0.1, 0.1)
+    wall_moved = Pose(Position(0.0, 0.55, 0.5))
+    for name, change in (
+        ("crate", lambda: host.send(box_put_in)),
+        ("wall", lambda: host.call("obj_wall", "set_pose", pose=wall_moved)),
+    ):
+        move = host.begin("obj_arm", "move_to_joints", target_joints=joints(ACROSS), speed=0.5, safe=True)
+        while pan(host) < 0.2:
+            pass
+        change()
+        error = host.answer(move)
+        assert isinstance(error, m.ErrorData), error
+        assert error.code == "path_blocked"
+        assert f"{name} came into its path" in error.message
+        assert 0.2 < pan(host) < 1.2
+        host.send(m.RemoveBodies(["crate"]))
+        assert go(host, READY, safe=False) is None
+
+
+def test_it_stops_in_a_program_too(host: HostProcess, package: Package) -> None:
+    body = f"""
+    from arcor2_hw.data.robot import Joint
+    arm = res.objects["obj_arm"]
+    goal = [Joint(f"{{name}}_joint", value) for name, value in zip({NAMES!r}, {ACROSS!r})]
+    arm.move_to_joints(goal, 0.5)
+    """
+    project = Project("project", "scn_1", id="pro_1")
+    directory = package.write({"SlowArm": SLOW_ARM}, [placed("arm", "SlowArm", Pose())], project, body)
+    host.send(m.RunPackage("pkg_1", str(directory), assets={"arm.urdf": str(URDF)}))
+    host.expect_state("running")
+    while pan(host) < 0.2:
+        pass
+    host.send(box("crate", Position(-0.1334, 0.4922, 0.4878), 0.1, 0.1, 0.1))
+    assert "crate came into its path" in host.expect_event("ProjectException")["message"]
+    host.expect_state("stopped")
 
 
 def test_what_is_held_collides_where_the_arm_alone_would_not(scene: HostProcess) -> None:

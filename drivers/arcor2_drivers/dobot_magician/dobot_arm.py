@@ -143,8 +143,9 @@ class DobotArm(DobotObserved):
         """Move the tool to a pose in the world, in a line or with all joints together.
 
         With `safe` a line that meets something in the scene is refused; a joint move leads around it, standing at each
-        waypoint, or is refused.
-        Raises KinematicsException, OutOfRange, Refused, NotInControl, DeviceFault, Cancelled, DeviceTimeout.
+        waypoint, or is refused. An obstacle that comes into the path meanwhile stops the arm.
+        Raises KinematicsException, PathBlocked, OutOfRange, Refused, NotInControl, DeviceFault, Cancelled,
+        DeviceTimeout.
         """
         stops = self._stops
         self._check_end_effector(end_effector_id)
@@ -159,7 +160,8 @@ class DobotArm(DobotObserved):
         with self._moving():
             way = self.safe_moves.line(end_effector_id, self.robot_joints(), target_pose)
             way.require_begin(self.name, self.robot_joints())
-            self._drive_tool(tool, q, LINE_TO_POSE, speed, stops)
+            with self.safe_moves.monitored(way):
+                self._drive_tool(tool, q, LINE_TO_POSE, speed, stops)
 
     def move_to_joints(self, target_joints: list[Joint], speed: float, safe: bool = True) -> None:
         """Move to joint values, all joints arriving together; with `safe` around what stands in the way, or not at all.
@@ -180,8 +182,9 @@ class DobotArm(DobotObserved):
             goal = [Joint(name, value) for name, value in zip(JOINTS, q, strict=True)]
             way = self.safe_moves.to_joints(self.robot_joints(), goal, speed, stopped=lambda: self._stops != stops)
             way.require_begin(self.name, self.robot_joints())
-            for waypoint in way.waypoints[1:]:
-                self._drive_joints(self._checked_joints(waypoint), speed, stops)
+            with self.safe_moves.monitored(way):
+                for waypoint in way.waypoints[1:]:
+                    self._drive_joints(self._checked_joints(waypoint), speed, stops)
 
     def home(self) -> None:
         """Reference the axes: the arm runs to its switches and back, some twenty seconds. Keep clear of it.

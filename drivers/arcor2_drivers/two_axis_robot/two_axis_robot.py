@@ -50,8 +50,10 @@ class TwoAxisRobot(TwoAxisControlled):
     ) -> None:
         """Move to a position in the world, joint by joint; a straight line is refused.
 
-        With `safe` around what stands in the scene, standing at each waypoint, or not at all.
-        Raises KinematicsException, OutOfRange, Refused, NotInControl, DeviceFault, Cancelled, DeviceTimeout.
+        With `safe` around what stands in the scene, standing at each waypoint, or not at all; an obstacle that comes
+        into the path meanwhile stops the arm.
+        Raises KinematicsException, PathBlocked, OutOfRange, Refused, NotInControl, DeviceFault, Cancelled,
+        DeviceTimeout.
         """
         stops = self._stops
         self._check_end_effector(end_effector_id)
@@ -78,8 +80,9 @@ class TwoAxisRobot(TwoAxisControlled):
             now = self.robot_joints()
             way = self.safe_moves.to_joints(now, self._joints(q), speed, stopped=lambda: self._stops != stops)
             way.require_begin(self.name, self.robot_joints())
-            for waypoint in way.waypoints[1:]:
-                self._drive(self._checked(waypoint), speed, 1.0, stops)
+            with self.safe_moves.monitored(way):
+                for waypoint in way.waypoints[1:]:
+                    self._drive(self._checked(waypoint), speed, 1.0, stops)
 
     def jog(
         self,

@@ -72,8 +72,10 @@ class UrMoving(UrArm):
         """Move the TCP to a pose in the world: in a line, or to the joints of the controller's own kinematics.
 
         With `safe` a line that meets something in the scene is refused; a joint move leads around it, standing at each
-        waypoint, or to another configuration that reaches the pose, or is refused.
-        Raises KinematicsException, OutOfRange, Refused, NotInControl, SafetyStop, Cancelled, DeviceTimeout.
+        waypoint, or to another configuration that reaches the pose, or is refused. An obstacle that comes into the
+        path meanwhile stops the arm.
+        Raises KinematicsException, PathBlocked, OutOfRange, Refused, NotInControl, SafetyStop, Cancelled,
+        DeviceTimeout.
         """
         stops = self._stops
         self._check_end_effector(end_effector_id)
@@ -90,7 +92,8 @@ class UrMoving(UrArm):
                 return
             way = self.safe_moves.line(end_effector_id, self.robot_joints(), target_pose)
             way.require_begin(self.name, self.robot_joints())
-            self._run_line(self._controlled(), self._observer.sample(), vector, speed, 1.0, stops)
+            with self.safe_moves.monitored(way):
+                self._run_line(self._controlled(), self._observer.sample(), vector, speed, 1.0, stops)
 
     def move_to_joints(self, target_joints: list[Joint], speed: float, safe: bool = True) -> None:
         """Move to joint values, all joints arriving together; with `safe` around what stands in the way, or not at all.
@@ -111,9 +114,10 @@ class UrMoving(UrArm):
         """Plan a way and drive it, standing at each waypoint: as the checked way is straight in joint space."""
         way = self.safe_moves.to_joints(self.robot_joints(), goal, speed, stopped=lambda: self._stops != stops)
         way.require_begin(self.name, self.robot_joints())
-        for waypoint in way.waypoints[1:]:
-            q = [joint.value for joint in waypoint]
-            result = self._run_joints(self._controlled(), self._observer.sample(), q, speed, 1.0, stops)
+        with self.safe_moves.monitored(way):
+            for waypoint in way.waypoints[1:]:
+                q = [joint.value for joint in waypoint]
+                result = self._run_joints(self._controlled(), self._observer.sample(), q, speed, 1.0, stops)
         return result
 
     def _free(self, pose: Pose, joints: list[Joint]) -> list[Joint]:

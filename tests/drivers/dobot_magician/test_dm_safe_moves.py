@@ -9,7 +9,7 @@ import arcor2_drivers
 from arcor2_drivers.dobot_magician.dobot_magician import DobotMagician
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.robot import Joint
-from arcor2_hw.exceptions import Cancelled
+from arcor2_hw.exceptions import Cancelled, PathBlocked
 from arcor2_hw.kinematics.model import RobotModel
 from tests.drivers.around import Around
 from tests.drivers.doing import Doing
@@ -102,3 +102,17 @@ def test_a_stop_ends_it_and_nothing_follows(arm: DobotMagician, around: Around, 
     assert abs(at[0] - RIGHT[0]) > 0.3
     arm._observer.after(arm._observer.sample().monotonic)
     assert values(arm) == pytest.approx(at, abs=1e-6)
+
+
+def test_it_stops_before_what_comes_into_its_path(arm: DobotMagician, around: Around) -> None:
+    box = around.boxes.pop("box")
+    doing = Doing(arm.move_to_joints, joints(RIGHT), 0.2)
+    start = values(arm)
+    while values(arm) == pytest.approx(start, abs=0.01):
+        assert not doing.ended_at
+    around.boxes["box"] = box
+    with pytest.raises(PathBlocked, match="box came into its path"):
+        doing.result()
+    assert touches(around, values(arm)) == set()
+    del around.boxes["box"]
+    arm.move_to_joints(joints(RIGHT), 1.0)

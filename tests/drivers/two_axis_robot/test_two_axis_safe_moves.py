@@ -11,6 +11,7 @@ import arcor2_drivers
 from arcor2_drivers.two_axis_robot.two_axis_robot import TwoAxisRobot
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import Joint
+from arcor2_hw.exceptions import PathBlocked
 from arcor2_hw.kinematics.model import RobotModel
 from tests.drivers.around import Around
 from tests.drivers.doing import Doing
@@ -87,3 +88,15 @@ def test_the_elbow_goes_to_the_side_that_is_free(arm: TwoAxisRobot, around: Arou
         with pytest.raises(arm.KinematicsException, match=r"arm/link_2 and pin"):
             move()
     assert values(arm) == pytest.approx(before, abs=0.01)
+
+
+def test_it_stops_before_what_comes_into_its_path(arm: TwoAxisRobot, around: Around) -> None:
+    pin = around.boxes.pop("pin")
+    doing = Doing(arm.move_to_joints, joints(RIGHT), 0.1)
+    start = values(arm)
+    while values(arm) == pytest.approx(start, abs=0.02):
+        assert not doing.ended_at
+    around.boxes["pin"] = pin
+    with pytest.raises(PathBlocked, match="pin came into its path"):
+        doing.result()
+    assert touches(around, values(arm)) == set()

@@ -12,7 +12,7 @@ import arcor2_drivers
 from arcor2_drivers.universal_robots.ur5e import UR5e
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.robot import Joint
-from arcor2_hw.exceptions import Cancelled, NotInControl
+from arcor2_hw.exceptions import Cancelled, NotInControl, PathBlocked
 from arcor2_hw.kinematics.model import RobotModel
 from tests.drivers.around import Around
 
@@ -116,6 +116,30 @@ def test_a_stop_between_waypoints_ends_it(ready: UR5e, around: Around, fake: Fak
     assert not fake.truth()["moving"]
     for a, b in itertools.pairwise([fake.truth()["q"] for _ in range(5)]):
         assert a == b
+
+
+@pytest.mark.parametrize("line", [False, True])
+def test_it_stops_before_what_comes_into_its_path(ready: UR5e, around: Around, fake: FakeUr, line: bool) -> None:
+    here = ready.get_end_effector_pose("tcp")
+    if line:
+        there = Pose(here.position + Position(0.0, 0.3, 0.0), here.orientation)
+        doing = Doing(ready.move_to_pose, "tcp", there, 0.2)
+        post = here.position + Position(0.0, 0.24, 0.05)
+    else:
+        at = between(ready)
+        post = Position(at.x, at.y, at.z - 0.05)
+        doing = Doing(ready.move_to_joints, joints(ready, BESIDE), 0.3)
+    moving(fake)
+    around.boxes["post"] = post, (0.03, 0.03, 0.4)
+    with pytest.raises(PathBlocked, match=r"ur stopped: post came into its path"):
+        doing.result()
+    stopped = fake.truth()
+    assert not stopped["moving"]
+    assert touches(around, stopped["q"]) == set()
+    # It is ready for what comes next.
+    del around.boxes["post"]
+    ready.move_to_joints(joints(ready, HOME), 1.0)
+    assert np.allclose(fake.truth()["q"], HOME, atol=1e-3)
 
 
 def test_the_tool_that_was_told_counts(ready: UR5e, around: Around) -> None:

@@ -1,0 +1,199 @@
+"""Watches the obstacles around a robot during a safe move, and stops the robot when one comes into its path."""
+
+import itertools
+import logging
+import threading
+from collections.abc import Callable, Iterable, Sequence
+from types import TracebackType
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from arcor2_hw.exceptions import Arcor2Error, Cancelled, PathBlocked, Refused
+from arcor2_hw.objects.robot import Robot
+from arcor2_hw.objects.snapshot import Others, Snapshot, build_world
+
+if TYPE_CHECKING:
+    from arcor2_hw.kinematics.arm import Arm
+    from arcor2_hw.kinematics.shapes import Array
+    from arcor2_hw.kinematics.world import CollisionWorld, Contact
+    from arcor2_hw.objects.robot_tools import RobotTools
+
+PERIOD: Final = 0.04
+"""Time between two looks at the surroundings, s."""
+RESOLUTION: Final = 0.005
+"""Distance, m, that no point of the robot exceeds between two checked configurations."""
+JOIN_WITHIN: Final = 2.0
+"""Time that the end of a move waits for a check that is under way, s."""
+
+log = logging.getLogger(__name__)
+
+
+class PlannedPath(NamedTuple):
+    """A path that was free when it was planned, and what it was planned with.
+
+    Attributes:
+        tools: Models and shapes; they stay on the planning thread, which waits while the robot moves.
+        arm: The joints that move.
+        points: Waypoints, joint values of the arm.
+        around: The surroundings during planning.
+        margin: Distance that the path keeps from them, m.
+    """
+
+    tools: "RobotTools"
+    arm: "Arm"
+    points: "list[Array]"
+    around: Snapshot
+    margin: float
+
+
+class PathMonitor:
+    """Context manager around a motion: checks the rest of the path whenever the surroundings change.
+
+    An obstacle in the rest of the path stops the robot at once, however far away it is. Only what changed since
+    planning counts. On leaving, PathBlocked names the obstacle, and tells whether the robot came to a stop before it.
+    """
+
+    def __init__(self, robot: Robot, path: PlannedPath, look: Callable[[Others], Snapshot]) -> None:
+        self._robot, self._path, self._look = robot, path, look
+        self._over = threading.Event()
+        self._stopping = threading.Lock()
+        self._others: Others | None = None
+        self._world: CollisionWorld | None = None
+        self._contact: Contact | None = None
+        self._problem: Arcor2Error | None = None
+        self._thread = threading.Thread(target=self._run, name=f"path of {robot.name}", daemon=True)
+
+    def __enter__(self) -> "PathMonitor":
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with self._stopping:  # a stop that was sent must not reach the next motion
+            self._over.set()
+        self._thread.join(JOIN_WITHIN)
+        blocked = self._contact is not None or self._problem is not None
+        if blocked and (error is None or isinstance(error, Cancelled)):
+            raise PathBlocked(self._message()) from error
+
+    # -------------------------------------------------------------------------------- watching
+    def _run(self) -> None:
+        seen = self._path.around
+        while True:
+            try:
+                now = self._snapshot(seen)
+                if now != seen:
+                    seen = now
+                    self._contact = self._first_contact(now)
+            except Arcor2Error as error:
+                self._problem = error
+            except Exception as error:
+                log.exception("the path of %s cannot be checked", self._robot.name)
+                self._problem = Refused(str(error))
+            if self._contact is not None or self._problem is not None:
+                self._stop()
+                return
+            if self._over.wait(PERIOD):
+                return
+
+    def _snapshot(self, before: Snapshot) -> Snapshot:
+        """Return the present surroundings; a robot that does not answer stays where it was."""
+        if self._others is None:
+            try:
+                others = self._robot.surroundings.robots()
+            except Arcor2Error as error:
+                log.warning("%s moves on with the last known joints of other robots: %s", self._robot.name, error)
+                others = self._others = list(before.robots.values())
+        else:
+            others = self._others
+        return self._look(others).settled(before)
+
+    def _first_contact(self, now: Snapshot) -> "Contact | None":
+        from arcor2_hw.kinematics.sweep import Sweep
+        from arcor2_hw.kinematics.world import Contact
+
+        path, name = self._path, self._robot.name
+        around = now.changed_since(path.around, name)
+        if around.empty:
+            return None
+        joints = self._robot.robot_joints()
+        # Half of the margin: an obstacle whose pose is measured again and again moves a little each time.
+        self._world = build_world(self._robot, path.tools, joints, around, path.margin / 2.0)
+        sweep = Sweep(self._world, name, path.arm, RESOLUTION)
+        hit = sweep.first_contact(rest_of(path.points, path.arm.values(joints), sweep.levers))
+        if hit is None:
+            return None
+        q = self._world.robot(name).q.copy()
+        q[path.arm.indices] = hit
+        found = self._with_surroundings(self._world.contacts(name, q))
+        return found[0] if found else Contact(name, "an obstacle", 0.0)
+
+    def _with_surroundings(self, contacts: "Iterable[Contact]") -> "list[Contact]":
+        """Leave out contacts of the robot with itself."""
+        name, world = self._robot.name, self._world
+        assert world is not None
+        held = world.robot(name).held
+        return [each for each in contacts if not (each.second in held or each.second.startswith(f"{name}/"))]
+
+    # -------------------------------------------------------------------------------- stopping
+    def _stop(self) -> None:
+        with self._stopping:
+            if self._over.is_set():
+                self._contact = self._problem = None  # the motion has ended by itself
+                return
+            try:
+                stop: Callable[[], None] = self._robot.stop
+                stop()
+            except Exception:
+                log.exception("%s could not be stopped before an obstacle", self._robot.name)
+
+    def _message(self) -> str:
+        name, contact = self._robot.name, self._contact
+        if contact is None:
+            return (
+                f"{name} stopped: its surroundings changed, and the rest of its path cannot be checked: "
+                f"{self._problem} Fix the cause, then start the move again."
+            )
+        obstacle = contact.second
+        touched = self._touched()
+        if touched is not None:
+            return (
+                f"{name} stopped at once, but {touched.second} appeared within its braking distance: {touched} are in "
+                "contact. Check for damage, and move the robot clear before you go on."
+            )
+        return (
+            f"{name} stopped: {obstacle} came into its path; {contact} would collide. "
+            f"Remove {obstacle} or choose another path, then start the move again."
+        )
+
+    def _touched(self) -> "Contact | None":
+        """Return what the robot touches at standstill."""
+        world, tools = self._world, self._path.tools
+        assert world is not None
+        try:
+            q = tools.model.values(self._robot.robot_joints(), tools.model.neutral())
+        except Arcor2Error:
+            return None
+        world.margin = 0.0
+        return next(iter(self._with_surroundings(world.contacts(self._robot.name, q))), None)
+
+
+def rest_of(points: "Sequence[Array]", q: "Array", levers: "Array") -> "list[Array]":
+    """Return the rest of a path: from joint values on it, or near it, to its end.
+
+    Args:
+        points: Waypoints of the whole path.
+        q: Present joint values.
+        levers: Weight of each joint when distances are compared, m per unit.
+    """
+    import numpy as np
+
+    best, segment = np.inf, 0
+    for number, (a, b) in enumerate(itertools.pairwise(points)):
+        way = (b - a) * levers
+        length = float(way @ way)
+        share = 0.0 if length == 0.0 else min(max(float(((q - a) * levers) @ way) / length, 0.0), 1.0)
+        off = float(np.linalg.norm((q - a - share * (b - a)) * levers))
+        if off < best - 1e-9:
+            best, segment = off, number
+    return [q, *points[segment + 1 :]]

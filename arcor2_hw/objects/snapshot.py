@@ -1,0 +1,156 @@
+"""The obstacles around a robot at one moment, and the collision world made of them.
+
+Pinocchio and coal come with the extra `kinematics` and are imported on first use.
+"""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Final
+
+from msgspec.structs import replace
+
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.robot import Joint
+from arcor2_hw.exceptions import Refused
+from arcor2_hw.objects.robot import Robot
+from arcor2_hw.objects.surroundings import Holder, Obstacle
+
+if TYPE_CHECKING:
+    from arcor2_hw.kinematics.model import RobotModel
+    from arcor2_hw.kinematics.shapes import Shape
+    from arcor2_hw.kinematics.world import CollisionWorld
+    from arcor2_hw.objects.robot_tools import RobotTools
+
+JOINT_TOLERANCE: Final = 0.01
+"""Change of a joint value, rad or m, below which a robot counts as unmoved."""
+
+Others = list[tuple[Robot, list[Joint]]]
+"""Other robots, each with its joint values."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Snapshot:
+    """Obstacles by name and other robots by name with their joint values, at one moment.
+
+    Tools of robots and parts that robots hold are obstacles with a holder.
+    """
+
+    obstacles: dict[str, Obstacle]
+    robots: dict[str, tuple[Robot, list[Joint]]]
+
+    @classmethod
+    def take(cls, robot: Robot, others: Others, tool: Callable[[Robot], Obstacle | None]) -> "Snapshot":
+        """Take a snapshot of the surroundings of a robot.
+
+        Args:
+            robot: The robot whose surroundings count.
+            others: The other robots that have a model.
+            tool: Returns the tool of a robot that its model does not contain.
+        """
+        # Copies, because programs may change poses and joints in place.
+        obstacles = {each.name: replace(each, pose=_copied(each.pose)) for each in robot.surroundings.obstacles()}
+        for each in (robot, *(other for other, _ in others)):
+            if (attached := tool(each)) is not None:
+                obstacles[attached.name] = attached
+            for part in each.parts.values():
+                holder, known = Holder(each.name, part.link), obstacles.get(part.name)
+                if part.model is not None:
+                    obstacles[part.name] = Obstacle(part.name, part.model, part.in_link, holder)
+                elif known is not None:
+                    obstacles[part.name] = replace(known, pose=part.in_link, holder=holder)
+        robots = {other.name: (other, [Joint(joint.name, joint.value) for joint in joints]) for other, joints in others}
+        return cls(obstacles, robots)
+
+    def settled(self, before: "Snapshot") -> "Snapshot":
+        """Return this snapshot with the joint values of `before` for robots that have not moved since."""
+        robots = dict(self.robots)
+        for name, (robot, joints) in self.robots.items():
+            known = before.robots.get(name)
+            if known is not None and not _differ(known[1], joints):
+                robots[name] = robot, known[1]
+        return Snapshot(self.obstacles, robots)
+
+    def changed_since(self, before: "Snapshot", robot: str) -> "Snapshot":
+        """Return the part of this snapshot that `robot` could newly collide with, and what it holds itself.
+
+        That is what appeared or moved since `before`. When the robot holds something new, it is everything.
+        """
+        obstacles = {name: one for name, one in self.obstacles.items() if before.obstacles.get(name) != one}
+        if any(one.holder is not None and one.holder.robot == robot for one in obstacles.values()):
+            return self
+        robots = {name: one for name, one in self.robots.items() if before.robots.get(name) != one}
+        if not obstacles and not robots:
+            return Snapshot({}, {})
+        carriers = {robot, *robots}
+        obstacles |= {
+            name: one for name, one in self.obstacles.items() if one.holder is not None and one.holder.robot in carriers
+        }
+        for one in obstacles.values():
+            if one.holder is not None and one.holder.robot in self.robots:
+                robots[one.holder.robot] = self.robots[one.holder.robot]
+        return Snapshot(obstacles, robots)
+
+    @property
+    def empty(self) -> bool:
+        """Tell whether it contains nothing."""
+        return not self.obstacles and not self.robots
+
+
+def build_world(
+    robot: Robot, tools: "RobotTools", now: Sequence[Joint], around: Snapshot, margin: float
+) -> "CollisionWorld":
+    """Return the collision world of a robot with joint values `now` and a margin in m.
+
+    Raises:
+        Refused: Joint values of another robot, a mesh or the holder of a part are unknown.
+    """
+    from arcor2_hw.kinematics.world import CollisionWorld
+
+    world = CollisionWorld(margin=margin)
+    world.add_robot(robot.name, tools.model, robot.pose, tools.model.values(now, tools.model.neutral()))
+    for other, joints in around.robots.values():
+        model = tools.other(other)
+        if model is not None:
+            _require_all_joints(other, model, joints)
+            world.add_robot(other.name, model, other.pose, model.values(joints, model.neutral()))
+    for obstacle in around.obstacles.values():
+        shape = tools.shape(obstacle)
+        if obstacle.holder is None:
+            world.put(obstacle.name, shape, obstacle.pose)
+        else:
+            _attach(world, obstacle.name, shape, obstacle.holder, obstacle.pose)
+    return world
+
+
+def _attach(world: "CollisionWorld", name: str, shape: "Shape", holder: Holder, in_link: Pose) -> None:
+    if holder.robot not in world.robots:
+        raise Refused(f"The position of {holder.robot}, which holds {name}, is unknown.")
+    standing = world.robot(holder.robot)
+    frames = standing.link_frames(standing.q)
+    if holder.link not in frames:
+        raise Refused(f"{name} is held by {holder.link}, which is no link of {holder.robot}")
+    world.put(name, shape, Pose.from_matrix(frames[holder.link]) * in_link)
+    world.attach(name, holder.robot, holder.link, touching=holder.touching)
+
+
+def _require_all_joints(robot: Robot, model: "RobotModel", joints: Sequence[Joint]) -> None:
+    """Raise Refused unless the values of all joints that lead to the robot's end effectors are given."""
+    given = {joint.name for joint in joints}
+    for name in model.end_effectors:
+        for joint in model.arm(name).joint_names:
+            if joint not in given:
+                raise Refused(
+                    f"where {robot.name} stands is not known, which may be in the way: it does not tell {joint}"
+                )
+
+
+def _copied(pose: Pose) -> Pose:
+    at, turn = pose.position, pose.orientation
+    return Pose(Position(at.x, at.y, at.z), Orientation(turn.x, turn.y, turn.z, turn.w))
+
+
+def _differ(one: Sequence[Joint], other: Sequence[Joint]) -> bool:
+    values = {joint.name: joint.value for joint in one}
+    return len(one) != len(other) or any(
+        abs(values.get(joint.name, float("inf")) - joint.value) > JOINT_TOLERANCE for joint in other
+    )

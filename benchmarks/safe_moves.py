@@ -1,0 +1,112 @@
+"""Safe moves among 20 boxes: what planning and monitoring add to a motion, and how soon a new obstacle stops it."""
+
+import threading
+import time
+from pathlib import Path
+from typing import Final
+
+import arcor2_drivers
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.object_type import Box
+from arcor2_hw.data.robot import Joint
+from arcor2_hw.exceptions import Cancelled, PathBlocked
+from arcor2_hw.objects.safe_moves import Way
+from arcor2_hw.objects.surroundings import Nothing, Obstacle
+from arcor2_hw.objects.urdf_robot import UrdfRobot
+from benchmarks.figures import Figure, median, percentile
+
+UR5E: Final = Path(next(iter(arcor2_drivers.__path__))) / "universal_robots" / "urdf" / "ur5e" / "ur5e.urdf"
+MOVES: Final = 100
+STOPS: Final = 40
+NAMES: Final = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
+READY: Final = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
+ACROSS: Final = (2.0, *READY[1:])
+
+
+class Around(Nothing):
+    """20 boxes near the arm that are not in its way, and the one that comes into it."""
+
+    def __init__(self) -> None:
+        self.boxes = {
+            f"box {n}": Pose(Position(0.15 * (n % 5) - 0.3, -0.5 - 0.1 * (n // 5), 0.1 * (n // 5))) for n in range(20)
+        }
+
+    def obstacles(self) -> list[Obstacle]:
+        """Return the boxes."""
+        return [Obstacle(name, Box(name, 0.1, 0.1, 0.1), at) for name, at in list(self.boxes.items())]
+
+    def asset(self, asset_id: str) -> Path | None:  # noqa: ARG002
+        """Return the model of the arm."""
+        return UR5E
+
+
+class InstantArm(UrdfRobot):
+    """A UR5e that is at its goal at once, or waits on its way until it is stopped."""
+
+    _ABSTRACT = False
+    urdf_package_name = "ur5e.urdf"
+
+    def __init__(self) -> None:
+        super().__init__("id", "arm", Pose())
+        self.now = _joints(READY)
+        self.moving, self.stopped = threading.Event(), threading.Event()
+        self.waits = False
+        self.stopped_at = 0.0
+
+    def robot_joints(self, include_gripper: bool = False) -> list[Joint]:  # noqa: ARG002
+        """Return the present joint values."""
+        return self.now
+
+    def follow(self, way: Way) -> None:
+        """Go to the goal."""
+        self.moving.set()
+        if self.waits:
+            self.stopped.wait(5.0)
+            raise Cancelled("stopped")
+        self.now = way.waypoints[-1]
+
+    def stop(self) -> None:
+        """Stop."""
+        self.stopped_at = time.perf_counter()
+        super().stop()
+        self.stopped.set()
+
+
+def figures() -> list[Figure]:
+    """Measure moves whose motion takes no time, and stops before a box that appears."""
+    arm, around = InstantArm(), Around()
+    arm.surround(around)
+    times = []
+    for number in range(MOVES):
+        began = time.perf_counter()
+        arm.move_to_joints(_joints(READY if number % 2 else ACROSS), 0.5)
+        times.append(time.perf_counter() - began)
+    found = [Figure("safe_move_overhead_ms", median(times[2:]) * 1e3, MOVES - 2, "20 boxes, none in the way")]
+    arm.waits, late = True, []
+    for _ in range(STOPS):
+        arm.now = _joints(READY)
+        arm.moving.clear()
+        arm.stopped.clear()
+        mover = threading.Thread(target=_blocked, args=(arm,))
+        mover.start()
+        arm.moving.wait()
+        time.sleep(0.1)
+        began = time.perf_counter()
+        around.boxes["crate"] = Pose(Position(-0.1334, 0.4922, 0.4878))
+        mover.join()
+        late.append(arm.stopped_at - began)
+        del around.boxes["crate"]
+    note = f"95th percentile {percentile(late, 95) * 1e3:.0f} ms; from the change to the call of stop"
+    return [*found, Figure("safe_move_stop_after_change_ms", median(late) * 1e3, STOPS, note)]
+
+
+def _blocked(arm: InstantArm) -> None:
+    try:
+        arm.move_to_joints(_joints(ACROSS), 0.5)
+    except PathBlocked:
+        return
+    raise AssertionError("the arm was not stopped")
+
+
+def _joints(values: tuple[float, ...]) -> list[Joint]:
+    return [Joint(f"{name}_joint", value) for name, value in zip(NAMES, values, strict=True)]
