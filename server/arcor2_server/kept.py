@@ -1,7 +1,5 @@
 """Answers, kept as long as what they were made from stays the same."""
 
-from typing import Any
-
 from msgspec import Raw
 
 
@@ -10,8 +8,6 @@ class KeptAnswers:
 
     def __init__(self) -> None:
         self._answers: dict[str, tuple[tuple[int, ...], Raw]] = {}
-        self.problems: dict[str, dict[str, tuple[tuple[Any, ...], list[str]]]] = {}
-        """By request, what is wrong with each saved document, by its id, with what it was found from."""
 
     def get(self, name: str, revisions: tuple[int, ...]) -> Raw | None:
         """Give a kept answer, None when it was made from something older."""

@@ -18,6 +18,7 @@ from arcor2_server.presence import PresenceBoard
 from arcor2_server.previews import Previews
 from arcor2_server.reachability import ReachabilityBoard
 from arcor2_server.runs import Runs
+from arcor2_server.session.saved_problems import SavedProblems
 from arcor2_server.storage.calibrations import Calibrations
 from arcor2_server.storage.shared import SharedData
 from arcor2_server.tasks import Tasks
@@ -50,7 +51,8 @@ class Services:
     compute: what needs numerics. calibration: poses from pictures. calibrations: what is being calibrated.
     calibration_records: what was. markers: which stand where. aiming: who points a robot at an object.
     collisions: what is in the way. type_news: object types that clients have to be told of. kept: encoded answers.
-    runs: their history. tasks: work under way. previews: what is dragged. views: what clients show, by user and shared.
+    saved_problems: what prevents saved documents from being opened. runs: their history.
+    tasks: work under way. previews: what is dragged. views: what clients show, by user and shared.
     breakpoints: the shared ones. presence: who looks at what. edit_news: what follows from edits.
     reachability: what robots reach of the open project. prepared: meshes and robots as clients show them.
     arm_calibrations: what controllers told of their very arms. damage: notices about damaged files.
@@ -77,6 +79,7 @@ class Services:
     collisions: CollisionWorld = field(default_factory=CollisionWorld)
     type_news: TypeNews = field(default_factory=TypeNews)
     kept: KeptAnswers = field(default_factory=KeptAnswers)
+    saved_problems: SavedProblems = field(init=False)
     runs: Runs = field(init=False)
     tasks: Tasks = field(init=False)
     previews: Previews = field(init=False)
@@ -98,6 +101,7 @@ class Services:
         self.arm_calibrations = ArmCalibrations(self, self.settings.arm_calibrations_file)
         self.prepared = PreparedAssets(self, self.settings.prepared_dir)
         self.markers = Markers(self.settings.markers_file, self.settings.markers)
+        self.saved_problems = SavedProblems(self.storage, self.types)
         data = SharedData(self.storage)
         self.runs = Runs(self.hub)
         self.tasks = Tasks(self.hub)

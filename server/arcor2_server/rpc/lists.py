@@ -1,6 +1,5 @@
 """Requests for saved scenes and projects; the lists are kept encoded until something is written."""
 
-from collections.abc import Awaitable, Callable
 from typing import Any
 
 import msgspec
@@ -37,24 +36,19 @@ async def list_scenes(context: Context, args: None) -> Raw:  # noqa: ARG001
     revisions = _revisions(services)
     if (kept := services.kept.get("ListScenes", revisions)) is not None:
         return kept
-    answer = []
-    known = _Problems(services, "ListScenes")
-    for scene in await services.storage.scenes():
-
-        async def look(key: str = scene.id) -> list[str]:
-            return services.session.scene_problems(await services.storage.scene(key))
-
-        problems = await known.of(scene.id, (scene.modified, services.types.revision), look)
-        answer.append(
-            ListScenesData(
-                id=scene.id,
-                name=scene.name,
-                created=_saved(scene.created),
-                modified=_saved(scene.modified),
-                description=scene.description or UNSET,
-                problems=problems or UNSET,
-            )
+    scenes = await services.storage.scenes()
+    problems = await services.saved_problems.of_scenes(scenes)
+    answer = [
+        ListScenesData(
+            id=scene.id,
+            name=scene.name,
+            created=_saved(scene.created),
+            modified=_saved(scene.modified),
+            description=scene.description or UNSET,
+            problems=problems[scene.id] or UNSET,
         )
+        for scene in scenes
+    ]
     return services.kept.keep("ListScenes", revisions, encode(answer))
 
 
@@ -66,38 +60,13 @@ async def list_projects(context: Context, args: None) -> Raw:  # noqa: ARG001
     revisions = _revisions(services)
     if (kept := services.kept.get("ListProjects", revisions)) is not None:
         return kept
-    answer = []
-    scenes = {scene.id: scene.modified for scene in await services.storage.scenes()}
-    known = _Problems(services, "ListProjects")
-    for project in await services.storage.projects():
-
-        async def look(key: str = project.id) -> list[str]:
-            return await services.session.project_problems(await services.storage.project(key))
-
-        made_from = (project.modified, scenes.get(project.scene_id), services.types.revision)
-        problems = await known.of(project.id, made_from, look)
-        answer.append(ListProjectsData(**msgspec.structs.asdict(project), problems=problems or UNSET))
+    projects, scenes = await services.storage.projects(), await services.storage.scenes()
+    problems = await services.saved_problems.of_projects(projects, scenes)
+    answer = [
+        ListProjectsData(**msgspec.structs.asdict(project), problems=problems[project.id] or UNSET)
+        for project in projects
+    ]
     return services.kept.keep("ListProjects", revisions, encode(answer))
-
-
-class _Problems:
-    """What is wrong with the documents of one list.
-
-    They are looked at again only when they, or what they are made of, were changed: one that was saved among hundreds
-    costs one. No two are saved at the same time.
-    """
-
-    def __init__(self, services: Services, request: str) -> None:
-        self._before = services.kept.problems.get(request, {})
-        self._found = services.kept.problems[request] = {}
-
-    async def of(self, key: str, made_from: tuple[Any, ...], look: Callable[[], Awaitable[list[str]]]) -> list[str]:
-        """Give what is wrong with a document, which `look` finds out."""
-        found = self._before.get(key)
-        if found is None or found[0] != made_from:
-            found = made_from, await look()
-        self._found[key] = found
-        return found[1]
 
 
 @rpc("GetScene")

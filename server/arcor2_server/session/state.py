@@ -23,7 +23,7 @@ from arcor2_hw.data.scene import BareScene, Scene, SceneObject
 from arcor2_hw.exceptions import NotFound, StorageError
 from arcor2_server.rpc.registry import RequestRefused, make_event
 from arcor2_server.session.changes import OF_SCENE, Change, Edit, How, Kind
-from arcor2_server.session.checks import project_problems, scene_problems
+from arcor2_server.session.checks import scene_problems
 from arcor2_server.session.document import Document
 from arcor2_server.session.history import History
 from arcor2_server.session.journal import Journal
@@ -354,14 +354,6 @@ class Session:
     def scene_problems(self, scene: Scene) -> list[str]:
         """Give what is wrong with a scene, empty when it can be opened."""
         return scene_problems(scene, self._services.types)
-
-    async def project_problems(self, project: Project) -> list[str]:
-        """Give what is wrong with a project on its saved scene, empty when it can be opened."""
-        try:
-            scene = await self._services.storage.scene(project.scene_id)
-        except NotFound:
-            return [f"The scene of the project {project.name} does not exist."]
-        return project_problems(scene, project, self._services.types)
 
     # ------------------------------------------------------------------------------------------ look-ups
     def scene_object(self, object_id: str) -> SceneObject:

@@ -1,6 +1,7 @@
 """Reading and writing saved documents; what a method wrote is on disk when it returns."""
 
-from collections.abc import AsyncIterator, Awaitable, Callable
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
 from contextvars import ContextVar
 from typing import Any, Final, Self
@@ -23,6 +24,8 @@ from arcor2_server.storage.sqlite import check_opens, prepare
 
 _together: ContextVar[AsyncSession | None] = ContextVar("together", default=None)
 """The session of the transaction that the present task is in."""
+_PER_QUERY: Final = 100
+"""Documents read by one query; each may have some hundred kilobytes."""
 _encode = msgspec.json.Encoder().encode
 _decode_scene = msgspec.json.Decoder(Scene).decode
 _decode_project = msgspec.json.Decoder(Project).decode
@@ -81,10 +84,11 @@ class Storage:
         columns = (SceneRow.name, SceneRow.description, SceneRow.created, SceneRow.modified, SceneRow.id)
         async with self.reading() as session:
             rows = await session.execute(select(*columns).order_by(SceneRow.name))
-            return [
-                BareScene(name=name, description=description, created=created, modified=modified, id=key)
-                for name, description, created, modified, key in rows
-            ]
+            return [BareScene(**row) for row in rows.mappings()]
+
+    async def scenes_with_ids(self, keys: Sequence[str]) -> list[Scene]:
+        """Return the saved scenes with these ids, in no particular order; ids without a scene are left out."""
+        return await self._with_ids(SceneRow, keys, _decode_scene)
 
     async def scene(self, key: str) -> Scene:
         """Give a saved scene; NotFound."""
@@ -133,18 +137,11 @@ class Storage:
         )
         async with self.reading() as session:
             rows = await session.execute(select(*columns).order_by(ProjectRow.name))
-            return [
-                BareProject(
-                    name=name,
-                    scene_id=scene_id,
-                    description=description,
-                    has_logic=has_logic,
-                    created=created,
-                    modified=modified,
-                    id=key,
-                )
-                for name, scene_id, description, has_logic, created, modified, key in rows
-            ]
+            return [BareProject(**row) for row in rows.mappings()]
+
+    async def projects_with_ids(self, keys: Sequence[str]) -> list[Project]:
+        """Return the saved projects with these ids, in no particular order; ids without a project are left out."""
+        return await self._with_ids(ProjectRow, keys, _decode_project)
 
     async def project(self, key: str) -> Project:
         """Give a saved project; NotFound."""
@@ -367,6 +364,16 @@ class Storage:
         if (row := await session.get(table, key)) is None:
             raise NotFound(f"There is no {what} {key!r}.")
         return row
+
+    async def _with_ids(self, table: type[Any], keys: Sequence[str], decode: Any) -> list[Any]:
+        """Return the decoded documents with these ids, decoded off the event loop, some at a time."""
+        found: list[Any] = []
+        for begin in range(0, len(keys), _PER_QUERY):
+            wanted = select(table.id, table.document).where(table.id.in_(keys[begin : begin + _PER_QUERY]))
+            async with self.reading() as session:
+                rows = list(await session.execute(wanted))
+            found += await asyncio.to_thread(lambda rows=rows: [self._decoded(decode, row) for row in rows])
+        return found
 
     def _decoded(self, decode: Any, row: Any) -> Any:
         try:

@@ -1,5 +1,6 @@
 """The lists of saved documents: what is wrong with each, looked for only where something changed."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import pytest
@@ -13,13 +14,13 @@ class Reads:
 
     def __init__(self, desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
         self.read: list[str] = []
-        for name in ("scene", "project"):
+        for name in ("scenes_with_ids", "projects_with_ids"):
             monkeypatch.setattr(desk.services.storage, name, self._counting(getattr(desk.services.storage, name)))
 
     def _counting(self, read: Any) -> Any:
-        async def counted(key: str) -> Any:
-            self.read.append(key.partition("_")[0])
-            return await read(key)
+        async def counted(keys: Sequence[str]) -> Any:
+            self.read += [key.partition("_")[0] for key in keys]
+            return await read(keys)
 
         return counted
 
@@ -62,4 +63,4 @@ async def test_only_what_changed_is_looked_at_again(desk: Desk, alice: Person, m
     assert all("WeighingMachine" in str(entry["problems"]) for entry in await alice.ask("ListProjects"))
     await alice.ask("DeleteProject", id=project)
     assert len(await alice.ask("ListProjects")) == 3
-    assert len(desk.services.kept.problems["ListProjects"]) == 3
+    assert len(desk.services.saved_problems._projects) == 3  # nothing is stored for the deleted one
