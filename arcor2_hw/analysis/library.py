@@ -3,24 +3,24 @@
 import ast
 import contextlib
 import gc
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Final
 
 import msgspec
-from msgspec import field
 
 from arcor2_hw.analysis.actions import ActionReader
-from arcor2_hw.analysis.enumerations import Enumeration, enumerations_of
+from arcor2_hw.analysis.enumerations import enumerations_of
 from arcor2_hw.analysis.hierarchy import Hierarchy, is_known_library
 from arcor2_hw.analysis.keywords import keyword_only
 from arcor2_hw.analysis.module import ClassInfo, Import, Module
 from arcor2_hw.analysis.presentation import of_type
 from arcor2_hw.analysis.robots import robot_meta
 from arcor2_hw.analysis.settings import SettingsReader
-from arcor2_hw.analysis.source import Broken, Problem, SourceFile, sendable
+from arcor2_hw.analysis.source import Broken, Problem, SourceFile, Stamp, sendable, stamp_of
 from arcor2_hw.analysis.symbols import External, Resolver, is_framework
-from arcor2_hw.data.base import UNSET, Data
+from arcor2_hw.analysis.type_analysis import TypeAnalysis
+from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ParameterMeta
 from arcor2_hw.data.older_names import not_offered
 from arcor2_hw.data.robot import RobotMeta
@@ -45,30 +45,6 @@ NO_DESCRIPTION: Final = "No description available."
 _OURS: Final = Path(__file__).resolve().parents[1]
 
 
-class TypeAnalysis(Data, frozen=True):
-    """What the source of one object type says.
-
-    is_object_type: false for a helper or mixin that does not derive from Generic; it is no type for clients.
-    robot: None for what is no robot, and for what may not be placed. implemented: the optional methods of our bases
-    that it really has. bases: the object types it derives from, nearest first. mixins: classes before its base.
-    enumerations: what its actions take, by action and parameter. keyword_only: parameters that are given by name only.
-    modules: the other files it needs, each after those that it needs itself; without ours, and without the packages
-    that they merely lie in.
-    """
-
-    meta: ObjectTypeMeta
-    actions: tuple[ObjectAction, ...] = ()
-    robot: RobotMeta | None = None
-    implemented: frozenset[str] = frozenset()
-    bases: tuple[str, ...] = ()
-    mixins: tuple[str, ...] = ()
-    modules: tuple[SourceFile, ...] = ()
-    is_object_type: bool = True
-    problem: Problem | None = None
-    enumerations: dict[tuple[str, str], Enumeration] = field(default_factory=dict)
-    keyword_only: frozenset[tuple[str, str]] = frozenset()
-
-
 class Library:
     """Sources by type name; our bases are built in. Nothing that is read is imported. For use on one thread."""
 
@@ -79,6 +55,8 @@ class Library:
         self._modules: dict[str, Module | Broken | None] = {}
         self._parsed: dict[str, Module] = {}  # what was read before; it is read again only when its text changed
         self._analyses: dict[str, TypeAnalysis] = {}
+        self.stamps: dict[str, Stamp | None] = {}
+        """Stamps of the files that were looked for on the disk, None for a missing one."""
         self._forget()
         for file in files:
             self.add(file)
@@ -127,6 +105,11 @@ class Library:
         """Give the source of an added type; NotFound."""
         return self._file(name)
 
+    def put_analyses(self, analyses: Mapping[str, TypeAnalysis], stamps: Mapping[str, Stamp | None]) -> None:
+        """Take over results that were made from the same sources, and the stamps of the files read for them."""
+        self._analyses = dict(analyses)
+        self.stamps = dict(stamps)
+
     def _file(self, name: str) -> SourceFile:
         try:
             return self._files[name]
@@ -170,6 +153,7 @@ class Library:
             return None  # parameter types and data classes are known by their names
         base = root.joinpath(*dotted.split("."))
         for path, is_package in ((base.with_suffix(".py"), False), (base / "__init__.py", True)):
+            self.stamps[str(path)] = stamp_of(path)
             try:
                 return SourceFile("", dotted, path.read_bytes(), str(path), is_package)
             except (FileNotFoundError, NotADirectoryError):

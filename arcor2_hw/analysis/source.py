@@ -1,5 +1,7 @@
 """What is read: a source file, and how its problems are told."""
 
+from pathlib import Path
+
 import humps
 
 from arcor2_hw.data.base import Data
@@ -11,6 +13,19 @@ def module_name(type_name: str) -> str:
     A name made only of capitals and digits stays as it is.
     """
     return str(humps.depascalize(type_name))
+
+
+Stamp = tuple[int, int]
+"""Time of the last change in ns, and size in bytes, of a file: what tells a changed one apart without reading it."""
+
+
+def stamp_of(path: Path) -> Stamp | None:
+    """Return the stamp of a file, None if it cannot be found or reached."""
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return status.st_mtime_ns, status.st_size
 
 
 class SourceFile(Data, frozen=True):

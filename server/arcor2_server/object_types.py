@@ -16,6 +16,7 @@ from arcor2_hw.analysis import (
     TypeAnalysis,
     installed_types,
     module_name,
+    snapshot,
 )
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ObjectTypeSource
@@ -70,8 +71,9 @@ class ObjectTypes:
     is disabled, as is one whose source cannot be read; a robot's description is named only when it is there.
     """
 
-    def __init__(self, storage: Storage, assets: AssetStore) -> None:
+    def __init__(self, storage: Storage, assets: AssetStore, stored_analysis: Path | None = None) -> None:
         self.revision = 0
+        self._stored_analysis = stored_analysis
         self._storage = storage
         self._assets = assets
         self._library = Library()
@@ -163,6 +165,8 @@ class ObjectTypes:
         self.revision += 1
 
     def _analyse(self, without_model: set[str]) -> _Known:
+        if self._stored_analysis is not None and not self._restored(self._stored_analysis):
+            self._store(self._stored_analysis)
         analyses = {name: self._library.analyse(name) for name in self._library.names()}
         metas = {}
         for name, analysis in analyses.items():
@@ -181,6 +185,23 @@ class ObjectTypes:
                 analyses[name] = TypeAnalysis(metas[name], problem=installed.problem)
         robots = {name: self._with_asset(a.robot) for name, a in analyses.items() if a.robot and name in metas}
         return _Known(analyses, dict(sorted(metas.items())), dict(sorted(robots.items())))
+
+    def _restored(self, file: Path) -> bool:
+        """Take over the analysis stored by an earlier process; return False if it is missing or outdated."""
+        try:
+            return snapshot.restore(self._library, file.read_bytes())
+        except OSError:
+            return False
+
+    def _store(self, file: Path) -> None:
+        """Analyse all types and store the results for the next start."""
+        encoded = snapshot.take(self._library)
+        fresh = file.with_suffix(".new")
+        try:
+            fresh.write_bytes(encoded)
+            fresh.replace(file)
+        except OSError as error:
+            log.warning("analysis not stored: the next start takes longer", file=str(file), reason=error.strerror)
 
     def _lacking(self, one: ObjectTypeSource) -> str:
         """Say which mesh a type needs that is not there; empty when none is missing."""

@@ -83,6 +83,11 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
         return self.data_dir / "journal.sqlite"
 
     @property
+    def analysis_file(self) -> Path:
+        """Return the file that stores the analysis of object types for the next start; it may be deleted."""
+        return self.data_dir / "analysis.msgpack"
+
+    @property
     def markers_file(self) -> Path:
         """Give the file in which markers are kept that were set over REST."""
         return self.data_dir / "markers.json"

@@ -1,0 +1,112 @@
+"""Results of an analysis, stored so that the next process with the same sources needs to parse nothing."""
+
+import hashlib
+import sys
+from pathlib import Path
+from typing import Final
+
+import msgspec
+from msgspec.structs import asdict
+
+from arcor2_hw.analysis.library import BUILT_IN, Library
+from arcor2_hw.analysis.source import SourceFile, Stamp, stamp_of
+from arcor2_hw.analysis.type_analysis import TypeAnalysis
+from arcor2_hw.data.base import Data
+
+_LIBRARY: Final = Path(__file__).resolve().parents[1]
+_CODE: Final = ("analysis", "data", "actions")
+"""Our packages on which a result depends without being read by the analysis."""
+
+
+class StoredSource(Data, frozen=True, array_like=True):
+    """A SourceFile whose text and bytes are apart: a decoder could not tell which of the two it reads."""
+
+    name: str
+    module: str
+    path: str
+    is_package: bool
+    text: str | None
+    content: bytes
+
+    @classmethod
+    def of(cls, file: SourceFile) -> "StoredSource":
+        """Return the stored form of a file."""
+        text, content = (file.source, b"") if isinstance(file.source, str) else (None, file.source)
+        return cls(file.name, file.module, file.path, file.is_package, text, content)
+
+    def file(self) -> SourceFile:
+        """Return the file as it was."""
+        source = self.content if self.text is None else self.text
+        return SourceFile(self.name, self.module, source, self.path, self.is_package)
+
+
+class StoredAnalysis(TypeAnalysis, frozen=True):
+    """A TypeAnalysis whose modules are indices into the sources of its snapshot, since several types share some."""
+
+    modules: tuple[int, ...] = ()  # type: ignore[assignment]
+
+
+class Snapshot(Data, frozen=True):
+    """The analyses of all types of a library, and what they were made from.
+
+    Attributes:
+        inputs: Digest of the sources that were added and of the code that analysed them.
+        stamps: Every file that was looked for on the disk, with its stamp; None where there was none.
+        analyses: Results by type name.
+        sources: The modules that the types need.
+    """
+
+    inputs: str
+    stamps: dict[str, Stamp | None]
+    analyses: dict[str, StoredAnalysis]
+    sources: tuple[StoredSource, ...]
+
+
+_encode = msgspec.msgpack.Encoder().encode
+
+
+def take(library: Library) -> bytes:
+    """Return the analyses of all types of a library, encoded for `restore`."""
+    indices: dict[SourceFile, int] = {}
+    analyses = {}
+    for name in library.names():
+        analysis = library.analyse(name)
+        modules = tuple(indices.setdefault(file, len(indices)) for file in analysis.modules)
+        analyses[name] = StoredAnalysis(**asdict(analysis) | {"modules": modules})
+    stored = tuple(StoredSource.of(file) for file in indices)
+    return _encode(Snapshot(_digest(library), library.stamps, analyses, stored))
+
+
+def restore(library: Library, encoded: bytes) -> bool:
+    """Put the analyses of an earlier process into a library that holds the same sources.
+
+    Returns:
+        False, with the library unchanged, if anything differs: a source, a file that was read or that was missing, our
+        own code, the Python version, or if `encoded` is damaged.
+    """
+    try:
+        snapshot = msgspec.msgpack.decode(encoded, type=Snapshot)
+    except msgspec.MsgspecError:
+        return False
+    if snapshot.inputs != _digest(library):
+        return False
+    if any(stamp_of(Path(path)) != stamp for path, stamp in snapshot.stamps.items()):
+        return False
+    files = [stored.file() for stored in snapshot.sources]
+    analyses = {
+        name: TypeAnalysis(**asdict(stored) | {"modules": tuple(files[index] for index in stored.modules)})
+        for name, stored in snapshot.analyses.items()
+    }
+    library.put_analyses(analyses, snapshot.stamps)
+    return True
+
+
+def _digest(library: Library) -> str:
+    digest = hashlib.sha256(repr(sys.version_info).encode())
+    for name in library.names():
+        if name not in BUILT_IN:
+            digest.update(_encode(StoredSource.of(library.file(name))))
+    for package in _CODE:
+        for file in sorted((_LIBRARY / package).rglob("*.py")):
+            digest.update(repr((str(file), stamp_of(file))).encode())
+    return digest.hexdigest()

@@ -1,0 +1,37 @@
+"""The result of reading one object type."""
+
+from msgspec import field
+
+from arcor2_hw.analysis.enumerations import Enumeration
+from arcor2_hw.analysis.source import Problem, SourceFile
+from arcor2_hw.data.base import Data
+from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta
+from arcor2_hw.data.robot import RobotMeta
+
+
+class TypeAnalysis(Data, frozen=True):
+    """The content of one object type's source.
+
+    Attributes:
+        is_object_type: False for a helper or mixin that does not derive from Generic; clients see no such type.
+        robot: None for a type that is no robot, and for one that may not be placed.
+        implemented: The optional methods of our bases that the type really implements.
+        bases: The object types it derives from, nearest first.
+        mixins: Classes before its base.
+        enumerations: The enumerations that its actions take, by action and parameter.
+        keyword_only: Parameters that are passed by name only, as (action, parameter).
+        modules: The other files it needs, each after those that it needs itself; without ours, and without packages
+            that merely contain them.
+    """
+
+    meta: ObjectTypeMeta
+    actions: tuple[ObjectAction, ...] = ()
+    robot: RobotMeta | None = None
+    implemented: frozenset[str] = frozenset()
+    bases: tuple[str, ...] = ()
+    mixins: tuple[str, ...] = ()
+    modules: tuple[SourceFile, ...] = ()
+    is_object_type: bool = True
+    problem: Problem | None = None
+    enumerations: dict[tuple[str, str], Enumeration] = field(default_factory=dict)
+    keyword_only: frozenset[tuple[str, str]] = frozenset()

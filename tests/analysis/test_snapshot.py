@@ -1,0 +1,91 @@
+"""A stored analysis is used exactly as long as nothing that it was made from has changed."""
+
+import ast
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from arcor2_hw.analysis import Library, SourceFile, installed_types, snapshot
+
+NEIGHBOURS = {
+    "vendor/__init__.py": "",
+    "vendor/limits.py": "TOP = 0.25\n",
+    "vendor/arm.py": """
+from arcor2_hw.actions import action
+from arcor2_hw.objects import Generic
+from vendor.limits import TOP
+try:
+    from vendor.extra import EXTRA
+except ImportError:
+    EXTRA = 0
+
+class Arm(Generic):
+    _ABSTRACT = False
+
+    @action
+    def move(self, speed: float = TOP, *, an: str | None = None) -> None: ...
+""",
+}
+
+
+@pytest.fixture
+def vendor(tmp_path: Path) -> Path:
+    for name, text in NEIGHBOURS.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    return tmp_path / "vendor"
+
+
+def library(vendor: Path) -> Library:
+    arm = vendor / "arm.py"
+    return Library([SourceFile("Arm", "vendor.arm", arm.read_bytes(), str(arm))])
+
+
+def test_all_installed_types_are_restored_without_parsing(monkeypatch: pytest.MonkeyPatch) -> None:
+    files = [each.file for each in installed_types() if each.file is not None]
+    first, second = Library(files), Library(files)
+    stored = snapshot.take(first)
+    monkeypatch.setattr(ast, "parse", None)
+    assert snapshot.restore(second, stored)
+    for name in first.names():
+        assert second.analyse(name) == first.analyse(name)
+
+
+CHANGES: dict[str, Callable[[Path], object]] = {
+    "its own source": lambda vendor: (vendor / "arm.py").write_text(NEIGHBOURS["vendor/arm.py"] + "\n"),
+    "a module it imports": lambda vendor: (vendor / "limits.py").write_text("TOP = 0.125\n"),
+    "a module that was missing": lambda vendor: (vendor / "extra.py").write_text("EXTRA = 1\n"),
+    "a module is gone": lambda vendor: (vendor / "limits.py").unlink(),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
+def test_a_change_of_any_file_is_noticed(vendor: Path, change: Callable[[Path], object]) -> None:
+    stored = snapshot.take(library(vendor))
+    assert snapshot.restore(library(vendor), stored)
+    change(vendor)
+    assert not snapshot.restore(library(vendor), stored)
+
+
+def test_a_further_source_is_noticed(vendor: Path) -> None:
+    stored = snapshot.take(library(vendor))
+    more = library(vendor)
+    more.add(SourceFile("Late", "late", "class Late: ...\n"))
+    assert not snapshot.restore(more, stored)
+
+
+def test_damaged_bytes_are_refused(vendor: Path) -> None:
+    stored = snapshot.take(library(vendor))
+    for damaged in (b"", b"\xff" * 8, stored[: len(stored) // 2], stored[:-1]):
+        fresh = library(vendor)
+        assert not snapshot.restore(fresh, damaged)
+        assert [parameter.name for parameter in fresh.analyse("Arm").actions[0].parameters] == ["speed"]
+
+
+def test_text_and_bytes_stay_apart() -> None:
+    source = "from object_types.helper import VALUE\nfrom arcor2_hw.objects import Generic\nclass A(Generic): ...\n"
+    files = [SourceFile("A", "a", source.encode()), SourceFile("Helper", "helper", "VALUE = 1\nclass Helper: ...\n")]
+    first, second = Library(files), Library(files)
+    assert snapshot.restore(second, snapshot.take(first))
+    assert [file.source for file in second.analyse("A").modules] == ["VALUE = 1\nclass Helper: ...\n"]
