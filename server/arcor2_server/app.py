@@ -6,6 +6,8 @@ from typing import Any, cast
 
 from litestar import Litestar, Request, Response, WebSocket, websocket
 from litestar.exceptions import HTTPException, MethodNotAllowedException, NotFoundException
+from litestar.plugins import PluginProtocol
+from litestar.plugins.core import MsgspecDIPlugin
 
 from arcor2_hw.data.role import Role
 from arcor2_server.access import Access, role_needed
@@ -74,7 +76,7 @@ async def running_services(settings: ServerSettings) -> AsyncIterator[Services]:
         locks = Locks(settings.lock_retries, settings.lock_retry_wait)
         users = Users(hub, locks, settings)
         stack.callback(users.close)
-        types = ObjectTypes(storage, assets)
+        types = ObjectTypes(storage, assets, settings.analysis_file)
         await types.load()
         services = Services(
             collisions=CollisionWorld(settings.scene_inflation),
@@ -145,10 +147,18 @@ def no_such_route(request: Request[Any, Any, Any], error: MethodNotAllowedExcept
     return http_refusal(request, error)
 
 
+class Application(Litestar):
+    """Litestar without its plugins for pydantic and attrs, which serve nothing here and cost a tenth of a second."""
+
+    @staticmethod
+    def _get_default_plugins(plugins: list[PluginProtocol]) -> list[PluginProtocol]:
+        return [*plugins, MsgspecDIPlugin()]
+
+
 def create_app(services: Services) -> Litestar:
     """Make the application around parts that are up."""
     endpoint, of_execution = Endpoint(services), execution_endpoint(services)
-    app = Litestar(
+    app = Application(
         route_handlers=[sockets, *routes(), *editor_routes()],
         guards=[own_pages_only, role_needed],
         openapi_config=None,

@@ -1,5 +1,6 @@
 """Serves the web editor: one page at `/`, its hashed files below `/editor`, as built from the folder `editor`."""
 
+import asyncio
 import hashlib
 import secrets
 from collections.abc import Mapping
@@ -56,24 +57,25 @@ class EditorFile(Data, frozen=True):
     content: Mapping[str, bytes]
 
 
-def read_files(directory: Path) -> dict[str, EditorFile]:
-    """Read the built editor, some megabytes, by path; empty when it was not built."""
-    found: dict[str, EditorFile] = {}
+def file_names(directory: Path) -> frozenset[str]:
+    """Return the paths of the built editor's files, relative to `directory`; empty if it was not built."""
     endings = tuple(ending for _, ending in _ENCODINGS)
-    for file in sorted(directory.rglob("*")) if directory.is_dir() else ():
-        hidden = any(part.startswith(".") for part in file.relative_to(directory).parts)  # the build's own notes
-        if hidden or not file.is_file() or file.name.endswith(endings):
-            continue
-        content = {"": file.read_bytes()}
-        for encoding, ending in _ENCODINGS:
-            if (compressed := file.with_name(file.name + ending)).is_file():
-                content[encoding] = compressed.read_bytes()
-        found[file.relative_to(directory).as_posix()] = EditorFile(
-            _MEDIA_TYPES.get(file.suffix, "application/octet-stream"),
-            f'"{hashlib.sha256(content[""]).hexdigest()[:32]}"',
-            content,
-        )
-    return found
+    found = (file.relative_to(directory) for file in directory.rglob("*") if file.is_file())
+    return frozenset(
+        name.as_posix()
+        for name in found
+        if not name.name.endswith(endings) and not any(part.startswith(".") for part in name.parts)  # the build's notes
+    )
+
+
+def read_file(file: Path) -> EditorFile:
+    """Read a file of the built editor with its compressed copies. Raise OSError if it cannot be read."""
+    content = {"": file.read_bytes()}
+    for encoding, ending in _ENCODINGS:
+        if (compressed := file.with_name(file.name + ending)).is_file():
+            content[encoding] = compressed.read_bytes()
+    media_type = _MEDIA_TYPES.get(file.suffix, "application/octet-stream")
+    return EditorFile(media_type, f'"{hashlib.sha256(content[""]).hexdigest()[:32]}"', content)
 
 
 def page_policy(nonce: str) -> str:
@@ -86,9 +88,10 @@ def page_policy(nonce: str) -> str:
 
 
 def editor_routes(directory: Path = FILES) -> list[HTTPRouteHandler]:
-    """Make the routes of the page and of its files, which are read once. They ask for no token, and tell nothing."""
-    files = read_files(directory)
-    page = files.pop("index.html", None)
+    """Return the routes of the page and of its files, each read once, on first use. They need no token."""
+    names = file_names(directory)
+    page = read_file(directory / "index.html") if "index.html" in names else None
+    files: dict[str, EditorFile] = {}
     open_to_all = {ROLE: Role.OPERATOR, OPEN: True}
 
     @route("/", http_method=[HttpMethod.GET, HttpMethod.HEAD], opt=open_to_all, name="editor page")
@@ -103,8 +106,10 @@ def editor_routes(directory: Path = FILES) -> list[HTTPRouteHandler]:
     async def editor_file(request: Request[Any, Any, Any]) -> Response[bytes]:
         """Answer with a file, compressed as the browser takes it; 304 when it has it, 404 when there is none."""
         name = str(request.path_params["path"]).lstrip("/")
-        if (file := files.get(name)) is None:
+        if name not in names or name == "index.html":
             raise NotFoundException("The editor has no such file.")
+        if (file := files.get(name)) is None:
+            file = files[name] = await asyncio.to_thread(read_file, directory / name)
         # What the build names after its content never changes.
         caching = IMMUTABLE if name.startswith("assets/") else "no-cache"
         headers = _COMMON | {"Cache-Control": caching, "ETag": file.etag, "Vary": "Accept-Encoding"}

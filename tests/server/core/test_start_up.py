@@ -1,0 +1,71 @@
+"""What a start of the server does not do: import what it does not need, parse sources that it knows."""
+
+import ast
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from arcor2_server.app import running_services
+from arcor2_server.settings import ServerSettings
+
+MODULES = 1150
+"""Budget of imported modules. Each costs about 0.6 ms of every start; imports are four fifths of it."""
+NOT_NEEDED = {
+    "alembic",
+    "cryptography",
+    "hypothesis",
+    "mako",
+    "PIL",
+    "pydantic",
+    "pytest",
+    "schemathesis",
+    "transforms3d",
+}
+"""Packages that are installed next to the server, and that a start has no use for."""
+START = """
+import asyncio, json, sys
+from pathlib import Path
+import arcor2_server.cli.main, arcor2_server.cli.serve
+from arcor2_server.app import create_app, running_services
+from arcor2_server.settings import ServerSettings
+async def start():
+    async with running_services(ServerSettings(data_dir=Path(sys.argv[1]))) as services:
+        create_app(services)
+        print(json.dumps(sorted(sys.modules)))
+asyncio.run(start())
+"""
+
+
+async def test_a_start_imports_only_what_it_needs(tmp_path: Path) -> None:
+    async with running_services(ServerSettings(data_dir=tmp_path)):
+        pass  # creates the database, which takes more imports than opening it
+    started = subprocess.run(
+        [sys.executable, "-c", START, str(tmp_path)], stdout=subprocess.PIPE, check=True, timeout=60
+    )
+    imported = json.loads(started.stdout)
+    assert not NOT_NEEDED & {name.partition(".")[0] for name in imported}
+    assert len(imported) <= MODULES
+
+
+async def test_a_second_start_parses_no_source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    settings = ServerSettings(data_dir=tmp_path)
+    async with running_services(settings) as first:
+        known = first.types.metas()
+    monkeypatch.setattr(ast, "parse", None)
+    async with running_services(settings) as second:
+        assert second.types.metas() == known
+        assert second.types.actions("TimeActions")
+
+
+async def test_a_damaged_analysis_is_made_again(tmp_path: Path) -> None:
+    settings = ServerSettings(data_dir=tmp_path)
+    async with running_services(settings) as first:
+        known = first.types.metas()
+    intact = settings.analysis_file.read_bytes()
+    settings.analysis_file.write_bytes(intact[: len(intact) // 3])
+    async with running_services(settings) as second:
+        assert second.types.metas() == known
+    assert settings.analysis_file.read_bytes() == intact
