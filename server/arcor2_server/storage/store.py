@@ -372,8 +372,11 @@ class Storage:
             wanted = select(table.id, table.document).where(table.id.in_(keys[begin : begin + _PER_QUERY]))
             async with self.reading() as session:
                 rows = list(await session.execute(wanted))
-            found += await asyncio.to_thread(lambda rows=rows: [self._decoded(decode, row) for row in rows])
+            found += await asyncio.to_thread(self._decode_all, decode, rows)
         return found
+
+    def _decode_all(self, decode: Any, rows: Sequence[Any]) -> list[Any]:
+        return [self._decoded(decode, row) for row in rows]
 
     def _decoded(self, decode: Any, row: Any) -> Any:
         try:
