@@ -13,7 +13,7 @@ from arcor2_hw.analysis.actions import ActionReader
 from arcor2_hw.analysis.enumerations import enumerations_of
 from arcor2_hw.analysis.hierarchy import Hierarchy, is_known_library
 from arcor2_hw.analysis.keywords import keyword_only
-from arcor2_hw.analysis.module import ClassInfo, Import, Module
+from arcor2_hw.analysis.module import ClassInfo, Import, Module, Value
 from arcor2_hw.analysis.presentation import of_type
 from arcor2_hw.analysis.robots import robot_meta
 from arcor2_hw.analysis.settings import SettingsReader
@@ -221,13 +221,11 @@ class Library:
             module = self._load(_dotted(file))
             assert module is not None
             info = module.bindings.get(name)
-            if not isinstance(info, ClassInfo):
+            if isinstance(info, Import | Value) or (info is None and self._declares_object_type(module)):
                 raise module.problem(f"there is no class {name} here", 1)
             needed = tuple(self._needed(module))
-            if not info.node.bases:
-                return self._helper(name, needed)
-            if not self._is_object_type(info):
-                return self._helper(name, needed)
+            if not isinstance(info, ClassInfo) or not info.node.bases or not self._is_object_type(info):
+                return TypeAnalysis(ObjectTypeMeta(name, abstract=True), modules=needed, is_object_type=False)
             return self._of_class(name, info, needed)
         except Broken as error:
             problem = error.problem
@@ -236,6 +234,10 @@ class Library:
             problem = Problem("this is nested too deeply to be read", sendable(path), 1)
         meta = ObjectTypeMeta(name, NO_DESCRIPTION, base=base, abstract=True, disabled=True, problem=str(problem))
         return TypeAnalysis(meta, modules=needed, problem=problem)
+
+    def _declares_object_type(self, module: Module) -> bool:
+        classes = (each for each in module.bindings.values() if isinstance(each, ClassInfo))
+        return any(self._hierarchy.derives_from(each, "Generic") for each in classes)
 
     def _is_object_type(self, info: ClassInfo) -> bool:
         """Tell whether a class derives from Generic. Raises Broken when that cannot be known, or by the wrong base."""
@@ -250,9 +252,6 @@ class Library:
         if base is None or not hierarchy.derives_from(base, "Generic"):
             raise info.problem(f"{info.name}: the last base is no object type; mixins come before the base", last)
         return True
-
-    def _helper(self, name: str, needed: tuple[SourceFile, ...]) -> TypeAnalysis:
-        return TypeAnalysis(ObjectTypeMeta(name, abstract=True), modules=needed, is_object_type=False)
 
     def _of_class(self, name: str, info: ClassInfo, needed: tuple[SourceFile, ...]) -> TypeAnalysis:
         hierarchy = self._hierarchy

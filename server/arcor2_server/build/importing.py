@@ -2,16 +2,16 @@
 
 import ast
 import asyncio
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
 
 import humps
 import msgspec
 from msgspec import UNSET, field
 
 from arcor2_hw.analysis import SourceFile, module_name
-from arcor2_hw.data.base import Data, Unset
+from arcor2_hw.data.base import Data, Unset, is_valid_name
 from arcor2_hw.data.object_type import Mesh, Model3dType, Models, ObjectModel, ObjectTypeSource
 from arcor2_hw.data.project import END, START, Action, Project
 from arcor2_hw.data.scene import Scene
@@ -51,7 +51,8 @@ class ImportedIds(Data, frozen=True, rename="camel"):
 class Imported(Data, frozen=True):
     """The content of a package as documents, checked as far as a package can be by itself.
 
-    types: the uploaded ones by name. installed: those whose driver it carries a copy of.
+    types: uploaded types and helpers, by name. installed: types whose driver the package carries a copy of.
+    helpers: those of `types` that have no class of their name.
     """
 
     scene: Scene
@@ -59,6 +60,7 @@ class Imported(Data, frozen=True):
     script: str
     types: dict[str, ObjectTypeSource] = field(default_factory=dict)
     installed: list[str] = field(default_factory=list)
+    helpers: list[str] = field(default_factory=list)
 
     @property
     def needs_source(self) -> bool:
@@ -102,8 +104,14 @@ def _text(files: Mapping[str, bytes], path: str) -> str:
         raise InvalidPackage(f"{path} of the package is no text: {error}") from error
 
 
-def _class_in(path: str, source: str) -> tuple[str, bool]:
-    """Give the name of the type in a module, and whether the module is merely a door to a copied driver."""
+_Kind = Literal["type", "installed", "helper"]
+
+
+def _class_in(path: str, source: str) -> tuple[str, _Kind]:
+    """Return the name of the type in a module; "installed" if the module only imports it from a copied driver.
+
+    A module that has no class of its name is a helper of others.
+    """
     stem = PurePosixPath(path).stem
     try:
         tree = ast.parse(source)
@@ -111,12 +119,14 @@ def _class_in(path: str, source: str) -> tuple[str, bool]:
         raise InvalidPackage(f"{path} of the package is no Python: {error}") from error
     for node in tree.body:
         if isinstance(node, ast.ClassDef) and module_name(node.name) == stem:
-            return node.name, False
+            return node.name, "type"
     for node in tree.body:
         if isinstance(node, ast.ImportFrom) and node.level:
             for alias in node.names:
                 if module_name(alias.asname or alias.name) == stem:
-                    return alias.asname or alias.name, True
+                    return alias.asname or alias.name, "installed"
+    if is_valid_name(stem) and module_name(stem) == stem:
+        return stem, "helper"
     raise InvalidPackage(f"{path} of the package has no class that the file is named after.")
 
 
@@ -131,20 +141,34 @@ def read(data: Path | bytes) -> Imported:
     source = _text(files, "script.py")
     types: dict[str, ObjectTypeSource] = {}
     installed: list[str] = []
+    helpers: list[str] = []
     for path in sorted(files):
         if not path.startswith(f"{snapshot.FOLDER}/"):
             continue
         text = _text(files, path)
-        name, is_door = _class_in(path, text)
-        if is_door:
+        name, kind = _class_in(path, text)
+        if kind == "installed":
             installed.append(name)
         else:
+            if kind == "helper":
+                helpers.append(name)
             types[name] = ObjectTypeSource(name, text, model=_model(files, name))
     modules = {module_name(name) for name in (*types, *installed)}
     for path in files:
         if path.startswith("data/models/") and PurePosixPath(path).stem not in modules:
             raise InvalidPackage(f"{path} of the package belongs to none of its object types.")
-    return Imported(scene, project, source, types, installed)
+    given = Imported(scene, project, source, types, installed, helpers)
+    extra = project.project_objects_ids
+    return given if isinstance(extra, Unset) else _with_helpers_named(given, extra)
+
+
+def _with_helpers_named(given: Imported, known: Iterable[str]) -> Imported:
+    """Return the package with helpers under the names by which they are known: a file tells only that of a module."""
+    modules = {module_name(name): name for name in known}
+    names = {name: modules.get(name, name) for name in given.helpers}
+    types = {names.get(name, name): one for name, one in given.types.items()}
+    types = {name: msgspec.structs.replace(one, id=name) for name, one in types.items()}
+    return msgspec.structs.replace(given, types=types, helpers=list(names.values()))
 
 
 def _model(files: Mapping[str, bytes], name: str) -> ObjectModel | Unset:
@@ -334,6 +358,7 @@ async def import_package(services: "Services", data: Path | bytes, options: Impo
     """
     given = await asyncio.to_thread(read, data)
     async with services.build.importing:
+        given = _with_helpers_named(given, [one.id for one in await services.storage.object_types()])
         _check_here(services, given)
         given = await asyncio.to_thread(_checked, given, services.types.files(), options)
         plan, conflicts = _plan(given, await _saved(services, given), options)

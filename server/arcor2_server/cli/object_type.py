@@ -6,8 +6,9 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from arcor2_hw.analysis import Library, SourceFile, module_name
+from arcor2_hw.analysis import Library, SourceFile, TypeAnalysis, module_name
 from arcor2_hw.client import Rest
+from arcor2_hw.data.base import is_valid_name
 from arcor2_server.cli import exchanging as x
 from arcor2_server.cli.reaching import HERE, Failed, Server, run
 from arcor2_server.cli.status import ExitStatus
@@ -25,14 +26,22 @@ def _read(file: Path) -> str:
 
 
 def _class_in(source: str, file: Path, name: str | None) -> str:
-    """Choose the class of a file that is brought in: the named one, the file's namesake, or its only object type."""
+    """Return the name under which a file is added.
+
+    That is the given class, the class that the file is named after, or its only object type. A helper module, which
+    declares no object type, has the name of the file.
+    """
     try:
         names = [node.name for node in ast.parse(source).body if isinstance(node, ast.ClassDef)]
     except SyntaxError as error:
         raise Failed(ExitStatus.ANALYSIS_PROBLEMS, f"{file}:{error.lineno}: {error.msg}") from error
     if name is None:
         found = [each for each in names if module_name(each) == file.stem]
-        found = found or [each for each in names if _may_be_placed(SourceFile(each, module_name(each), source))]
+        if not found:
+            types = [analysis for each in names if (analysis := _analysis(each, source)).is_object_type]
+            found = [analysis.meta.type for analysis in types if not analysis.meta.abstract]
+            if not types and is_valid_name(file.stem) and module_name(file.stem) == file.stem:
+                found = [file.stem]
     else:
         found = [each for each in names if each == name]
     if len(found) != 1:
@@ -41,9 +50,8 @@ def _class_in(source: str, file: Path, name: str | None) -> str:
     return found[0]
 
 
-def _may_be_placed(file: SourceFile) -> bool:
-    analysis = Library([file]).analyse(file.name)
-    return analysis.is_object_type and not analysis.meta.abstract
+def _analysis(name: str, source: str) -> TypeAnalysis:
+    return Library([SourceFile(name, module_name(name), source)]).analyse(name)
 
 
 async def _in_order(given: dict[str, SourceFile], rest: Rest) -> list[SourceFile]:

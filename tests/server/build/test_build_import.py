@@ -108,6 +108,26 @@ async def test_all_of_a_package_comes_back(here: Any, packed: bytes) -> None:
     assert {meta.type for meta in here.hub.told[0].data} == {"Arm", "table"}
 
 
+async def test_a_helper_module_without_a_class_comes_back(here: Any, packed: bytes) -> None:
+    arm = f"from .sort_tools import FASTEST\n{workplace.ARM}"
+    helper = b"import math\n\nFASTEST = math.inf\n"
+    given = changed(packed, object_types__arm_py=arm.encode(), object_types__sort_tools_py=helper)
+    await import_package(here, given, NOTHING)
+    assert (await here.storage.object_type("sort_tools")).source == helper.decode()
+    await here.types.refresh()
+    assert not here.types.known("sort_tools")  # no type that could be placed
+    assert not here.types.meta("Arm").disabled
+    built = files_in(await here.build.publish("pro_1"))
+    assert built["object_types/sort_tools.py"] == helper
+
+    # It keeps the name that it has here.
+    await here.storage.delete_object_type("sort_tools")
+    await here.storage.put_object_type(ObjectTypeSource("SortTools", helper.decode()))
+    revision = here.storage.revision
+    await import_package(here, given, NOTHING)
+    assert here.storage.revision == revision
+
+
 async def test_from_a_file(here: Any, packed: bytes, tmp_path: Path) -> None:
     path = tmp_path / "package.zip"
     path.write_bytes(packed)
@@ -299,6 +319,12 @@ async def test_a_driver_that_is_not_installed_is_named(
         assert bare.storage.revision == 0
 
 
+async def test_a_type_whose_file_lacks_its_class_is_named(here: Any, packed: bytes) -> None:
+    with pytest.raises(NotFound, match="The object type Arm is neither in the package nor here"):
+        await import_package(here, changed(packed, object_types__arm_py=b"class Leg:\n    pass\n"), ALL)
+    assert here.storage.revision == 0
+
+
 async def test_a_mesh_needs_its_asset(here: Any, packed: bytes) -> None:
     mesh = ObjectModel(Model3dType.MESH, mesh=Mesh("table", "table.stl"))
     other = changed(packed, data__models__table_json=msgspec.json.encode(mesh))
@@ -337,7 +363,7 @@ def _renamed_action() -> bytes:
             "act_gone",
         ),
         ({"object_types__arm_py": b"class Arm(:\n"}, "object_types/arm.py of the package is no Python"),
-        ({"object_types__arm_py": b"class Leg:\n    pass\n"}, "object_types/arm.py of the package has no class"),
+        ({"object_types__0arm_py": b"class Leg:\n    pass\n"}, "object_types/0arm.py of the package has no class"),
         ({"object_types__arm_py": b"\xff"}, "is no text"),
         (
             {"object_types__arm_py": b"from .nothing import Base\n\n\nclass Arm(Base):\n    pass\n"},

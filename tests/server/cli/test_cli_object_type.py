@@ -69,13 +69,19 @@ def test_a_family_of_types_is_brought_in_together_and_one_by_one(
     sources: Path, server: ServerProcess, loop: asyncio.Runner, object_type: Cli
 ) -> None:
     arm, base, mixin = (sources / f"{name}.py" for name in ("arm_m1", "abstract_arm", "kinematics_mixin"))
+    helper = sources / "gains.py"
+    helper.write_text("SLOW = 0.1\n")
+    arm.write_text(f"{arm.read_text()}\n\nfrom .gains import SLOW\n")
+    assert object_type(server, "add", helper).stdout == "gains added\n"
     lonely = object_type(server, "add", arm)
     assert lonely.returncode == ExitStatus.ANALYSIS_PROBLEMS
     assert "arm_m1.py:3: the module abstract_arm that it imports does not exist" in lonely.stderr
     together = object_type(server, "add", arm, base, mixin)
     assert (together.returncode, together.stderr) == (0, "")
     assert together.stdout.split() == ["AbstractArm", "added", "KinematicsMixin", "added", "ArmM1", "added"]
-    assert loop.run(types(server.url))["ArmM1"] == (False, "AbstractArm")
+    known = loop.run(types(server.url))
+    assert known["ArmM1"] == (False, "AbstractArm")
+    assert "gains" not in known
     # What it needs is there already.
     arm.write_text(arm.read_text().replace("arm-m1.zip", "arm-m2.zip"))
     assert object_type(server, "add", arm).returncode == 0
