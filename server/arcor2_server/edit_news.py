@@ -46,7 +46,7 @@ class EditNews:
     def _changed(self, edit: Edit | None) -> None:
         loop = asyncio.get_running_loop()
         self._last = loop.time()
-        self._kept = 0 if edit is None else edit.number
+        self._kept = self._services.session.revision if edit is None else edit.number
         if edit is not None:
             self._changes += edit.changes
             self._services.previews.changed(edit.changes)
@@ -83,7 +83,6 @@ class EditNews:
 
 
 # ---------------------------------------------------------------------------------------------- sentences
-_MOVES: Final = ("UpdateObjectPose", "UpdateActionPointPosition", "UpdateActionPointUsingRobot")
 _WORDS: Final = {
     Kind.SCENE: "the scene",
     Kind.OBJECT: "the object",
@@ -96,6 +95,19 @@ _WORDS: Final = {
     Kind.LOGIC: "a connection",
     Kind.OVERRIDE: "an override",
 }
+_BY_IMPORTANCE: Final = (
+    Kind.SCENE,
+    Kind.OBJECT,
+    Kind.PROJECT,
+    Kind.POINT,
+    Kind.ACTION,
+    Kind.PARAMETER,
+    Kind.ORIENTATION,
+    Kind.JOINTS,
+    Kind.LOGIC,
+    Kind.OVERRIDE,
+)
+"""What an edit is named after, if it changes items of several kinds."""
 
 
 def _original(edit: Edit, history: History) -> Edit:
@@ -106,24 +118,33 @@ def _original(edit: Edit, history: History) -> Edit:
 
 
 def sentence(edit: Edit) -> str:
-    """Give what an edit did, as it follows `Undo` on a button: `moving the object gripper`.
+    """Return what an edit did, as it follows `Undo` on a button: `moving the object gripper`.
 
     Of an undo, what was taken back: that is what Redo would do again.
     """
     if edit.how is How.RESTORE:
         return f"going back to revision {edit.of}"
-    changes = [change.inverse() for change in reversed(edit.changes)] if edit.how is How.UNDO else edit.changes
+    changes = [change.inverse() for change in edit.changes] if edit.how is How.UNDO else edit.changes
     if not changes:
         return edit.request
-    first = changes[0]
+    # What else changes follows from it: joints of a moved point become invalid, its actions go with it.
+    kind = min((change.kind for change in changes), key=_BY_IMPORTANCE.index)
+    of_kind = [change for change in changes if change.kind is kind]
+    first = of_kind[0]
     value = first.before if first.after is None else first.after
-    before, after = getattr(first.before, "name", ""), getattr(first.after, "name", "")
-    what = _WORDS[first.kind]
-    if first.before is not None and first.after is not None and before != after:
-        return f"renaming {what} {before} to {after}"
-    verb = "adding" if first.before is None else "removing" if first.after is None else "changing"
-    if verb == "changing" and edit.request.startswith(_MOVES):
-        verb = "moving"
     name = getattr(value, "name", "")
-    others = len({change.id for change in changes}) - 1
-    return f"{verb} {what}{' ' if name else ''}{name}" + (f" and {others} more" if others else "")
+    what = f"{_WORDS[kind]} {name}".rstrip()
+    old, new = first.before, first.after
+    if old is None or new is None:
+        text = f"{'adding' if old is None else 'removing'} {what}"
+    elif name and old.name != name:
+        text = f"renaming {_WORDS[kind]} {old.name} to {name}"
+    elif kind is Kind.POINT and old.parent != new.parent:
+        text = f"changing the parent of {what}"
+    elif any(getattr(old, field, None) != getattr(new, field, None) for field in ("pose", "position")):
+        text = f"moving {what}"
+    else:
+        text = f"changing {what}"
+    others = len({change.id for change in of_kind}) - 1
+    # Points below a point follow it.
+    return text + (f" and {others} more" if others and kind is not Kind.POINT else "")

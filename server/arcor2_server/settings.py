@@ -88,6 +88,11 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
         return self.data_dir / "analysis.msgpack"
 
     @property
+    def history_dir(self) -> Path:
+        """Directory of the histories of closed documents."""
+        return self.data_dir / "history"
+
+    @property
     def markers_file(self) -> Path:
         """Give the file in which markers are kept that were set over REST."""
         return self.data_dir / "markers.json"

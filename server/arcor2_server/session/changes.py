@@ -86,6 +86,8 @@ class How(enum.StrEnum):
     UNDO = "undo"
     REDO = "redo"
     RESTORE = "restore"
+    EXTERNAL = "external"
+    """The stored document was changed while it was closed; such an edit has no user."""
 
 
 class Edit(Struct, frozen=True):

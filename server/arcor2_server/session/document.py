@@ -2,6 +2,7 @@
 
 import operator
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any, Final
 
 import msgspec
@@ -122,9 +123,15 @@ class Document:
         item = self._get(kind, item_id, kind.replace("_", " "))
         return Change(kind, item_id, item.parent, item.rank, item.value, None)
 
-    def retire(self) -> None:
-        """Refuse to make further changes: something else was opened while somebody waited with this one."""
+    @contextmanager
+    def retiring(self) -> Iterator[None]:
+        """Refuse further changes while this document is closed, and afterwards unless closing fails."""
         self._retired = True
+        try:
+            yield
+        except BaseException:
+            self._retired = False
+            raise
 
     def _check_open(self) -> None:
         if self._retired:

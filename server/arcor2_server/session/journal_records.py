@@ -81,13 +81,17 @@ class Recovered(msgspec.Struct, frozen=True):
 
 
 class Base(msgspec.Struct, frozen=True):
-    """A whole document to begin with: its items after edit `number`; edits up to `forget` are dropped."""
+    """A whole document to begin with: its items after edit `number`.
+
+    Stored edits up to `forget` are dropped, then `edits`, which lead to the document, are stored.
+    """
 
     items: list[Item]
     number: int
     scene: Times
     project: Times
     forget: int
+    edits: Sequence[Edit] = ()
 
 
 class Position(msgspec.Struct, frozen=True):
@@ -157,7 +161,7 @@ def write(connection: sqlite3.Connection, job: Edit | Base | None, serial: int) 
         case Edit(number, time, user, changes, request, how, of):
             row = (number, time, user, encode_changes(changes), request, how.value, of)
             connection.execute("insert into edit values (?, ?, ?, ?, ?, ?, ?, ?)", (*row, edit_sum(row)))
-        case Base(items, number, scene, project, forget):
+        case Base(items, number, scene, project, forget, edits):
             times = (msgspec.json.encode(scene).decode(), msgspec.json.encode(project).decode())
             whole = (encode_items(items), number, *times)
             connection.execute("update opening set serial = ?", (serial,))
@@ -165,6 +169,8 @@ def write(connection: sqlite3.Connection, job: Edit | Base | None, serial: int) 
                 "insert or replace into base values (1, ?, ?, ?, ?, ?)", (*whole, base_sum(whole, serial))
             )
             connection.execute("delete from edit where number <= ?", (forget,))
+            for edit in edits:
+                write(connection, edit, serial)
         case None:
             connection.execute("update opening set serial = ?", (serial,))
             connection.execute("delete from base")

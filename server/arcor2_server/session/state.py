@@ -24,6 +24,7 @@ from arcor2_hw.exceptions import NotFound, StorageError
 from arcor2_server.rpc.registry import RequestRefused, make_event
 from arcor2_server.session.changes import OF_SCENE, Change, Edit, How, Kind
 from arcor2_server.session.checks import scene_problems
+from arcor2_server.session.closed import ClosedHistories
 from arcor2_server.session.document import Document
 from arcor2_server.session.history import History
 from arcor2_server.session.journal import Journal
@@ -58,6 +59,8 @@ class Session:
         self._services = services
         self._limit = settings.history_limit
         self._journal = Journal(settings.journal_database, self._take_back)
+        self._closed = ClosedHistories(settings.history_dir)
+        services.storage.on_deleted.append(self._closed.forget)
         self._number = 0
         self._based_on = 0
         self._scene_times = Times()
@@ -300,27 +303,33 @@ class Session:
 
     # ------------------------------------------------------------------------------------------ opening, saving
     async def show(self, scene: Scene, project: Project | None = None) -> None:
-        """Open a scene, or a project on its scene, in place of what is open."""
-        document = Document.of(scene, project)
-        scene_times = Times.of(scene)
-        project_times = Times() if project is None else Times.of(project)
-        await self._journal.rebase(Base(document.items(), 0, scene_times, project_times, ALL))
-        # Before it is told: who looks then keeps what he sees.
+        """Open a scene, or a project on its scene, in place of what is open; its history is continued."""
+        with self.document.retiring():
+            document, edits = await self._closed.reopen(scene, project)
+            await self._closed.store(self.document, self.history, self._unsaved)
+            scene_times = Times.of(scene)
+            project_times = Times() if project is None else Times.of(project)
+            number = edits[-1].number if edits else 0
+            await self._journal.rebase(Base(document.items(), number, scene_times, project_times, ALL, edits))
+        # Before observers are called, which read the times.
         self._scene_times, self._project_times = scene_times, project_times
-        self._replace(document)
+        self._replace(document, edits)
 
     async def discard(self) -> None:
         """Close what is open; what is not saved is lost."""
-        await self._journal.clear()
+        with self.document.retiring():
+            await self._closed.store(self.document, self.history, self._unsaved)
+            await self._journal.clear()
         self._scene_times = self._project_times = Times()
         self._replace(Document())
 
-    def _replace(self, document: Document) -> None:
-        self.document.retire()
+    def _replace(self, document: Document, edits: Sequence[Edit] = ()) -> None:
         self.document = document
         self.history.clear()
+        for edit in edits:
+            self.history.append(edit)
         self.removed_types.clear()
-        self._number = self._based_on = 0
+        self._number = self._based_on = edits[-1].number if edits else 0
         self._unsaved = Unsaved()
         self._forget_snapshots()
         for tell in self.on_change:

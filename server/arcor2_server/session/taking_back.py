@@ -7,7 +7,7 @@ from arcor2_hw.data.project import END, START
 from arcor2_hw.data.role import Role
 from arcor2_server.lock_table import PROJECT, SCENE
 from arcor2_server.rpc.registry import RequestRefused
-from arcor2_server.session.changes import OF_SCENE, Change, Edit, Kind, net
+from arcor2_server.session.changes import OF_SCENE, Change, Edit, How, Kind, net
 from arcor2_server.session.checks import Types
 from arcor2_server.session.document import Document, action_of
 from arcor2_server.session.history import History
@@ -38,6 +38,8 @@ def _by(history: History, ids: set[str], after: int, user: str, opening: str = "
     edit = history.last_to_touch(ids, after=after, besides=user) if ids else None
     if edit is None:
         return ""
+    if edit.how is How.EXTERNAL:
+        return f"{opening} outside the editor, while the document was closed (edit {edit.number})" + "." * bool(opening)
     who = "you" if edit.user == user else edit.user
     return f"{opening} by {who} (edit {edit.number}{f', {edit.request}' if edit.request else ''})" + "." * bool(opening)
 

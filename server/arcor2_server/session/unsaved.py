@@ -28,6 +28,12 @@ class Unsaved:
                 found._of(item.kind)[item.kind, item.id] = None
         return found
 
+    def copy(self) -> "Unsaved":
+        """Return a copy that notes changes of its own."""
+        copied = Unsaved()
+        copied._of_scene, copied._of_project = dict(self._of_scene), dict(self._of_project)
+        return copied
+
     def _of(self, kind: Kind) -> _Values:
         return self._of_scene if kind in OF_SCENE else self._of_project
 

@@ -86,7 +86,7 @@ class Edits(RuleBasedStateMachine):
         return flat(Picture.of(self.session.scene, self.session.project))
 
     def _opened(self) -> None:
-        """What is open now is what is saved, and has no history."""
+        """What is open now is what is saved; what its history was is not known here."""
         self.saved = self.there_is()
         self.states = {self.session.revision: self.saved}
 

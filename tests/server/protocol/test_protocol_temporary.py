@@ -84,6 +84,8 @@ async def test_a_project_runs_and_is_open_again(tmp_path: Path) -> None:
         assert story(bob) == CLOSED + OPENED
         assert await alice.ask("ListPackages") == []
         assert not stage.services.session.has_changes
+        assert (await alice.ask("Undo"))["request"] == "AddActionPoint", "the history goes on after a run"
+        assert len(stage.services.session.require_project().action_points) == 1
         await alice.ask("AddActionPoint", name="another", position={"x": 0, "y": 0, "z": 0})
 
 

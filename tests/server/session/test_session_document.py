@@ -193,7 +193,8 @@ def test_names_users_and_trees() -> None:
 
 def test_a_closed_document_takes_no_changes() -> None:
     document = Document.of(*some_project())
-    document.retire()
+    with document.retiring():
+        pass
     for make in (
         lambda: document.add(Kind.PARAMETER, "x", ProjectParameter("x", "double", "1.0")),
         lambda: document.update(Kind.POINT, "acp_0", None),

@@ -6,8 +6,10 @@ from pathlib import Path
 import pytest
 
 from arcor2_server import breakpoints
+from arcor2_server.edit_news import sentence
 from tests.server.session.desk import Desk, Person, Refused, open_desk
-from tests.server.session.work import Work
+from tests.server.session.edits import EDITS, make, rich_project
+from tests.server.session.work import POSE, Work
 from tests.server.sharing.conftest import came, subscribed
 
 
@@ -142,6 +144,58 @@ async def test_each_is_told_what_he_could_undo(alice: Person, bob: Person, stran
     await alice.ask("WriteUnlock", object_id=point)
     await alice.ask("CloseProject", force=True)
     assert await came(alice, "HistoryChanged") == {"revision": 0}
+
+
+SENTENCES = {
+    "AddActionPoint": "adding the action point new",
+    "RenameActionPoint": "renaming the action point base to other",
+    "UpdateActionPointPosition": "moving the action point base",
+    "UpdateActionPointParent": "changing the parent of the action point base",
+    "CopyActionPoint": "adding the action point base_copy",
+    "RemoveActionPoint": "removing the action point below",
+    "AddActionPointOrientation": "adding the orientation o",
+    "UpdateActionPointOrientation": "changing the orientation o",
+    "RenameActionPointOrientation": "renaming the orientation o to other",
+    "RemoveActionPointOrientation": "removing the orientation o",
+    "UpdateActionPointJoints": "changing the joints j",
+    "RenameActionPointJoints": "renaming the joints j to other",
+    "RemoveActionPointJoints": "removing the joints j",
+    "UpdateAction": "changing the action one",
+    "RenameAction": "renaming the action one to other",
+    "AddLogicItem": "adding a connection",
+    "RemoveLogicItem": "removing a connection",
+    "UpdateLogicItem": "changing a connection",
+    "UpdateProjectHasLogic": "changing the project project",
+    "UpdateProjectDescription": "changing the project project",
+    "RenameProject": "renaming the project project to other",
+    "AddProjectParameter": "adding the parameter x",
+    "UpdateProjectParameter": "renaming the parameter speed to v",
+    "RemoveProjectParameter": "removing the parameter speed",
+    "UpdateOverride": "changing an override",
+    "DeleteOverride": "removing an override",
+}
+
+
+async def test_every_edit_is_called_what_it_is(desk: Desk, alice: Person, work: Work) -> None:
+    ids = await rich_project(work)
+    ids["project"] = desk.session.require_project().id
+    found = {}
+    for name, edit in EDITS.items():
+        await make(alice, edit, ids)
+        undo = desk.session.history.undoable("alice")
+        assert undo is not None
+        found[name] = sentence(undo)
+        await alice.ask("Undo")
+    assert found == SENTENCES
+    await alice.ask("CloseProject", force=True)
+    await alice.ask("OpenScene", id=(await alice.ask("ListScenes"))[0]["id"])
+    await alice.lock(ids["robot"])
+    await alice.ask(
+        "UpdateObjectPose", object_id=ids["robot"], pose=POSE | {"position": {"x": 9.0, "y": 9.0, "z": 9.0}}
+    )
+    undo = desk.session.history.undoable("alice")
+    assert undo is not None
+    assert sentence(undo) == "moving the object robot"
 
 
 async def test_edits_in_a_row_are_told_after_their_answers_and_not_each(desk: Desk, alice: Person, work: Work) -> None:

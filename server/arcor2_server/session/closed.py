@@ -1,0 +1,164 @@
+"""History of closed documents: stored when a document is closed, continued when it is opened again."""
+
+import asyncio
+import hashlib
+import zlib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Final
+
+import msgspec
+import structlog
+
+from arcor2_hw.data.base import now
+from arcor2_hw.data.project import Project
+from arcor2_hw.data.scene import Scene
+from arcor2_server.private_files import DIRECTORY_MODE, write_private
+from arcor2_server.session.changes import OF_SCENE, Change, Edit, How, Item, Kind, decode_changes, decode_items
+from arcor2_server.session.document import Document
+from arcor2_server.session.history import History
+from arcor2_server.session.unsaved import Unsaved
+
+log = structlog.get_logger(__name__)
+
+CLOSED_LIMIT: Final = 100
+"""Number of closed documents whose history is stored; the document that was closed first is dropped first."""
+
+
+class ClosedHistory(msgspec.Struct, frozen=True):
+    """Edits of a closed document, and its content after the last of them."""
+
+    document: str
+    items: list[Item]
+    edits: list[Edit]
+
+
+class _EditRow(msgspec.Struct, frozen=True):
+    number: int
+    time: str
+    user: str
+    changes: msgspec.Raw
+    request: str
+    how: How
+    of: int
+
+
+class _Stored(msgspec.Struct, frozen=True):
+    document: str
+    items: msgspec.Raw
+    edits: list[_EditRow]
+
+
+class ClosedHistories:
+    """One file per closed document."""
+
+    def __init__(self, directory: Path) -> None:
+        self._directory = directory
+
+    async def store(self, document: Document, history: History, unsaved: Unsaved) -> None:
+        """Store the history of a document that is about to be closed, as far as it leads to what is saved."""
+        item = next((item for kind in (Kind.PROJECT, Kind.SCENE) for item in document.of_kind(kind)), None)
+        if item is None:
+            return
+        closed = history_to_close(item.id, document, history, unsaved)
+        try:
+            if closed is None:
+                await self.forget(item.id)
+            else:
+                await asyncio.to_thread(self._write, closed)
+        except OSError as error:
+            log.warning("undo history is not stored", document=item.id, reason=str(error))
+
+    async def reopen(self, scene: Scene, project: Project | None) -> tuple[Document, list[Edit]]:
+        """Return the document of a scene or project, and its history, which is empty where none leads to it."""
+        closed = await asyncio.to_thread(self._read, scene.id if project is None else project.id)
+        continued = None if closed is None else continue_history(closed, scene, project)
+        return continued or (Document.of(scene, project), [])
+
+    async def forget(self, document: str) -> None:
+        """Delete the history of a document. Raises OSError."""
+        await asyncio.to_thread(self._path(document).unlink, missing_ok=True)
+
+    def _write(self, history: ClosedHistory) -> None:
+        self._directory.mkdir(mode=DIRECTORY_MODE, exist_ok=True)
+        write_private(self._path(history.document), zlib.compress(msgspec.json.encode(history), 1))
+        stored = sorted(self._directory.glob("*.history"), key=lambda file: file.stat().st_mtime_ns)
+        for oldest in stored[:-CLOSED_LIMIT]:
+            oldest.unlink()
+
+    def _read(self, document: str) -> ClosedHistory | None:
+        path = self._path(document)
+        try:
+            stored = msgspec.json.decode(zlib.decompress(path.read_bytes()), type=_Stored)
+            edits = [
+                Edit(row.number, row.time, row.user, decode_changes(row.changes), row.request, row.how, row.of)
+                for row in stored.edits
+            ]
+            return ClosedHistory(stored.document, decode_items(stored.items), edits)
+        except FileNotFoundError:
+            return None
+        except (OSError, zlib.error, msgspec.DecodeError, ValueError) as error:
+            log.error("undo history cannot be read", document=document, file=str(path), reason=str(error))
+            return None
+
+    def _path(self, document: str) -> Path:
+        # An id may hold characters that a file name cannot.
+        return self._directory / f"{hashlib.sha256(document.encode()).hexdigest()}.history"
+
+
+# ---------------------------------------------------------------------------------------------- closing
+def history_to_close(key: str, document: Document, history: History, unsaved: Unsaved) -> ClosedHistory | None:
+    """Return the history up to what is saved, None when no revision in it is the saved one.
+
+    Edits after the newest revision that equals the saved document are dropped: closing discards them.
+    """
+    edits, unsaved, discarded = list(history), unsaved.copy(), list[Change]()
+    while edits and (unsaved.scene or unsaved.project):
+        for change in reversed(edits.pop().changes):
+            discarded.append(change.inverse())
+            unsaved.note(discarded[-1])
+    if not edits or unsaved.scene or unsaved.project:
+        return None
+    if discarded:
+        document = Document(document.items())
+        document.apply(discarded)
+    return ClosedHistory(key, document.items(), edits)
+
+
+# ---------------------------------------------------------------------------------------------- opening
+def continue_history(
+    closed: ClosedHistory, scene: Scene, project: Project | None
+) -> tuple[Document, list[Edit]] | None:
+    """Return the document as it is saved now and its history; None when the history does not lead to it.
+
+    What was changed outside the editor since the document was closed is an edit without a user at the end.
+    """
+    saved = Document.of(scene, project)
+    of_scene = project is None
+    # The scene of a project has a history of its own: it is taken as it is now.
+    items = [item for item in closed.items if (item.kind in OF_SCENE) is of_scene]
+    items += [item for item in saved.items() if (item.kind in OF_SCENE) is not of_scene]
+    document = Document(items)
+    changes = differences(document, saved.items())
+    document.apply(changes)
+    # The order and the owner of an item are no part of a change.
+    if document.scene != saved.scene or document.project != saved.project:
+        return None
+    edits = closed.edits
+    if changes:
+        edits = [*edits, Edit(edits[-1].number + 1, now(), "", changes, how=How.EXTERNAL)]
+    return document, edits
+
+
+def differences(document: Document, wanted: Iterable[Item]) -> list[Change]:
+    """Return the changes that make other items of a document."""
+    changes, found = [], set()
+    for item in wanted:
+        found.add((item.kind, item.id))
+        present = document.find(item.kind, item.id)
+        if present is None:
+            changes.append(document.add(item.kind, item.id, item.value, item.parent))
+        elif present.value != item.value:
+            changes.append(document.update(item.kind, item.id, item.value))
+    gone = [item for item in document.items() if (item.kind, item.id) not in found]
+    return [document.remove(item.kind, item.id) for item in reversed(gone)] + changes
