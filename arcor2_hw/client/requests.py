@@ -158,6 +158,7 @@ from arcor2_hw.data.rpc.operation import (
     JogRobotArgs,
     JogRobotData,
     RetryObjectArgs,
+    StopAllData,
     StreamRobotArgs,
 )
 from arcor2_hw.data.rpc.projects import (
@@ -1398,6 +1399,11 @@ class Requests(ABC):
             dry_run=dry_run,
             timeout=timeout,
         )
+
+    async def stop_all(self, *, timeout: float | None = None) -> StopAllData:
+        """StopAll. Needs the role operator."""
+        answer: StopAllData = await self.call("StopAll", timeout=timeout)
+        return answer
 
     async def stop_package(self, *, timeout: float | None = None) -> None:
         """StopPackage. Needs the role operator."""

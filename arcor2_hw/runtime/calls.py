@@ -3,6 +3,8 @@
 import threading
 from collections.abc import Callable
 
+import msgspec
+
 from arcor2_hw.actions.json_values import encode as encode_json
 from arcor2_hw.exceptions import Arcor2Error, Cancelled
 from arcor2_hw.runtime import messages as m
@@ -10,6 +12,8 @@ from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.clock import Clock
 from arcor2_hw.runtime.device import STOP_DEADLINE, STOP_GRACE, Device, describe
 from arcor2_hw.runtime.lane import Job
+from arcor2_hw.runtime.program import Program
+from arcor2_hw.runtime.stopping import SentStop, outcomes, send_stop
 
 Post = Callable[[m.ToServer], None]
 
@@ -35,6 +39,7 @@ class Calls:
         self._post = post
         self._clock = clock
         self._stopping = stopping
+        self._answering: threading.Thread | None = None
 
     def call(self, message: m.Call) -> None:
         """Begin a call; CallDone or CallFailed answers it."""
@@ -74,36 +79,45 @@ class Calls:
         return answer
 
     def stop_motion(self, message: m.StopMotion) -> None:
-        """Stop one device, or all; answered when all have obeyed, or one has not."""
+        """Stop one device; answered when it has obeyed, or with why it has not."""
         try:
-            devices = [self._cell()[message.object_id]] if message.object_id else list(self._cell())
+            device = self._cell()[message.object_id]
         except Arcor2Error as error:
             self._post(m.CallFailed(message.id, error_data(error, message.object_id)))
             return
-        stops = [device for device in devices if device.stop_method is not None]
-        if message.object_id and not stops:
-            refusal = Arcor2Error(f"{devices[0].name} cannot be stopped: it has no stop")
-            self._post(m.CallFailed(message.id, error_data(refusal, message.object_id)))
-            return
-        left = len(stops)
-        failed: list[m.ErrorData] = []
-        lock = threading.Lock()
 
         def answer(device: Device, error: BaseException | None) -> None:
-            nonlocal left
-            with lock:
-                left -= 1
-                if error is not None:
-                    failed.append(error_data(describe(device, error), device.id))
-                if left:
-                    return
-            self._post(m.CallFailed(message.id, failed[0]) if failed else m.CallDone(message.id))
+            if error is None:
+                self._post(m.CallDone(message.id))
+            else:
+                self._post(m.CallFailed(message.id, error_data(describe(device, error), device.id)))
 
-        if not stops:
-            self._post(m.CallDone(message.id))
-        for device in stops:
-            self.stop(device, answer)
-            self._stopping(device)
+        if device.stop_method is None:
+            answer(device, Arcor2Error(f"{device.name} cannot be stopped: its type has no stop()"))
+            return
+        self.stop(device, answer)
+        self._stopping(device)
+
+    def stop_all(self, message: m.StopAll, program: Program | None) -> None:
+        """Stop every device, or wait for the stops of a program; answered within STOP_DEADLINE."""
+        stops: list[SentStop] = []
+        if program is None:
+            stops = [send_stop(device) for device in self._cell() if device.up]
+            for stop in stops:
+                self._stopping(stop.device)
+
+        def answer() -> None:
+            sent = stops if program is None else program.sent_stops()
+            self._post(m.CallDone(message.id, msgspec.json.encode(outcomes(sent))))
+
+        thread = threading.Thread(target=answer, name="stop all", daemon=True)
+        thread.start()
+        self._answering = thread
+
+    def settle(self) -> None:
+        """Wait until the last stop of all devices is answered."""
+        if self._answering is not None:
+            self._answering.join(STOP_DEADLINE)
 
     def stop(self, device: Device, answer: Callable[[Device, BaseException | None], None]) -> None:
         """Stop a device past everything else; `answer` is called once it has obeyed, or with why it did not."""

@@ -11,12 +11,13 @@ from msgspec.structs import replace
 from arcor2_hw.data.device import Connection
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.scene import Scene, SceneObjectOverride
-from arcor2_hw.exceptions import Arcor2Error, Cancelled, NotConnected, NotFound, ProgramStopped, Refused
+from arcor2_hw.exceptions import Arcor2Error, NotConnected, NotFound, ProgramStopped, Refused
 from arcor2_hw.objects import Camera, Generic, Robot
 from arcor2_hw.runtime.creation import Recipe, load_type, recipe
-from arcor2_hw.runtime.device import CLOSE_DEADLINE, STOP_DEADLINE, Device, describe, overrides, until
+from arcor2_hw.runtime.device import CLOSE_DEADLINE, Device, describe, overrides, until
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.messages import OpenScene
+from arcor2_hw.runtime.stopping import SentStop, send_stop
 from arcor2_hw.runtime.surroundings import SceneSurroundings
 from arcor2_hw.runtime.told import Told
 
@@ -240,33 +241,17 @@ class Cell:
         return problem
 
     # -------------------------------------------------------------------------------- stop and control
-    def stop_all(self, because: BaseException | None = None) -> list[tuple[Device, Job]]:
-        """Send `stop` to every device that has it, without waiting; gives the calls.
+    def stop_all(self, because: BaseException | None = None) -> list[SentStop]:
+        """Send a stop to every device without waiting; return the stops.
 
         With `because`, calls that run or wait end at once with that error for whoever waits for them.
         """
-        jobs = []
+        stops = []
         for device in self:
-            try:
-                begun = device.begin_stop()
-            except Arcor2Error:  # its stop lane hangs: an earlier stop has not come back
-                continue
-            if begun is not None:
-                jobs.append((device, begun[0]))
+            stops.append(send_stop(device))
             if because is not None and (running := device.lane.interrupt()) is not None:
                 running.give_up(because)
-        return jobs
-
-    def wait_stopped(self, stops: list[tuple[Device, Job]], within: float = STOP_DEADLINE) -> Arcor2Error | None:
-        """Wait until devices obeyed their `stop`; gives the first that did not."""
-        deadline = time.monotonic() + within
-        problem: Arcor2Error | None = None
-        for device, job in stops:
-            if not job.wait(until(deadline)):
-                device.stop_lane.expire(job, within)
-            if job.error is not None and not isinstance(job.error, Cancelled):
-                problem = problem or describe(device, job.error)
-        return problem
+        return stops
 
     def wait_still(self, within: float) -> bool:
         """Wait until no device says that it moves; False when one still does after `within` s."""

@@ -100,6 +100,7 @@ class Device:
         self.stop_lane = Lane(self.name, "stop")
         self._watch_lane: Lane | None = None
         self.closing = False
+        self._opening: Job | None = None
         self.closed_by: Job | None = None
         """What closes it after it failed."""
         self.failure: Arcor2Error | None = None
@@ -110,9 +111,15 @@ class Device:
         """Begin to create and connect the instance; gives the call and its deadline."""
         cls = self.recipe.cls
         deadline = connect_timeout(cls) + (1.0 if overrides(cls, "connect") else CONSTRUCTION_DEADLINE)
-        job = Job("connect", self._open, notify=notify)
+        job = self._opening = Job("connect", self._open, notify=notify)
         self.lane.submit(job)
         return job, deadline
+
+    @property
+    def up(self) -> bool:
+        """Tell whether the device is connected and not being disconnected."""
+        opening = self._opening
+        return opening is not None and opening.ended and opening.error is None and not self.closing
 
     def _open(self) -> None:
         with listening(self._life_changed):
@@ -246,22 +253,48 @@ class Device:
             raise InvalidData(f"{self.name}.{action} cannot be cancelled")
         return method
 
+    def _cancel_method(self, action: str) -> Callable[[], Any] | None:
+        """Return the method, other than `stop`, that cancels a running action; None when there is none."""
+        name = getattr(type(self.instance), "CANCEL_MAPPING", {}).get(action)
+        found = getattr(self.instance, name, None) if name else None
+        return found if callable(found) and found != self.stop_method else None
+
     def begin_stop(self, notify: Callable[[Job], None] | None = None) -> tuple[Job, Job | None] | None:
-        """Send `stop` past everything else; gives the call and the call that it interrupts, None without `stop`."""
-        stop = self.stop_method
-        if stop is None:
+        """Stop the device past everything else: call `stop`, and whatever cancels the running action.
+
+        Return the call and the call that it interrupts. Without `stop`, and with nothing that cancels the running
+        action, return None; calls that wait are cancelled all the same.
+        """
+        running = self.lane.current
+        stop, cancel = self.stop_method, None if running is None else self._cancel_method(running.method)
+        if stop is None and cancel is None:
+            self.lane.cancel_waiting()
             return None
         interrupted = self.lane.interrupt()
-        job = Job("stop", self._stop, (stop, time.monotonic()), notify=notify)
+        job = Job("stop", self._stop, (stop, cancel, interrupted, time.monotonic()), notify=notify)
         self.stop_lane.submit(job)
         return job, interrupted
 
-    def _stop(self, stop: Callable[[], Any], moment: float) -> None:
-        """Stop; and again when a call that had only just begun is not over: its command may have overtaken the stop."""
-        stop()
-        job = self.lane.current
-        if job is not None and job.since > moment - OVERTAKES_WITHIN and not job.wait(OVERTAKES_WITHIN / 2):
-            stop()
+    def _stop(
+        self,
+        stop: Callable[[], Any] | None,
+        cancel: Callable[[], Any] | None,
+        interrupted: Job | None,
+        moment: float,
+    ) -> None:
+        """Call `stop`, again if a call that had only just begun has not returned, and then `cancel` if needed.
+
+        The command of a call that had only just begun may have overtaken the first stop.
+        """
+        try:
+            if stop is not None:
+                stop()
+                job = self.lane.current
+                if job is not None and job.since > moment - OVERTAKES_WITHIN and not job.wait(OVERTAKES_WITHIN / 2):
+                    stop()
+        finally:
+            if cancel is not None and self.lane.current is interrupted:
+                cancel()
 
     @property
     def moving(self) -> bool:

@@ -34,6 +34,7 @@ from arcor2_hw.runtime.holding import Holds
 from arcor2_hw.runtime.link import Link
 from arcor2_hw.runtime.package import put_on_path
 from arcor2_hw.runtime.program import Program, set_current, traceback_text
+from arcor2_hw.runtime.stopping import wait_stopped
 from arcor2_hw.runtime.streaming import RatedStreams, Streams
 from arcor2_hw.runtime.watch import OBSERVE_PERIOD, Watch
 
@@ -79,6 +80,7 @@ class Host:
         self._rated = RatedStreams(lambda: self._cell, self.clock, self._streams)
         self._watch = Watch(self._cell, self.link.post, self._lost)
         self._leaving = threading.Event()
+        self._stop_requested = threading.Event()
         self._scene: m.OpenScene | None = None
         self._retrying = threading.Lock()
         self._types: str | None = None
@@ -177,7 +179,7 @@ class Host:
             or self._holds.any
             or any(device.lane.busy_with or device.moving for device in self._cell)
         )
-        stopped = self._cell.wait_stopped(self._cell.stop_all(), 0.5) if active else None
+        stopped = wait_stopped(self._cell.stop_all(), 0.5) if active else None
         problem = self._cell.close() or stopped
         self.link.post(m.SceneClosed(None if problem is None else error_data(problem)))
 
@@ -196,8 +198,8 @@ class Host:
         program.inside = True
         self.program = program
         set_current(program)
-        if self._leaving.is_set():
-            program.stop()
+        if self._leaving.is_set() or self._stop_requested.is_set():
+            self._stop_program()
         if message.streaming_period > 0:
             self.clock.every(message.streaming_period, self._stream_all)
         directory = Path(message.directory)
@@ -217,6 +219,7 @@ class Host:
         if program.error is not None and not (handled and isinstance(program.error, Arcor2Error)):
             _save_traceback(directory, program.error)
         problem = program.settle(failed)
+        self._calls.settle()  # before the devices it asks are closed
         problem = program.cell.close() or problem
         why = program.error or problem
         self.link.post(
@@ -267,6 +270,9 @@ class Host:
                 self._calls.call(message)
             case m.StopMotion():
                 self._calls.stop_motion(message)
+            case m.StopAll():
+                self._calls.stop_all(message, self.program)  # first: a program that has ended waits for the answer
+                self._stop_program()
             case m.Lease():
                 self._holds.lease(message)
             case m.RetryObject():
@@ -298,6 +304,7 @@ class Host:
         self._work.put(m.CloseScene())
 
     def _stop_program(self) -> None:
+        self._stop_requested.set()  # before the check: a program that is just being created sees one or the other
         if self.program is not None and not self.program.stop_requested:
             self.program.stop()
             self._nudge()

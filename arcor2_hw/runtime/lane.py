@@ -150,12 +150,16 @@ class Lane:
                 waiting.finish(None, self._hung(job))
 
     def interrupt(self) -> Job | None:
-        """Cancel what waits, and mark what runs as stopped: it ends as Cancelled. Gives the running call."""
+        """Cancel the waiting calls and mark the running one, which is returned, so that it ends as Cancelled."""
         self._epoch += 1
         current = self._current
+        self.cancel_waiting()
+        return current
+
+    def cancel_waiting(self) -> None:
+        """Cancel the calls that have not started."""
         for waiting in self._drain():
             waiting.finish(None, Cancelled(f"{self.device}: {waiting.method} was stopped before it began"))
-        return current
 
     def check_wanted(self) -> None:
         """Raise Cancelled when the call that runs was stopped or given up. On the lane, before it begins to act.

@@ -62,6 +62,17 @@ class PutIn(Struct, frozen=True):
     touching: list[str] = field(default_factory=list)
 
 
+class DeviceStop(Struct, frozen=True):
+    """The result of a stop on one device.
+
+    reason: why it was not stopped, empty when it was. method: the call that ran when the stop came, empty for none.
+    """
+
+    object_id: str
+    reason: str = ""
+    method: str = ""
+
+
 # ------------------------------------------------------------------------------------------------ server to host
 class ToHost(Struct, frozen=True, tag=True):
     """Base of everything the server says."""
@@ -150,10 +161,19 @@ class Call(ToHost, frozen=True):
 
 
 class StopMotion(ToHost, frozen=True):
-    """Call `stop` on the stop lane of one device, or of all (empty id). Answer: CallDone or CallFailed with this id."""
+    """Stop one device on its stop lane. Answer: CallDone or CallFailed with this id."""
 
     id: int
-    object_id: str = ""
+    object_id: str
+
+
+class StopAll(ToHost, frozen=True):
+    """Stop the program, if one runs, and all devices, concurrently.
+
+    Answer: CallDone with this id and a JSON list of DeviceStop.
+    """
+
+    id: int
 
 
 class Subscribe(ToHost, frozen=True):
@@ -350,6 +370,7 @@ HostBound = (
     | Calibrate
     | Call
     | StopMotion
+    | StopAll
     | Subscribe
     | Stream
     | Lease

@@ -22,8 +22,8 @@ from arcor2_hw.data.project import Project, ProjectRobotJoints
 from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, InvalidData, NotFound, ProgramStopped
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.device import STOP_DEADLINE, Device, describe
-from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.pacing import Gate
+from arcor2_hw.runtime.stopping import SentStop, wait_stopped
 from arcor2_hw.runtime.values import encode_shown, results
 
 POINT: Final = "action_point_id"
@@ -94,7 +94,7 @@ class Program:
         self._main = threading.main_thread()
         self._telling = threading.Lock()
         self._device_lost = False
-        self._stops: list[tuple[Device, Job]] = []
+        self._stops: list[SentStop] = []
         self._stop_sent = threading.Event()
         self._action_ids: dict[str, str] = {}
         self._joints_points: dict[str, str] = {}
@@ -218,7 +218,12 @@ class Program:
             self._stop_sent.wait(STOP_DEADLINE)  # the script may be out before the last device was told
         elif failed:
             self._stops = self.cell.stop_all()
-        return self.cell.wait_stopped(self._stops)
+        return wait_stopped(self._stops)
+
+    def sent_stops(self) -> list[SentStop]:
+        """Return the stops of a program that is being stopped, once they are sent to all devices."""
+        self._stop_sent.wait(STOP_DEADLINE)
+        return self._stops
 
     def exception(self, error: BaseException) -> None:
         """Tell of an exception that ended the script; one that was told already is not told again."""

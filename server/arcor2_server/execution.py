@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import time
 from collections.abc import Coroutine
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -87,7 +88,12 @@ class Execution(KeptPackages):
     @property
     def busy(self) -> bool:
         """Tell whether nothing else may be opened or run: from a program's start until what follows it is over."""
-        return self.reserved or self.state not in _IDLE
+        return self.reserved or self.active
+
+    @property
+    def active(self) -> bool:
+        """Tell whether a program is starting, running or ending."""
+        return self.state not in _IDLE
 
     def devices(self) -> list[DeviceStatus]:
         """Give what the devices of the running program say of themselves."""
@@ -156,9 +162,11 @@ class Execution(KeptPackages):
 
     async def _run(self, package_id: str, how: How) -> None:
         self._require_idle()
+        requested_at = time.monotonic()
         directory = await asyncio.to_thread(self.packages.directory, package_id)
         project_id = await asyncio.to_thread(self.packages.project_id, package_id) if how.shared_breakpoints else ""
         self._require_idle()
+        self._services.cell.last_stop.require_none_since(requested_at)
         self.package_id = package_id
         self._shared_of = project_id
         self._stopped_by = None
@@ -203,6 +211,10 @@ class Execution(KeptPackages):
             self._fail(str(error), type(error).__name__)
             self._ended()
             return
+        if self.state is S.STOPPING:  # stopped while its host was starting
+            await host.close()
+            self._ended()
+            return
         self._host = host
         host.send(with_world(self._services, message, measured))
 
@@ -226,10 +238,20 @@ class Execution(KeptPackages):
         One that has just been started is refused, as the protocol says, unless its host has fallen silent.
         """
         host = self._require(RUN_STATES if self.board.answering else RUN_STATES | {S.STARTED}, "stopped")
+        self._stop(by)
+        host.send(m.StopProgram())
+
+    def _stop(self, by: str) -> None:
         self._stopped_by = by
         self._enter(S.STOPPING)
-        host.send(m.StopProgram())
-        self._killing = asyncio.get_running_loop().call_later(self.stop_within, self._kill, host)
+        if self._host is not None:
+            self._killing = asyncio.get_running_loop().call_later(self.stop_within, self._kill, self._host)
+
+    def begin_stop_all(self, by: str) -> CellHost | None:
+        """Stop the program in every state; return the host that is to stop it and its devices, None without one."""
+        if self.state in RUN_STATES | {S.STARTED}:
+            self._stop(by)
+        return self._host
 
     def pause(self) -> None:
         """Let no further action begin."""

@@ -126,7 +126,7 @@ def test_stop_passes_the_busy_device(host: HostProcess, tmp_path: Path) -> None:
     while "move" not in (tmp_path / "notes").read_text():
         time.sleep(0.01)
     began = time.monotonic()
-    host.send(m.StopMotion(99))
+    host.send(m.StopMotion(99, "obj_a"))
     assert host.answer(queued).code == "cancelled"
     assert host.answer(move).code == "cancelled"
     assert host.answer(99) is None
@@ -142,7 +142,7 @@ def test_a_command_that_overtakes_the_stop_is_stopped_too(host: HostProcess, tmp
     move = host.begin("obj_a", "move")
     while "move" not in (tmp_path / "notes").read_text():
         time.sleep(0.001)
-    host.send(m.StopMotion(99))
+    host.send(m.StopMotion(99, "obj_a"))
     began = time.monotonic()
     assert host.answer(move).code == "cancelled"
     assert time.monotonic() - began < 0.5
@@ -166,7 +166,7 @@ def test_a_stop_while_control_is_taken_lets_nothing_begin(host: HostProcess, tmp
     host.send(m.Call(77, "obj_a", "move", control=True))
     while "taking" not in notes.read_text():
         time.sleep(0.001)
-    host.send(m.StopMotion(99))
+    host.send(m.StopMotion(99, "obj_a"))
     error = host.answer(77)
     assert error.code == "cancelled"
     time.sleep(0.6)  # control is taken by now

@@ -98,6 +98,9 @@ from arcor2_hw.data.rpc.operation import JogFrame as JogFrame
 from arcor2_hw.data.rpc.operation import JogRobotArgs as JogRobotArgs
 from arcor2_hw.data.rpc.operation import JogRobotData as JogRobotData
 from arcor2_hw.data.rpc.operation import RetryObjectArgs as RetryObjectArgs
+from arcor2_hw.data.rpc.operation import StopAllData as StopAllData
+from arcor2_hw.data.rpc.operation import StopKind as StopKind
+from arcor2_hw.data.rpc.operation import StopOutcome as StopOutcome
 from arcor2_hw.data.rpc.operation import StreamRobotArgs as StreamRobotArgs
 from arcor2_hw.data.rpc.projects import AddActionArgs as AddActionArgs
 from arcor2_hw.data.rpc.projects import AddLogicItemArgs as AddLogicItemArgs
@@ -313,6 +316,7 @@ RPCS: Final = {
         Rpc("StartSceneKeepGoing", None, None, Role.STANDARD_USER, dry_run=True, additional=True),
         Rpc("StepAction", None, None, Role.OPERATOR),
         Rpc("StepRobotEef", StepRobotEefArgs, None, Role.STANDARD_USER, dry_run=True),
+        Rpc("StopAll", None, StopAllData, Role.OPERATOR, additional=True),
         Rpc("StopPackage", None, None, Role.OPERATOR),
         Rpc("StopRobot", StopRobotArgs, None, Role.OPERATOR),
         Rpc("StopScene", None, None, Role.STANDARD_USER, dry_run=True),

@@ -71,6 +71,33 @@ class StreamRobotArgs(Data, frozen=True):
     send: bool = True
 
 
+class StopKind(enum.StrEnum):
+    """What a stop applies to."""
+
+    DEVICE = "device"
+    ACTION = "action"
+    PROGRAM = "program"
+
+
+class StopOutcome(Data, frozen=True):
+    """The result of StopAll for one device, the action that is being tried, or the program.
+
+    id, name: of the scene object, the action or the package. reason: why it was not stopped.
+    """
+
+    kind: StopKind
+    id: str
+    name: str
+    stopped: bool
+    reason: str | Unset = UNSET
+
+
+class StopAllData(Data, frozen=True):
+    """Answer of StopAll: an outcome for everything to which a stop was sent, or which cannot be stopped."""
+
+    outcomes: list[StopOutcome]
+
+
 class RetryObjectArgs(Data, frozen=True):
     """Arguments of RetryObject."""
 

@@ -14,7 +14,7 @@ export function notRunnable(state: State): string {
   if (!state.doc?.project) return "Open a project: a scene alone cannot be run.";
   if (isRunning(state)) return "It runs already.";
   if (state.live.state === "starting" || state.live.state === "stopping") return "Wait until the devices are online or offline.";
-  if (state.live.executing) return "An action is being tried: wait for it, or cancel it.";
+  if (state.live.executing) return "An action is being tried. Wait for it, or press Stop motion.";
   return barred(state, "TemporaryPackage");
 }
 

@@ -1529,6 +1529,27 @@ export interface StepRobotEefArgs {
 /** Values of What in StepRobotEef. */
 export type StepWhat = "position" | "orientation";
 
+/** Answer of StopAll: an outcome for everything to which a stop was sent, or which cannot be stopped. */
+export interface StopAllData {
+  outcomes: StopOutcome[];
+}
+
+/** What a stop applies to. */
+export type StopKind = "device" | "action" | "program";
+
+/**
+ * The result of StopAll for one device, the action that is being tried, or the program.
+ *
+ * id, name: of the scene object, the action or the package. reason: why it was not stopped.
+ */
+export interface StopOutcome {
+  kind: StopKind;
+  id: string;
+  name: string;
+  stopped: boolean;
+  reason?: string;
+}
+
 /** Arguments of StopRobot. */
 export interface StopRobotArgs {
   robot_id: string;
@@ -1904,6 +1925,7 @@ export interface Requests {
   StartSceneKeepGoing: { args: undefined; data: undefined };
   StepAction: { args: undefined; data: undefined };
   StepRobotEef: { args: StepRobotEefArgs; data: undefined };
+  StopAll: { args: undefined; data: StopAllData };
   StopPackage: { args: undefined; data: undefined };
   StopRobot: { args: StopRobotArgs; data: undefined };
   StopScene: { args: undefined; data: undefined };
@@ -2123,6 +2145,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   StartSceneKeepGoing: 2,
   StepAction: 1,
   StepRobotEef: 2,
+  StopAll: 1,
   StopPackage: 1,
   StopRobot: 1,
   StopScene: 2,

@@ -1,5 +1,7 @@
 """One action executed by itself, online: its arguments worked out, its result told and kept."""
 
+import math
+import time
 from typing import TYPE_CHECKING, Any
 
 import msgspec
@@ -10,7 +12,7 @@ from arcor2_hw.data.base import Data
 from arcor2_hw.data.object_type import ObjectAction
 from arcor2_hw.data.project import Action, ActionParameter, ActionParameterType, parse_link
 from arcor2_hw.data.project_index import ProjectLookup
-from arcor2_hw.exceptions import Arcor2Error, InvalidData
+from arcor2_hw.exceptions import Arcor2Error, Cancelled, InvalidData
 from arcor2_server.rpc.registry import RequestRefused
 
 if TYPE_CHECKING:
@@ -19,14 +21,33 @@ if TYPE_CHECKING:
 log = structlog.get_logger(__name__)
 
 
+class LastStop:
+    """When everything was last stopped: what was requested before that does not start any more."""
+
+    def __init__(self) -> None:
+        self._at = -math.inf
+
+    def note(self) -> None:
+        """Note that everything is being stopped now."""
+        self._at = time.monotonic()
+
+    def require_none_since(self, moment: float | None) -> None:
+        """Raise Cancelled if everything was stopped since `moment`, s of the monotonic clock; None: never raise."""
+        if moment is not None and self._at >= moment:
+            raise Cancelled("It was stopped before it started.")
+
+
 class RunningAction:
     """The action that is being executed."""
 
-    def __init__(self, action_id: str, object_id: str, method: str) -> None:
+    def __init__(self, action_id: str, object_id: str, method: str, requested_at: float) -> None:
         self.action_id = action_id
         self.object_id = object_id
         self.method = method
+        self.requested_at = requested_at
         self.cancelled = False
+        self.stop_requested = False
+        """Everything was stopped while it ran: the scene may go offline even if the action does not return."""
 
 
 class PreparedAction(Data, frozen=True):
@@ -80,7 +101,9 @@ async def execute(cell: "OnlineCell", prepared: PreparedAction, running: Running
     results: list[str] | None = None
     error: str | None = None
     try:
-        raw = await cell.call(prepared.object_id, prepared.method, prepared.arguments, control=True)
+        raw = await cell.call(
+            prepared.object_id, prepared.method, prepared.arguments, control=True, requested_at=running.requested_at
+        )
         results = split_results(raw, prepared.returns)
     except Arcor2Error as caught:
         error = str(caught)

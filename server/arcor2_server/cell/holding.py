@@ -273,6 +273,11 @@ class HeldRobots:
         for press in [press for press in self._held.values() if press.client is client]:
             self._end(press, f"{press.user} is not connected any more")
 
+    def stop(self, by: str) -> None:
+        """End all holds because a user stopped everything."""
+        for press in list(self._held.values()):
+            self._end(press, f"{by} stopped everything" if by else "everything was stopped")
+
     def offline(self, reason: str) -> None:
         """Forget all: the scene is offline, and whatever moved was stopped by the host."""
         for press in list(self._held.values()):

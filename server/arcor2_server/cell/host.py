@@ -28,6 +28,8 @@ LAST_WORDS: Final = 0.2
 """Seconds that the second sign of the end (socket or process) may come after the first."""
 HELD_WITHIN: Final = 15.0
 """Seconds for a hold to begin, in which control may have to be taken, or for a robot to come to rest."""
+STOPPED_WITHIN: Final = 3.0
+"""Seconds for a stop of all devices; the host gives the devices two."""
 ANSWERS_WITHIN: Final = 5.0
 """Seconds beyond a call's own deadline after which the host itself is to blame for the missing answer."""
 
@@ -191,10 +193,20 @@ class CellHost:
         message = m.Call(number, object_id, method, dict(arguments or {}), control, cancel, deadline)
         return await self._ask(number, message, deadline)
 
-    async def stop_motion(self, object_id: str = "") -> None:
-        """Call `stop` past whatever goes on; of all devices when none is named. CellError, ConnectionLost."""
+    async def stop_motion(self, object_id: str) -> None:
+        """Stop a device past whatever it does. CellError, ConnectionLost."""
         number = next(self._number)
         await self._ask(number, m.StopMotion(number, object_id), None)
+
+    async def stop_all(self) -> list[m.DeviceStop]:
+        """Stop the program and all devices; return what became of each. ConnectionLost, DeviceTimeout."""
+        number = next(self._number)
+        try:
+            async with asyncio.timeout(STOPPED_WITHIN):
+                raw = await self._ask(number, m.StopAll(number), None)
+        except TimeoutError:
+            raise DeviceTimeout("The cell host does not answer.", f"pid {self.pid}") from None
+        return msgspec.json.decode(raw, type=list[m.DeviceStop])
 
     async def lease(self, object_id: str, hold: int, kind: HoldKind, until: float, **motion: Any) -> bytes:
         """Let a robot be moved until a moment of the monotonic clock, 0 to let go; gives the scale as JSON, or empty.

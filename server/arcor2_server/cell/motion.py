@@ -83,12 +83,18 @@ async def take_control(services: "Services", robot_id: str, arm_id: str | None) 
 
 
 async def move(
-    services: "Services", robot_id: str, method: str, arguments: Mapping[str, Any], event: str, told: Told
+    services: "Services",
+    robot_id: str,
+    method: str,
+    arguments: Mapping[str, Any],
+    event: str,
+    told: Told,
+    requested_at: float,
 ) -> None:
-    """Move, and tell the end or the failure. The robot counts as moving from the request on (`cell.moving`)."""
+    """Move, and publish the end or the failure. The robot counts as moving from the request on (`cell.moving`)."""
     phase, problem = MoveEventType.END, ""
     try:
-        await services.cell.call(robot_id, method, arguments, control=True)
+        await services.cell.call(robot_id, method, arguments, control=True, requested_at=requested_at)
     except asyncio.CancelledError:
         raise
     except Arcor2Error as error:

@@ -15,7 +15,7 @@ from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import Arcor2Error, ConnectionLost
 from arcor2_hw.runtime import messages as m
-from arcor2_server.cell.actions import RunningAction
+from arcor2_server.cell.actions import LastStop, RunningAction
 from arcor2_server.cell.devices import DeviceBoard, DeviceStatus
 from arcor2_server.cell.holding import HeldRobots
 from arcor2_server.cell.host import CellHost, json_of
@@ -52,6 +52,7 @@ class OnlineCell:
         self.running_action: RunningAction | None = None
         self.results: dict[str, list[str]] = {}
         """Results of executed actions by action id, as JSON; forgotten when the scene goes offline."""
+        self.last_stop = LastStop()
         self.moving: set[str] = set()
         """Robots that move because a request said so."""
         self._services = services
@@ -202,8 +203,8 @@ class OnlineCell:
         services.session.require_scene_open()
         if not self.online:
             raise RequestRefused("The scene is not online.")
-        if self.running_action is not None:
-            raise RequestRefused("An action is running: wait for it, or cancel it.")
+        if self.running_action is not None and not self.running_action.stop_requested:
+            raise RequestRefused("An action is running: wait for it, or stop it.")
         await services.locks.acquire(SERVER, SCENE, PROJECT)
         try:
             self.require_online()
@@ -306,8 +307,13 @@ class OnlineCell:
         *,
         control: bool = False,
         deadline: float | None = None,
+        requested_at: float | None = None,
     ) -> bytes:
-        """Call a method of an object; gives the result as JSON, empty for None."""
+        """Call a method of an object; return the result as JSON, empty for None.
+
+        requested_at: when the motion was requested, s of the monotonic clock; Cancelled if all was stopped since.
+        """
+        self.last_stop.require_none_since(requested_at)
         encoded = {name: json_of(value) for name, value in (args or {}).items()}
         return await self._online_host().call(object_id, method, encoded, control=control, deadline=deadline)
 
@@ -319,9 +325,18 @@ class OnlineCell:
         """Make and connect an object anew that has failed."""
         await self._online_host().retry(object_id)
 
-    async def stop_motion(self, object_id: str = "") -> None:
-        """Stop an object, or all, past whatever they do."""
+    async def stop_motion(self, object_id: str) -> None:
+        """Stop an object past whatever it does."""
         await self._online_host().stop_motion(object_id)
+
+    def begin_stop_all(self, by: str) -> CellHost | None:
+        """End holds and what is about to start; return the host whose devices are to be stopped, None without one."""
+        self.last_stop.note()
+        self.held.stop(by)
+        if self.running_action is not None:
+            self.running_action.stop_requested = True
+            self.running_action.cancelled = True  # its end is published as ActionCancelled, unless it goes on
+        return self._host
 
     async def ask(self, kind: type[Any], object_id: str, method: str, args: Mapping[str, Any] | None = None) -> Any:
         """Call a method that only observes, and read its result as `kind`."""

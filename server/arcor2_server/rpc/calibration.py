@@ -146,7 +146,7 @@ async def calibrate_robot(context: Context, args: CalibrateRobotArgs) -> None:
     async def find(told: Told) -> Outcome:
         if moves:
             told(0.0, f"{robot.name} moves to where it is seen well")
-            await services.cell.call(robot.id, TO_CALIBRATION_POSE, control=True)
+            await services.cell.call(robot.id, TO_CALIBRATION_POSE, control=True, requested_at=context.received_at)
         return await _seen(services, robot, camera, parameters, model, told)
 
     def end() -> None:

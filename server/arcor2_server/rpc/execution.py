@@ -61,7 +61,7 @@ async def execute_action(context: Context, args: ExecuteActionArgs) -> None:
         prepared = prepare(action, services.types.action(obj.type, method), session, cell.results)
         if context.dry_run:
             return
-        running = cell.running_action = RunningAction(action.id, object_id, method)
+        running = cell.running_action = RunningAction(action.id, object_id, method, context.received_at)
     context.emit("ActionExecution", ActionExecutionData(action.id))
     cell.spawn(execute(cell, prepared, running), f"action {action.name}")
 
@@ -76,7 +76,7 @@ async def cancel_action(context: Context, args: None) -> None:  # noqa: ARG001
         raise RequestRefused("No action is running.")
     obj = services.session.scene_object(running.object_id)
     if not services.types.action(obj.type, running.method).meta.cancellable:
-        raise RequestRefused(f"{obj.name}.{running.method} cannot be cancelled.")
+        raise RequestRefused(f"{obj.name}.{running.method} cannot be cancelled. StopAll stops its device.")
     running.cancelled = True
     try:
         await services.cell.cancel(running.object_id, running.method)

@@ -16,10 +16,13 @@ from arcor2_hw.data.rpc import (
     JogRobotArgs,
     JogRobotData,
     RetryObjectArgs,
+    StopAllData,
+    StopKind,
     StreamRobotArgs,
 )
 from arcor2_hw.data.rpc.operation import FASTEST_STREAM
 from arcor2_server.cell.motion import require_feature, require_not_moving
+from arcor2_server.cell.stop_all import stop_all
 from arcor2_server.rpc.editing import optional
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
 from arcor2_server.rpc.robot import require_robot_online
@@ -115,6 +118,16 @@ def _axes(context: Context, args: JogRobotArgs) -> Orientation:
     if isinstance(found.pose, Unset):
         raise RequestRefused(f"{found.name} has no pose.")
     return found.pose.orientation
+
+
+# ------------------------------------------------------------------------------------------------ stop
+@rpc("StopAll")
+async def stop_all_(context: Context, args: None) -> StopAllData:  # noqa: ARG001
+    """Stop the program, every robot and device, and the action that is being tried."""
+    data = await stop_all(context.services, context.client.name)
+    if any(outcome.kind is StopKind.ACTION and outcome.stopped for outcome in data.outcomes):
+        context.emit("ActionCancelled")
+    return data
 
 
 # ------------------------------------------------------------------------------------------------ streams

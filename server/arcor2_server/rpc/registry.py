@@ -1,5 +1,6 @@
 """How a request finds its handler, and what a handler is given."""
 
+import time
 from collections.abc import Awaitable, Callable
 from typing import TYPE_CHECKING, Any, Final
 
@@ -52,13 +53,24 @@ class Context:
     sent when the request is granted, or refused with data; an error that is raised otherwise drops them.
     """
 
-    __slots__ = ("client", "dry_run", "events_after", "events_before", "events_to_caller", "request", "services")
+    __slots__ = (
+        "client",
+        "dry_run",
+        "events_after",
+        "events_before",
+        "events_to_caller",
+        "received_at",
+        "request",
+        "services",
+    )
 
     def __init__(self, services: "Services", client: "Client", dry_run: bool = False, request: str = "") -> None:
         self.services = services
         self.client = client
         self.dry_run = dry_run
         self.request = request
+        self.received_at = time.monotonic()
+        """When the request came, s of the monotonic clock."""
         self.events_before: list[Event] = []
         self.events_after: list[Event] = []
         self.events_to_caller: list[Event] = []

@@ -206,7 +206,7 @@ def begin_motion(
 
     async def whole() -> None:
         try:
-            await move(services, robot_id, method, arguments, event, told)
+            await move(services, robot_id, method, arguments, event, told, context.received_at)
         finally:
             if lock:
                 services.locks.release(lock, robot_id)

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import time
 
 import structlog
 
@@ -46,6 +47,7 @@ class _Run:
         self._services = services
         self._how = asked
         self._package = ""
+        self._requested_at = time.monotonic()
         self._online = False
 
     async def whole(self, built: "asyncio.Future[None]") -> None:
@@ -56,6 +58,7 @@ class _Run:
         try:
             async with self._services.locks.exclusive():
                 project = await self._build()
+                self._services.cell.last_stop.require_none_since(self._requested_at)
                 self._services.execution.reserved = True
                 _settle(built)
                 await asyncio.sleep(0)  # the answer goes out first
@@ -130,6 +133,7 @@ class _Run:
 
     async def _run(self) -> None:
         try:
+            self._services.cell.last_stop.require_none_since(self._requested_at)
             await self._services.execution.run_through(self._package, self._how)
         except Arcor2Error as error:
             log.warning("temporary package not run", package=self._package, reason=str(error))

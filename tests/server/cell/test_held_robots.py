@@ -343,6 +343,12 @@ async def test_stop_by_anybody_and_a_scene_that_goes_offline(arm: Server) -> Non
     with pytest.raises(Arcor2Error):
         await hand.jog()
     await hand.jog(new=True)
+    assert [outcome.stopped for outcome in (await arm.ask("StopAll", client=operator)).outcomes] == [True]
+    told = await operator.event("RobotHold", lambda data: not data["held"])
+    assert told["reason"] == "olga stopped everything"
+    with pytest.raises(Arcor2Error):
+        await hand.jog()
+    await hand.jog(new=True)
     await arm.ask("StopScene")
     told = await operator.event("RobotHold", lambda data: not data["held"])
     assert told["reason"]

@@ -22,6 +22,7 @@ ASKED: dict[str, dict[str, Any] | None] = {
     "StartSceneKeepGoing": None,
     "RetryObject": {"object_id": "nobody"},
     "AcknowledgeStop": {"object_id": "nobody"},
+    "StopAll": None,
 }
 ROLES = {
     "JogRobot": Role.STANDARD_USER,
@@ -30,6 +31,7 @@ ROLES = {
     "StartSceneKeepGoing": Role.STANDARD_USER,
     "RetryObject": Role.STANDARD_USER,
     "AcknowledgeStop": Role.OPERATOR,
+    "StopAll": Role.OPERATOR,
 }
 CLOSED, OFFLINE, ONLINE = "needs an open scene", "needs other scene state", "other"
 EXPECTED = {
@@ -37,6 +39,8 @@ EXPECTED = {
     "scene_offline": dict.fromkeys(ASKED, f"refused: {OFFLINE}") | {"StartSceneKeepGoing": "ok"},
     "scene_online": dict.fromkeys(ASKED, f"refused: {ONLINE}") | {"StartSceneKeepGoing": f"refused: {OFFLINE}"},
 }
+for row in EXPECTED.values():
+    row["StopAll"] = "ok"
 EXPECTED |= {"project_offline": EXPECTED["scene_offline"], "project_online": EXPECTED["scene_online"]}
 """What is asked names nothing that there is: where it would be granted otherwise, it is refused for that alone."""
 ANONYMOUS = {"JogRobot", "HoldHandTeaching", "AcknowledgeStop"}
@@ -72,6 +76,9 @@ async def test_the_role_that_is_stated_is_asked_for(tmp_path: Path) -> None:
         client.role = Role.OPERATOR
         for name, role in ROLES.items():
             assert RPCS[name].role is role
+            if name == "StopAll":  # nothing speaks against it
+                assert await answer(operator, name) == "ok"
+                continue
             text = await refused(operator, name, **(ASKED[name] or {}))
             assert ("needs the role standard_user" in text) is (role is Role.STANDARD_USER), f"{name}: {text}"
 

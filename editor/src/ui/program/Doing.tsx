@@ -3,6 +3,7 @@
 import { type FormEvent, useState } from "react";
 import { duplicateAction, notEditable, removeAction, renameAction } from "../../commands/program";
 import { barred } from "../../commands/asking";
+import { stopMotion } from "../../commands/operation";
 import { breakAt, cancel, execute, notRunnable, runTo } from "../../commands/run";
 import { metaOf } from "../../program/logic";
 import { useEditor } from "../../store/store";
@@ -27,8 +28,8 @@ const Doing: Section["Body"] = ({ selection: { id } }) => {
     <>
       <div className="row">
         {running ? (
-          <Button icon="close" why={meta?.meta.cancellable ? "" : "It cannot be cancelled: Stop motion stops the robot."} onPress={() => void cancel()}>
-            Cancel
+          <Button icon="close" onPress={() => void (meta?.meta.cancellable ? cancel() : stopMotion())}>
+            {meta?.meta.cancellable ? "Cancel" : "Stop everything"}
           </Button>
         ) : (
           <Button icon="play" why={notNow} onPress={() => void execute(id)}>

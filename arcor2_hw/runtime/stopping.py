@@ -1,0 +1,99 @@
+"""Stops that were sent to devices, and what became of them."""
+
+import time
+from typing import Final, NamedTuple
+
+from arcor2_hw.exceptions import Arcor2Error, Cancelled
+from arcor2_hw.runtime.device import STOP_DEADLINE, Device, describe, until
+from arcor2_hw.runtime.lane import Job
+from arcor2_hw.runtime.messages import DeviceStop
+
+UNSTOPPABLE_AFTER: Final = 0.25
+"""Seconds after which a call that nothing can stop is reported as still running."""
+POLL: Final = 0.005
+"""Seconds between two checks whether a call has returned."""
+
+
+class SentStop(NamedTuple):
+    """A stop of one device.
+
+    call: the call on the stop lane, None where the device has nothing to call. running: what ran on the device when
+    the stop came, None if it was idle. problem: why the stop could not be sent.
+    """
+
+    device: Device
+    call: Job | None
+    running: Job | None
+    problem: Arcor2Error | None = None
+
+
+def send_stop(device: Device) -> SentStop:
+    """Send a stop to a device without waiting for it."""
+    running = device.lane.current
+    try:
+        begun = device.begin_stop()
+    except Arcor2Error as error:  # an earlier stop has not returned
+        return SentStop(device, None, running, error)
+    return SentStop(device, None, running) if begun is None else SentStop(device, *begun)
+
+
+def wait_stopped(stops: list[SentStop], within: float = STOP_DEADLINE) -> Arcor2Error | None:
+    """Wait until the devices have obeyed; return the error of the first that has not."""
+    deadline = time.monotonic() + within
+    errors = [_call_error(stop, deadline, within) for stop in stops]
+    return next((error for error in errors if error is not None), None)
+
+
+def outcomes(stops: list[SentStop], within: float = STOP_DEADLINE) -> list[DeviceStop]:
+    """Wait until the devices have stopped, and report each to which a stop was sent or on which a call still runs.
+
+    within: seconds that all devices together have; they stop concurrently.
+    """
+    deadline = time.monotonic() + within
+    found = []
+    for stop in stops:
+        reason = _reason(stop, deadline, within)
+        if stop.call is not None or reason:
+            method = "" if stop.running is None else stop.running.method
+            found.append(DeviceStop(stop.device.id, reason, method))
+    return found
+
+
+def _call_error(stop: SentStop, deadline: float, within: float) -> Arcor2Error | None:
+    device, call = stop.device, stop.call
+    if call is None:
+        return None
+    if not call.wait(until(deadline)):
+        device.stop_lane.expire(call, within)
+    if call.error is None or isinstance(call.error, Cancelled):
+        return None
+    return describe(device, call.error)
+
+
+def _reason(stop: SentStop, deadline: float, within: float) -> str:
+    """Return why a device was not stopped, empty when it was."""
+    error = stop.problem or _call_error(stop, deadline, within)
+    if error is not None:
+        return str(error)
+    device, running = stop.device, stop.running
+    if running is None:
+        return ""
+    if stop.call is None:
+        if _returned(device, running, min(deadline, time.monotonic() + UNSTOPPABLE_AFTER)):
+            return ""
+        kind = device.recipe.cls.__name__
+        return (
+            f"{device.name}: {running.method} cannot be stopped from here, because {kind} has neither stop() nor a "
+            f"CANCEL_MAPPING entry for it"
+        )
+    if _returned(device, running, deadline):
+        return ""
+    return f"{device.name}: stop() returned, but {running.method} is still running"
+
+
+def _returned(device: Device, running: Job, deadline: float) -> bool:
+    while device.lane.current is running:
+        if time.monotonic() >= deadline:
+            return False
+        time.sleep(POLL)
+    return True

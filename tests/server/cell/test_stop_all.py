@@ -1,0 +1,276 @@
+"""StopAll: whatever runs is stopped by one request, and what cannot be stopped is named at once."""
+
+import asyncio
+import os
+import signal
+import time
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import pytest
+
+from arcor2_hw.data.geometry import Position
+from arcor2_hw.data.project import Action, ActionPoint, Flow, Project
+from arcor2_hw.data.rpc import StopAllData, StopKind
+from arcor2_hw.data.scene import Scene, SceneObject
+from arcor2_server.rpc import operation as _operation  # noqa: F401 - for its handlers
+from arcor2_server.rpc.registry import RequestRefused
+from tests.runtime.conftest import Package, scene_object
+
+from .conftest import Server, action, serving
+
+TYPES = {
+    "Screwdriver": """
+class Screwdriver(Generic):
+    _ABSTRACT = False
+    def __init__(self, obj_id, name, settings=None):
+        super().__init__(obj_id, name, settings)
+        self.stopped = threading.Event()
+    def stop(self):
+        self.stopped.set()
+    @action
+    def run(self, *, an: str | None = None) -> None:
+        Path(BEGAN).touch()
+        if self.stopped.wait(30):
+            self.stopped.clear()
+            raise Cancelled("stopped")
+""",
+    "Timer": """
+class Timer(Generic):
+    _ABSTRACT = False
+    CANCEL_MAPPING = {"run": "cancel"}
+    def __init__(self, obj_id, name, settings=None):
+        super().__init__(obj_id, name, settings)
+        self.cancelled = threading.Event()
+    def cancel(self):
+        self.cancelled.set()
+    @action
+    def run(self, *, an: str | None = None) -> None:
+        Path(BEGAN).touch()
+        if self.cancelled.wait(30):
+            raise Cancelled("cancelled")
+""",
+    "Press": """
+class Press(Generic):
+    _ABSTRACT = False
+    @action
+    def run(self, *, an: str | None = None) -> None:
+        Path(BEGAN).touch()
+        time.sleep(30)
+""",
+    "Stubborn": """
+class Stubborn(Generic):
+    _ABSTRACT = False
+    def stop(self):
+        time.sleep(30)
+    @action
+    def run(self, *, an: str | None = None) -> None:
+        Path(BEGAN).touch()
+        time.sleep(30)
+""",
+    "Slow": """
+class Slow(Generic):
+    _ABSTRACT = False
+    def connect(self, timeout=5.0):
+        time.sleep(0.6)
+    def disconnect(self):
+        time.sleep(0.6)
+    def stop(self):
+        pass
+    @action
+    def run(self, *, an: str | None = None) -> None:
+        Path(BEGAN).touch()
+        pass
+""",
+}
+NAMES = [name.lower() for name in TYPES]
+PROJECT = Project(
+    "project",
+    "scn_1",
+    id="pro_1",
+    modified="2026-01-02T00:00:00+00:00",
+    action_points=[
+        ActionPoint(
+            "p",
+            Position(),
+            id="acp_1",
+            actions=[Action(f"{n}_1", f"obj_{n}/run", f"act_{n}", [], [Flow()]) for n in NAMES],
+        )
+    ],
+)
+
+
+def sources(server: Server, *names: str) -> dict[str, str]:
+    began = f"BEGAN = {str(server.services.settings.data_dir / 'began')!r}"
+    return {name.capitalize(): began + TYPES[name.capitalize()] for name in names}
+
+
+def devices(*names: str) -> Callable[[Server], Awaitable[None]]:
+    async def prepare(server: Server) -> None:
+        for name, source in sources(server, *names).items():
+            server.types.add(name, source, [action("run", cancellable=name == "Timer")])
+        objects = [SceneObject(name, name.capitalize(), id=f"obj_{name}") for name in names]
+        await server.open(Scene("scene", id="scn_1", objects=objects), PROJECT)
+
+    return prepare
+
+
+async def begun(server: Server) -> None:
+    """Wait until the device runs its action."""
+    path = server.services.settings.data_dir / "began"
+    async with asyncio.timeout(15):
+        while not path.exists():
+            await asyncio.sleep(0.01)
+    path.unlink()
+
+
+async def trying(server: Server, name: str) -> None:
+    await server.ask("ExecuteAction", {"action_id": f"act_{name}"})
+    await server.client.event("ActionExecution")
+    await begun(server)
+
+
+async def stop_all(server: Server) -> StopAllData:
+    data = await server.ask("StopAll")
+    assert isinstance(data, StopAllData)
+    return data
+
+
+def missed(data: StopAllData) -> dict[str, Any]:
+    return {outcome.name: outcome.reason for outcome in data.outcomes if not outcome.stopped}
+
+
+async def ended(server: Server, within: float = 1.0) -> None:
+    async with asyncio.timeout(within):
+        while server.services.cell.running_action is not None:
+            await asyncio.sleep(0.01)
+
+
+@serving(devices("screwdriver", "timer"))
+async def test_a_tried_action_ends_whether_or_not_its_type_says_what_cancels_it(server: Server) -> None:
+    await server.start()
+    for name in ("screwdriver", "timer"):
+        await trying(server, name)
+        began = time.monotonic()
+        data = await stop_all(server)
+        assert time.monotonic() - began < 1.0
+        of_action = [outcome for outcome in data.outcomes if outcome.kind is StopKind.ACTION]
+        assert [(one.id, one.name, one.stopped) for one in of_action] == [(f"act_{name}", f"{name}_1", True)]
+        assert missed(data) == {}
+        await server.client.event("ActionCancelled")
+        await ended(server)
+    assert all(event["event"] != "ActionResult" for event in server.client.got)
+
+
+@serving(devices("screwdriver", "press"))
+async def test_what_cannot_be_stopped_is_named_at_once_and_does_not_keep_the_scene_online(server: Server) -> None:
+    await server.start()
+    await trying(server, "press")
+    with pytest.raises(RequestRefused):
+        await server.ask("StopScene")
+    began = time.monotonic()
+    data = await stop_all(server)
+    assert time.monotonic() - began < 1.0
+    assert {outcome.name for outcome in data.outcomes if outcome.stopped} == {"screwdriver"}
+    assert "press: run cannot be stopped" in missed(data)["press_1"]
+    assert all(word in missed(data)["press_1"] for word in ("Press", "stop()", "CANCEL_MAPPING"))
+    assert server.services.cell.running_action is not None
+    assert all(event["event"] != "ActionCancelled" for event in server.client.got)
+    began = time.monotonic()
+    await server.ask("StopScene")
+    await server.client.state("stopped")
+    assert time.monotonic() - began < 5.0
+    await ended(server)
+
+
+@serving(devices("screwdriver", "stubborn"))
+async def test_a_stop_that_hangs_is_named_and_delays_no_other(server: Server) -> None:
+    await server.start()
+    await trying(server, "stubborn")
+    began = time.monotonic()
+    data = await stop_all(server)
+    assert time.monotonic() - began < 3.0
+    assert set(missed(data)) == {"stubborn_1"}
+    assert "stop did not finish within 2 s" in missed(data)["stubborn_1"]
+    assert {outcome.name for outcome in data.outcomes if outcome.stopped} == {"screwdriver"}
+
+
+@serving(devices("slow"))
+async def test_while_the_scene_starts_and_stops(server: Server) -> None:
+    await server.ask("StartScene")
+    await server.client.state("starting")
+    assert missed(await stop_all(server)) == {}
+    await server.client.state("started")
+    await server.ask("StopScene")
+    await server.client.state("stopping")
+    assert missed(await stop_all(server)) == {}
+    assert "message" not in await server.client.state("stopped")
+    assert (await stop_all(server)).outcomes == []
+
+
+@serving(devices("press"))
+async def test_what_was_requested_before_does_not_start_after(server: Server) -> None:
+    await server.start()
+    await server.ask("ExecuteAction", {"action_id": "act_press"})
+    await stop_all(server)  # before the call has gone to the device
+    await server.client.event("ActionCancelled")
+    await ended(server)
+
+
+@serving(devices("screwdriver", "timer"))
+async def test_a_frozen_host_is_named(server: Server) -> None:
+    await server.start()
+    await trying(server, "screwdriver")
+    host = server.services.cell._host
+    assert host is not None
+    os.kill(host.pid, signal.SIGSTOP)
+    try:
+        began = time.monotonic()
+        data = await stop_all(server)
+        assert time.monotonic() - began < 4.0
+    finally:
+        os.kill(host.pid, signal.SIGCONT)
+    assert set(missed(data)) == {"timer", "screwdriver_1"}
+    assert all("does not answer" in reason for reason in missed(data).values())
+
+
+def write(server: Server, script: str, name: str) -> None:
+    directory = server.services.settings.packages_dir / "pkg_1"
+    body = f'device = res.objects["obj_{name}"]\n{script}'
+    kind = name.capitalize()
+    Package(directory).write(sources(server, name), [scene_object(name, kind)], PROJECT, body)
+
+
+@serving()
+async def test_a_program_is_stopped_with_its_devices(server: Server) -> None:
+    write(server, "device.run(an='screwdriver_1')", "screwdriver")
+    await server.ask("RunPackage", {"id": "pkg_1"})
+    await begun(server)
+    data = await stop_all(server)
+    assert {(outcome.kind, outcome.name, outcome.stopped) for outcome in data.outcomes} == {
+        (StopKind.PROGRAM, "pkg_1", True),
+        (StopKind.DEVICE, "screwdriver", True),
+    }
+    await server.client.state("stopping", "PackageState")
+    await server.client.state("stopped", "PackageState")
+    assert all(event["event"] != "ProjectException" for event in server.client.got)
+
+
+@serving()
+async def test_a_program_that_is_just_starting_does_not_begin(server: Server) -> None:
+    write(server, "device.run(an='screwdriver_1')", "screwdriver")
+    await server.ask("RunPackage", {"id": "pkg_1"})
+    data = await stop_all(server)
+    assert [(outcome.kind, outcome.stopped) for outcome in data.outcomes] == [(StopKind.PROGRAM, True)]
+    await server.client.state("stopped", "PackageState")
+    assert all(event["event"] not in ("ActionStateBefore", "PackageInfo") for event in server.client.got)
+
+
+@serving()
+async def test_a_program_whose_device_cannot_be_stopped_ends_and_names_it(server: Server) -> None:
+    write(server, "device.run(an='press_1')", "press")
+    await server.ask("RunPackage", {"id": "pkg_1"})
+    await begun(server)
+    data = await stop_all(server)
+    assert set(missed(data)) == {"press"}
+    await server.client.state("stopped", "PackageState")
