@@ -41,6 +41,7 @@ def action(
     *,
     composite: bool = False,
     hidden: bool = False,
+    quick: bool = False,
     deadline: float | None = DEFAULT_DEADLINE,
     category: str = "",
     icon: str = "",
@@ -53,6 +54,7 @@ def action(
     *,
     composite: bool = False,
     hidden: bool = False,
+    quick: bool = False,
     deadline: float | None = DEFAULT_DEADLINE,
     category: str = "",  # noqa: ARG001 - read from the source
     icon: str = "",  # noqa: ARG001
@@ -60,6 +62,7 @@ def action(
     """Mark a method as an action.
 
     composite: it may call other actions. hidden: it is not offered to users.
+    quick: it neither waits nor moves anything and returns within 1 s, so that there is nothing to stop.
     deadline: seconds after which the call is given up as failed; None for one that ends only when it is stopped.
     category, icon: how the editor shows it, where that is not as its type has it.
     """
@@ -67,6 +70,7 @@ def action(
     def mark(function: F) -> F:
         function.__action__ = ActionMetadata(composite=composite, hidden=hidden)  # type: ignore[attr-defined]
         function.__deadline__ = deadline  # type: ignore[attr-defined]
+        function.__quick__ = quick  # type: ignore[attr-defined]
         return function
 
     return mark if method is None else mark(method)
@@ -76,6 +80,11 @@ def metadata_of(method: object) -> ActionMetadata | None:
     """Give the metadata of an action, None for a method that is none."""
     found = getattr(method, "__action__", None)
     return found if isinstance(found, ActionMetadata) else None
+
+
+def is_quick(method: object) -> bool:
+    """Tell whether an action declares that it returns within 1 s."""
+    return bool(getattr(method, "__quick__", False))
 
 
 def deadline_of(method: object) -> float | None:

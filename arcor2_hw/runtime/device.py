@@ -15,7 +15,7 @@ from arcor2_hw.exceptions import (
     InvalidData,
     NotConnected,
 )
-from arcor2_hw.objects import Axis, CollisionObject, Generic, Robot
+from arcor2_hw.objects import Axis, CollisionObject, Generic, MultiArmRobot, Robot
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.observing import Observing, listening
 from arcor2_hw.objects.surroundings import Surroundings
@@ -27,6 +27,8 @@ CONSTRUCTION_DEADLINE: Final = 10.0
 """Seconds beyond the connect timeout for a constructor that, by the older convention, opens the device itself."""
 STOP_DEADLINE: Final = 2.0
 """Seconds a `stop` may take before it is reported as failed."""
+NO_STOP: Final = (Robot.stop, MultiArmRobot.stop)
+"""The hooks that only raise the not-implemented error."""
 OVERTAKES_WITHIN: Final = 0.1
 """Seconds from the begin of a call within which its command to the device may still be on its way."""
 STOP_GRACE: Final = 2.0
@@ -244,7 +246,7 @@ class Device:
         if isinstance(instance, Axis):
             return instance.halt
         found = getattr(instance, "stop", None)
-        return found if callable(found) and getattr(found, "__func__", None) is not Robot.stop else None
+        return found if callable(found) and getattr(found, "__func__", None) not in NO_STOP else None
 
     def cancelled_by(self, action: str) -> str:
         """Name the method that cancels an action; InvalidData when nothing does."""

@@ -4,12 +4,17 @@ import inspect
 from functools import lru_cache
 from typing import Any, Final
 
+from arcor2_hw.actions import deadline_of, metadata_of
+from arcor2_hw.actions.marking import is_quick
 from arcor2_hw.analysis import Library
 from arcor2_hw.exceptions import Arcor2NotImplemented
-from arcor2_hw.objects import Generic
+from arcor2_hw.objects import Axis, Generic
+from arcor2_hw.runtime.device import NO_STOP
 from arcor2_hw.testing import described
 
 OURS: Final = "arcor2_hw.objects"
+STOPPABLE_FROM: Final = 1.0
+"""Seconds: an action that may last longer has to be stoppable."""
 READS: Final = frozenset(
     {
         "alarms",
@@ -120,6 +125,27 @@ def readable(kind: type[Generic], said: frozenset[str]) -> list[str]:
 
 def _required_beyond_self(function: Any) -> bool:
     return _required(function) > 1
+
+
+def unstoppable(kind: type[Generic]) -> list[str]:
+    """Return the actions of a type that may last longer than STOPPABLE_FROM s and that nothing stops.
+
+    An action is stopped by `stop()` of its type (`halt()` of an axis), or by the method that CANCEL_MAPPING names.
+    """
+    stop = getattr(kind, "stop", None)
+    if issubclass(kind, Axis) or (callable(stop) and stop not in NO_STOP):
+        return []
+    found = []
+    for name in dir(kind):
+        member = getattr(kind, name, None)
+        if metadata_of(member) is None or getattr(member, "__module__", "").startswith(OURS) or is_quick(member):
+            continue
+        deadline = deadline_of(member)
+        if deadline is not None and deadline <= STOPPABLE_FROM:
+            continue
+        if not callable(getattr(kind, kind.CANCEL_MAPPING.get(name, ""), None)):
+            found.append(name)
+    return found
 
 
 def unhinted(kind: type[Generic]) -> list[str]:

@@ -20,6 +20,14 @@ class WrittenCases:
         lacking = capabilities.unhinted(arcor2_bench.object_type)
         assert not lacking, f"there is no hint at {', '.join(lacking)}"
 
+    def test_long_actions_can_be_stopped(self, arcor2_bench: Bench) -> None:
+        """Every action that can last longer than 1 s is ended by stop() or by what CANCEL_MAPPING names for it."""
+        found = capabilities.unstoppable(arcor2_bench.object_type)
+        assert not found, (
+            f"nothing stops {', '.join(found)}: define stop(), name a method in CANCEL_MAPPING, or declare that an "
+            f"action is over within {capabilities.STOPPABLE_FROM:g} s by @action(quick=True)"
+        )
+
     def test_capabilities_declared(self, arcor2_bench: Bench) -> None:
         """An optional method is there where analysis sees it, and says not-implemented where it does not."""
         said = capabilities.declared(arcor2_bench.object_type)

@@ -1,12 +1,13 @@
 """A crate of parts as an object type: the pose of the next part, from a depth picture."""
 
 import datetime
+from collections.abc import Callable
 from typing import TYPE_CHECKING, ClassVar
 
 from arcor2_hw.actions import action
 from arcor2_hw.data.device import Connection, LossReaction
 from arcor2_hw.data.geometry import Pose
-from arcor2_hw.exceptions import DeviceError, InvalidData, NotConnected, OutOfRange, Stale
+from arcor2_hw.exceptions import Cancelled, DeviceError, InvalidData, NotConnected, OutOfRange, Stale
 from arcor2_hw.objects import GenericWithPose
 from arcor2_hw.objects.frame import PictureNote
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
@@ -37,6 +38,7 @@ class Bin(GenericWithPose):
         self._given = settings
         self._model: Model | None = None
         self._connected = Connection.OFFLINE
+        self._stops = 0
 
     # -------------------------------------------------------------------------------- connection
     def connect(self, timeout: float = DEFAULT_CONNECT_TIMEOUT) -> None:
@@ -73,6 +75,20 @@ class Bin(GenericWithPose):
             raise NotConnected(f"{self.name} is not connected")
         return self._model
 
+    def stop(self) -> None:
+        """End a search for a part, which then raises Cancelled; called while it runs."""
+        self._stops += 1
+
+    def _go_on(self) -> Callable[[], None]:
+        """Return what raises Cancelled once a stop has come."""
+        stops = self._stops
+
+        def go_on() -> None:
+            if self._stops != stops:
+                raise Cancelled(f"{self.name}: the search for a part was stopped")
+
+        return go_on
+
     # -------------------------------------------------------------------------------- actions
     @action
     def next_part(self, depth: "Image.Image", *, an: str | None = None) -> tuple[Pose, float]:
@@ -85,7 +101,7 @@ class Bin(GenericWithPose):
         model = self._loaded()
         view = self._view(depth)
         try:
-            found = find(view, self._crate(), model, self._given.tolerance, self._given.min_quality)
+            found = find(view, self._crate(), model, self._given.tolerance, self._given.min_quality, self._go_on())
         except DeviceError as error:
             raise type(error)(f"{self.name}: {error}", error.detail) from error
         return self.pose * Pose.from_matrix(found.pose), round(found.fit.quality, 4)

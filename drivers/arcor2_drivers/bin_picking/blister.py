@@ -66,7 +66,7 @@ class Blister(GenericWithPose):
             raise NotConnected(f"{self.name} is not connected")
 
     # -------------------------------------------------------------------------------- actions
-    @action
+    @action(quick=True)
     def next_part(self, *, an: str | None = None) -> Pose:
         """Give the pose of the next part; it stays there until part_taken."""
         self._check()
@@ -76,7 +76,7 @@ class Blister(GenericWithPose):
         self._offered = found
         return self._pose_of(*found)
 
-    @action
+    @action(quick=True)
     def part_taken(self, *, an: str | None = None) -> None:
         """Note that the part that next_part gave is gone."""
         self._check()
@@ -85,7 +85,7 @@ class Blister(GenericWithPose):
         self._note(*self._offered, False)
         self._offered = None
 
-    @action
+    @action(quick=True)
     def next_free(self, *, an: str | None = None) -> Pose:
         """Give the pose of the next free place; it stays free until part_put."""
         self._check()
@@ -95,7 +95,7 @@ class Blister(GenericWithPose):
         self._free = found
         return self._pose_of(*found)
 
-    @action
+    @action(quick=True)
     def part_put(self, *, an: str | None = None) -> None:
         """Note that a part lies at the place that next_free gave."""
         self._check()
@@ -104,7 +104,7 @@ class Blister(GenericWithPose):
         self._note(*self._free, True)
         self._free = None
 
-    @action
+    @action(quick=True)
     def grip_pose(self, part: Pose, above: float = 0.0, *, an: str | None = None) -> Pose:
         """Give the pose for the tool at a part or place: z down into it.
 
@@ -115,7 +115,7 @@ class Blister(GenericWithPose):
 
         return gripping(part, self.pose, 0.0, above)
 
-    @action
+    @action(quick=True)
     def place(self, row: int, column: int, *, an: str | None = None) -> Pose:
         """Give the pose of a place, whether there is a part or not.
 
@@ -125,7 +125,7 @@ class Blister(GenericWithPose):
         self._exists(row, column)
         return self._pose_of(row, column)
 
-    @action
+    @action(quick=True)
     def set_place(self, row: int, column: int, full: bool, *, an: str | None = None) -> None:
         """Say that a place has a part, or has none.
 
@@ -137,30 +137,30 @@ class Blister(GenericWithPose):
         self._exists(row, column)
         self._note(row, column, full)
 
-    @action
+    @action(quick=True)
     def refill(self, *, an: str | None = None) -> None:
         """Say that all places have a part: a full one was put there."""
         self._check()
         self._all(True)
 
-    @action
+    @action(quick=True)
     def clear(self, *, an: str | None = None) -> None:
         """Say that all places are free: an empty one was put there."""
         self._check()
         self._all(False)
 
-    @action
+    @action(quick=True)
     def parts(self, *, an: str | None = None) -> int:
         """Give how many places have a part."""
         self._check()
         return self._places.count
 
-    @action
+    @action(quick=True)
     def is_empty(self, *, an: str | None = None) -> bool:
         """Tell whether no place has a part."""
         return self.parts() == 0
 
-    @action
+    @action(quick=True)
     def is_full(self, *, an: str | None = None) -> bool:
         """Tell whether every place has a part."""
         return self.parts() == self._given.rows * self._given.columns

@@ -1,5 +1,6 @@
 """Finding the next part in a crate: from a depth picture to a pose with its quality, or why there is none."""
 
+from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -83,9 +84,17 @@ def lies_there(view: View, crate: Crated, model: Model, tolerance: float) -> boo
     return bool(_things(see(view, crate, tolerance), view, model, tolerance))
 
 
-def find(view: View, crate: Crated, model: Model, tolerance: float, min_quality: float) -> Found:
+def find(
+    view: View,
+    crate: Crated,
+    model: Model,
+    tolerance: float,
+    min_quality: float,
+    go_on: Callable[[], None] = lambda: None,
+) -> Found:
     """Find the part that lies highest and fits well.
 
+    go_on: called before each candidate is registered, and may raise to end the search.
     Raises Empty when nothing lies there, PartsTouch, BadFit; NoDepth when the crate is not seen.
     """
     seen = see(view, crate, tolerance)
@@ -97,10 +106,12 @@ def find(view: View, crate: Crated, model: Model, tolerance: float, min_quality:
     best: Fit | None = None
     too_large = False
     for pixels in sorted(wholes, key=lambda each: -_top(seen, each))[:MOST_CANDIDATES]:
+        go_on()
         fit = register(seen, pixels, model, view.camera, beams, tolerance)
         if fit.quality < min_quality:
             pieces = [each for each in surfaces(seen, pixels) if _area(each, view) > LEAST_AREA * smallest]
             for piece in sorted(pieces, key=lambda each: -_top(seen, each))[:MOST_CANDIDATES]:
+                go_on()
                 if piece.sum() < pixels.sum() and _area(piece, view) <= TOO_LARGE * largest:
                     fit = max(fit, register(seen, piece, model, view.camera, beams, tolerance), key=_quality)
                     if fit.quality >= min_quality:

@@ -7,7 +7,7 @@ from typing import ClassVar, Final
 from arcor2_hw.actions import action
 from arcor2_hw.data.base import now
 from arcor2_hw.data.device import Alarm, Connection, Health, Identity, LossReaction, Severity
-from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, NotFound, OutOfRange, Refused
+from arcor2_hw.exceptions import Cancelled, DeviceError, DeviceFault, DeviceTimeout, NotFound, OutOfRange, Refused
 from arcor2_hw.objects import Printer
 from arcor2_hw.objects.asked_line import AskedLine
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
@@ -64,6 +64,7 @@ class ZplPrinter(Printer):
         self._template = settings.template
         self._unconfirmed: int | None = None  # the counter before a label of which we don't know what became
         self._alarms: dict[str, Alarm] = {}
+        self._stops = 0
 
     # -------------------------------------------------------------------------------- connection
     def connect(self, timeout: float = DEFAULT_CONNECT_TIMEOUT) -> None:
@@ -124,9 +125,11 @@ class ZplPrinter(Printer):
         """Send one label in ZPL, once, and give the job's id when the printer has counted it.
 
         Raises OutOfRange for what is no single label, DeviceFault naming what keeps the printer from printing, Refused
-        while it prints others' labels or the last one is unconfirmed, DeviceTimeout or ConnectionLost in between: then
-        the label may come out or not, and nothing more is printed before somebody has taken note of that.
+        while it prints others' labels or the last one is unconfirmed, Cancelled by `stop`, DeviceTimeout or
+        ConnectionLost in between: then the label may come out or not, and nothing more is printed before somebody has
+        taken note of that.
         """
+        stops = self._stops
         try:
             data = zpl.check_label(label)
         except BadLabel as e:
@@ -140,18 +143,28 @@ class ZplPrinter(Printer):
             if found.buffer_full or not found.idle:
                 raise Refused(f"{self._who} is printing labels of somebody else; nothing was sent")
             before = self._ask_counter()
+            self._check_not_stopped(stops, "nothing was sent")
             self._unconfirmed = before
             self._alarm(UNCONFIRMED, True)
             self._line.send(data)
-            job = self._confirm(before)
+            job = self._confirm(before, stops)
             self._settle()
             self._line.observing.settled()
             return job
 
-    def _confirm(self, before: int) -> str:
+    def stop(self) -> None:
+        """End the wait for a label, which then raises Cancelled; the printer finishes what it has received."""
+        self._stops += 1
+
+    def _check_not_stopped(self, stops: int, and_: str) -> None:
+        if self._stops != stops:
+            raise Cancelled(f"{self._who}: printing was stopped; {and_}")
+
+    def _confirm(self, before: int, stops: int) -> str:
         """Wait until the printer has counted the label; gives the job's id."""
         deadline = time.monotonic() + self._print_timeout
         while True:
+            self._check_not_stopped(stops, "the label was sent and may come out; it is not sent again")
             found = self._ask_status()
             counted = self._ask_counter() - before
             if counted == 1 and found.idle:

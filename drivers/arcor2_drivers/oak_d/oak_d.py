@@ -132,6 +132,10 @@ class OakD(Camera):
             )
         self._observed.set_exposure(exposure)
 
+    def stop(self) -> None:
+        """End what waits for a picture, which then raises Cancelled; the camera keeps taking pictures."""
+        self._observed.stop_waiting()
+
     # -------------------------------------------------------------------------------- actions
     @action
     def color_image(self, *, an: str | None = None) -> "Image.Image":

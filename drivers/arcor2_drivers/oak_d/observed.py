@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from arcor2_hw.data.base import Timestamp, now
 from arcor2_hw.data.device import Alarm, Connection, Health, Severity
-from arcor2_hw.exceptions import DeviceError, DeviceTimeout, NotConnected, Refused, Stale
+from arcor2_hw.exceptions import Cancelled, DeviceError, DeviceTimeout, NotConnected, Refused, Stale
 from arcor2_hw.objects.observing import Observing
 
 from .settings import OakDSettings
@@ -39,6 +39,7 @@ class Observed:
         self._feed: Feed | None = None
         self._newest: Shot | None = None
         self._came = 0.0
+        self._stops = 0
         self.taken = 0
         """Pictures that have come since the object was made."""
         self._news = threading.Condition()
@@ -63,12 +64,15 @@ class Observed:
     def after(self, moment: float, timeout: float) -> "Shot":
         """Wait for the first picture whose exposure ended after `moment` (monotonic, s).
 
-        Raises ConnectionLost, and after `timeout` s Stale.
+        Raises Cancelled by `stop_waiting`, ConnectionLost, and after `timeout` s Stale.
         """
         deadline = time.monotonic() + timeout
         with self._news:
+            stops = self._stops
             while True:
                 self.observing.check()
+                if self._stops != stops:
+                    raise Cancelled(f"{self.who}: waiting for a picture was stopped")
                 newest = self._newest
                 if newest is not None and newest.monotonic > moment:
                     return newest
@@ -77,6 +81,12 @@ class Observed:
                 self._news.wait(left)
         age = "never" if newest is None else f"{time.monotonic() - newest.monotonic:.2f} s ago"
         raise Stale(f"{self.who} gave no new picture within {timeout:g} s; the last was taken {age}")
+
+    def stop_waiting(self) -> None:
+        """End the calls that wait for a picture, with Cancelled."""
+        with self._news:
+            self._stops += 1
+            self._news.notify_all()
 
     @property
     def latency(self) -> float:

@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from arcor2_drivers.bin_picking import finder
 from arcor2_drivers.bin_picking.bin import Bin
 from arcor2_drivers.bin_picking.errors import BadFit, Empty, PartsTouch
 from arcor2_hw.actions.json_values import decode_picture, encode
 from arcor2_hw.data.geometry import Orientation, Pose, Position
-from arcor2_hw.exceptions import InvalidData, NoDepth, NotConnected, OutOfRange, Stale
+from arcor2_hw.exceptions import Cancelled, InvalidData, NoDepth, NotConnected, OutOfRange, Stale
 from arcor2_hw.objects.frame import PictureNote
 
 from .conftest import CRATE, PART, Photographer, at, part, turned
@@ -172,3 +173,19 @@ def test_pictures_that_are_none(picture: Photographer, make: Callable[..., Bin])
     crate.disconnect()
     with pytest.raises(NotConnected, match=r"^crate is not connected"):
         crate.next_part(photo)
+
+
+def test_stop_ends_a_search(picture: Photographer, make: Callable[..., Bin], monkeypatch: pytest.MonkeyPatch) -> None:
+    bin_ = make()
+    register = finder.register
+
+    def stopped_meanwhile(*given: Any) -> Any:
+        bin_.stop()
+        return register(*given)._replace(quality=0.0)
+
+    view = picture(part("a", at(-0.05, 0.0, FLAT)), part("b", at(0.07, 0.0, FLAT)))
+    monkeypatch.setattr(finder, "register", stopped_meanwhile)
+    with pytest.raises(Cancelled, match="stopped"):
+        bin_.next_part(view)
+    monkeypatch.undo()
+    assert bin_.next_part(view)[1] > 0.9

@@ -11,7 +11,17 @@ import yaml
 from arcor2_drivers.label_printer.settings import ZplPrinterSettings
 from arcor2_drivers.label_printer.zpl_printer import ZplPrinter
 from arcor2_hw.data.device import Connection, Health, Identity
-from arcor2_hw.exceptions import ConnectionLost, DeviceFault, DeviceTimeout, NotConnected, NotFound, OutOfRange, Refused
+from arcor2_hw.exceptions import (
+    Cancelled,
+    ConnectionLost,
+    DeviceFault,
+    DeviceTimeout,
+    NotConnected,
+    NotFound,
+    OutOfRange,
+    Refused,
+)
+from arcor2_hw.testing.life import Beside
 from tests.fakes.conftest import FakeProcess
 
 on_both = pytest.mark.parametrize("fake", ["tcp", "pty"], indirect=True)
@@ -263,3 +273,19 @@ def test_what_the_quality_file_claims_is_there() -> None:
         file, _, function = test.partition("::")
         assert f"def {function}(" in (Path(__file__).parent / file).read_text(), test
     assert all(hasattr(getattr(ZplPrinter, name), "__action__") for name in claims["actions"])
+
+
+@pytest.mark.parametrize("fake", ["flags"], indirect=True)
+def test_stop_ends_the_wait_and_the_label_comes_out_once(fake: FakeProcess, printer: ZplPrinter) -> None:
+    printing = Beside(lambda: printer.print(LABEL))
+    while "format" not in fake.truth()["received"]:
+        assert not printing.over
+    printer.stop()
+    error = printing.outcome(2.0, "printing that was stopped")
+    assert isinstance(error, Cancelled)
+    assert "not sent again" in str(error)
+    assert [alarm.code for alarm in printer.alarms()] == ["unconfirmed"]
+    while fake.truth()["counter"] == 0:
+        time.sleep(0.01)
+    assert printer.last_came_out()
+    assert printer.print(LABEL) == "printer-2"

@@ -13,6 +13,7 @@ import pytest
 from arcor2_drivers.oak_d.oak_d import OakD
 from arcor2_hw.data.device import Connection, Health
 from arcor2_hw.exceptions import (
+    Cancelled,
     ConnectionLost,
     DeviceFault,
     DeviceTimeout,
@@ -21,6 +22,7 @@ from arcor2_hw.exceptions import (
     Overexposed,
     Stale,
 )
+from arcor2_hw.testing.life import Beside
 from tests.fakes.conftest import FakeProcess
 
 from .conftest import PATIENCE
@@ -224,3 +226,15 @@ def test_several_cameras_have_to_be_told_apart(monkeypatch: pytest.MonkeyPatch) 
     with pytest.raises(NotConnected, match=r"^camera: there are 2 cameras; give the device id of one") as raised:
         device_feed.find("camera", "", 0.1)
     assert "10.0.0.7" in raised.value.detail
+
+
+def test_stop_ends_the_wait_for_a_picture(fake: FakeProcess, camera: OakD) -> None:
+    fake.control.do("frozen")
+    waiting = Beside(camera.color_image)
+    while not waiting.over:
+        camera.stop()
+        time.sleep(0.01)
+    assert isinstance(waiting.error, Cancelled)
+    fake.control.do("heal")
+    wait(lambda: fresh(camera))
+    assert camera.color_image().size == (640, 360)
