@@ -27,6 +27,7 @@ from benchmarks import (
     operation,
     recovery,
     requests,
+    restart,
     robot,
     robot_pose,
     running,
@@ -38,6 +39,7 @@ LONG: Final = "--long"
 ROOMS: Final[dict[str, Callable[[Report, Path], Awaitable[None]]]] = {
     "requests": requests.run,
     "documents": documents.run,
+    "restart": restart.run,
     "listeners": listeners.run,
     "operation": operation.run,
     "running": running.run,

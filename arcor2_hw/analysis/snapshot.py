@@ -101,12 +101,18 @@ def restore(library: Library, encoded: bytes) -> bool:
     return True
 
 
-def _digest(library: Library) -> str:
+def code_digest(*packages: Path) -> str:
+    """Return a digest of the sources in these folders, by their stamps, and of the Python version."""
     digest = hashlib.sha256(repr(sys.version_info).encode())
+    for package in packages:
+        for file in sorted(package.rglob("*.py")):
+            digest.update(repr((str(file), stamp_of(file))).encode())
+    return digest.hexdigest()
+
+
+def _digest(library: Library) -> str:
+    digest = hashlib.sha256(code_digest(*(_LIBRARY / package for package in _CODE)).encode())
     for name in library.names():
         if name not in BUILT_IN:
             digest.update(_encode(StoredSource.of(library.file(name))))
-    for package in _CODE:
-        for file in sorted((_LIBRARY / package).rglob("*.py")):
-            digest.update(repr((str(file), stamp_of(file))).encode())
     return digest.hexdigest()

@@ -1,9 +1,11 @@
 """What the server knows of object types: built-in, installed and uploaded ones, read by analysis, never imported."""
 
 import asyncio
+import hashlib
 from collections.abc import Iterable
 from pathlib import Path
 
+import msgspec
 import structlog
 from msgspec import Struct
 from msgspec.structs import replace
@@ -23,6 +25,7 @@ from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ObjectTypeS
 from arcor2_hw.data.robot import RobotMeta
 from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_hw.runtime.messages import TypeCode
+from arcor2_server.private_files import write_private
 from arcor2_server.robot_packages import robot_packages
 from arcor2_server.storage import AssetStore, Storage
 
@@ -62,6 +65,7 @@ class _Known(Struct, frozen=True):
     analyses: dict[str, TypeAnalysis] = {}
     metas: dict[str, ObjectTypeMeta] = {}
     robots: dict[str, RobotMeta] = {}
+    digest: str = ""
 
 
 class ObjectTypes:
@@ -184,7 +188,10 @@ class ObjectTypes:
                 metas[name] = ObjectTypeMeta(name, abstract=True, disabled=True, problem=str(installed.problem))
                 analyses[name] = TypeAnalysis(metas[name], problem=installed.problem)
         robots = {name: self._with_asset(a.robot) for name, a in analyses.items() if a.robot and name in metas}
-        return _Known(analyses, dict(sorted(metas.items())), dict(sorted(robots.items())))
+        metas, robots = dict(sorted(metas.items())), dict(sorted(robots.items()))
+        actions = [analyses[name].actions for name in metas]
+        digest = hashlib.sha256(msgspec.msgpack.encode((metas, robots, actions))).hexdigest()
+        return _Known(analyses, metas, robots, digest)
 
     def _restored(self, file: Path) -> bool:
         """Take over the analysis stored by an earlier process; return False if it is missing or outdated."""
@@ -196,10 +203,8 @@ class ObjectTypes:
     def _store(self, file: Path) -> None:
         """Analyse all types and store the results for the next start."""
         encoded = snapshot.take(self._library)
-        fresh = file.with_suffix(".new")
         try:
-            fresh.write_bytes(encoded)
-            fresh.replace(file)
+            write_private(file, encoded)
         except OSError as error:
             log.warning("analysis not stored: the next start takes longer", file=str(file), reason=error.strerror)
 
@@ -234,6 +239,11 @@ class ObjectTypes:
         self._note()
 
     # ------------------------------------------------------------------------------------------------ look-ups
+    @property
+    def digest(self) -> str:
+        """Return a digest of all types, robots and actions; it is the same in the next process if they are."""
+        return self._known.digest
+
     def names(self) -> list[str]:
         """Give the names of all types."""
         return list(self._known.metas)

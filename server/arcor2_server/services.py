@@ -101,7 +101,7 @@ class Services:
         self.arm_calibrations = ArmCalibrations(self, self.settings.arm_calibrations_file)
         self.prepared = PreparedAssets(self, self.settings.prepared_dir)
         self.markers = Markers(self.settings.markers_file, self.settings.markers)
-        self.saved_problems = SavedProblems(self.storage, self.types)
+        self.saved_problems = SavedProblems(self.storage, self.types, self.settings.problems_file)
         data = SharedData(self.storage)
         self.runs = Runs(self.hub)
         self.tasks = Tasks(self.hub)
@@ -119,6 +119,7 @@ class Services:
 
     async def close_shared(self) -> None:
         """End what `share` brought up."""
+        await self.saved_problems.close()
         await self.prepared.close()
         await self.arm_calibrations.close()
         await self.reachability.close()

@@ -93,6 +93,11 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
         return self.data_dir / "history"
 
     @property
+    def problems_file(self) -> Path:
+        """Return the file that stores the problems of saved documents for the next start; it may be deleted."""
+        return self.data_dir / "problems.msgpack"
+
+    @property
     def markers_file(self) -> Path:
         """Give the file in which markers are kept that were set over REST."""
         return self.data_dir / "markers.json"

@@ -2,51 +2,92 @@
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from pathlib import Path
+from typing import Final
 
+import msgspec
+import structlog
+
+from arcor2_hw.analysis.snapshot import code_digest
+from arcor2_hw.data.base import Data
 from arcor2_hw.data.project import BareProject, Project
-from arcor2_hw.data.scene import BareScene
+from arcor2_hw.data.scene import BareScene, Scene
 from arcor2_server.object_types import ObjectTypes
+from arcor2_server.private_files import write_private
 from arcor2_server.session.checks import project_problems, scene_problems
 from arcor2_server.storage import Storage
 
-Sources = tuple[Any, ...]
-"""What the problems of a document depend on: its own revision, its scene's and that of the object types."""
-Checked = Mapping[str, tuple[Sources, list[str]]]
-"""By document id, the problems found and what they were found from."""
+log = structlog.get_logger(__name__)
+
+_CHECKS: Final = Path(__file__).parent
+"""The code whose change makes stored problems outdated."""
+
+
+class Checked(Data, frozen=True, array_like=True):
+    """The problems of a document.
+
+    Attributes:
+        sources: What they depend on: when the document and its scene were modified, and the digest of the types.
+        problems: In the order found; empty if the document can be opened.
+    """
+
+    sources: tuple[str, ...]
+    problems: list[str]
+
+
+class Stored(Data, frozen=True):
+    """The file that a process leaves to the next: all problems by document id, and a digest of the code's sources."""
+
+    code: str
+    scenes: dict[str, Checked]
+    projects: dict[str, Checked]
 
 
 class SavedProblems:
-    """Checks saved documents, and checks one again only after it, its scene or an object type has changed."""
+    """Checks saved documents, and checks one again only after it, its scene or an object type has changed.
 
-    def __init__(self, storage: Storage, types: ObjectTypes) -> None:
+    The results are stored in a file, so that this holds across restarts.
+    """
+
+    def __init__(self, storage: Storage, types: ObjectTypes, file: Path) -> None:
         self._storage = storage
         self._types = types
-        self._scenes: Checked = {}
-        self._projects: Checked = {}
+        self._file = file
+        self._stored: Stored | None = None
+        self._changing = asyncio.Lock()
+        self._writing: asyncio.Future[None] | None = None
+
+    async def close(self) -> None:
+        """Wait until the last results are stored."""
+        if self._writing is not None:
+            await self._writing
 
     async def of_scenes(self, scenes: Sequence[BareScene]) -> dict[str, list[str]]:
-        """Return the problems of each of these saved scenes by id, empty where it can be opened."""
-        sources = {scene.id: (scene.modified, self._types.revision) for scene in scenes}
-        found = await self._storage.scenes_with_ids(_outdated(sources, self._scenes))
-        fresh = await asyncio.to_thread(lambda: {scene.id: scene_problems(scene, self._types) for scene in found})
-        self._scenes = _merged(sources, self._scenes, fresh)
-        return {key: problems for key, (_, problems) in self._scenes.items()}
+        """Return the problems of each of these saved scenes by id."""
+        async with self._changing:
+            known = await self._known()
+            sources = {scene.id: (str(scene.modified), self._types.digest) for scene in scenes}
+            found = await self._storage.scenes_with_ids(_outdated(sources, known.scenes))
+            fresh = await asyncio.to_thread(lambda: {scene.id: scene_problems(scene, self._types) for scene in found})
+            checked = _merged(sources, known.scenes, fresh)
+            self._keep(msgspec.structs.replace(known, scenes=checked))
+        return {key: each.problems for key, each in checked.items()}
 
     async def of_projects(self, projects: Sequence[BareProject], scenes: Sequence[BareScene]) -> dict[str, list[str]]:
         """Return the problems of each of these saved projects by id, given all saved scenes."""
-        modified = {scene.id: scene.modified for scene in scenes}
-        sources = {each.id: (each.modified, modified.get(each.scene_id), self._types.revision) for each in projects}
-        found = await self._storage.projects_with_ids(_outdated(sources, self._projects))
-        fresh = await asyncio.to_thread(self._checker(await self._scenes_of(found)), found)
-        self._projects = _merged(sources, self._projects, fresh)
-        return {key: problems for key, (_, problems) in self._projects.items()}
+        async with self._changing:
+            known = await self._known()
+            modified = {scene.id: str(scene.modified) for scene in scenes}
+            digest = self._types.digest
+            sources = {each.id: (str(each.modified), modified.get(each.scene_id, ""), digest) for each in projects}
+            found = await self._storage.projects_with_ids(_outdated(sources, known.projects))
+            used = await self._storage.scenes_with_ids(sorted({project.scene_id for project in found}))
+            fresh = await asyncio.to_thread(self._checker({scene.id: scene for scene in used}), found)
+            checked = _merged(sources, known.projects, fresh)
+            self._keep(msgspec.structs.replace(known, projects=checked))
+        return {key: each.problems for key, each in checked.items()}
 
-    async def _scenes_of(self, projects: Sequence[Project]) -> dict[str, Any]:
-        scenes = await self._storage.scenes_with_ids(sorted({project.scene_id for project in projects}))
-        return {scene.id: scene for scene in scenes}
-
-    def _checker(self, scenes: Mapping[str, Any]) -> Callable[[Sequence[Project]], dict[str, list[str]]]:
+    def _checker(self, scenes: Mapping[str, Scene]) -> Callable[[Sequence[Project]], dict[str, list[str]]]:
         def check(project: Project) -> list[str]:
             if (scene := scenes.get(project.scene_id)) is None:
                 return [f"The scene of the project {project.name} does not exist."]
@@ -54,15 +95,41 @@ class SavedProblems:
 
         return lambda projects: {project.id: check(project) for project in projects}
 
+    def _read(self) -> Stored:
+        """Return what an earlier process stored; nothing if the file is missing, damaged or of other code."""
+        code = code_digest(_CHECKS)
+        try:
+            stored = msgspec.msgpack.decode(self._file.read_bytes(), type=Stored)
+        except (OSError, msgspec.MsgspecError):
+            return Stored(code, {}, {})
+        return stored if stored.code == code else Stored(code, {}, {})
 
-def _outdated(sources: Mapping[str, Sources], checked: Checked) -> list[str]:
-    return [key for key, source in sources.items() if key not in checked or checked[key][0] != source]
+    async def _known(self) -> Stored:
+        if self._stored is None:
+            self._stored = await asyncio.to_thread(self._read)
+        return self._stored
+
+    def _keep(self, known: Stored) -> None:
+        if known != self._stored:
+            self._stored = known
+            self._writing = asyncio.get_running_loop().run_in_executor(None, self._write, known)
+
+    def _write(self, known: Stored) -> None:
+        try:
+            write_private(self._file, msgspec.msgpack.encode(known))
+        except OSError as error:
+            log.warning("problems not stored: the next list takes longer", file=str(self._file), reason=error.strerror)
 
 
-def _merged(sources: Mapping[str, Sources], checked: Checked, fresh: Mapping[str, list[str]]) -> Checked:
-    """Return what is known now; a document that was deleted while it was to be read has no problems."""
-    known = {key: problems for key, (_, problems) in checked.items()} | {
-        key: [] for key in sources if key not in checked
+def _outdated(sources: Mapping[str, tuple[str, ...]], checked: Mapping[str, Checked]) -> list[str]:
+    return [key for key, source in sources.items() if key not in checked or checked[key].sources != source]
+
+
+def _merged(
+    sources: Mapping[str, tuple[str, ...]], checked: Mapping[str, Checked], fresh: Mapping[str, list[str]]
+) -> dict[str, Checked]:
+    """Return the problems known now; a document that was deleted before it could be read has none."""
+    return {
+        key: Checked(source, fresh[key] if key in fresh else checked[key].problems if key in checked else [])
+        for key, source in sources.items()
     }
-    known.update(fresh)
-    return {key: (source, known[key]) for key, source in sources.items()}

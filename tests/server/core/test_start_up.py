@@ -4,10 +4,13 @@ import ast
 import json
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
+from arcor2_hw.data.project import Project
+from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_server.app import running_services
 from arcor2_server.settings import ServerSettings
 
@@ -69,3 +72,38 @@ async def test_a_damaged_analysis_is_made_again(tmp_path: Path) -> None:
     async with running_services(settings) as second:
         assert second.types.metas() == known
     assert settings.analysis_file.read_bytes() == intact
+
+
+async def test_a_second_start_checks_no_saved_document_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    settings = ServerSettings(data_dir=tmp_path)
+    async with running_services(settings) as first:
+        await first.storage.put_scene(Scene("good", id="scn_good"))
+        lamp = SceneObject("lamp", "NoSuchType", id="obj_lamp")
+        await first.storage.put_scene(Scene("bad", id="scn_bad", objects=[lamp]))
+        await first.storage.put_project(Project("project", "scn_bad", id="pro_bad"))
+        scenes, projects = await first.storage.scenes(), await first.storage.projects()
+        of_scenes = await first.saved_problems.of_scenes(scenes)
+        of_projects = await first.saved_problems.of_projects(projects, scenes)
+        assert of_scenes["scn_good"] == []
+        assert "NoSuchType" in of_scenes["scn_bad"][0]
+        assert "NoSuchType" in of_projects["pro_bad"][0]
+    async with running_services(settings) as second:
+        read: list[str] = []
+        original = second.storage.scenes_with_ids
+
+        async def counted(keys: Sequence[str]) -> list[Scene]:
+            read.extend(keys)
+            return await original(keys)
+
+        monkeypatch.setattr(second.storage, "scenes_with_ids", counted)
+        assert await second.saved_problems.of_scenes(scenes) == of_scenes
+        assert await second.saved_problems.of_projects(projects, scenes) == of_projects
+        assert read == []
+        await second.storage.put_scene(Scene("bad", id="scn_bad"))
+        scenes = await second.storage.scenes()
+        assert (await second.saved_problems.of_scenes(scenes))["scn_bad"] == []
+        assert (await second.saved_problems.of_projects(projects, scenes))["pro_bad"] == []
+        assert read == ["scn_bad", "scn_bad"]
+    settings.problems_file.write_bytes(b"damaged")
+    async with running_services(settings) as third:
+        assert (await third.saved_problems.of_scenes(scenes))["scn_bad"] == []

@@ -79,6 +79,10 @@ class RecordedTypes:
         self.news: list[ObjectTypeMeta] = []
 
     @property
+    def digest(self) -> str:
+        return f"{self.revision} {sorted(self._metas)}"
+
+    @property
     def up_to_date(self) -> bool:
         return not self.news
 

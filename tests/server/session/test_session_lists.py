@@ -63,4 +63,4 @@ async def test_only_what_changed_is_looked_at_again(desk: Desk, alice: Person, m
     assert all("WeighingMachine" in str(entry["problems"]) for entry in await alice.ask("ListProjects"))
     await alice.ask("DeleteProject", id=project)
     assert len(await alice.ask("ListProjects")) == 3
-    assert len(desk.services.saved_problems._projects) == 3  # nothing is stored for the deleted one
+    assert len(desk.services.saved_problems._stored.projects) == 3  # nothing is stored for the deleted one

@@ -1,0 +1,88 @@
+"""Restarts of the server: killed with a large project open, next to busy processes; the first list after a start."""
+
+import contextlib
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from benchmarks import serving
+from benchmarks.documents import Author
+from benchmarks.figures import Figure, Report, median, percentile
+
+ACTIONS: Final = 1000
+"""Actions in the project that is open when the server is killed."""
+UNSAVED: Final = 100
+"""Of these, so many are in the journal alone."""
+PROJECTS: Final = 200
+ROUNDS: Final = 12
+BUSY: Final = (2, 8)
+
+
+@contextlib.contextmanager
+def busy(processes: int) -> Iterator[None]:
+    """Run so many processes that compute without pause."""
+    running = [
+        subprocess.Popen([sys.executable, "-c", "while True: pass"], start_new_session=True)  # as a service of its own
+        for _ in range(processes)
+    ]
+    try:
+        yield
+    finally:
+        for process in running:
+            process.kill()
+        for process in running:
+            process.wait()
+
+
+async def fill(directory: Path) -> None:
+    """Save many projects, and leave a large one open with unsaved edits."""
+    async with serving.server(directory) as (url, _), serving.socket(url) as socket:
+        author = Author(socket)
+        scene = await author.scene()
+        await author.ask("CloseScene")
+        small, point = await author.project(scene, "small")
+        await author.actions(point, range(10))
+        await author.ask("SaveProject")
+        await author.ask("CloseProject")
+        for number in range(PROJECTS - 2):
+            await author.ask("CopyProject", source_id=small, target_name=f"copy {number}")
+        _, point = await author.project(scene, "large")
+        await author.actions(point, range(ACTIONS - UNSAVED))
+        await author.ask("SaveProject")
+        await author.actions(point, range(ACTIONS - UNSAVED, ACTIONS))
+
+
+async def killed(directory: Path) -> float:
+    """Return the time from starting the server until a client has the open project, s; then kill the server."""
+    begin = time.perf_counter()
+    async with serving.server(directory) as (url, process):
+        async with serving.socket(url) as socket:
+            await socket.send(json.dumps({"id": 1, "request": "RegisterUser", "args": {"user_name": "bench"}}))
+            while '"OpenProject"' not in str(await socket.recv())[:200]:
+                pass
+            taken = time.perf_counter() - begin
+        process.kill()
+    return taken
+
+
+async def run(report: Report, directory: Path) -> None:
+    """Measure everything in this room."""
+    data = directory / "restart"
+    await fill(data)
+    for processes in BUSY:
+        with busy(processes):
+            samples = [await killed(data) for _ in range(ROUNDS)]
+        note = f"median {median(samples):.2f} s, worst {max(samples):.2f} s"
+        report.add(Figure(f"restart_{processes}_busy_p95_s", percentile(samples, 95), ROUNDS, note))
+    first, again = [], []
+    for _ in range(5):
+        async with serving.server(data) as (url, _process), serving.socket(url) as socket:
+            author = Author(socket)
+            first.append(await author.timed("ListProjects"))
+            again.append(await author.timed("ListProjects"))
+    note = f"again {median(again) * 1e3:.2f} ms"
+    report.add(Figure("list_projects_200_first_ms", median(first) * 1e3, len(first), note))
