@@ -2,11 +2,16 @@
 
 import enum
 import time
-from typing import Generic, TypeVar
+from typing import Final, Generic, TypeVar
 
 from arcor2_hw.data.base import Data, Timestamp, now
 
 T = TypeVar("T")
+DEVICE_FILES: Final = "ARCOR2_HW_DEVICE_FILES"
+"""Environment variable with the directories, separated by `:`, in which the settings of devices may name files.
+
+The server sets it for its cell hosts. A script that is started by hand runs without it and may name any file.
+"""
 
 
 class Quality(enum.StrEnum):

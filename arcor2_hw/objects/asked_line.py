@@ -10,8 +10,17 @@ from typing import Final, TypeVar
 
 import serial
 
-from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotConnected, Refused
+from arcor2_hw.exceptions import (
+    ConnectionLost,
+    DeviceError,
+    DeviceFault,
+    DeviceTimeout,
+    NotConnected,
+    OutOfRange,
+    Refused,
+)
 from arcor2_hw.objects.observing import Observing
+from arcor2_hw.objects.settings import check_serial_port
 
 T = TypeVar("T")
 
@@ -46,6 +55,7 @@ class AskedLine:
         lost: Callable[[DeviceError], None] = lambda _: None,
         overdue: Callable[[DeviceTimeout], DeviceError] = lambda error: error,
     ) -> None:
+        check_serial_port("port", port)
         self.who = who
         self.answer_timeout = answer_timeout
         self.observing = Observing(who, self._open, self._watch, self._close, self._give_up)
@@ -217,12 +227,10 @@ def _reach(who: str, port: str, timeout: float) -> None:
         raise NotConnected(f"{who}: the port cannot be opened", str(e)) from e
 
 
-def check_line(port: str, baud_rate: int, answer_timeout: float) -> str:
-    """Give what is wrong with the settings of a line, beginning with the parameter's name; empty when nothing is."""
-    if not port.strip():
-        return "port must be the path of a serial port, or socket://host:port"
+def check_line(port: str, baud_rate: int, answer_timeout: float) -> None:
+    """Check the settings of a line. Raises OutOfRange with the setting's name."""
+    check_serial_port("port", port)
     if not 300 <= baud_rate <= 921600:
-        return f"baud_rate must be 300 to 921600, not {baud_rate!r}"
+        raise OutOfRange(f"baud_rate must be 300 to 921600, not {baud_rate!r}")
     if not 0.1 <= answer_timeout <= 10.0:
-        return f"answer_timeout must be 0.1 to 10 s, not {answer_timeout!r}"
-    return ""
+        raise OutOfRange(f"answer_timeout must be 0.1 to 10 s, not {answer_timeout!r}")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from arcor2_hw.data.device import Identity
 from arcor2_hw.exceptions import ConnectionLost, DeviceFault, DeviceTimeout, NotConnected
+from arcor2_hw.objects.settings import check_serial_port
 
 if TYPE_CHECKING:
     from arcor2_hw.objects.modbus_client import Client, ModbusPDU
@@ -62,6 +63,8 @@ class ModbusLink:
         stopbits: int = 1,
         exceptions: Mapping[int, str] = EXCEPTIONS,
     ) -> None:
+        if serial_port:
+            check_serial_port("serial_port", serial_port)
         self.who = f"{name} at {serial_port or f'{host}:{port}'}"
         self.sent = 0.0
         """When the last request was sent, on the monotonic clock."""

@@ -1,8 +1,22 @@
-"""Settings of an object type: a dataclass, filled from the scene object's parameters."""
+"""Settings of an object type: a dataclass, filled from the scene object's parameters.
+
+Users set the parameters, and the cell host acts on them with the rights of the server. A setting that names a port, a
+URL or a file therefore goes through the checks in this module; each raises OutOfRange with the setting's name.
+"""
 
 import dataclasses
+import os
+import re
+import stat
+import urllib.parse
+from pathlib import Path
+from typing import Final
 
+from arcor2_hw.data.device import DEVICE_FILES
 from arcor2_hw.exceptions import OutOfRange
+
+_HOST: Final = re.compile(r"[\w.-]+|\[?[0-9A-Fa-f:.]*:[0-9A-Fa-f:.]*(%[\w.-]+)?\]?")
+"""A host name, an IPv4 address, or an IPv6 address with or without brackets and zone."""
 
 
 @dataclasses.dataclass
@@ -10,9 +24,86 @@ class Settings:
     """Base of every settings dataclass: fields are bool, int, float, str or enumerations."""
 
 
-def check_host(host: str, port: int) -> None:
-    """Raise OutOfRange, naming the setting, unless a host is given and the port is one."""
-    if not host.strip():
-        raise OutOfRange("host must be the address of the device")
+def check_host(host: str, port: int = 1) -> None:
+    """Check the settings `host`, a name or an address, and `port`."""
+    if not _HOST.fullmatch(host):
+        raise OutOfRange(f"host must be the name or address of the device, not {host!r}")
     if not 1 <= port <= 65535:
         raise OutOfRange(f"port must be 1 to 65535, not {port!r}")
+
+
+def check_url(name: str, url: str, *schemes: str) -> urllib.parse.SplitResult:
+    """Check a URL of one of the schemes, and return its parts: host, optional port and path, nothing else."""
+    problem = f"{name} must be {' or '.join(f'{scheme}://host:port' for scheme in schemes)}"
+    try:
+        parts = urllib.parse.urlsplit(url)
+        sound = bool(parts.hostname and _HOST.fullmatch(parts.hostname)) and parts.port != 0
+    except ValueError:
+        raise OutOfRange(problem) from None
+    if "@" in parts.netloc or parts.query or parts.fragment:
+        raise OutOfRange(f"{problem}, without user, password, query and fragment")
+    if not sound or parts.scheme not in schemes or not url.startswith(parts.scheme) or not url.isprintable():
+        raise OutOfRange(f"{problem}, not {url!r}")
+    return parts
+
+
+def check_serial_port(name: str, port: str, *, sockets: bool = True) -> None:
+    """Check a serial port: the path of a serial device or, with `sockets`, socket://host:port.
+
+    pyserial takes further URLs, some of which write files (spy://) or load classes (alt://).
+    """
+    if sockets and port.startswith("socket://"):
+        parts = check_url(name, port, "socket")
+        if parts.port is None or parts.path.strip("/"):
+            raise OutOfRange(f"{name} must be socket://host:port, not {port!r}")
+        return
+    problem = f"{name} must be the path of a serial device{', or socket://host:port' if sockets else ''}, not {port!r}"
+    if not port.startswith("/") or "\0" in port:
+        raise OutOfRange(problem)
+    try:
+        present = Path(port).stat()
+    except OSError:
+        return  # unplugged
+    if not stat.S_ISCHR(present.st_mode):
+        raise OutOfRange(problem)
+
+
+def device_file(name: str, path: str) -> str:
+    """Check the path of a file or directory, and return it as an absolute path; an empty path stays empty.
+
+    Where DEVICE_FILES is set, the path must be in one of its directories; a relative path starts in the first one.
+    """
+    directories = _device_files()
+    if not path or not directories:
+        return path
+    found = _normal(directories[0] / path)
+    if not any(found.is_relative_to(directory) for directory in directories):
+        places = " or ".join(map(str, directories))
+        raise OutOfRange(f"{name} must be in {places}, not {path!r}. Move the file there, or set {DEVICE_FILES}.")
+    return str(found)
+
+
+def secret_file(name: str, path: str, host: str | None) -> str:
+    """Check the path of a file whose content is sent to `host`, as `device_file` does.
+
+    Where DEVICE_FILES is set, the file must be in a directory that is named after the host. A user who changes the host
+    in the settings can thus not send the secret of one device to another machine.
+    """
+    found = device_file(name, path)
+    directories = _device_files()
+    wanted = (host or "").lower()
+    if found and directories and not any(Path(found).is_relative_to(each / wanted) for each in directories if wanted):
+        raise OutOfRange(
+            f"{name} must be in {directories[0] / wanted}, not {path!r}: "
+            f"a secret is sent only to the host that its directory is named after. Move the file there."
+        )
+    return found
+
+
+def _device_files() -> list[Path]:
+    return [_normal(Path(each)) for each in os.environ.get(DEVICE_FILES, "").split(os.pathsep) if each]
+
+
+def _normal(path: Path) -> Path:
+    """Return a path without `..`; links are the administrator's and stay."""
+    return Path(os.path.normpath(path))

@@ -9,10 +9,13 @@ import msgspec
 
 from arcor2_hw.calibration.configuration import CalibrationConfiguration
 from arcor2_hw.data.cell import Cell
+from arcor2_hw.data.device import DEVICE_FILES
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
 
 MIB: Final = 1024 * 1024
+DEVICE_FILES_NAME: Final = "device-files"
+"""Directory, in the data directory, of the files that the settings of devices may name."""
 
 
 class LegacyListener(msgspec.Struct, frozen=True):
@@ -41,6 +44,8 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     """Further ports by the name of the service that the original has there; empty: all is on one port."""
     legacy: "LegacyListener | None" = None
     """Where clients connect that can send no token, nor speak TLS."""
+    device_files: tuple[str, ...] = ()
+    """Directories in which the settings of devices may name files, besides those in the data directory."""
     database_url: str = ""
     """SQLAlchemy URL of an asynchronous driver; empty: SQLite in the data directory."""
     cell: Cell | None = None
@@ -113,6 +118,12 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
         return self.data_dir / "arm-calibrations.json"
 
     @property
+    def device_files_dirs(self) -> tuple[Path, ...]:
+        """Give the directories in which the settings of devices may name files; the outbox is where results wait."""
+        data = self.data_dir.absolute()
+        return (data / DEVICE_FILES_NAME, data / "outbox", *map(Path, self.device_files))
+
+    @property
     def prepared_dir(self) -> Path:
         """Give the directory of meshes as clients show them; it may be emptied at any time."""
         return self.data_dir / "prepared"
@@ -133,7 +144,10 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
         for variable, name in _VARIABLES.items():
             if (text := environment.get(variable)) is None or name in given:
                 continue
-            given_value = [part.strip() for part in text.split(",") if part.strip()] if name in _LISTS else text
+            separator = _LISTS.get(name)
+            given_value: Any = text
+            if separator:
+                given_value = [part.strip() for part in text.split(separator) if part.strip()]
             try:
                 values[name] = msgspec.convert(given_value, types[name], strict=False)
             except msgspec.ValidationError as error:
@@ -157,14 +171,15 @@ _VARIABLES: Final = {
     "ARCOR2_HW_HOST": "host",
     "ARCOR2_HW_DATABASE_URL": "database_url",
     "ARCOR2_HW_ALLOWED_HOSTS": "allowed_hosts",
+    DEVICE_FILES: "device_files",
     "ARCOR2_HW_HISTORY_LIMIT": "history_limit",
     "ARCOR2_HW_DEFAULT_ROLE": "default_role",
     "ARCOR2_HW_OUTGOING_BYTES": "outgoing_bytes",
     "ARCOR2_HW_OUTGOING_AGE": "outgoing_age",
     "ARCOR2_HW_PING_INTERVAL": "ping_interval",
 }
-_LISTS: Final = frozenset({"allowed_hosts"})
-"""Settings that are names separated by commas."""
+_LISTS: Final = {"allowed_hosts": ",", "device_files": os.pathsep}
+"""Settings that are lists, with the separator."""
 
 
 def default_data_dir(environment: Mapping[str, str] = os.environ) -> Path:

@@ -6,6 +6,7 @@ import math
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
+from arcor2_hw.objects.settings import check_host
 
 LEFT = "left"
 RIGHT = "right"
@@ -98,8 +99,7 @@ class YumiSettings(Settings):
     poll_period: float = 0.1
 
     def __post_init__(self) -> None:
-        if not self.host.strip():
-            raise OutOfRange("host must be the address of the controller")
+        check_host(self.host)
         if not self.user.strip():
             raise OutOfRange("user must name a user of the controller")
         within("rws_port", self.rws_port, 1, 65535)

@@ -5,6 +5,7 @@ import math
 
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
+from arcor2_hw.objects.settings import check_serial_port
 
 
 @dataclasses.dataclass
@@ -21,8 +22,7 @@ class BarcodeReaderSettings(Settings):
     answer_timeout: float = 0.5
 
     def __post_init__(self) -> None:
-        if not self.port.strip():
-            raise OutOfRange("port must be the path of a serial port, or socket://host:port")
+        check_serial_port("port", self.port)
         if not 300 <= self.baud_rate <= 921600:
             raise OutOfRange(f"baud_rate must be 300 to 921600, not {self.baud_rate!r}")
         if not (math.isfinite(self.answer_timeout) and 0.1 <= self.answer_timeout <= 10.0):

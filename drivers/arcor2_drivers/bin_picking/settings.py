@@ -5,6 +5,7 @@ import math
 
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
+from arcor2_hw.objects.settings import device_file
 
 LARGEST_PART = 1.0
 """m"""
@@ -47,6 +48,7 @@ class BinSettings(Settings):
     max_age: float = 10.0
 
     def __post_init__(self) -> None:
+        self.part_mesh = device_file("part_mesh", self.part_mesh)
         for name in ("length", "width", "height"):
             within(name, getattr(self, name), 0.02, 3.0)
         sizes = {name: getattr(self, name) for name in ("part_length", "part_width", "part_height")}
@@ -101,3 +103,4 @@ class BlisterSettings(Settings):
         for name in ("origin_x", "origin_y", "origin_z"):
             within(name, getattr(self, name), -5.0, 5.0)
         within("turn", self.turn, -360.0, 360.0)
+        self.state_file = device_file("state_file", self.state_file)

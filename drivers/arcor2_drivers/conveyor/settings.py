@@ -2,12 +2,14 @@
 
 import dataclasses
 import math
+import re
 import urllib.parse
 from typing import Final
 
 from arcor2_hw.actions import StrEnum
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
+from arcor2_hw.objects.settings import check_serial_port, check_url
 
 LONGEST_HEARTBEAT: Final = 1000
 """ms: what the type declares as its reaction to a loss holds up to here."""
@@ -15,6 +17,7 @@ LONGEST_RAMP: Final = 0.5
 """s from the highest speed to a stand by quick stop; the declared reaction counts on it."""
 LONGEST_MOVE: Final = 600.0
 _INT32: Final = (1 << 31) - 1
+_NETWORK_INTERFACE: Final = re.compile(r"[\w.-]{1,15}")
 
 
 class CanInterface(StrEnum):
@@ -77,14 +80,7 @@ class ConveyorSettings(Settings):
     belt_speed: float = 0.2
 
     def __post_init__(self) -> None:
-        if not self.channel.strip():
-            raise OutOfRange("channel must be socket://host:port, a serial port, or a network interface")
-        if self.channel.startswith("socket://"):
-            self._check_socket()
-        if self.interface is CanInterface.SOCKETCAND and not (
-            self.channel.startswith("socket://") and self.server[2].isidentifier()
-        ):
-            raise OutOfRange(f"channel must be socket://host:port/bus for socketcand, not {self.channel!r}")
+        self._check_channel()
         if self.bitrate not in (10000, 20000, 50000, 100000, 125000, 250000, 500000, 800000, 1000000):
             raise OutOfRange(f"bitrate must be one of CiA 301 such as 500000, not {self.bitrate!r}")
         _within("node_id", self.node_id, 1, 127)
@@ -111,14 +107,17 @@ class ConveyorSettings(Settings):
         # A request that is answered only just in time must not cost the heartbeat.
         _within("sdo_timeout", self.sdo_timeout, 0.02, self.heartbeat_ms / 2000.0)
 
-    def _check_socket(self) -> None:
-        try:
-            where = urllib.parse.urlsplit(self.channel)
-            complete = where.hostname is not None and where.port is not None
-        except ValueError:
-            complete = False
-        if not complete:
-            raise OutOfRange(f"channel must be socket://host:port, not {self.channel!r}")
+    def _check_channel(self) -> None:
+        match self.interface:
+            case CanInterface.SLCAN:
+                check_serial_port("channel", self.channel)
+            case CanInterface.SOCKETCAN:
+                if not _NETWORK_INTERFACE.fullmatch(self.channel):
+                    raise OutOfRange(f"channel must be a network interface for socketcan, not {self.channel!r}")
+            case CanInterface.SOCKETCAND:
+                where = check_url("channel", self.channel, "socket")
+                if where.port is None or not self.server[2].isidentifier():
+                    raise OutOfRange(f"channel must be socket://host:port/bus for socketcand, not {self.channel!r}")
 
     @property
     def server(self) -> tuple[str, int, str]:

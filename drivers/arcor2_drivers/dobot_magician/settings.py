@@ -5,6 +5,7 @@ import math
 
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
+from arcor2_hw.objects.settings import check_serial_port
 
 
 def within(name: str, value: float, low: float, high: float) -> None:
@@ -51,8 +52,7 @@ class DobotMagicianSettings(Settings):
     home_timeout: float = 60.0
 
     def __post_init__(self) -> None:
-        if not self.port.strip():
-            raise OutOfRange("port must be the path of a serial port")
+        check_serial_port("port", self.port, sockets=False)
         within("answer_timeout", self.answer_timeout, 0.05, 5.0)
         within("tool_x", self.tool_x, 0.0, 0.3)
         within("tool_z", self.tool_z, -0.3, 0.3)

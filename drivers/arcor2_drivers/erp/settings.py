@@ -4,11 +4,11 @@ import dataclasses
 import ipaddress
 import math
 import re
-import urllib.parse
 from typing import Final
 
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
+from arcor2_hw.objects.settings import check_url, device_file, secret_file
 
 _STATION: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 
@@ -56,21 +56,16 @@ class ErpSettings(Settings):
     poll: float = 1.0
 
     def __post_init__(self) -> None:
-        try:
-            parts = urllib.parse.urlsplit(self.url)
-            port_is_sound = parts.port is None or parts.port > 0
-        except ValueError:
-            port_is_sound = False
-        if not port_is_sound or parts.scheme not in ("http", "https") or not parts.hostname:
-            raise OutOfRange(f"url must be http://host:port/path or https://..., not {self.url!r}")
-        if parts.username or parts.password or parts.query or parts.fragment:
-            raise OutOfRange("url must have no user, password, query or fragment; a token goes into token_file")
-        if self.token_file and parts.scheme == "http" and not is_loopback(parts.hostname):
+        parts = check_url("url", self.url, "http", "https")
+        if self.token_file and parts.scheme == "http" and not is_loopback(parts.hostname or ""):
             raise OutOfRange("token_file needs a url that begins with https: a token is not sent in clear")
         if parts.scheme == "http" and (self.ca_file or self.client_certificate):
             raise OutOfRange("ca_file and client_certificate need a url that begins with https")
         if bool(self.client_certificate) != bool(self.client_key):
             raise OutOfRange("client_key must be given with client_certificate, and only with it")
+        self.token_file = secret_file("token_file", self.token_file, parts.hostname)
+        for name in ("outbox", "ca_file", "client_certificate", "client_key"):
+            setattr(self, name, device_file(name, getattr(self, name)))
         if not _STATION.fullmatch(self.station):
             raise OutOfRange(f"station must be 1 to 64 letters, digits, '.', '-' or '_', not {self.station!r}")
         _within("request_timeout", self.request_timeout, 0.1, 30.0)

@@ -6,6 +6,7 @@ from typing import Final
 
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
+from arcor2_hw.objects.settings import check_host
 
 LONGEST_WATCHDOG: Final = 2000
 """ms: what the type declares as its reaction to a loss (`loss_reaction`) holds up to here."""
@@ -41,9 +42,7 @@ class FunctionalTesterSettings(Settings):
     door_timeout: float = 5.0
 
     def __post_init__(self) -> None:
-        if not self.host.strip():
-            raise OutOfRange("host must be the address of the tester")
-        within("port", self.port, 1, 65535)
+        check_host(self.host, self.port)
         within("unit_id", self.unit_id, 0, 255)
         within("watchdog_ms", self.watchdog_ms, 200, LONGEST_WATCHDOG)
         # A reading that is asked for a second time must not trip the watchdog: two time-outs, and one to spare.

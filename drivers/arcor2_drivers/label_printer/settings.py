@@ -27,8 +27,7 @@ class ZplPrinterSettings(Settings):
     template: str = DEFAULT_TEMPLATE
 
     def __post_init__(self) -> None:
-        if wrong := check_line(self.port, self.baud_rate, self.answer_timeout):
-            raise OutOfRange(wrong)
+        check_line(self.port, self.baud_rate, self.answer_timeout)
         if not 0.1 <= self.print_timeout <= 90.0:
             raise OutOfRange(f"print_timeout must be 0.1 to 90 s, not {self.print_timeout!r}")
         try:

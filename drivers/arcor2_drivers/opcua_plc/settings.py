@@ -2,12 +2,12 @@
 
 import dataclasses
 import math
-import urllib.parse
 from typing import Final
 
 from arcor2_hw.actions import StrEnum
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
+from arcor2_hw.objects.settings import check_url, device_file, secret_file
 
 from .points import parse_handshake, parse_points
 
@@ -69,13 +69,7 @@ class OpcUaPlcSettings(Settings):
     server_certificate: str = ""
 
     def __post_init__(self) -> None:
-        try:
-            parts = urllib.parse.urlsplit(self.url)
-            sound = parts.scheme == "opc.tcp" and bool(parts.hostname) and (parts.port is None or parts.port > 0)
-        except ValueError:
-            sound = False
-        if not sound or "@" in self.url:
-            raise OutOfRange(f"url must be opc.tcp://host:port, without user and password, not {self.url!r}")
+        host = check_url("url", self.url, "opc.tcp").hostname
         parse_points(self.points)
         parse_handshake(self.handshake)
         within("host_number", self.host_number, 1, 65535)
@@ -86,6 +80,8 @@ class OpcUaPlcSettings(Settings):
         if bool(self.user) != bool(self.password_file):
             raise OutOfRange("password_file must be given with user, and only with it")
         certificates = ("client_certificate", "client_key", "server_certificate")
+        self.password_file = secret_file("password_file", self.password_file, host)
         for name in certificates:
+            setattr(self, name, device_file(name, getattr(self, name)))
             if bool(getattr(self, name)) != (self.security is not Security.NONE):
                 raise OutOfRange(f"{name} must be given with a security other than none, and only with it")

@@ -6,6 +6,7 @@ from typing import Final
 
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
+from arcor2_hw.objects.settings import check_host, check_serial_port
 
 from .patterns import parse_patterns
 from .points import Point, parse_address, parse_points
@@ -48,9 +49,13 @@ class BlockSettings(Settings):
     request_timeout: float = 0.25
 
     def __post_init__(self) -> None:
-        if bool(self.host.strip()) == bool(self.serial_port.strip()):
+        self.serial_port = self.serial_port.strip()
+        if bool(self.host.strip()) == bool(self.serial_port):
             raise OutOfRange("host must be the address of the block, or serial_port its serial port: one of the two")
-        within("port", self.port, 1, 65535)
+        if self.serial_port:
+            check_serial_port("serial_port", self.serial_port)
+        else:
+            check_host(self.host, self.port)
         if self.baudrate not in BAUDRATES:
             raise OutOfRange(f"baudrate must be one of {', '.join(map(str, BAUDRATES))}, not {self.baudrate!r}")
         within("unit_id", self.unit_id, 1 if self.serial_port else 0, 247 if self.serial_port else 255)

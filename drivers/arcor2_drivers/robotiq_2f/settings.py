@@ -7,6 +7,7 @@ from typing import Final
 from arcor2_hw.actions import StrEnum
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
+from arcor2_hw.objects.settings import check_host, check_serial_port
 
 
 class Wire(StrEnum):
@@ -98,11 +99,10 @@ class Robotiq2FSettings(Settings):
                 setattr(self, field.name, getattr(data, field.name))
         within("tcp_z", self.tcp_z, 0.05, 0.5, f"m; that of a {self.model} is not known here and has to be given")
         within("mass", self.mass, 0.1, 5.0, "kg")
-        if self.wire is Wire.URCAP and not self.host.strip():
-            raise OutOfRange("host must be the address of the robot controller, as wire is urcap")
-        if self.wire is Wire.MODBUS_RTU and not self.serial_port.strip():
-            raise OutOfRange("serial_port must be the path of a serial port, as wire is modbus_rtu")
-        within("port", self.port, 1, 65535)
+        if self.wire is Wire.URCAP:
+            check_host(self.host, self.port)
+        else:
+            check_serial_port("serial_port", self.serial_port)
         within("baud_rate", self.baud_rate, 9600, 115200)
         within("unit_id", self.unit_id, 1, 247)
         within("request_timeout", self.request_timeout, 0.05, 5.0, "s")

@@ -23,7 +23,6 @@ class MtSicsScaleSettings(Settings):
     stable_timeout: float = 10.0
 
     def __post_init__(self) -> None:
-        if wrong := check_line(self.port, self.baud_rate, self.answer_timeout):
-            raise OutOfRange(wrong)
+        check_line(self.port, self.baud_rate, self.answer_timeout)
         if not 0.1 <= self.stable_timeout <= 60.0:
             raise OutOfRange(f"stable_timeout must be 0.1 to 60 s, not {self.stable_timeout!r}")

@@ -6,6 +6,7 @@ from typing import Final
 
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
+from arcor2_hw.objects.settings import check_serial_port
 
 BAUD_RATES: Final = (9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000)
 LONGEST_WATCHDOG: Final = 0.4
@@ -64,8 +65,7 @@ class TwoAxisRobotSettings(Settings):
     watchdog: float = 0.2
 
     def __post_init__(self) -> None:
-        if not self.port.strip():
-            raise OutOfRange("port must be the serial port of the bus adapter")
+        check_serial_port("port", self.port, sockets=False)
         if self.baud_rate not in BAUD_RATES:
             raise OutOfRange(f"baud_rate must be one of {', '.join(map(str, BAUD_RATES))}, not {self.baud_rate!r}")
         for joint in (1, 2):

@@ -6,6 +6,7 @@ import math
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
+from arcor2_hw.objects.settings import check_host
 
 SLOWEST_WATCHDOG = 2.5
 """Hz: with less the arm could not stop within the time that the type declares (`loss_reaction`)."""
@@ -69,8 +70,7 @@ class UrSettings(Settings):
     gripper_time: float = 0.3
 
     def __post_init__(self) -> None:
-        if not self.host.strip():
-            raise OutOfRange("host must be the address of the controller")
+        check_host(self.host)
         if not self.payload_mass < 0.0:
             within("payload_mass", self.payload_mass, 0.0, 40.0)
         for axis in "xyz":

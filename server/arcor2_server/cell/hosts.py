@@ -2,10 +2,14 @@
 
 import asyncio
 import contextlib
+import os
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Final
 
 import structlog
 
+from arcor2_hw.data.device import DEVICE_FILES
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_server.cell.host import CellHost, HostUser
 
@@ -18,9 +22,13 @@ READY_WITHIN: Final = 20.0
 
 
 class CellHosts:
-    """Gives hosts away. Who took one calls `prepare` again once it is up, and the processors are free for a start."""
+    """Gives hosts away. Who took one calls `prepare` again once it is up, and the processors are free for a start.
 
-    def __init__(self) -> None:
+    device_files: the directories in which the settings of devices may name files.
+    """
+
+    def __init__(self, device_files: Sequence[Path]) -> None:
+        self._environment = os.environ | {DEVICE_FILES: os.pathsep.join(map(str, device_files))}
         self._spare: asyncio.Task[CellHost] | None = None
         self._given: set[CellHost] = set()
         self._closed = False
@@ -61,7 +69,7 @@ class CellHosts:
         await asyncio.gather(*(host.close() for host in hosts))
 
     async def _start(self) -> CellHost:
-        host = await CellHost.start()
+        host = await CellHost.start(self._environment)
         try:
             async with asyncio.timeout(READY_WITHIN):
                 await asyncio.shield(host.ready)

@@ -47,7 +47,7 @@ class OnlineCell:
     """
 
     def __init__(self, services: "Services") -> None:
-        self.hosts = CellHosts()
+        self.hosts = CellHosts(services.settings.device_files_dirs)
         self.state = SceneStateEnum.STOPPED
         self.running_action: RunningAction | None = None
         self.results: dict[str, list[str]] = {}

@@ -73,8 +73,7 @@ WIRES: Final = {
         (("port", "str", "", "path of the serial port"), ("baud_rate", "int", "9600", "bits per second")),
         "address",
         "/dev/does-not-exist",
-        """        if not self.port.strip():
-            raise OutOfRange("port must be the path of a serial port")
+        """        check_serial_port("port", self.port)
         if not 300 <= self.baud_rate <= 921600:
             raise OutOfRange(f"baud_rate must be 300 to 921600, not {self.baud_rate!r}")""",
     ),
@@ -85,8 +84,7 @@ WIRES: Final = {
         (("url", "str", "", "where the device is, as http://192.168.0.7"),),
         'f"http://{address}"',
         "127.0.0.1:1",
-        """        if not self.url.startswith(("http://", "https://")):
-            raise OutOfRange(f"url must begin with http:// or https://, not {self.url!r}")""",
+        """        check_url("url", self.url, "http", "https")""",
     ),
 }
 
@@ -180,6 +178,8 @@ def _words(name: str, module: str, base: Base, bus: Bus) -> dict[str, str]:
     article = "an" if title[0] in "aeiou" else "a"
     modbus = bus is Bus.MODBUS
     names = [field[0] for field in wire.fields]
+    imported = sorted(set(re.findall(r"check_\w+", wire.check)))
+    out_of_range = "OutOfRange, " if "OutOfRange" in wire.check else ""
     made = ", ".join(f"settings.{field}" for field in names)
     lines = [f"    {n}: {t}" + (f" = {d}" if d else "") for n, t, d, _ in wire.fields]
     settings = "\n".join(
@@ -237,12 +237,10 @@ def _words(name: str, module: str, base: Base, bus: Bus) -> dict[str, str]:
         "own_test": kind.own_test,
         "imports": _imports(base),
         "threading": "import threading\n" if base is Base.READER else "",
-        "settings_import": "from arcor2_hw.objects.settings import check_host\n" if wire.address == HOST else "",
-        "exceptions": "" if wire.address == HOST else "from arcor2_hw.exceptions import OutOfRange\n",
-        "point_exceptions": "from arcor2_hw.exceptions import NotFound, "
-        + ("Refused\n" if wire.address == HOST else "OutOfRange, Refused\n"),
-        "fault_exceptions": "from arcor2_hw.exceptions import DeviceFault"
-        + ("\n" if wire.address == HOST else ", OutOfRange\n"),
+        "settings_import": f"from arcor2_hw.objects.settings import {', '.join(imported)}\n",
+        "exceptions": "from arcor2_hw.exceptions import OutOfRange\n" if out_of_range else "",
+        "point_exceptions": f"from arcor2_hw.exceptions import NotFound, {out_of_range}Refused\n",
+        "fault_exceptions": f"from arcor2_hw.exceptions import DeviceFault{', OutOfRange' if out_of_range else ''}\n",
         "actions": kind.actions,
         "on_loss": kind.on_loss,
         "loss_case": "test_loss_reaction" if kind.run_long else "test_control_does_not_come_back",

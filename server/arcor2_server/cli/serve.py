@@ -33,7 +33,7 @@ from arcor2_server import classic
 from arcor2_server import logging as server_logging
 from arcor2_server.access import is_loopback
 from arcor2_server.cli.status import ExitStatus
-from arcor2_server.settings import LegacyListener, ServerSettings
+from arcor2_server.settings import DEVICE_FILES_NAME, LegacyListener, ServerSettings
 from arcor2_server.tokens import TokenFile
 
 log = structlog.get_logger(__name__)
@@ -342,6 +342,7 @@ def data_directory(directory: Path) -> Generator[IO[bytes], None, None]:
     """Make sure that the directory is there, can be written, and is ours alone. CannotServe."""
     try:
         directory.mkdir(parents=True, exist_ok=True)
+        (directory / DEVICE_FILES_NAME).mkdir(mode=0o700, exist_ok=True)
         lock = (directory / "lock").open("ab")
     except OSError as error:
         reason = f"the data directory {directory} cannot be used: {error.strerror}"

@@ -209,7 +209,7 @@ def test_control_is_refused_while_another_master_has_it(
 )
 def test_settings_are_checked_by_name(name: str, value: Any) -> None:
     with pytest.raises(OutOfRange, match=f"^{name} must"):
-        ConveyorSettings(**({"channel": "can0"} | {name: value}))
+        ConveyorSettings(**({"channel": "/dev/ttyACM0"} | {name: value}))
 
 
 def test_status_words_and_codes() -> None:

@@ -232,10 +232,10 @@ def test_an_alarm_ends_a_motion_by_name_and_is_acknowledged(fake: FakeProcess, a
 def test_settings_name_the_parameter() -> None:
     for settings, words in (
         ({"port": " "}, "^port must be"),
-        ({"port": "p", "answer_timeout": math.nan}, "^answer_timeout must be 0.05 to 5, not nan$"),
-        ({"port": "p", "max_tcp_speed": 0.0}, "^max_tcp_speed"),
-        ({"port": "p", "conveyor_port": 2}, "^conveyor_port must be 0 or 1, or -1 for none, not 2$"),
-        ({"port": "p", "home_timeout": 1e9}, "^home_timeout"),
+        ({"port": "/dev/ttyUSB0", "answer_timeout": math.nan}, "^answer_timeout must be 0.05 to 5, not nan$"),
+        ({"port": "/dev/ttyUSB0", "max_tcp_speed": 0.0}, "^max_tcp_speed"),
+        ({"port": "/dev/ttyUSB0", "conveyor_port": 2}, "^conveyor_port must be 0 or 1, or -1 for none, not 2$"),
+        ({"port": "/dev/ttyUSB0", "home_timeout": 1e9}, "^home_timeout"),
     ):
         with pytest.raises(OutOfRange, match=words):
             DobotMagicianSettings(**settings)  # type: ignore[arg-type]

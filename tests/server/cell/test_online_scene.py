@@ -132,6 +132,39 @@ async def with_arm(server: Server) -> None:
     await server.open(SCENE, PROJECT)
 
 
+@serving()
+async def test_a_setting_names_no_file_outside_the_device_files(server: Server) -> None:
+    source = """
+    from arcor2_hw.objects.settings import device_file
+
+    @dataclass
+    class BoxSettings(Settings):
+        file: str
+        def __post_init__(self): self.file = device_file("file", self.file)
+
+    class Box(Generic):
+        _ABSTRACT = False
+        def __init__(self, obj_id, name, settings: BoxSettings):
+            super().__init__(obj_id, name, settings)
+        def connect(self, timeout=5.0):
+            Path(self.settings.file).write_text("")
+    """
+    server.types.add("Box", source)
+    data_dir = server.services.settings.data_dir
+    tokens = data_dir / "tokens.json"
+    tokens.write_text("[]")
+    await server.open(Scene("scene", id="scn_1", objects=[scene_object("box", "Box", file=str(tokens))]))
+    await server.ask("StartScene")
+    refused = await server.client.state("stopping")
+    assert f"file must be in {data_dir / 'device-files'}" in refused["message"]
+    assert tokens.read_text() == "[]"
+    await server.client.state("stopped")
+    (data_dir / "device-files").mkdir()
+    await server.open(Scene("scene", id="scn_1", objects=[scene_object("box", "Box", file="box.txt")]))
+    await server.start()
+    assert (data_dir / "device-files" / "box.txt").exists()
+
+
 @serving(with_arm)
 async def test_up_and_down(arm: Server) -> None:
     cell, client = arm.services.cell, arm.client
