@@ -58,6 +58,11 @@ def is_loopback(host: str) -> bool:
         return False
 
 
+def is_local(settings: ServerSettings) -> bool:
+    """Return whether only this machine reaches the server: it listens on loopback, and no proxy is in front of it."""
+    return is_loopback(settings.host) and not settings.trusted_proxies
+
+
 class Access:
     """Decides for each connection."""
 
@@ -71,7 +76,7 @@ class Access:
         """Whether no token is asked for: by a setting, or since only this machine reaches us and there is no token."""
         if self._settings.insecure:
             return True
-        return is_loopback(self._settings.host) and not self._tokens.all() and not self._tokens.unusable
+        return is_local(self._settings) and not self._tokens.all() and not self._tokens.unusable
 
     def by_token(self, secret: str, address: str) -> Admission:
         """Let in by a token. AccessRefused; TooManyAttempts before the token is even looked at."""

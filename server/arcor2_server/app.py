@@ -23,7 +23,8 @@ from arcor2_server.execution_socket import execution_endpoint
 from arcor2_server.hub import Hub
 from arcor2_server.locks import Locks
 from arcor2_server.object_types import ObjectTypes
-from arcor2_server.origin import own_pages_only
+from arcor2_server.origin import HostNames, own_pages_only
+from arcor2_server.response_headers import add_headers
 from arcor2_server.rest import routes
 from arcor2_server.rest.answers import ROLE, http_refusal
 
@@ -161,6 +162,7 @@ def create_app(services: Services) -> Litestar:
     app = Application(
         route_handlers=[sockets, *routes(), *editor_routes()],
         guards=[own_pages_only, role_needed],
+        before_send=[add_headers],
         openapi_config=None,
         exception_handlers={MethodNotAllowedException: no_such_route, HTTPException: http_refusal},
         on_shutdown=[endpoint.close, of_execution.close],
@@ -169,5 +171,6 @@ def create_app(services: Services) -> Litestar:
     app.state.access = services.access
     app.state.endpoint = endpoint
     app.state.execution = of_execution
+    app.state.host_names = HostNames.of(services.settings)
     app.state.services = services
     return app

@@ -36,15 +36,9 @@ _MEDIA_TYPES: Final = {
 }
 _ENCODINGS: Final = (("br", ".br"), ("gzip", ".gz"))
 """Encodings, the densest first, and what the name of a file that is compressed so ends with."""
-_COMMON: Final = {
-    "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "no-referrer",
-    "Cross-Origin-Resource-Policy": "same-origin",
-}
-_PAGE: Final = _COMMON | {
+_PAGE: Final = {
     "Cache-Control": "no-cache",
     "Cross-Origin-Opener-Policy": "same-origin",
-    "X-Frame-Options": "DENY",
     "Permissions-Policy": "camera=(self), xr-spatial-tracking=(self), fullscreen=(self), microphone=(), geolocation=()",
 }
 
@@ -112,7 +106,7 @@ def editor_routes(directory: Path = FILES) -> list[HTTPRouteHandler]:
             file = files[name] = await asyncio.to_thread(read_file, directory / name)
         # What the build names after its content never changes.
         caching = IMMUTABLE if name.startswith("assets/") else "no-cache"
-        headers = _COMMON | {"Cache-Control": caching, "ETag": file.etag, "Vary": "Accept-Encoding"}
+        headers = {"Cache-Control": caching, "ETag": file.etag, "Vary": "Accept-Encoding"}
         if request.headers.get("if-none-match") == file.etag:
             return Response(b"", status_code=304, media_type=file.media_type, headers=headers)
         accepted = accepted_encodings(request)

@@ -1,21 +1,85 @@
-"""Keeps foreign web pages out: a page that somebody has open elsewhere must not command the robots here."""
+"""Keep foreign web pages out: a page that is open in somebody's browser must neither command nor read this server."""
 
 import ipaddress
 import socket
-from typing import Any
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Final
 from urllib.parse import urlsplit
 
 from litestar.connection import ASGIConnection
 from litestar.exceptions import PermissionDeniedException
-from litestar.handlers import BaseRouteHandler
+from litestar.handlers import BaseRouteHandler, WebsocketRouteHandler
+
+from arcor2_server.settings import ServerSettings
+
+HOSTS: Final = Path("/etc/hosts")
+RESOLVER: Final = Path("/etc/resolv.conf")
 
 
-def may_connect(origin: str | None, host: str | None, allowed: frozenset[str] = frozenset()) -> bool:
-    """Tell whether a request with these headers may be served.
+class HostNames:
+    """The names under which this server is reached: any IP address, localhost, the machine's names, `configured` ones.
 
-    Programs send no Origin and may. A browser sends the page's: it must be a page of ours, so from the very host that
-    is asked, and that by an address, as localhost, by this machine's name or a name in `allowed`. Any other name could
-    be one that its owner points at this machine (DNS rebinding).
+    Every other name may belong to somebody who points it at this machine (DNS rebinding): to a browser, that person's
+    page then has the same origin as this server. An address belongs to nobody else's page.
+    """
+
+    def __init__(self, configured: Iterable[str] = ()) -> None:
+        self._names = frozenset(name.lower().rstrip(".") for name in ("localhost", *machine_names(), *configured))
+
+    @classmethod
+    def of(cls, settings: ServerSettings) -> "HostNames":
+        """Return the names for these settings."""
+        legacy = () if settings.legacy is None else (settings.legacy.host,)
+        return cls((settings.host, *legacy, *settings.allowed_hosts))
+
+    def __contains__(self, name: object) -> bool:
+        """Return whether a host name, without port and brackets, is one of ours."""
+        if not isinstance(name, str) or not name:
+            return False
+        if name.lower().rstrip(".") in self._names:
+            return True
+        try:
+            ipaddress.ip_address(name)
+        except ValueError:
+            return False
+        return True
+
+
+def machine_names() -> set[str]:
+    """Return the names of this machine, by files alone: a name server may not answer, or be someone else's."""
+    full = socket.gethostname()
+    short = full.partition(".")[0]
+    names = {full, short, f"{short}.local"}
+    for fields in _lines(HOSTS):
+        if full in fields[1:]:
+            names.update(fields[1:])
+    for fields in _lines(RESOLVER):
+        if fields[0] in ("domain", "search"):
+            names.update(f"{short}.{domain}" for domain in fields[1:])
+    return names
+
+
+def _lines(file: Path) -> list[list[str]]:
+    try:
+        text = file.read_text("utf-8", "replace")
+    except OSError:
+        return []
+    return [fields for line in text.splitlines() if (fields := line.partition("#")[0].split())]
+
+
+def host_of(header: str | None) -> str | None:
+    """Return the name or address in a Host header; None for a missing or malformed one."""
+    try:
+        return urlsplit(f"//{header or ''}").hostname
+    except ValueError:
+        return None
+
+
+def may_connect(origin: str | None, host: str | None, names: HostNames) -> bool:
+    """Return whether a page of this origin may use the server that it addresses as `host`.
+
+    A client that is no browser sends no Origin. A browser sends the page's, which must be one of our own pages.
     """
     if origin is None:
         return True
@@ -24,20 +88,23 @@ def may_connect(origin: str | None, host: str | None, allowed: frozenset[str] = 
         same = (page.hostname, page.port) == (asked.hostname, asked.port)
     except ValueError:
         return False
-    name = page.hostname
-    if name is None or not same:
-        return False
-    if name in allowed or name == "localhost" or name == socket.gethostname().lower():
-        return True
-    try:
-        ipaddress.ip_address(name)
-    except ValueError:
-        return False
-    return True
+    return same and page.hostname in names
 
 
-def own_pages_only(connection: ASGIConnection[Any, Any, Any, Any], _: BaseRouteHandler) -> None:
-    """Refuse a connection from a foreign page (a guard of Litestar, for routes and the websocket)."""
-    allowed = connection.app.state.services.settings.allowed_hosts
-    if not may_connect(connection.headers.get("origin"), connection.headers.get("host"), allowed):
+def own_pages_only(connection: ASGIConnection[Any, Any, Any, Any], handler: BaseRouteHandler) -> None:
+    """Refuse requests of foreign pages (a guard of Litestar, for routes and the websocket).
+
+    A browser sends no Origin with a page's requests to its own host. Requests must therefore also name a host of ours.
+    Websockets of browsers always have an Origin, so that one without comes from another client, which may use any name.
+    """
+    names: HostNames = connection.app.state.host_names
+    origin, host = connection.headers.get("origin"), connection.headers.get("host")
+    if not may_connect(origin, host, names):
         raise PermissionDeniedException("Pages of other origins may not use this server.")
+    if host is None or isinstance(handler, WebsocketRouteHandler):
+        return
+    if (name := host_of(host)) not in names:
+        raise PermissionDeniedException(
+            f"This server is not reached as {name or host!r}: use its address, "
+            "or add the name to ARCOR2_HW_ALLOWED_HOSTS."
+        )

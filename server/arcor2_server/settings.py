@@ -1,5 +1,6 @@
 """Settings of the server: where it listens, where it keeps data, its limits; from the command line and environment."""
 
+import ipaddress
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -64,7 +65,9 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     history_limit: int = 1000
     """Steps of undo that the journal keeps."""
     allowed_hosts: frozenset[str] = frozenset()
-    """Names, beside addresses and this machine's own name, under which browsers may reach the server."""
+    """Names under which the server is reached, besides addresses, localhost and this machine's own names."""
+    trusted_proxies: tuple[str, ...] = ()
+    """Addresses and networks of reverse proxies, whose X-Forwarded-For and X-Forwarded-Proto are believed."""
     default_role: Role = Role.PROGRAMMER
     """Role of whoever connects where no token is asked for."""
     served_size: int = 16 * MIB
@@ -76,6 +79,10 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     outgoing_age: float = 10.0
     """A client that takes nothing for so long is closed, as is one with more than the two numbers above waiting."""
     ping_interval: float = 20.0
+
+    def __post_init__(self) -> None:
+        for proxy in self.trusted_proxies:
+            ipaddress.ip_network(proxy)
 
     @property
     def documents_database(self) -> Path:
@@ -157,7 +164,10 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
             values["streaming_period"] = 0.1
         if "data_dir" not in values:
             values["data_dir"] = default_data_dir(environment)
-        return cls(**values)
+        try:
+            return cls(**values)
+        except ValueError as error:
+            raise InvalidData(f"ARCOR2_HW_TRUSTED_PROXIES: {error}") from None
 
 
 _VARIABLES: Final = {
@@ -171,6 +181,7 @@ _VARIABLES: Final = {
     "ARCOR2_HW_HOST": "host",
     "ARCOR2_HW_DATABASE_URL": "database_url",
     "ARCOR2_HW_ALLOWED_HOSTS": "allowed_hosts",
+    "ARCOR2_HW_TRUSTED_PROXIES": "trusted_proxies",
     DEVICE_FILES: "device_files",
     "ARCOR2_HW_HISTORY_LIMIT": "history_limit",
     "ARCOR2_HW_DEFAULT_ROLE": "default_role",
@@ -178,7 +189,7 @@ _VARIABLES: Final = {
     "ARCOR2_HW_OUTGOING_AGE": "outgoing_age",
     "ARCOR2_HW_PING_INTERVAL": "ping_interval",
 }
-_LISTS: Final = {"allowed_hosts": ",", "device_files": os.pathsep}
+_LISTS: Final = {"allowed_hosts": ",", "trusted_proxies": ",", "device_files": os.pathsep}
 """Settings that are lists, with the separator."""
 
 

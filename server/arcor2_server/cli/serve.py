@@ -31,7 +31,7 @@ from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound, StorageError
 from arcor2_server import classic
 from arcor2_server import logging as server_logging
-from arcor2_server.access import is_loopback
+from arcor2_server.access import is_local, is_loopback
 from arcor2_server.cli.status import ExitStatus
 from arcor2_server.settings import DEVICE_FILES_NAME, LegacyListener, ServerSettings
 from arcor2_server.tokens import TokenFile
@@ -163,11 +163,12 @@ def _markers(given: Path | None, path: Path | None, cell: Cell | None) -> Calibr
 def check_access(settings: ServerSettings) -> None:
     """Refuse to be reached by other machines while nobody needs a token. CannotServe, StorageError."""
     tokens = TokenFile(settings.data_dir)
-    if is_loopback(settings.host) or settings.insecure or tokens.all() or tokens.unusable:
+    if is_local(settings) or settings.insecure or tokens.all() or tokens.unusable:
         return
     raise CannotServe(
         ExitStatus.NO_TOKENS,
-        f"other machines reach {settings.host}, and there is no token yet: "
+        f"other machines reach {settings.host}{' by a proxy' if settings.trusted_proxies else ''}, "
+        "and there is no token yet: "
         "make one with `arcor2-hw token add NAME --role programmer`, or say --insecure",
     )
 
@@ -284,6 +285,8 @@ def configuration(
         log_config=None,
         access_log=False,
         server_header=False,
+        proxy_headers=bool(settings.trusted_proxies),
+        forwarded_allow_ips=list(settings.trusted_proxies),
         ws_max_size=settings.drained_size,
         ws_ping_interval=settings.ping_interval,
         ws_ping_timeout=settings.ping_interval,

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import msgspec
 import pytest
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosedError
@@ -255,6 +256,29 @@ def test_other_machines_are_not_served_without_tokens(tmp_path: Path) -> None:
     assert ended.returncode == ExitStatus.NO_TOKENS
     assert "token add" in ended.stderr
     assert len(ended.stderr.splitlines()) == 1
+
+
+def test_a_proxy_lets_other_machines_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    settings = ServerSettings(data_dir=tmp_path, trusted_proxies=("127.0.0.1",))
+    assert not Access(settings).open_to_all
+    assert Access(msgspec.structs.replace(settings, trusted_proxies=())).open_to_all
+    monkeypatch.setenv("ARCOR2_HW_TRUSTED_PROXIES", "127.0.0.1")
+    ended = start(tmp_path)
+    assert ended.returncode == ExitStatus.NO_TOKENS
+    assert "proxy" in ended.stderr
+
+
+async def test_only_a_trusted_proxy_states_who_connects(tmp_path: Path) -> None:
+    TokenFile(tmp_path / "data").add("first", Role.OPERATOR)
+    stated = bearer("wrong") | {"X-Forwarded-For": "198.51.100.7"}
+    for proxies, address in (("10.0.0.2", "127.0.0.1"), ("10.0.0.0/8,127.0.0.1", "198.51.100.7")):
+        async with (
+            running(tmp_path / "data", ARCOR2_HW_TRUSTED_PROXIES=proxies, FORWARDED_ALLOW_IPS="*") as server,
+            rest(server) as http,
+        ):
+            assert (await http.get("/api/devices", headers=stated)).status_code == 401
+        (line,) = [json.loads(line) for line in server.log.read_text().splitlines() if "wrong token" in line]
+        assert line["address"] == address
 
 
 @pytest.mark.parametrize("address", ["nowhere", "127.0.0.1:", "127.0.0.1:99999"])

@@ -1,0 +1,33 @@
+"""The headers that every HTTP answer has, whatever answers it."""
+
+from typing import Final
+from urllib.parse import parse_qsl
+
+from litestar.datastructures import MutableScopeHeaders
+from litestar.types import Message, Scope
+
+from arcor2_server.access import PARAMETER
+
+EVERYWHERE: Final = {
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+PAGE_POLICY: Final = "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
+"""Content security policy of a page that does not send one of its own; it may state more in its markup."""
+DATA_POLICY: Final = "default-src 'none'; frame-ancestors 'none'"
+"""Content security policy of everything else."""
+
+
+async def add_headers(message: Message, scope: Scope) -> None:
+    """Add the headers that an answer does not have (a hook of Litestar)."""
+    if message["type"] != "http.response.start":
+        return
+    headers = MutableScopeHeaders.from_message(message)
+    for name, value in EVERYWHERE.items():
+        headers.setdefault(name, value)
+    is_page = headers.get("content-type", "").startswith("text/html")
+    headers.setdefault("Content-Security-Policy", PAGE_POLICY if is_page else DATA_POLICY)
+    if any(name == PARAMETER for name, _ in parse_qsl(scope["query_string"].decode("latin-1"), keep_blank_values=True)):
+        headers["Cache-Control"] = "no-store"
