@@ -41,6 +41,12 @@ log = structlog.get_logger(__name__)
 LegacyRole = Literal["operator", "standard_user", "advanced_user", "technician"]
 """Never programmer."""
 
+PREPARED_AFTER = 0.5
+"""Time from readiness until what the first scene needs is prepared, s: clients that wait for the server go first."""
+
+COLLECTION = (700, 10, 10)
+"""The interpreter's default thresholds, which `main` raises for the imports."""
+
 GRACE = 2
 """Seconds that open requests get to end; the contract allows 5 for everything."""
 
@@ -254,7 +260,11 @@ async def run(
 
         def when_ready() -> None:
             gc.freeze()
+            gc.set_threshold(*COLLECTION)
             gc.enable()
+            loop.call_later(PREPARED_AFTER, prepare)
+
+        def prepare() -> None:
             services.cell.hosts.prepare()
             loop.run_in_executor(None, importlib.import_module, "transforms3d.quaternions")
 
