@@ -33,6 +33,7 @@ class Napper(Generic):
         time.sleep(0.005)
 '''
 ROUNDS = 100
+STOPS = 10
 DISTINCT = 1000
 
 
@@ -72,13 +73,20 @@ async def prepare(url: str, directory: Path) -> None:
     scene = {
         "id": "scn_running",
         "name": "running",
-        "objects": [probe, {"name": "napper", "type": "Napper", "id": "obj_napper"}],
+        "objects": [
+            probe,
+            {"name": "napper", "type": "Napper", "id": "obj_napper"},
+            {"name": "time", "type": "TimeActions", "id": "obj_time"},
+        ],
     }
+    sleeping = project("sleeping", 1, "obj_time/sleep")
+    sleeping["actionPoints"][0]["actions"][0]["parameters"] = [{"name": "seconds", "type": "double", "value": "60.0"}]
     async with httpx.AsyncClient(base_url=url.replace("ws://", "http://"), timeout=30) as http:
         for path, body in (
             ("/scenes", scene),
             ("/projects", project("few", 2, "obj_napper/nap")),
             ("/projects", project("distinct", DISTINCT, "obj_probe/tick")),
+            ("/projects", sleeping),
         ):
             (await http.put(path, json=body)).raise_for_status()
 
@@ -125,6 +133,22 @@ async def commands(report: Report, url: str) -> None:
         report.add(Figure(f"{name}_ms", percentile(values, 95) * 1e3, len(values), note))
 
 
+async def stopped(report: Report, url: str) -> None:
+    """Measure how soon a program is over that is stopped in an action in which no device moves."""
+    samples = []
+    async with Client(url, "bench") as client:
+        package = await built(client, "sleeping")
+        for _ in range(STOPS):
+            await asyncio.sleep(1.0)  # the spare cell host gets ready
+            await client.call("RunPackage", rpc.RunPackageArgs(package))
+            await client.next_event("ActionStateBefore")
+            await asyncio.sleep(0.1)
+            samples.append(await timed(client, "StopPackage", "PackageState", "stopped"))
+            await client.next_event("ShowMainScreen")
+    note = f"median {median(samples) * 1e3:.1f} ms"
+    report.add(Figure("stopped_ms", percentile(samples, 95) * 1e3, len(samples), note))
+
+
 async def until_paused(client: Client) -> None:
     """Wait for the program to be paused."""
     while (await client.next_event("PackageState")).data.state != "paused":
@@ -155,4 +179,5 @@ async def run(report: Report, directory: Path) -> None:
     async with serving.server(directory / "running") as (url, _):
         await prepare(url, directory)
         await commands(report, url)
+        await stopped(report, url)
         await distinct(report, url)
