@@ -974,6 +974,7 @@ class Requests(ABC):
         modified: str | Unset = UNSET,
         category: str | Unset = UNSET,
         icon: str | Unset = UNSET,
+        shadows: str | Unset = UNSET,
         dry_run: bool = False,
         timeout: float | None = None,
     ) -> None:
@@ -995,6 +996,7 @@ class Requests(ABC):
                 modified=modified,
                 category=category,
                 icon=icon,
+                shadows=shadows,
             ),
             dry_run=dry_run,
             timeout=timeout,

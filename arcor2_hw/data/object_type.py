@@ -139,7 +139,11 @@ class ObjectAction(Data, frozen=True):
 
 
 class ObjectTypeMeta(Data, frozen=True):
-    """What clients know of an object type; category and icon are ours, beside the protocol."""
+    """What clients know of an object type; category, icon and shadows are ours, beside the protocol.
+
+    built_in: a base class or an installed type, which cannot be deleted. shadows: distribution and version of the
+    installed type of the same name that this uploaded one takes the place of.
+    """
 
     type: str
     description: str = ""
@@ -155,6 +159,7 @@ class ObjectTypeMeta(Data, frozen=True):
     modified: Timestamp | Unset = UNSET
     category: str | Unset = UNSET
     icon: str | Unset = UNSET
+    shadows: str | Unset = UNSET
 
 
 class ObjectTypeSource(Data, frozen=True):

@@ -11,6 +11,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from arcor2_hw.analysis import (
+    BUILT_IN,
     Enumeration,
     InstalledType,
     Library,
@@ -28,6 +29,7 @@ from arcor2_hw.runtime.messages import TypeCode
 from arcor2_server.private_files import write_private
 from arcor2_server.robot_packages import robot_packages
 from arcor2_server.storage import AssetStore, Storage
+from arcor2_server.type_changes import Changes, PendingChanges
 
 log = structlog.get_logger(__name__)
 
@@ -46,17 +48,6 @@ class PackageType(Data, frozen=True):
     folder: Path | None = None
     distribution: str = ""
     version: str = ""
-
-
-class Changes(Struct, frozen=True):
-    """What `refresh` found: for ChangedObjectTypes remove, update and add, in this order."""
-
-    removed: list[ObjectTypeMeta] = []
-    updated: list[ObjectTypeMeta] = []
-    added: list[ObjectTypeMeta] = []
-
-    def __bool__(self) -> bool:
-        return bool(self.removed or self.updated or self.added)
 
 
 class _Known(Struct, frozen=True):
@@ -85,8 +76,7 @@ class ObjectTypes:
         self._uploaded: dict[str, ObjectTypeSource] = {}
         self._known = _Known()
         self._read_at: tuple[int, int] | None = None
-        self._told_of: dict[str, ObjectTypeMeta] = {}
-        self._untold = Changes()
+        self._pending = PendingChanges()
         self._reading = asyncio.Lock()
 
     # ------------------------------------------------------------------------------------------------ life
@@ -100,7 +90,7 @@ class ObjectTypes:
     @property
     def up_to_date(self) -> bool:
         """Tell whether there is nothing that clients do not know yet."""
-        return self._stored_revision == self._read_at and not self._untold
+        return self._stored_revision == self._read_at and not self._pending.changes
 
     @property
     def _stored_revision(self) -> tuple[int, int]:
@@ -109,13 +99,11 @@ class ObjectTypes:
     async def refresh(self) -> Changes:
         """Take in what was put straight into storage since the last time; gives what clients do not know yet."""
         if self.up_to_date:
-            return self._untold
+            return self._pending.changes
         async with self._reading:
             if self._stored_revision != self._read_at:
                 await self._read_uploaded()
-            changes, self._untold = self._untold, Changes()
-            self._told_of = self._known.metas
-        return changes
+            return self._pending.take()
 
     async def take_in(self) -> None:
         """Take in what was put straight into storage; what clients do not know yet waits for the next refresh."""
@@ -145,28 +133,41 @@ class ObjectTypes:
         revision = self._stored_revision
         stored = {one.id: one for one in await self._storage.object_types()}
         for name in self._uploaded.keys() - stored.keys():
-            del self._uploaded[name]
-            self._library.remove(name)
+            self._withdraw(name)
         for name, one in stored.items():
             if self._uploaded.get(name) == one:
-                continue
-            if name in self._installed:
-                log.warning("uploaded object type ignored: one of that name is installed", type=name)
                 continue
             try:
                 self._library.add(SourceFile(name, module_name(name), one.source))
             except InvalidData as error:
                 log.warning("uploaded object type ignored", type=name, reason=str(error))
                 continue
+            if name not in self._uploaded and name in self._installed:
+                log.warning("uploaded object type shadows an installed one", type=name, of=self._origin(name))
             self._uploaded[name] = one
         # Off the event loop: a hundred types take a moment to read.
         known = await asyncio.to_thread(self._analyse, await self._storage.types_without_model())
-        if first:
-            self._told_of = known.metas
         self._known = known
-        self._note()
+        self._pending.set_current(known.metas)
+        if first:
+            self._pending.take()
         self._read_at = revision
         self.revision += 1
+
+    def _withdraw(self, name: str) -> None:
+        """Forget an uploaded type; the installed one of that name is in its place again."""
+        del self._uploaded[name]
+        self._library.remove(name)
+        installed = self._installed.get(name)
+        if installed is not None:
+            log.info("installed object type is used again", type=name, of=self._origin(name))
+            if installed.file is not None:
+                self._library.add(installed.file)
+
+    def _origin(self, name: str) -> str:
+        """Return the distribution of an installed type, with its version."""
+        installed = self._installed[name]
+        return f"{installed.distribution} {installed.version}".strip()
 
     def _analyse(self, without_model: set[str]) -> _Known:
         if self._stored_analysis is not None and not self._restored(self._stored_analysis):
@@ -182,10 +183,16 @@ class ObjectTypes:
                 problem = f"its collision model {name} is missing" if name in without_model else self._lacking(one)
                 if problem and not meta.disabled:
                     meta = replace(meta, disabled=True, problem=problem)
+                if name in self._installed:
+                    meta = replace(meta, shadows=self._origin(name))
+            else:
+                meta = replace(meta, built_in=True)
             metas[name] = meta
         for name, installed in self._installed.items():
-            if installed.file is None:
-                metas[name] = ObjectTypeMeta(name, abstract=True, disabled=True, problem=str(installed.problem))
+            if installed.file is None and name not in self._uploaded:
+                metas[name] = ObjectTypeMeta(
+                    name, built_in=True, abstract=True, disabled=True, problem=str(installed.problem)
+                )
                 analyses[name] = TypeAnalysis(metas[name], problem=installed.problem)
         robots = {name: self._with_asset(a.robot) for name, a in analyses.items() if a.robot and name in metas}
         metas, robots = dict(sorted(metas.items())), dict(sorted(robots.items()))
@@ -220,23 +227,6 @@ class ObjectTypes:
         if isinstance(name, Unset) or self._assets.exists(name):
             return robot
         return replace(robot, urdf_package_filename=UNSET)
-
-    def _note(self) -> None:
-        """Remember in what clients have to be told: how what is known differs from what they were told of."""
-        before, after = self._told_of, self._known.metas
-        self._untold = Changes(
-            [meta for name, meta in before.items() if name not in after],
-            [meta for name, meta in after.items() if before.get(name, meta) != meta],
-            [meta for name, meta in after.items() if name not in before],
-        )
-
-    def _told(self, name: str) -> None:
-        """Leave out of what is untold what the caller tells himself."""
-        told = {key: meta for key, meta in self._told_of.items() if key != name}
-        if (meta := self._known.metas.get(name)) is not None:
-            told[name] = meta
-        self._told_of = told
-        self._note()
 
     # ------------------------------------------------------------------------------------------------ look-ups
     @property
@@ -309,13 +299,10 @@ class ObjectTypes:
         """Tell whether a type really has an optional method, by itself or by an ancestor."""
         return method in self._analysis(name).implemented
 
-    def is_installed(self, name: str) -> bool:
-        """Tell whether a type belongs to an installed distribution, or to us, and so can only be changed with it."""
-        return name in self._installed or (name in self._library and name not in self._uploaded)
-
     def files(self) -> list[SourceFile]:
-        """Give the sources of installed and uploaded types, for reading them together with others."""
-        return [self._library.file(name) for name in (*self._installed, *self._uploaded) if name in self._library]
+        """Return the sources of installed and then of uploaded types, to be put into another library in this order."""
+        installed = [each.file for each in self._installed.values() if each.file is not None]
+        return [*installed, *(self._library.file(name) for name in self._uploaded)]
 
     def is_uploaded(self, name: str) -> bool:
         """Tell whether a type was uploaded, and so can be changed and deleted."""
@@ -371,34 +358,47 @@ class ObjectTypes:
 
     # ------------------------------------------------------------------------------------------------ changes
     async def add(self, source: ObjectTypeSource) -> ObjectTypeMeta:
-        """Save an uploaded type (new, or of changed source or model) and analyse it; the caller tells the clients.
+        """Save an uploaded type (new, or of changed source or model) and analyse it; the caller notifies the clients.
 
-        InvalidData for the name of a built-in or installed type.
+        It takes the place of an installed type of the same name until it is deleted.
+
+        Raises:
+            InvalidData: The name is that of a base class.
         """
-        self.refuse_given(source.id, "replaced")
+        self.require_replaceable(source.id)
         async with self._reading:
             await self._storage.put_object_type(source)
             await self._read_uploaded()
-            self._told(source.id)
+            self._pending.skip(source.id)
         return self.meta(source.id)
 
     async def remove(self, name: str) -> ObjectTypeMeta:
-        """Delete an uploaded type; gives its last meta. InvalidData for a built-in or installed type, NotFound."""
-        self.refuse_given(name, "deleted")
+        """Delete an uploaded type and return its last meta; an installed type of that name is in its place again.
+
+        Raises:
+            InvalidData: The type is a base class, or installed.
+            NotFound: There is no such type.
+        """
+        self.require_deletable(name)
         meta = self.meta(name)
         async with self._reading:
             await self._storage.delete_object_type(name)
             await self._read_uploaded()
-            self._told(name)
+            self._pending.skip(name)
         return meta
 
-    def refuse_given(self, name: str, what: str) -> None:
-        """Refuse that a built-in or installed type is `what`; InvalidData."""
-        if name in self._installed:
-            installed = self._installed[name]
+    @staticmethod
+    def require_replaceable(name: str) -> None:
+        """Refuse to replace a base class; InvalidData."""
+        if name in BUILT_IN:
+            raise InvalidData(f"The object type {name} is built in and cannot be replaced.")
+
+    def require_deletable(self, name: str) -> None:
+        """Refuse to delete a base class or an installed type; InvalidData."""
+        if name in BUILT_IN:
+            raise InvalidData(f"The object type {name} is built in and cannot be deleted.")
+        if name in self._installed and name not in self._uploaded:
             raise InvalidData(
-                f"The object type {name} belongs to {installed.distribution or 'an installed distribution'}"
-                f" and cannot be {what}."
+                f"The object type {name} belongs to {self._origin(name) or 'an installed distribution'}"
+                " and cannot be deleted. Uninstall that instead."
             )
-        if name in self._library and name not in self._uploaded:
-            raise InvalidData(f"The object type {name} is built in and cannot be {what}.")

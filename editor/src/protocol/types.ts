@@ -908,7 +908,12 @@ export interface ObjectStateData {
   overlaid?: string[];
 }
 
-/** What clients know of an object type; category and icon are ours, beside the protocol. */
+/**
+ * What clients know of an object type; category, icon and shadows are ours, beside the protocol.
+ *
+ * built_in: a base class or an installed type, which cannot be deleted. shadows: distribution and version of the
+ * installed type of the same name that this uploaded one takes the place of.
+ */
 export interface ObjectTypeMeta {
   type: string;
   description: string;
@@ -924,6 +929,7 @@ export interface ObjectTypeMeta {
   modified?: string;
   category?: string;
   icon?: string;
+  shadows?: string;
 }
 
 /** What the event OpenProject carries. */

@@ -16,12 +16,13 @@ from arcor2_server.build.frame import TypeFacts
 class Candidates:
     """Look-ups over object types (`Types` of session.checks); each raises NotFound for a type that is not known.
 
-    known: the sources that are here. given: those of the package, which stand in for the ones of the same names.
+    known: the sources that are here; of two with one name the later counts. given: those of the package, which take the
+    place of those of the same names.
     """
 
     def __init__(self, known: Iterable[SourceFile], given: Mapping[str, ObjectTypeSource]) -> None:
         self._given = given
-        self._library = Library(file for file in known if file.name not in given)
+        self._library = Library(known)
         for name, one in given.items():
             try:
                 self._library.add(SourceFile(name, module_name(name), one.source))

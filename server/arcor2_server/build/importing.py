@@ -339,9 +339,6 @@ def _open_conflicts(services: "Services", plan: _Plan, given: Imported) -> list[
 
 
 def _check_here(services: "Services", given: Imported) -> None:
-    for name in given.types:
-        if services.types.is_installed(name):
-            raise Conflict(f"The object type {name} is installed here: the one of the package cannot replace it.")
     for one in given.types.values():
         mesh = UNSET if isinstance(one.model, Unset) else one.model.model()
         if isinstance(mesh, Mesh) and not services.assets.exists(mesh.asset_id):

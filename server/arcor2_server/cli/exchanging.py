@@ -129,7 +129,8 @@ async def bring_in(
             await target.carry_out()
     words = {"new": "would be new", "replaced": "would be replaced", "same": "is the same"} if dry_run else {}
     for step in steps:
-        say(f"{step.kind} {step.name}: {words.get(step.verb, step.verb)}")
+        notice = f", {step.notice}" if step.notice else ""
+        say(f"{step.kind} {step.name}: {words.get(step.verb, step.verb)}{notice}")
 
 
 async def validate(paths: list[Path], kind: Kind, as_json: bool) -> ExitStatus:

@@ -8,7 +8,7 @@ from cyclopts import App, Parameter
 
 from arcor2_hw.analysis import Library, SourceFile, TypeAnalysis, module_name
 from arcor2_hw.client import Rest
-from arcor2_hw.data.base import is_valid_name
+from arcor2_hw.data.base import Unset, is_valid_name
 from arcor2_server.cli import exchanging as x
 from arcor2_server.cli.reaching import HERE, Failed, Server, run
 from arcor2_server.cli.status import ExitStatus
@@ -91,11 +91,14 @@ def add(
             source = _read(file)
             chosen = _class_in(source, file, name)
             given[chosen] = SourceFile(chosen, module_name(chosen), source, str(file))
-        async with server.rest() as rest:
-            for one in await _in_order(given, rest):
+        async with server.client() as client:
+            for one in await _in_order(given, client.rest):
                 source = one.source if isinstance(one.source, str) else one.source.decode()
-                await rest.put_object_type(one.name, source)
+                await client.rest.put_object_type(one.name, source)
                 x.say(f"{one.name} added")
+            for meta in await client.get_object_types():
+                if meta.type in given and not isinstance(meta.shadows, Unset):
+                    x.say(f"{meta.type} takes the place of the installed type of {meta.shadows} until you remove it")
 
     return run("object-type add", work)
 

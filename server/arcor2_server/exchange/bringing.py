@@ -14,7 +14,7 @@ from arcor2_hw.analysis import SourceFile, module_name
 from arcor2_hw.client import Client, NothingThere
 from arcor2_hw.client.rest import Asset, Listed
 from arcor2_hw.data.base import Data, Unset, new_id
-from arcor2_hw.data.object_type import Models, ObjectTypeSource
+from arcor2_hw.data.object_type import Models, ObjectTypeMeta, ObjectTypeSource
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error, Conflict, DeviceTimeout, InvalidPackage
@@ -26,17 +26,19 @@ from arcor2_server.exchange.undoing import Undoing
 Part = Literal["all", "scene", "project", "types", "assets"]
 """What of an export may take the place of something else on the server."""
 Verb = Literal["new", "replaced", "same"]
+SHADOWS: Final = "takes the place of the installed type until it is removed"
 _UNTIMED: Final[dict[str, Any]] = {"created": UNSET, "modified": UNSET, "int_modified": UNSET}
 FIRST_WORD: Final = 5.0
 """Seconds in which the server's greeting, which says what is open, has to come."""
 
 
 class Step(Data, frozen=True):
-    """One thing of an export, and what becomes of it on the server."""
+    """One thing of an export, what happens to it on the server, and what else the user should know."""
 
     verb: Verb
     kind: str
     name: str
+    notice: str = ""
 
 
 def renamed(archive: Archive, name: str) -> Archive:
@@ -62,6 +64,7 @@ class Target:
         self._work: list[Step] = []
         self._old_scene: Scene | None = None
         self._old_project: Project | None = None
+        self._metas: dict[str, ObjectTypeMeta] = {}
 
     async def plan(self, installed: list[SourceFile]) -> list[Step]:
         """Give what would be done. Nothing is changed.
@@ -83,11 +86,8 @@ class Target:
 
     async def _check(self, installed: list[SourceFile]) -> None:
         archive, client = self._archive, self._client
-        metas = {meta.type: meta for meta in await client.get_object_types()}
+        metas = self._metas = {meta.type: meta for meta in await client.get_object_types()}
         uploaded = await self._source.uploaded()
-        for name in archive.types:
-            if name in metas and name not in uploaded:
-                self._conflicts.append(f"The object type {name} is installed there and cannot be replaced.")
         used = set() if archive.scene is None else {obj.type for obj in archive.scene.objects}
         actions = {
             name: {action.name: action for action in await client.get_actions(name)}
@@ -106,8 +106,8 @@ class Target:
         if not {part, "all"} & set(self._overwrite):
             self._conflicts.append(f"{what} is there already and differs (--overwrite {part} would replace it).")
 
-    def _note(self, kind: str, name: str, same: bool, new: bool) -> None:
-        step = Step("same" if same else "new" if new else "replaced", kind, name)
+    def _note(self, kind: str, name: str, same: bool, new: bool, notice: str = "") -> None:
+        step = Step("same" if same else "new" if new else "replaced", kind, name, notice)
         self.steps.append(step)
         if not same:
             self._work.append(step)
@@ -134,7 +134,8 @@ class Target:
             same = old is not None and (old.source, old.model) == (new.source, new.model)
             if old is not None and not same:
                 self._may("types", f"The object type {name}")
-            self._note("object type", name, same, old is None)
+            shadows = old is None and name in self._metas
+            self._note("object type", name, same, old is None, SHADOWS if shadows else "")
 
     async def _plan_document(
         self, kind: Literal["scene", "project"], given: Scene | Project, there: list[Listed]

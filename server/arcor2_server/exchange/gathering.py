@@ -6,6 +6,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
+from arcor2_hw.analysis import BUILT_IN
 from arcor2_hw.client import Client, NothingThere
 from arcor2_hw.client.rest import Listed
 from arcor2_hw.data.base import Unset
@@ -94,8 +95,7 @@ class Source:
         if project is not None and not isinstance(project.project_objects_ids, Unset):
             named |= set(project.project_objects_ids)
         types = with_needed(named, uploaded)
-        built_in = {meta.type for meta in await self._client.get_object_types() if meta.built_in}
-        installed = sorted(named - types.keys() - built_in)
+        installed = sorted(named - types.keys() - set(BUILT_IN))
         assets = await self._assets(types, named)
         return replace(archive, types=types, installed=installed, assets=assets)
 

@@ -53,14 +53,15 @@ async def get_object_type(services: Services, obj_type_id: str) -> ObjectType:
 async def put_object_type(services: Services, body: ObjectType) -> Timestamp:
     """Upload an object type, or a module that others need, new or changed; answers the time.
 
-    The source is read, never imported. Clients are told of what changed at the latest half a second after the last
-    upload, and before a scene is opened.
+    The source is read, never imported. It takes the place of an installed type of the same name until it is deleted.
+    Clients are notified of what changed at the latest half a second after the last upload, and before a scene is
+    opened.
     """
     if body.id != body.name or not is_valid_name(body.id):
         raise InvalidData(f"{body.id[:80]!r} cannot name an object type: id and name are the name of its class.")
     if len(body.source.encode()) > MAX_SOURCE:
         raise TooLarge(f"The source of {body.id} has more than {MAX_SOURCE} bytes.")
-    services.types.refuse_given(body.id, "replaced")
+    services.types.require_replaceable(body.id)
     source = ObjectTypeSource(body.id, body.source, body.description)
     if not isinstance(body.model, Unset) and body.model.type is not Model3dType.NONE:
         if body.model.id != body.id:
@@ -76,7 +77,10 @@ async def put_object_type(services: Services, body: ObjectType) -> Timestamp:
 
 @operation("DELETE", "/object-types/{obj_type_id}", STORAGE, Role.PROGRAMMER)
 async def delete_object_type(services: Services, obj_type_id: str) -> None:
-    """Delete an uploaded object type; a scene that uses it has a problem from then on."""
-    services.types.refuse_given(obj_type_id, "deleted")
+    """Delete an uploaded object type; an installed type of that name is in its place again.
+
+    A scene that uses a type that no longer exists has a problem from then on.
+    """
+    services.types.require_deletable(obj_type_id)
     await services.storage.delete_object_type(obj_type_id)
     await services.type_news.taken(services)

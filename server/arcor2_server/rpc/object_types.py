@@ -14,9 +14,9 @@ from arcor2_hw.exceptions import Arcor2Error, InvalidData
 from arcor2_hw.runtime.messages import TypeCode
 from arcor2_server.hub import encode
 from arcor2_server.locks import ADDING_OBJECT
-from arcor2_server.object_types import Changes
 from arcor2_server.rpc.registry import Context, RequestRefused, at_once, make_event, rpc
 from arcor2_server.services import Services
+from arcor2_server.type_changes import Changes
 
 
 def change_events(changes: Changes) -> list[Event]:
@@ -143,7 +143,7 @@ def derived_source(name: str, base: TypeCode, description: str = "") -> str:
 # ------------------------------------------------------------------------------------------------ deleted ones
 @rpc("DeleteObjectTypes")
 async def delete_object_types(context: Context, args: set[str] | None) -> list[DeleteObjectTypesData] | None:
-    """Delete the named uploaded types, or all of them; those that are in use stay, and are answered with why."""
+    """Delete the named uploaded types, or all of them; those that are in use stay, and the answer says why."""
     services = context.services
     user = context.user
     wanted = sorted(args) if args is not None else [name for name in services.types.names() if _given(context, name)]
@@ -155,6 +155,8 @@ async def delete_object_types(context: Context, args: set[str] | None) -> list[D
                 await _check_unused(context, name)
                 if not context.dry_run:
                     context.emit_first("ChangedObjectTypes", [await services.types.remove(name)], ChangeType.REMOVE)
+                    if services.types.known(name):  # the installed type of that name is back
+                        context.emit_first("ChangedObjectTypes", [services.types.meta(name)], ChangeType.ADD)
             except Arcor2Error as error:
                 failed.append(DeleteObjectTypesData(name, str(error)))
     if failed:
@@ -173,10 +175,8 @@ def _ancestors(context: Context, name: str) -> list[str]:
 
 async def _check_unused(context: Context, name: str) -> None:
     types, session = context.services.types, context.services.session
-    if types.meta(name).built_in:
-        raise RequestRefused(f"The object type {name} is built in.")
-    if not types.is_uploaded(name):
-        raise RequestRefused(f"The object type {name} belongs to an installed driver: uninstall that.")
+    types.meta(name)
+    types.require_deletable(name)
     if derived := [other for other in types.names() if other != name and name in types.bases(other)]:
         raise RequestRefused(f"The object type {name} is the base of {', '.join(derived)}.")
     if (opened := session.scene) is not None and any(placed.type == name for placed in opened.objects):

@@ -303,10 +303,24 @@ async def test_what_is_open_is_not_replaced(here: Any, packed: bytes, what: str)
         await import_package(here, packed, ALL)
 
 
-async def test_an_installed_type_is_not_replaced(here: Any, packed: bytes) -> None:
-    source = b"from arcor2_hw.objects import Generic\n\n\nclass AcmeReader(Generic):\n    _ABSTRACT = False\n"
-    with pytest.raises(Conflict, match="AcmeReader is installed here"):
-        await import_package(here, changed(packed, object_types__acme_reader_py=source), ALL)
+async def test_a_type_of_the_package_shadows_an_installed_one(here: Any, packed: bytes) -> None:
+    await import_package(here, packed, NOTHING)
+    before = files_in(await here.build.publish("pro_1"))
+    module = here.types.type_code("AcmeReader").entry_point.partition(":")[0]
+    source = f"from {module} import AcmeReader as Installed\n\n\nclass AcmeReader(Installed):\n    pass\n"
+    await import_package(here, changed(packed, object_types__acme_reader_py=source.encode()), NOTHING)
+    await here.types.refresh()
+    meta = here.types.meta("AcmeReader")
+    assert (meta.built_in, meta.disabled) == (False, False)
+    assert "acme" in str(meta.shadows)
+    after = files_in(await here.build.publish("pro_1"))
+    assert after["object_types/acme_reader.py"] == source.encode()
+    assert before["object_types/acme_reader.py"] != source.encode()
+
+    # Base classes stay what they are.
+    generic = b"from arcor2_hw.objects import Robot\n\n\nclass Generic(Robot):\n    pass\n"
+    with pytest.raises(InvalidPackage, match="Generic is built in"):
+        await import_package(here, changed(packed, object_types__generic_py=generic), ALL)
 
 
 # ------------------------------------------------------------------------------------------------ refusals

@@ -11,6 +11,7 @@ from arcor2_hw.analysis import module_name
 from arcor2_hw.client import Client
 from arcor2_server.cli.main import app
 from arcor2_server.cli.status import ExitStatus
+from arcor2_server.exchange.bringing import SHADOWS
 from tests.runtime.older_sources import SOURCES
 from tests.server.core.serving import ServerProcess
 
@@ -92,6 +93,17 @@ def test_a_family_of_types_is_brought_in_together_and_one_by_one(
     again = object_type(server, "add", arm)
     assert again.returncode == ExitStatus.ANALYSIS_PROBLEMS
     assert "kinematics_mixin" in again.stderr
+    # The name of an installed type: the user is told, and how to undo it.
+    flow = sources / "flow_actions.py"
+    flow.write_text("from arcor2_hw.objects import Generic\n\n\nclass FlowActions(Generic):\n    _ABSTRACT = False\n")
+    notice = object_type(server, "add", flow).stdout
+    assert "FlowActions takes the place of the installed type of arcor2-hw" in notice
+    assert "until you remove it" in notice
+    exported = sources / "flow.zip"
+    assert object_type(server, "export", "FlowActions", "--output", exported).returncode == 0
+    assert object_type(server, "remove", "FlowActions").returncode == 0
+    imported = object_type(server, "import", exported)
+    assert imported.stdout == f"object type FlowActions: new, {SHADOWS}\n", imported.stderr
 
 
 def test_what_makes_no_sense_is_refused(sources: Path, object_type: Cli) -> None:

@@ -9,9 +9,10 @@ from msgspec import UNSET
 
 from arcor2_hw.data.object_type import Box, Mesh, ObjectModel, ObjectTypeSource, Sphere
 from arcor2_hw.exceptions import InvalidData, NotFound
-from arcor2_server.object_types import Changes, ObjectTypes
+from arcor2_server.object_types import ObjectTypes
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import AssetStore, Storage
+from arcor2_server.type_changes import Changes
 from tests.server.core.serving import ServerProcess, running, talking
 
 LAMP = '''
@@ -75,8 +76,8 @@ async def put_lamps(storage: Storage) -> None:
 
 
 async def test_built_in_and_installed_types_are_known(types: ObjectTypes, spec: Path) -> None:
-    built_in = {meta.type for meta in types.metas() if meta.built_in}
-    assert built_in == {
+    assert all(meta.built_in for meta in types.metas()), "nothing is uploaded yet"
+    assert set(types.names()) > {
         "Camera",
         "CollisionObject",
         "Generic",
@@ -86,7 +87,6 @@ async def test_built_in_and_installed_types_are_known(types: ObjectTypes, spec: 
         "VirtualCollisionObject",
     }
     assert types.names() == sorted(types.names())
-    assert not types.meta("FlowActions").built_in
     assert types.derives_from("MultiArmRobot", "GenericWithPose")
     assert types.bases("MultiArmRobot") == ["Robot", "GenericWithPose", "Generic"]
     assert types.type_code("FlowActions").entry_point.endswith(":FlowActions")
@@ -117,17 +117,58 @@ async def test_uploaded_type(types: ObjectTypes, storage: Storage) -> None:
         await types.remove("Lamp")
 
 
-async def test_given_types_cannot_be_replaced_or_deleted(types: ObjectTypes, storage: Storage) -> None:
-    for name in ("Generic", "FlowActions"):
-        with pytest.raises(InvalidData, match=name):
-            await types.add(ObjectTypeSource(name, f"class {name}: ..."))
-        with pytest.raises(InvalidData, match=name):
-            await types.remove(name)
-        # Nor by putting them straight into storage.
-        before = types.meta(name)
-        await storage.put_object_type(ObjectTypeSource(name, f"class {name}: ..."))
-        assert not await types.refresh()
-        assert types.meta(name) == before
+async def test_base_classes_cannot_be_replaced_or_deleted(types: ObjectTypes, storage: Storage) -> None:
+    source = ObjectTypeSource("Generic", "class Generic: ...")
+    with pytest.raises(InvalidData, match="Generic"):
+        await types.add(source)
+    with pytest.raises(InvalidData, match="Generic"):
+        await types.remove("Generic")
+    # Nor by a source that is put straight into storage.
+    before = types.meta("Generic")
+    await storage.put_object_type(source)
+    assert not await types.refresh()
+    assert types.meta("Generic") == before
+
+
+async def test_an_upload_shadows_an_installed_type_until_it_is_deleted(types: ObjectTypes, storage: Storage) -> None:
+    installed, code = types.meta("UR5e"), types.type_code("UR5e")
+    others = {name: types.actions(name) for name in ("UR3e", "UR10e")}
+    assert installed.built_in
+    with pytest.raises(InvalidData, match=r"belongs to arcor2-hw .* cannot be deleted"):
+        await types.remove("UR5e")
+
+    source = LAMP.replace("class Lamp", "class UR5e")
+    uploaded = await types.add(ObjectTypeSource("UR5e", source))
+    assert (uploaded.built_in, uploaded.base, uploaded.description) == (False, "Generic", "Gives light.")
+    assert re.fullmatch(r"arcor2-hw \d.*", str(uploaded.shadows))
+    assert [action.name for action in types.actions("UR5e")] == ["switch"]
+    assert types.type_code("UR5e").source == source
+    assert [(one.name, one.source) for one in types.sources_for(["UR5e"])] == [("UR5e", source)]
+    assert [robot for robot in types.robot_metas() if robot.type == "UR5e"] == []
+    assert [file.source for file in types.files() if file.name == "UR5e"][-1] == source
+    # Installed types next to it, in the same module, stay what they are.
+    assert {name: types.actions(name) for name in others} == others
+    assert not any(types.meta(name).disabled for name in others)
+    assert not await types.refresh(), "the caller of add notifies the clients"
+
+    assert await types.remove("UR5e") == uploaded
+    assert (types.meta("UR5e"), types.type_code("UR5e")) == (installed, code)
+    assert not await types.refresh()
+
+    # Put straight into storage it is an update for clients, and so is its end.
+    await storage.put_object_type(ObjectTypeSource("UR5e", source))
+    changes = await types.refresh()
+    assert ([meta.type for meta in changes.updated], changes.added, changes.removed) == (["UR5e"], [], [])
+    await storage.delete_object_type("UR5e")
+    changes = await types.refresh()
+    assert (changes.updated, changes.added, changes.removed) == ([installed], [], [])
+
+
+async def test_an_upload_shadows_after_a_restart(types: ObjectTypes, storage: Storage, assets: AssetStore) -> None:
+    shadow = await types.add(ObjectTypeSource("FlowActions", LAMP.replace("class Lamp", "class FlowActions")))
+    again = ObjectTypes(storage, assets)
+    await again.load()
+    assert again.meta("FlowActions") == shadow
 
 
 async def test_what_is_put_straight_into_storage_is_noticed_once(types: ObjectTypes, storage: Storage) -> None:

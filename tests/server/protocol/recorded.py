@@ -1,14 +1,12 @@
 """The workplace of the recorded sessions: a robot that stands where the recorded one stood, and moves at once."""
 
-import json
 from typing import Any
 
 from arcor2_hw.data.object_type import Box, ObjectModel, ObjectTypeSource
 from tests.server.session.desk import trace
 
-ROBOT = "RecordedDobot"
-NAMES = {"DobotMagician": ROBOT, "TimeActions": "RecordedTime", "RandomActions": "RecordedRandom"}
-"""Recorded types under names of their own: installed ones, which have other parameters, are called so here."""
+ROBOT = "DobotMagician"
+"""Like the other recorded types it takes the place of an installed one, which has other parameters."""
 
 
 def _answer(name: str, number: int) -> Any:
@@ -128,7 +126,7 @@ from arcor2_hw.actions import action
 from arcor2_hw.objects import Generic
 
 
-class RecordedTime(Generic):
+class TimeActions(Generic):
     _ABSTRACT = False
 
     @action
@@ -143,7 +141,7 @@ from arcor2_hw.actions import action
 from arcor2_hw.objects import Generic
 
 
-class RecordedRandom(Generic):
+class RandomActions(Generic):
     _ABSTRACT = False
 
     @action
@@ -159,16 +157,12 @@ def uploads() -> list[ObjectTypeSource]:
     model = ObjectModel.of(Box(**box))
     return [
         ObjectTypeSource(ROBOT, source().lstrip()),
-        ObjectTypeSource("RecordedTime", TIME.lstrip()),
-        ObjectTypeSource("RecordedRandom", RANDOM.lstrip()),
+        ObjectTypeSource("TimeActions", TIME.lstrip()),
+        ObjectTypeSource("RandomActions", RANDOM.lstrip()),
         ObjectTypeSource("WeighingMachine", SCALE.lstrip(), model=model),
     ]
 
 
 def session(name: str) -> list[dict[str, Any]]:
-    """Give a recorded session with our names of the types."""
-    text = json.dumps(trace(name))
-    for theirs, ours in NAMES.items():
-        text = text.replace(f'"{theirs}"', f'"{ours}"')
-    recorded: list[dict[str, Any]] = json.loads(text)
-    return recorded
+    """Return a recorded session."""
+    return trace(name)

@@ -144,7 +144,7 @@ class Stage:
         """Make a scene of objects by name and type; their ids are kept in `ids`."""
         await person.ask("NewScene", name="scene")
         for name, kind in objects.items():
-            pose: dict[str, Any] = {} if kind in ("Chooser", "TimeActions", "RandomActions") else {"pose": ORIGIN}
+            pose: dict[str, Any] = {"pose": ORIGIN} if self.services.types.meta(kind).has_pose else {}
             await person.ask("AddObjectToScene", name=name, type=kind, **pose)
         scene = self.services.session.require_scene()
         self.ids |= {obj.name: obj.id for obj in scene.objects}

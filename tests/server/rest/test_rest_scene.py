@@ -101,6 +101,7 @@ async def test_meshes_are_in_the_way_as_they_are(http: httpx.AsyncClient) -> Non
         ("box", {"boxId": "x", "sizeX": 1, "sizeY": 1}, ORIGIN, "sizeZ"),
         ("box", {"sizeX": 1, "sizeY": 1, "sizeZ": 1}, ORIGIN, "boxId"),
         ("box", {"boxId": "x", "sizeX": 1, "sizeY": 1, "sizeZ": -1}, ORIGIN, "size_z"),
+        ("box", {"boxId": "x", "sizeX": 0, "sizeY": 1, "sizeZ": 1}, ORIGIN, "size_x"),
         ("box", {"boxId": "x", "sizeX": "wide", "sizeY": 1, "sizeZ": 1}, ORIGIN, "sizeX"),
         ("sphere", {"sphereId": "x", "radius": "nan"}, ORIGIN, "radius"),
         ("sphere", {"sphereId": "x", "radius": "inf"}, ORIGIN, "radius"),

@@ -238,7 +238,15 @@ async def test_a_module_that_is_no_type_is_taken(http: httpx.AsyncClient, servic
     granted(await http.delete("/object-types/Colours"))
 
 
-@pytest.mark.parametrize("name", ["Generic", "FlowActions", "not a name", "class", "", "a" * 300 + "!"])
+async def test_an_installed_type_may_be_shadowed_but_not_deleted(http: httpx.AsyncClient, services: Services) -> None:
+    granted(await http.put("/object-types", json=lamp("FlowActions")))
+    assert services.types.is_uploaded("FlowActions")
+    granted(await http.delete("/object-types/FlowActions"))
+    assert services.types.meta("FlowActions").built_in
+    refused(await http.delete("/object-types/FlowActions"), 400, "Argument", "arcor2-hw", "cannot be deleted")
+
+
+@pytest.mark.parametrize("name", ["Generic", "not a name", "class", "", "a" * 300 + "!"])
 async def test_a_name_that_cannot_be_uploaded(http: httpx.AsyncClient, name: str) -> None:
     refused(await http.put("/object-types", json=lamp(name)), 400, "Argument")
 

@@ -23,7 +23,6 @@ from arcor2_server.access import Access
 from arcor2_server.endpoint import Endpoint
 from arcor2_server.hub import Hub
 from arcor2_server.locks import Locks
-from arcor2_server.object_types import Changes
 from arcor2_server.rpc import (  # noqa: F401
     action_points,
     actions,
@@ -47,6 +46,7 @@ from arcor2_server.services import Services
 from arcor2_server.session import Session
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import Storage
+from arcor2_server.type_changes import Changes
 from arcor2_server.users import Users
 from arcor2_server.wire import EXTENSION
 
