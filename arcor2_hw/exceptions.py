@@ -122,6 +122,12 @@ class InvalidData(Arcor2Error):
     code = "invalid_data"
 
 
+class TextTooLong(InvalidData):
+    """A text is longer than its field allows; the message names the field and the limit."""
+
+    code = "text_too_long"
+
+
 class NotFound(Arcor2Error):
     """What was named does not exist."""
 

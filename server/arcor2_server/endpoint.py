@@ -14,7 +14,8 @@ from msgspec import UNSET, Raw, Struct
 from arcor2_hw.data.events import Event
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import RPCS, Request, Response, Rpc
-from arcor2_hw.exceptions import Arcor2Error, StorageError
+from arcor2_hw.data.texts import SHORTEST, check_texts
+from arcor2_hw.exceptions import Arcor2Error, StorageError, TextTooLong
 from arcor2_server.access import AccessRefused, address_of
 from arcor2_server.client import Client, CloseCode
 from arcor2_server.hub import encode
@@ -267,6 +268,11 @@ class Endpoint:
             if not isinstance(request.args, msgspec.UnsetType):
                 try:
                     args = route.decode(request.args)
+                    if len(request.args) > SHORTEST:
+                        check_texts(args)
+                except TextTooLong as error:
+                    self._refuse(client, request, f"The arguments of {rpc.name} are wrong: {error}", error.code)
+                    return
                 except (msgspec.DecodeError, RecursionError) as error:
                     wrong = f"The arguments of {rpc.name} are wrong: {error}."
                     self._refuse(client, request, wrong, "invalid_arguments")

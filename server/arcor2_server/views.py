@@ -24,7 +24,6 @@ MOST_DOCUMENTS: Final = 200
 MOST_SHARED: Final = 10_000
 """Documents whose shared views are kept."""
 IN_MEMORY: Final = 64
-LONGEST_USER: Final = 200
 
 
 class ViewStates:
@@ -46,8 +45,6 @@ class ViewStates:
 
     async def change(self, scope: ViewScope, user: str, document: str, values: Mapping[str, Any], by: Client) -> int:
         """Write values, None: take them away, and tell the others; gives the revision. RequestRefused, StorageError."""
-        if len(user) > LONGEST_USER:
-            raise RequestRefused(f"View states are kept for users with names up to {LONGEST_USER} characters.")
         encoded = {key: _encoded(key, value) for key, value in values.items()}
         owner = _owner(scope, user)
         async with self._turn:

@@ -15,7 +15,8 @@ from arcor2_hw.data.base import Data, Unset, is_valid_name
 from arcor2_hw.data.object_type import Mesh, Model3dType, Models, ObjectModel, ObjectTypeSource
 from arcor2_hw.data.project import END, START, Action, Project
 from arcor2_hw.data.scene import Scene
-from arcor2_hw.exceptions import Conflict, InvalidPackage, InvalidProject, NotFound
+from arcor2_hw.data.texts import check_texts
+from arcor2_hw.exceptions import Conflict, InvalidPackage, InvalidProject, NotFound, TextTooLong
 from arcor2_server.build import package, script, snapshot
 from arcor2_server.build.candidates import Candidates
 from arcor2_server.build.reading import from_script
@@ -87,12 +88,17 @@ def _document(files: Mapping[str, bytes], path: str, kind: type[T]) -> T:
     except KeyError:
         raise InvalidPackage(f"The package has no {path}.") from None
     try:
-        return msgspec.json.decode(raw, type=kind)
+        found = msgspec.json.decode(raw, type=kind)
     except (msgspec.MsgspecError, RecursionError) as error:
         try:
-            return msgspec.convert(humps.decamelize(msgspec.json.decode(raw)), kind)
+            found = msgspec.convert(humps.decamelize(msgspec.json.decode(raw)), kind)
         except (msgspec.MsgspecError, ValueError, RecursionError):
             raise InvalidPackage(f"{path} of the package is damaged: {error}") from error
+    try:
+        check_texts(found)
+    except TextTooLong as error:
+        raise InvalidPackage(f"{path} of the package: {error}") from error
+    return found
 
 
 def _text(files: Mapping[str, bytes], path: str) -> str:

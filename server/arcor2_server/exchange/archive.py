@@ -14,7 +14,8 @@ from arcor2_hw.data.base import Data, Unset, is_valid_name
 from arcor2_hw.data.object_type import Mesh, Model3dType, ObjectModel, ObjectTypeSource
 from arcor2_hw.data.project import Project, ProjectParameter
 from arcor2_hw.data.scene import Scene, SceneObjectOverride
-from arcor2_hw.exceptions import InvalidPackage, NotFound, StorageError
+from arcor2_hw.data.texts import check_texts
+from arcor2_hw.exceptions import InvalidPackage, NotFound, StorageError, TextTooLong
 from arcor2_server.build import importing, package
 
 T = TypeVar("T")
@@ -146,9 +147,12 @@ def _wanted(path: PurePosixPath) -> bool:
 def _document(files: Mapping[str, bytes], path: str, kind: type[T]) -> T:
     try:
         found = msgspec.json.decode(files[path], type=kind)
+        check_texts(found)
         if b"\\u" in files[path]:
             msgspec.json.encode(found)  # half a surrogate pair can be read, but neither be written nor shown
         return found
+    except TextTooLong as error:
+        raise InvalidPackage(f"{path}: {error}") from error
     except UnicodeError as error:
         raise InvalidPackage(f"{path}: it has a character that is none: {error}") from error
     except KeyError:

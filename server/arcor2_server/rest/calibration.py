@@ -10,6 +10,7 @@ from arcor2_hw.data.camera import CameraParameters, EstimatedPose, MarkerCorners
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.role import Role
+from arcor2_hw.data.texts import check_texts
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.calibration import RobotView
 from arcor2_server.rest.naming import camelized_names, snaked
@@ -85,6 +86,8 @@ async def calibrate_robot(services: Services, upload: Upload) -> Pose:
 def read_args(text: str, kind: type[T]) -> T:
     """Read the part `args` of a multipart body, JSON in either spelling of names. InvalidData."""
     try:
-        return msgspec.convert(snaked(msgspec.json.decode(text)), kind)
+        args = msgspec.convert(snaked(msgspec.json.decode(text)), kind)
     except (msgspec.DecodeError, RecursionError) as error:
         raise InvalidData(f"The part args is wrong: {camelized_names(str(error))}.") from None
+    check_texts(args)
+    return args

@@ -20,6 +20,7 @@ from litestar.handlers import HTTPRouteHandler
 from litestar.response import Stream
 
 from arcor2_hw.data.role import Role
+from arcor2_hw.data.texts import check_texts
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
 from arcor2_server.rest.answers import OPEN, PERSON, ROLE, SERVICE, InternalError, Unsupported, refusal
 from arcor2_server.rest.encodings import accepted_encodings
@@ -202,6 +203,7 @@ def _query(kind: Any, request: Request[Any, Any, Any]) -> Any:
         read = msgspec.convert(values, kind, strict=False)
     except msgspec.ValidationError as error:
         raise InvalidData(f"The query is wrong: {error}.") from None
+    check_texts(read)
     for name in fields:
         value = getattr(read, name)
         for each in value if isinstance(value, list) else (value,):
@@ -230,9 +232,11 @@ def _decoded(content: bytes, kind: Any) -> Any:
         value = snaked(msgspec.json.decode(content))
         if b"\\u" in content:
             msgspec.json.encode(value)  # half a surrogate pair can be read, but neither kept nor sent back
-        return msgspec.convert(value, kind)
+        body = msgspec.convert(value, kind)
+        check_texts(body)
     except (msgspec.DecodeError, RecursionError, UnicodeError) as error:
         raise InvalidData(f"The body is wrong: {camelized_names(str(error))}.") from None
+    return body
 
 
 async def _upload(declared: Operation, request: Request[Any, Any, Any], uploads: list[UploadFile]) -> Upload:

@@ -229,3 +229,16 @@ async def test_request_of_one_who_leaves_is_finished(services: Services, monkeyp
         go_on.set()
         async with asyncio.timeout(5):
             await done.wait()
+
+
+async def test_a_name_of_megabytes_is_refused_and_nobody_is_told(services: Services) -> None:
+    async with connecting(services) as connect:
+        ann, bob = connect(), connect()
+        await bob.heard(1)
+        ann.say(id=1, request="RegisterUser", args={"user_name": "x" * 15_000_000}, codes=True)
+        answer = (await ann.heard(2))[-1]
+        assert (answer["result"], answer["code"]) == (False, "text_too_long")
+        assert "user_name has 15000000 characters; at most 200 are allowed" in answer["messages"][0]
+        ann.say(id=2, request="RegisterUser", args={"user_name": "x" * 200})
+        assert (await ann.heard(3))[2]["result"]
+        assert len(bob.protocol.sent) == 1

@@ -103,6 +103,11 @@ async def test_what_is_no_scene(http: httpx.AsyncClient, body: bytes) -> None:
     refused(await http.get("/scenes/scn_x"), 404, "NotFound")
 
 
+async def test_a_text_that_is_too_long_is_named(http: httpx.AsyncClient) -> None:
+    body = scene("long") | {"name": "x" * 201}
+    refused(await http.put("/scenes", json=body), 400, "Argument", "name has 201 characters", "at most 200")
+
+
 async def test_another_media_type_and_too_much(http: httpx.AsyncClient) -> None:
     xml = {"Content-Type": "application/xml"}
     refused(await http.put("/scenes", content=b"<scene/>", headers=xml), 415, "Argument", "application/xml")

@@ -1,0 +1,51 @@
+"""Length limits of the texts that requests carry, all in one place, and the check that enforces them."""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+import msgspec
+
+from arcor2_hw.exceptions import TextTooLong
+
+NAME: Final = 200
+"""Limit of the names of users, scenes, projects, objects, points, actions, parameters and packages, in characters."""
+DESCRIPTION: Final = 10_000
+"""Limit of descriptions and remarks, in characters."""
+VALUE: Final = 1_000_000
+"""Limit of values and other JSON in a text, in characters."""
+OTHER: Final = 1000
+"""Limit of every text whose field has no limit of its own, such as identifiers, in characters."""
+LIMITS: Final[Mapping[str, int | None]] = (
+    dict.fromkeys(
+        ("name", "new_name", "target_name", "package_name", "object_name", "user_name", "user", "users"), NAME
+    )
+    | dict.fromkeys(("description", "new_description", "remark", "problem"), DESCRIPTION)
+    | dict.fromkeys(("value", "default_value", "extra"), VALUE)
+    | dict.fromkeys(("data", "image", "source", "script", "client", "values"), None)
+)
+"""Limit by field name; None for content, whose size is limited as that of the message or where it is stored."""
+SHORTEST: Final = NAME
+"""A message no longer than this, in bytes, holds no text that is too long."""
+
+
+def check_texts(value: Any, field: str = "") -> None:
+    """Raise TextTooLong for the first text in `value` that is longer than the limit of its field.
+
+    value: a decoded request, or a part of one. field: the name of the field that holds it.
+    """
+    if isinstance(value, str):
+        limit = LIMITS.get(field, OTHER)
+        if limit is not None and len(value) > limit:
+            raise TextTooLong(
+                f"{field or 'A text'} has {len(value)} characters; at most {limit} are allowed. Shorten it."
+            )
+    elif isinstance(value, msgspec.Struct):
+        for name in value.__struct_fields__:
+            check_texts(getattr(value, name), name)
+    elif isinstance(value, list | tuple | set | frozenset):
+        for item in value:
+            check_texts(item, field)
+    elif isinstance(value, dict):
+        for key, item in value.items():
+            check_texts(key, field)
+            check_texts(item, field)
