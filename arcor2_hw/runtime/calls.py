@@ -14,6 +14,7 @@ from arcor2_hw.runtime.device import STOP_DEADLINE, STOP_GRACE, Device, describe
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.program import Program
 from arcor2_hw.runtime.stopping import SentStop, outcomes, send_stop
+from arcor2_hw.runtime.teaching import SET_MODE, Teaching
 
 Post = Callable[[m.ToServer], None]
 
@@ -34,11 +35,13 @@ class Calls:
         post: Post,
         clock: Clock,
         stopping: Callable[[Device], None] = lambda _: None,
+        teaching: Teaching | None = None,
     ) -> None:
         self._cell = cell
         self._post = post
         self._clock = clock
         self._stopping = stopping
+        self._teaching = teaching
         self._answering: threading.Thread | None = None
 
     def call(self, message: m.Call) -> None:
@@ -46,7 +49,7 @@ class Calls:
         device: Device | None = None
         try:
             device = self._cell()[message.object_id]
-            answer = self._answer(message.id, device)
+            answer = self._answer(message, device)
             method = device.cancelled_by(message.method) if message.cancel else message.method
             if method == "stop":
                 self.stop_motion(m.StopMotion(message.id, message.object_id))
@@ -63,7 +66,9 @@ class Calls:
             within = deadline
             self._clock.after(within, lambda: lane.expire(job, within))
 
-    def _answer(self, number: int, device: Device) -> Callable[[Job], None]:
+    def _answer(self, message: m.Call, device: Device) -> Callable[[Job], None]:
+        number = message.id
+
         def answer(job: Job) -> None:
             error = job.error
             if error is None:
@@ -72,6 +77,10 @@ class Calls:
                 except Arcor2Error as caught:
                     error = caught
                 else:
+                    if message.method == SET_MODE and self._teaching is not None:
+                        given = {name: msgspec.json.decode(value) for name, value in message.arguments.items()}
+                        arm = {} if given.get("arm_id") is None else {"arm_id": given["arm_id"]}
+                        self._teaching.set(device, arm, given.get("enabled") is True)
                     self._post(m.CallDone(number, value))
                     return
             self._post(m.CallFailed(number, error_data(describe(device, error), device.id)))

@@ -3,9 +3,10 @@
 Whoever hangs, client, network or server: the lease ends by the clock of this process, and by the driver's own.
 """
 
+import contextlib
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from arcor2_hw.actions.json_values import encode as encode_json
@@ -19,6 +20,7 @@ from arcor2_hw.runtime.clock import Clock
 from arcor2_hw.runtime.device import Device, describe
 from arcor2_hw.runtime.jogging import Jog
 from arcor2_hw.runtime.lane import Job
+from arcor2_hw.runtime.teaching import SET_MODE, Teaching
 
 RENEWED_WITHIN: Final = 2.0
 """Seconds that a driver has to take a renewal, or to make an arm stiff again; a good one takes milliseconds."""
@@ -50,8 +52,9 @@ class _Hold:
 class Holds:
     """At most one hold of each device. Leases come on the reader's thread, time passes on the clock's."""
 
-    def __init__(self, cell: Callable[[], Cell], post: Post, clock: Clock, calls: Calls) -> None:
+    def __init__(self, cell: Callable[[], Cell], post: Post, clock: Clock, calls: Calls, teaching: Teaching) -> None:
         self._cell = cell
+        self._teaching = teaching
         self._post = post
         self._clock = clock
         self._calls = calls
@@ -120,7 +123,7 @@ class Holds:
                 return
             numbers, hold.unanswered = hold.unanswered, []
             job = hold.job = Job(
-                "jog" if hold.kind is HoldKind.JOG else "set_hand_teaching_mode",
+                "jog" if hold.kind is HoldKind.JOG else SET_MODE,
                 lambda: self._tell_driver(hold),
                 notify=lambda done: self._told(hold, done, numbers),
             )
@@ -162,6 +165,8 @@ class Holds:
             hold.job = None
             self.end(hold, error)
             return
+        if hold.kind is HoldKind.HAND_TEACHING and not hold.begun:
+            self._teaching.set(device, hold.arm, True)
         hold.begun = True
         value = encode_json({"scale": job.value}).encode()
         for number in numbers:
@@ -176,12 +181,27 @@ class Holds:
         if hold is not None:
             self.end(hold, Cancelled(f"{device.name} was stopped"))
 
+    def teaching_ended(self, device: Device, arm: Mapping[str, Any], error: Arcor2Error) -> None:
+        """End the hold of an arm whose hand teaching has ended, or report that, and make the arm stiff."""
+        hold = self._held.get(device.id)
+        if hold is not None and hold.kind is HoldKind.HAND_TEACHING:
+            self.end(hold, error)
+            return
+        robot, lane = device.instance, device.lane
+        if isinstance(robot, Robot):
+            job = Job(SET_MODE, lambda: robot.set_hand_teaching_mode(False, **arm))
+            with contextlib.suppress(DeviceTimeout):  # the lane hangs; the arm is not movable any more either way
+                lane.submit(job)
+                self._clock.after(RENEWED_WITHIN, lambda: lane.expire(job, RENEWED_WITHIN))
+        self._post(m.HandTeachingEnded(device.id, error_data(error, device.id), arm.get("arm_id")))
+
     def end(self, hold: _Hold, error: Arcor2Error | None) -> None:
         """Bring the robot to rest, then tell; `error` says why, None when it was let go."""
         with self._lock:
             if hold.ending:
                 return
             hold.ending, hold.error = True, error
+            self._teaching.set(hold.device, hold.arm, False)
             numbers, hold.unanswered = hold.unanswered, []
         why = error or Cancelled(f"{hold.device.name} was let go")
         for number in numbers:
@@ -204,7 +224,7 @@ class Holds:
                 problem = job.error
                 self._calls.stop(device, lambda _, other: self._at_rest(hold, problem if other else None))
 
-        job = Job("set_hand_teaching_mode", lambda: robot.set_hand_teaching_mode(False, **hold.arm), notify=done)
+        job = Job(SET_MODE, lambda: robot.set_hand_teaching_mode(False, **hold.arm), notify=done)
         try:
             lane.submit(job)
         except DeviceTimeout as error:

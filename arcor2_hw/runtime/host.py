@@ -36,6 +36,7 @@ from arcor2_hw.runtime.package import put_on_path
 from arcor2_hw.runtime.program import Program, set_current, traceback_text
 from arcor2_hw.runtime.stopping import wait_stopped
 from arcor2_hw.runtime.streaming import RatedStreams, Streams
+from arcor2_hw.runtime.teaching import TEACHING_PERIOD, Teaching
 from arcor2_hw.runtime.watch import OBSERVE_PERIOD, Watch
 
 GONE_WITHIN: Final = 1.8
@@ -74,8 +75,9 @@ class Host:
         self._told = self._cell.told
         self._work: SimpleQueue[m.HostBound] = SimpleQueue()
         self._subscribed: dict[str, m.Subscribe] = {}
-        self._calls = Calls(lambda: self._cell, self.link.post, self.clock, self._stopping)
-        self._holds = Holds(lambda: self._cell, self.link.post, self.clock, self._calls)
+        self._teaching = Teaching(lambda *ended: self._holds.teaching_ended(*ended))
+        self._calls = Calls(lambda: self._cell, self.link.post, self.clock, self._stopping, self._teaching)
+        self._holds = Holds(lambda: self._cell, self.link.post, self.clock, self._calls, self._teaching)
         self._streams = Streams(self.link.post_stream)
         self._rated = RatedStreams(lambda: self._cell, self.clock, self._streams)
         self._watch = Watch(self._cell, self.link.post, self._lost)
@@ -97,6 +99,7 @@ class Host:
         self.clock.every(m.HEARTBEAT_PERIOD, lambda: self.link.post(m.Heartbeat()))
         self.clock.every(OBSERVE_PERIOD, lambda: self._watch.look())
         self.clock.every(NUDGE_PERIOD, self._nudge)
+        self.clock.every(TEACHING_PERIOD, self._teaching.look)
         self.clock.start()
         self.link.post(m.Ready(os.getpid()))
         threading.Thread(target=self._read, name="from server", daemon=True).start()

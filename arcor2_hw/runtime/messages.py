@@ -11,13 +11,14 @@ from msgspec import Struct, field
 from arcor2_hw import framing
 from arcor2_hw.data.cell import Cell
 from arcor2_hw.data.device import Alarm, Connection, Health
-from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.operation import HoldKind
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.robot import Joint, KinematicCalibration
 from arcor2_hw.data.scene import Scene, SceneObjectOverride
 from arcor2_hw.framing import PREFIX_SIZE as PREFIX_SIZE
+from arcor2_hw.runtime.message_parts import DeviceStop as DeviceStop
+from arcor2_hw.runtime.message_parts import PutIn as PutIn
 
 MAX_MESSAGE: Final = 64 * 1024 * 1024
 HEARTBEAT_PERIOD: Final = 0.25
@@ -43,34 +44,6 @@ class TypeCode(Struct, frozen=True):
     entry_point: str = ""
     module: str = ""
     source: str = ""
-
-
-class PutIn(Struct, frozen=True):
-    """Something that stands in the way beside the objects of the scene.
-
-    pose: in the world, or in the frame of the link that holds it. scale: of a mesh, whose file is `file`. robot: the id
-    of the object that holds it with `link`, empty when nobody does; it may touch the links `touching`, too.
-    """
-
-    id: str
-    model: ObjectModel
-    pose: Pose
-    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    file: str = ""
-    robot: str = ""
-    link: str = ""
-    touching: list[str] = field(default_factory=list)
-
-
-class DeviceStop(Struct, frozen=True):
-    """The result of a stop on one device.
-
-    reason: why it was not stopped, empty when it was. method: the call that ran when the stop came, empty for none.
-    """
-
-    object_id: str
-    reason: str = ""
-    method: str = ""
 
 
 # ------------------------------------------------------------------------------------------------ server to host
@@ -338,6 +311,14 @@ class ProgramChanged(ToServer, frozen=True):
     error: ErrorData | None = None
 
 
+class HandTeachingEnded(ToServer, frozen=True):
+    """Hand teaching that was switched on by a call has ended without a request; `error` says why."""
+
+    object_id: str
+    error: ErrorData
+    arm_id: str | None = None
+
+
 class DeviceChanged(ToServer, frozen=True):
     """A device's connection, health, alarms or owner of control changed; `reason` why the connection is lost.
 
@@ -391,6 +372,7 @@ ServerBound = (
     | CallFailed
     | StreamEvent
     | HoldEnded
+    | HandTeachingEnded
     | ProgramEvent
     | ActionFailed
     | ProgramChanged

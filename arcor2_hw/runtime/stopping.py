@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 from arcor2_hw.exceptions import Arcor2Error, Cancelled
 from arcor2_hw.runtime.device import STOP_DEADLINE, Device, describe, until
 from arcor2_hw.runtime.lane import Job
-from arcor2_hw.runtime.messages import DeviceStop
+from arcor2_hw.runtime.message_parts import DeviceStop
 
 UNSTOPPABLE_AFTER: Final = 0.25
 """Seconds after which a call that nothing can stop is reported as still running."""

@@ -13,7 +13,7 @@ import msgspec
 import structlog
 
 from arcor2_hw.data.base import UNSET, Data, Unset
-from arcor2_hw.data.events import HandTeachingModeData
+from arcor2_hw.data.events import HandTeachingModeData, NotificationData, NotificationLevel
 from arcor2_hw.data.operation import HoldKind, RobotHoldData
 from arcor2_hw.data.rpc import HoldHandTeachingArgs, JogRobotArgs
 from arcor2_hw.data.rpc.operation import LONGEST_LEASE_MS
@@ -265,6 +265,14 @@ class HeldRobots:
         if press.kind is HoldKind.HAND_TEACHING:
             data = HandTeachingModeData(press.robot_id, held, press.arm_id)
             hub.broadcast(make_event("HandTeachingMode", data))
+
+    def teaching_ended(self, message: m.HandTeachingEnded) -> None:
+        """Publish that hand teaching, which was on until switched off, has ended without a request."""
+        hub = self._services.hub
+        log.warning("hand teaching ended", robot=message.object_id, reason=message.error.message)
+        data = HandTeachingModeData(message.object_id, False, message.arm_id or UNSET)
+        hub.broadcast(make_event("HandTeachingMode", data))
+        hub.broadcast(make_event("Notification", NotificationData(message.error.message, NotificationLevel.WARN)))
 
     def forget(self, client: Client) -> None:
         """Let go of what a client held that is gone."""

@@ -254,6 +254,8 @@ class OnlineCell:
                     self.streams.heard(message)
             case m.HoldEnded():
                 self.held.ended(message)
+            case m.HandTeachingEnded():
+                self.held.teaching_ended(message)
             case m.SceneOpened():
                 self._answered(None)
             case m.SceneFailed() | m.SceneClosed():

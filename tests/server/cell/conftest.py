@@ -5,6 +5,7 @@ import contextlib
 import json
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import msgspec
@@ -137,6 +138,7 @@ async def running_server(data_dir: Path) -> AsyncIterator[Server]:
     hub, locks, types = Hub(), Locks(2, 0.05), Types()
     none: Any = None
     given: dict[str, Any] = dict.fromkeys(("access", "users", "storage", "session", "cell", "execution", "build"), none)
+    given["storage"] = SimpleNamespace(on_deleted=[])
     given["assets"] = await AssetStore.open(settings.assets_dir)
     services = Services(settings=settings, hub=hub, locks=locks, types=types, **given)  # type: ignore[arg-type]
     services.session = Session(services)

@@ -333,6 +333,26 @@ async def test_hand_teaching_while_held(arm: Server) -> None:
 
 
 @serving(with_arm)
+async def test_a_protective_stop_ends_hand_teaching_and_that_is_published(arm: Server) -> None:
+    subscribe(arm, arm.client)
+    hand = Hand(arm)
+    await hand.teach(new=True)
+    await arm.client.event("HandTeachingMode", lambda data: data["enabled"])
+    await do(arm, "be", safety="protective_stop")
+    told = await arm.client.event("RobotHold", lambda data: not data["held"])
+    assert "protective stop" in told["reason"]
+    assert await arm.client.event("HandTeachingMode") == {"robot_id": OBJ, "enabled": False}
+
+    await do(arm, "be", safety="normal")
+    await arm.ask("HandTeachingMode", {"robot_id": OBJ, "enable": True})
+    await arm.client.event("HandTeachingMode", lambda data: data["enabled"])
+    await do(arm, "be", safety="protective_stop")
+    assert await arm.client.event("HandTeachingMode") == {"robot_id": OBJ, "enabled": False}
+    assert "protective stop" in (await arm.client.event("Notification"))["message"]
+    assert (await report(arm))[2][-1] is False
+
+
+@serving(with_arm)
 async def test_stop_by_anybody_and_a_scene_that_goes_offline(arm: Server) -> None:
     operator = await join(arm, "olga", Role.OPERATOR)
     hand = Hand(arm)
