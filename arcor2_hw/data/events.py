@@ -281,12 +281,14 @@ class ObjectStateData(Data, frozen=True):
     """What the event ObjectState carries: how the connection of an object of the scene or program in operation is.
 
     reason: why it is lost or failed, or why all ended. overlaid: the settings that come from the server's cell file.
+    answering: false while the process that controls the devices does not answer; `state` is then the last known one.
     """
 
     object_id: str
     state: Connection
     reason: str | Unset = UNSET
     overlaid: list[str] | Unset = UNSET
+    answering: bool | Unset = UNSET
 
 
 class ChangeType(enum.StrEnum):

@@ -355,7 +355,7 @@ class Execution(KeptPackages):
     def host_silent(self, host: CellHost, silent: bool) -> None:
         """Note that the host does not answer, or answers again."""
         if host is self._host:
-            self.board.answering = not silent
+            self.board.set_answering(not silent)
             log.warning("program does not answer" if silent else "program answers again", package=self.package_id)
 
     def host_ended(self, host: CellHost, reason: str) -> None:

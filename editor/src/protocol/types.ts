@@ -900,12 +900,14 @@ export interface ObjectModel {
  * What the event ObjectState carries: how the connection of an object of the scene or program in operation is.
  *
  * reason: why it is lost or failed, or why all ended. overlaid: the settings that come from the server's cell file.
+ * answering: false while the process that controls the devices does not answer; `state` is then the last known one.
  */
 export interface ObjectStateData {
   object_id: string;
   state: Connection;
   reason?: string;
   overlaid?: string[];
+  answering?: boolean;
 }
 
 /**

@@ -136,6 +136,14 @@ describe("operation", () => {
     expect(off.live).toMatchObject({ state: "stopped", message: "no robot", objects: {} });
   });
 
+  test("devices whose process is frozen are told of once, and again when they answer", () => {
+    const object = (object_id: string, answering?: boolean): ServerEvent => ({ event: "ObjectState", data: { object_id, state: "online", ...(answering === undefined ? {} : { answering }) } });
+    const frozen = [online, object("a"), object("b"), object("a", false), object("b", false)];
+    expect(after(OPEN, ...frozen).notices.map((each) => each.level)).toEqual(["error"]);
+    expect(after(OPEN, ...frozen).notices[0]?.text).toContain("do not answer");
+    expect(after(OPEN, ...frozen, object("a"), object("b")).notices.map((each) => each.level)).toEqual(["error", "info"]);
+  });
+
   test("a motion that failed is told", () => {
     const state = after({
       event: "RobotMoveToPose",

@@ -169,6 +169,12 @@ function viewState(state: State, data: import("../protocol/types").ViewState): P
 }
 
 /** The scene in operation; null when the event is about something else. */
+const SILENT = "The devices do not answer: the process that controls them is frozen or overloaded. If something moves, use the emergency stop.";
+
+function isAnswering(objects: State["live"]["objects"]): boolean {
+  return Object.values(objects).every((each) => each.answering !== false);
+}
+
 function live(state: State, event: ServerEvent): Partial<State> | null {
   const now = state.live;
   const become = (change: Partial<typeof now>) => ({ live: { ...now, ...change } });
@@ -179,8 +185,13 @@ function live(state: State, event: ServerEvent): Partial<State> | null {
       if (next === "starting") return { live: { ...OFFLINE, state: next, message } };
       return become({ state: next, message });
     }
-    case "ObjectState":
-      return become({ objects: put(now.objects, event.data.object_id, event.data) });
+    case "ObjectState": {
+      const objects = put(now.objects, event.data.object_id, event.data);
+      const was = isAnswering(now.objects);
+      if (was === isAnswering(objects)) return become({ objects });
+      if (was) return { ...become({ objects }), ...notice(state, "error", SILENT) };
+      return { ...become({ objects }), ...(event.data.state === "offline" ? {} : notice(state, "info", "The devices answer again.")) };
+    }
     case "ObjectHealth":
       return become({ health: put(now.health, event.data.object_id, event.data) });
     case "RobotHold": {

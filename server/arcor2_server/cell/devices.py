@@ -72,6 +72,14 @@ class DeviceBoard:
         self._hub.broadcast(make_event("ObjectState", data))
         self._told()
 
+    def set_answering(self, answering: bool) -> None:
+        """Note whether the process that controls the devices answers, and publish it with the state of each device."""
+        if self.answering == answering:
+            return
+        self.answering = answering
+        for state in self.states():
+            self._tell(state)
+
     def clear(self, reason: str = "") -> None:
         """Begin anew: what was connected is offline now, for a reason."""
         before, self._said = self._said, {}
@@ -132,7 +140,8 @@ class DeviceBoard:
 
     def _state(self, said: DeviceChanged) -> ObjectStateData:
         overlaid = self._overlaid.get(said.object_id)
-        return ObjectStateData(said.object_id, said.connection, said.reason or UNSET, overlaid or UNSET)
+        answering = UNSET if self.answering else False
+        return ObjectStateData(said.object_id, said.connection, said.reason or UNSET, overlaid or UNSET, answering)
 
     def statuses(self) -> list[DeviceStatus]:
         """Give all objects in the order of the scene."""

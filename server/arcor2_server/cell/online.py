@@ -281,7 +281,7 @@ class OnlineCell:
     def host_silent(self, host: CellHost, silent: bool) -> None:
         """Note that the host does not answer, or answers again."""
         if host is self._host:
-            self.board.answering = not silent
+            self.board.set_answering(not silent)
             log.warning("cell host does not answer" if silent else "cell host answers again", pid=host.pid)
 
     def host_ended(self, host: CellHost, reason: str) -> None:

@@ -263,13 +263,17 @@ async def test_a_driver_that_ends_the_process_while_it_connects(server: Server) 
 async def test_silence_is_reported_and_forgiven(arm: Server) -> None:
     await arm.start()
     cell = arm.services.cell
+    arm.services.hub.subscribe(arm.client, {"ObjectState"}, True)  # type: ignore[arg-type]
+    began = time.monotonic()
     call = asyncio.create_task(cell.call(OBJ, "freeze"))
-    async with asyncio.timeout(3):
-        while cell.devices()[0].answering:
-            await asyncio.sleep(0.02)
-        await call
-        while not cell.devices()[0].answering:
-            await asyncio.sleep(0.02)
+    told = await arm.client.event("ObjectState", lambda data: data.get("answering") is False)
+    assert time.monotonic() - began < 2.0
+    assert told == {"object_id": OBJ, "state": "online", "answering": False}
+    assert not cell.devices()[0].answering
+    assert cell.object_states()[0].answering is False, "whoever subscribes now is told, too"
+    await call
+    assert await arm.client.event("ObjectState") == {"object_id": OBJ, "state": "online"}
+    assert cell.devices()[0].answering
     assert cell.online
 
 

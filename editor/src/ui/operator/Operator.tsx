@@ -120,7 +120,7 @@ function Trouble() {
 function Devices() {
   const live = useEditor((state) => state.live);
   const doc = useEditor((state) => state.doc);
-  const wrong = Object.values(live.objects).filter((each) => each.state === "lost" || each.state === "failed");
+  const wrong = Object.values(live.objects).filter((each) => each.state === "lost" || each.state === "failed" || each.answering === false);
   if (!doc || wrong.length === 0) return null;
   return (
     <section className="exception" role="alert">

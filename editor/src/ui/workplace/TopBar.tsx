@@ -66,7 +66,7 @@ function LiveSwitch() {
   const running = useEditor(isRunning);
   const cannot = useEditor((state) => barred(state, "StartScene"));
   const objects = useEditor((state) => state.live.objects);
-  const wrong = Object.values(objects).filter((each) => each.state === "failed" || each.state === "lost").length;
+  const wrong = Object.values(objects).filter((each) => each.state === "failed" || each.state === "lost" || each.answering === false).length;
   const busy = live === "starting" || live === "stopping";
   return (
     <Button

@@ -39,7 +39,11 @@ export default function Panel() {
             <li key={object.id}>
               <div className="device-head">
                 <strong>{object.name}</strong>
-                <span className={`tag ${TONE[state?.state ?? ""] ?? ""}`}>{STATES[state?.state ?? "offline"]}</span>
+                {state?.answering === false ? (
+                  <span className="tag bad">no answer</span>
+                ) : (
+                  <span className={`tag ${TONE[state?.state ?? ""] ?? ""}`}>{STATES[state?.state ?? "offline"]}</span>
+                )}
               </div>
               {state?.reason && <p className="small">{state.reason}</p>}
               {health?.alarms.map((alarm) => (
