@@ -15,6 +15,8 @@ from arcor2_hw.keep_alive_process import PULSE
 
 PULSE_PERIOD: Final = 0.05
 """Seconds between pulses, where a driver does not work at a rhythm of its own."""
+BUSY_FOR: Final = 0.3
+"""Seconds of running time that a caller waits for a fresh reading which a busy process may not have taken yet."""
 LONGEST_STEP: Final = 0.05
 """Most seconds that `RunningTime` counts between two readings."""
 TOO_SLOW: Final = "this computer was too slow for the {}'s watchdog"
@@ -56,7 +58,7 @@ class KeepAlive:
     def pulse(self) -> None:
         """Report that the device is supervised; to be called at least each 0.1 s."""
         assert self._process.stdin is not None
-        with contextlib.suppress(OSError):  # a child that died leaves the device to its watchdog
+        with contextlib.suppress(OSError, ValueError):  # closed, or the child died: the device has its watchdog
             os.write(self._process.stdin.fileno(), pulse())
 
     def close(self) -> None:

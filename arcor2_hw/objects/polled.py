@@ -7,6 +7,7 @@ from typing import Final, Generic, NamedTuple, TypeVar
 
 from arcor2_hw.data.base import Timestamp, now
 from arcor2_hw.exceptions import Cancelled, ConnectionLost, DeviceError, DeviceTimeout, Stale
+from arcor2_hw.keep_alive import BUSY_FOR, LONGEST_STEP, RunningTime, once_within
 from arcor2_hw.objects.observing import Observing
 
 T = TypeVar("T")
@@ -106,13 +107,21 @@ class Polled(Generic[T]):
         return None if newest is None else newest.value
 
     def current(self) -> Snapshot[T]:
-        """Give the newest state. Raises NotConnected, ConnectionLost, or Stale when it is too old to count."""
+        """Return the newest state; wait a moment for one that is not too old to count.
+
+        Raises NotConnected, ConnectionLost, Stale.
+        """
         self.observing.check()
-        newest = self._newest
-        age = float("inf") if newest is None else time.monotonic() - newest.asked
+        once_within(lambda: self._age() <= self._fresh or not self.observing.online, BUSY_FOR, self._busy)
+        self.observing.check()
+        newest, age = self._newest, self._age()
         if newest is None or age > self._fresh:
             raise Stale(f"{self.who}: the newest state is {age:.2f} s old, {self._fresh:g} s at most are asked for")
         return newest
+
+    def _age(self) -> float:
+        newest = self._newest
+        return float("inf") if newest is None else time.monotonic() - newest.asked
 
     def fresh(self) -> Snapshot[T]:
         """Give a state that was asked for after this call. Raises DeviceTimeout, NotConnected, ConnectionLost."""
@@ -124,7 +133,7 @@ class Polled(Generic[T]):
         go_on: of `begin`. Raises DeviceTimeout naming `what` after `timeout` s, ConnectionLost as soon as the
         connection is lost.
         """
-        began, losses = time.monotonic(), self.losses
+        began, losses, clock = time.monotonic(), self.losses, RunningTime()
         with self._news:
             self._waiting += 1
             try:
@@ -136,10 +145,9 @@ class Polled(Generic[T]):
                     newest = self._newest
                     if newest is not None and newest.asked >= began and holds(newest.value):
                         return newest
-                    left = began + timeout - time.monotonic()
-                    if left <= 0.0:
+                    if clock() >= timeout:
                         raise DeviceTimeout(f"{self.who}: {what} took longer than {timeout:.3g} s")
-                    self._news.wait(left)
+                    self._news.wait(min(timeout, LONGEST_STEP))
             finally:
                 self._waiting -= 1
 

@@ -15,13 +15,16 @@ from dynamixel_sdk import (  # type: ignore[import-untyped]
 )
 
 from arcor2_hw.exceptions import ConnectionLost, DeviceTimeout, NotConnected, Refused
+from arcor2_hw.keep_alive import KeepAlive, RunningTime
 
-from .registers import STATUS_ERRORS, Register
+from .registers import LED, STATUS_ERRORS, Register
 
 POLL: Final = 0.002
 """s for which a read waits for bytes: the library alone would spin."""
-LONGEST: Final = 0.25
+LONGEST: Final = 0.35
 """s for one exchange whatever comes; the library's own limit is not looked at while bytes keep coming."""
+PATIENCE: Final = 0.25
+"""s that the first byte of an answer is waited for; the library's 0.034 are few on a busy computer."""
 QUIET: Final = 0.03
 """s for which what comes late is thrown away before something is asked anew."""
 ALERT: Final = 0x80
@@ -37,37 +40,55 @@ class _Endless(Exception):
 
 
 class _Port(PortHandler):  # type: ignore[misc]
-    """The library's port, waiting instead of spinning."""
+    """The library's port, waiting instead of spinning. Times are running time: an answer waits while we do not run."""
 
-    until = 0.0
-    patience = 0.0
-    """ms that an answer may keep us waiting for its first byte; the library's 34 are few on a busy computer."""
-    heard = False
+    def __init__(self, path: str) -> None:
+        super().__init__(path)
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin an exchange."""
+        self._clock = RunningTime()
+        self._asked = 0.0
+        self._heard = False
 
     def readPort(self, length: int) -> bytes:  # noqa: N802 - the library's name
-        if time.monotonic() > self.until:
+        if self._clock() > LONGEST:
             raise _Endless
         found: bytes = self.ser.read(max(length, 0))
-        self.heard = self.heard or bool(found)
+        self._heard = self._heard or bool(found)
         return found
 
+    def setPacketTimeout(self, packet_length: int) -> None:  # noqa: N802 - the library's name
+        super().setPacketTimeout(packet_length)
+        self._asked = self._clock()
+
     def isPacketTimeout(self) -> bool:  # noqa: N802 - the library's name
-        if not self.heard and self.getTimeSinceStart() <= self.patience:
-            return False
-        late: bool = super().isPacketTimeout()
-        return late
+        limit = float(self.packet_timeout) / 1000.0
+        return self._clock() - self._asked > (limit if self._heard else max(limit, PATIENCE))
+
+
+class _Recorder:
+    """In place of a port: takes the bytes of a packet."""
+
+    is_using = False
+    packet = b""
+
+    def clearPort(self) -> None:  # noqa: N802 - the library's name
+        """Clear nothing."""
+
+    def writePort(self, packet: list[int]) -> int:  # noqa: N802 - the library's name
+        """Take a packet."""
+        self.packet = bytes(packet)
+        return len(packet)
 
 
 class Bus:
-    """Two servos on one serial port. Each exchange is one instruction and its answers.
+    """Two servos on one serial port. Each exchange is one instruction and its answers."""
 
-    `patience` is how long the first byte of an answer is waited for at least, s.
-    """
-
-    def __init__(self, name: str, port: str, baud_rate: int, patience: float = 0.0) -> None:
+    def __init__(self, name: str, port: str, baud_rate: int) -> None:
         self.who = f"{name} at {port}"
         self._name, self._path, self._baud_rate = name, port, baud_rate
-        self._patience = patience
         self._port: _Port | None = None
         self._packets: Any = PacketHandler(2.0)
 
@@ -78,7 +99,6 @@ class Bus:
     def open(self) -> None:
         """Open the port for us alone. Raises NotConnected naming it."""
         port = _Port(self._path)
-        port.patience = 1000.0 * self._patience
         try:
             port.baudrate = self._baud_rate
             port.openPort()
@@ -105,7 +125,7 @@ class Bus:
         port = self._port
         if port is None:
             raise NotConnected(f"{self.who} is not connected")
-        port.until, port.heard = time.monotonic() + LONGEST, False
+        port.begin()
         try:
             yield port
         except (OSError, termios.error) as e:
@@ -192,6 +212,17 @@ class Bus:
         with self._exchange() as port:
             result = self._packets.syncWriteTxOnly(port, address, size, data, len(data))
         self._check(next(iter(blocks)), result, 0, f"a block at register {address}")
+
+    def keep_alive(self, numbers: tuple[int, ...], period: float, quiet: float) -> KeepAlive:
+        """Keep the servos' bus watchdog quiet from a child process when the line is quiet for `quiet` s.
+
+        It writes the LEDs, which nothing here uses: nobody answers a sync write, so no answer of ours is disturbed.
+        """
+        recorder = _Recorder()
+        data = [byte for number in numbers for byte in (number, 0)]
+        self._packets.syncWriteTxOnly(recorder, LED.address, LED.size, data, len(data))
+        with self._exchange() as port:
+            return KeepAlive(port.ser.fileno(), recorder.packet, period, quiet)
 
     def again(self, ask: Callable[[], Any]) -> Any:
         """Give what `ask` gives; ask a second time, on a quiet line, when the answer was missing or damaged."""

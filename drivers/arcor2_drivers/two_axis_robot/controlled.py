@@ -10,6 +10,7 @@ from typing import ClassVar, Final
 from arcor2_hw.data.device import LossReaction
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, InvalidData, NotInControl, Refused
+from arcor2_hw.keep_alive import FROZEN_AFTER, TOO_SLOW
 
 from . import registers as reg
 from .bus import Bus
@@ -32,7 +33,7 @@ class TwoAxisControlled(TwoAxisObserved):
     """A two-axis robot under control."""
 
     _ABSTRACT = True
-    loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(LONGEST_WATCHDOG + 0.1)
+    loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(FROZEN_AFTER + LONGEST_WATCHDOG + 0.1)
 
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: TwoAxisRobotSettings) -> None:
         super().__init__(obj_id, name, pose, settings)
@@ -56,6 +57,7 @@ class TwoAxisControlled(TwoAxisObserved):
         if self._ours:
             self._why_not = why
         self._ours = self._teaching = False
+        self._observer.end_keep_alive()
 
     def control_owner(self) -> str | None:
         """Tell whether we have control. A port has one user: nobody else can have it while we are connected."""
@@ -108,6 +110,7 @@ class TwoAxisControlled(TwoAxisObserved):
             self._observer.setups = tuple(setups)
 
     def _enable(self, bus: Bus) -> None:
+        self._observer.begin_keep_alive()
         for number, block in zip(self._axes.ids, bus.sync_read(self._axes.ids, reg.STATE), strict=True):
             bus.write(number, reg.BUS_WATCHDOG, 0)  # a tripped one refuses goals
             bus.write(number, reg.GOAL, reg.decode(block).position)  # else the joint would jump
@@ -147,7 +150,7 @@ class TwoAxisControlled(TwoAxisObserved):
         if self._ours:
             for number, servo in zip(self._axes.ids, snapshot.servos, strict=True):
                 if servo.watchdog == reg.TRIPPED:
-                    self._drop(f"the bus watchdog of servo {number} has tripped")
+                    self._drop(f"the bus watchdog of servo {number} has tripped: {TOO_SLOW.format('robot')}")
                 elif servo.watchdog != self._watchdog() or servo.torque == self._teaching:
                     self._drop(f"servo {number} was switched by somebody else, or lost its supply")
         if not self._ours:

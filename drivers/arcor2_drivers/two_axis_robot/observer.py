@@ -11,6 +11,7 @@ from functools import partial
 from typing import Any, Final, NamedTuple
 
 from arcor2_hw.exceptions import Cancelled, ConnectionLost, DeviceError, DeviceTimeout, Refused, Stale
+from arcor2_hw.keep_alive import BUSY_FOR, LONGEST_STEP, KeepAlive, RunningTime, once_within
 from arcor2_hw.objects.observing import Observing
 
 from .bus import Bus
@@ -23,8 +24,10 @@ QUIET_PERIOD: Final = 0.03
 FRESH: Final = 0.25
 """s after which a state is too old."""
 JOB_TIMEOUT: Final = 1.5
-PATIENCE: Final = 0.35
-"""Part of the servos' watchdog for which an answer is waited for: a reading asked for twice must not trip it."""
+QUIET: Final = 0.1
+"""s without a reading after which the child process speaks, so that no answer is on its way."""
+KICK_PERIOD: Final = 0.05
+"""s between what it says; far below the shortest bus watchdog."""
 TURNS: Final = 0.02
 """s for which velocity 0 must be told to count as standing: a joint that turns back tells it too."""
 JITTERS: Final = 0.1
@@ -47,10 +50,10 @@ class Snapshot(NamedTuple):
 
 
 class Observer:
-    """Observes both servos. Reading them is what keeps their bus watchdog quiet."""
+    """Observes both servos. Reading them keeps their bus watchdog quiet; while this process is busy a child does."""
 
     def __init__(self, name: str, settings: TwoAxisRobotSettings, lost: Callable[[DeviceError], None]) -> None:
-        self.bus = Bus(name, settings.port, settings.baud_rate, PATIENCE * settings.watchdog)
+        self.bus = Bus(name, settings.port, settings.baud_rate)
         self.who = self.bus.who
         self.setups: tuple[ServoSetup, ...] = ()
         self.losses = 0
@@ -63,13 +66,16 @@ class Observer:
         self._jobs: deque[tuple[Future[Any], Callable[[Bus], Any]]] = deque()
         self._wake = threading.Event()
         self._moved = self._faster = -math.inf
+        self._keep_alive: KeepAlive | None = None
 
     def newest(self) -> Snapshot | None:
         """Give the newest state however old."""
         return self._newest
 
     def current(self, max_age: float = FRESH) -> Snapshot:
-        """Give the newest state. Raises NotConnected, ConnectionLost, Stale."""
+        """Return the newest state; wait a moment for one that is not too old. Raises ConnectionLost, Stale."""
+        self.observing.check()
+        once_within(lambda: self._newest is not None and self._newest.age <= max_age, BUSY_FOR, BUSY_PERIOD)
         self.observing.check()
         newest = self._newest
         if newest is None or newest.age > max_age:
@@ -79,7 +85,7 @@ class Observer:
 
     def fresh(self, timeout: float = 1.0) -> Snapshot:
         """Give a state asked for after this call. Raises ConnectionLost, DeviceTimeout."""
-        began, losses = time.monotonic(), self.losses
+        began, losses, clock = time.monotonic(), self.losses, RunningTime()
         self._wake.set()
         with self._news:
             while True:
@@ -89,10 +95,9 @@ class Observer:
                 newest = self._newest
                 if newest is not None and newest.asked >= began:
                     return newest
-                left = began + timeout - time.monotonic()
-                if left <= 0.0:
+                if clock() >= timeout:
                     raise DeviceTimeout(f"{self.who} did not tell its state within {timeout:g} s")
-                self._news.wait(left)
+                self._news.wait(LONGEST_STEP)
 
     def do(self, job: Callable[[Bus], Any], urgent: bool = False, timeout: float = JOB_TIMEOUT) -> Any:
         """Have a job done by the thread and give what it gives; an urgent one is next. What is late is dropped."""
@@ -106,7 +111,18 @@ class Observer:
             future.cancel()
             raise DeviceTimeout(f"{self.who} did not come to a command within {timeout:g} s") from None
 
+    def end_keep_alive(self) -> None:
+        """Leave the servos to their watchdog, except for our reading. Does nothing the second time."""
+        keep_alive, self._keep_alive = self._keep_alive, None
+        if keep_alive is not None:
+            keep_alive.close()
+
     # -------------------------------------------------------------------------------- on the observing thread
+    def begin_keep_alive(self) -> None:
+        """Keep the servos' watchdog quiet while this process is busy, from now on."""
+        if self._keep_alive is None:
+            self._keep_alive = self.bus.keep_alive(self._ids, KICK_PERIOD, QUIET)
+
     def _open(self, timeout: float) -> None:
         deadline = time.monotonic() + timeout
         self.bus.open()
@@ -161,8 +177,11 @@ class Observer:
         with self._news:
             self._newest = Snapshot(servos, asked, standing)
             self._news.notify_all()
+        if (keep_alive := self._keep_alive) is not None:
+            keep_alive.pulse()
 
     def _close(self) -> None:
+        self.end_keep_alive()
         self.bus.close()
         while self._jobs:
             future, _ = self._jobs.popleft()

@@ -9,8 +9,8 @@ from arcor2_hw.objects import Settings
 from arcor2_hw.objects.settings import check_serial_port
 
 BAUD_RATES: Final = (9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000)
-LONGEST_WATCHDOG: Final = 0.4
-"""s: what the type declares as its reaction to a loss holds up to here."""
+LONGEST_WATCHDOG: Final = 0.6
+"""s: up to this value the servos stop within the time that the type declares (`loss_reaction`)."""
 
 
 def within(name: str, value: float, low: float, high: float) -> None:
@@ -62,7 +62,7 @@ class TwoAxisRobotSettings(Settings):
     joint_acceleration: float = 12.0
     stop_deceleration: float = 30.0
     current_limit: float = 1.0
-    watchdog: float = 0.2
+    watchdog: float = 0.4
 
     def __post_init__(self) -> None:
         check_serial_port("port", self.port, sockets=False)

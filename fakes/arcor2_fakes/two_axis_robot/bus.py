@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Final
 
 from arcor2_fakes.two_axis_robot.packet import BROADCAST, BadCrc, Instruction, Receiver, status
-from arcor2_fakes.two_axis_robot.servo import BAD_CRC, BAD_INSTRUCTION, BAD_LENGTH, OK, Servo
+from arcor2_fakes.two_axis_robot.servo import BAD_CRC, BAD_INSTRUCTION, BAD_LENGTH, FIELDS, OK, Servo
 
 PING: Final = 0x01
 READ: Final = 0x02
@@ -25,7 +25,7 @@ class Bus:
         self._receiver = Receiver()
         self.packets = 0
         self.sync_writes: deque[float] = deque(maxlen=200)
-        """When sync writes came, by the machine's monotonic clock, s."""
+        """When sync writes of goals came, by the machine's monotonic clock, s."""
         self.wrong_crcs = 0
         self._refusals: dict[int, int] = {}
 
@@ -112,7 +112,9 @@ class Bus:
     def _sync_write(self, parameters: bytes) -> None:
         address, size = int.from_bytes(parameters[:2], "little"), int.from_bytes(parameters[2:4], "little")
         rest = parameters[4:]
-        self.sync_writes.append(time.monotonic())
+        goal = FIELDS["goal"]
+        if address <= goal.address < address + size:
+            self.sync_writes.append(time.monotonic())
         if len(rest) % (size + 1):
             return  # nobody answers a broadcast, not even to refuse it
         for start in range(0, len(rest), size + 1):

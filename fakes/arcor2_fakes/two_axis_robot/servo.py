@@ -43,6 +43,7 @@ FIELDS: Final = {
     "max_position": Field(48, 4, 4095, 0, 4095),
     "min_position": Field(52, 4, 0, 0, 4095),
     "torque": Field(64, 1, 0, 0, 1),
+    "led": Field(65, 1, 0, 0, 1),
     "hardware_error": Field(70, 1),
     "watchdog": Field(98, 1, 0, 0, 127),
     "profile_acceleration": Field(108, 4, 0, 0, 32767),

@@ -29,8 +29,7 @@ def make() -> Iterator[Callable[..., TwoAxisRobot]]:
     made: list[TwoAxisRobot] = []
 
     def build(port: str, pose: Pose | None = None, **settings: Any) -> TwoAxisRobot:
-        # The longest watchdog: the machine that runs the tests may be busy.
-        wanted = TwoAxisRobotSettings(port, **{"watchdog": 0.4, **settings})
+        wanted = TwoAxisRobotSettings(port, **settings)
         robot = TwoAxisRobot("arm_id", "arm", pose or Pose(), wanted)
         made.append(robot)
         return robot

@@ -193,7 +193,7 @@ def test_a_late_answer_answers_nothing_else(fake: FakeProcess, request_: str) ->
     bus = Bus("arm", fake.ready["port"], 1_000_000)
     bus.open()
     try:
-        fake.control.do("slow", seconds=0.06)
+        fake.control.do("slow", seconds=0.3)
         with pytest.raises(DeviceTimeout, match="servo 1"):
             bus.ping(1)
         fake.control.do("absent", servo=1)

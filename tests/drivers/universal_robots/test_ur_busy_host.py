@@ -1,6 +1,5 @@
 """A busy host does not stop the arm, a frozen one brings it to rest, a dead one at once: UR."""
 
-import ctypes
 import os
 import signal
 import time
@@ -13,18 +12,12 @@ import pytest
 from arcor2_drivers.universal_robots.ur5e import UR5e
 from arcor2_hw.data.device import LossKind
 from arcor2_hw.exceptions import Cancelled, ConnectionLost
+from tests.drivers.busy import BUSY, stall
 
 from .conftest import Doing, FakeUr, moving, wait
 
 Owner = Callable[[], "Popen[bytes]"]
-BUSY = 0.5
-"""Seconds of a stall that must not stop a robot."""
 FROZEN = 1.3
-
-
-def stall(seconds: float) -> None:
-    """Keep the interpreter: no other thread of this process runs meanwhile."""
-    ctypes.PyDLL(None).usleep(round(seconds * 1e6))
 
 
 def far_move(robot: UR5e, fake: FakeUr) -> Doing:

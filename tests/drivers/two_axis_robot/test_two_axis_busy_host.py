@@ -1,0 +1,75 @@
+"""A busy host does not stop the servos, a frozen one brings them to rest, a dead one at once: two-axis robot."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from arcor2_drivers.two_axis_robot.two_axis_robot import TwoAxisRobot
+from arcor2_hw.data.robot import Joint
+from arcor2_hw.exceptions import Cancelled
+from tests.drivers.busy import BUSY, stall
+from tests.fakes.conftest import FakeProcess
+
+from .conftest import Doing, moving, standing
+from .test_two_axis_bad_days import FAR, KILLED
+
+
+@pytest.fixture
+def owner(fake: FakeProcess) -> Iterator["subprocess.Popen[bytes]"]:
+    """Another process that has a long move of the arm under way."""
+    command = [sys.executable, "-c", KILLED, fake.ready["port"]]
+    with subprocess.Popen(command, cwd=Path(__file__).parents[3]) as process:
+        fake.control.wait_until(lambda t: t["servos"]["1"]["speed"] > 0.5, within=15.0)
+        yield process
+        process.kill()
+
+
+def trips(fake: FakeProcess) -> int:
+    return sum(servo["watchdog"] == 0xFF for servo in fake.truth()["servos"].values())
+
+
+def test_a_stall_of_half_a_second_does_not_stop_a_move(fake: FakeProcess, ready: TwoAxisRobot) -> None:
+    doing = Doing(ready.move_to_joints, FAR, 0.15)
+    moving(fake)
+    for _ in range(2):
+        stall(BUSY)
+        assert trips(fake) == 0
+        assert not standing(fake.truth())
+        time.sleep(0.1)
+    ready.stop()
+    with pytest.raises(Cancelled):
+        doing.result(1.0)
+    assert ready.control_owner() == "us"
+    ready.move_to_joints([Joint("joint_1", 0.0), Joint("joint_2", 0.0)], 1.0)
+
+
+def test_a_frozen_owner_stops_the_servos_within_what_is_declared(
+    fake: FakeProcess, owner: "subprocess.Popen[bytes]"
+) -> None:
+    began = time.monotonic()
+    os.kill(owner.pid, signal.SIGSTOP)
+    time.sleep(BUSY)
+    assert trips(fake) == 0
+    fake.control.wait_until(standing, within=2.0)
+    assert time.monotonic() - began < TwoAxisRobot.loss_reaction.within
+    assert trips(fake) == 2
+
+
+def test_a_killed_owner_stops_the_servos_at_once(fake: FakeProcess, owner: "subprocess.Popen[bytes]") -> None:
+    owner.kill()
+    began = time.monotonic()
+    fake.control.wait_until(standing, within=2.0)
+    assert time.monotonic() - began < 0.4 + 0.3  # the watchdog of its settings, and what a busy machine adds
+
+
+def test_control_given_back_ends_the_child_process(ready: TwoAxisRobot, wait_for: Callable[..., object]) -> None:
+    keep_alive = ready._observer._keep_alive
+    assert keep_alive is not None
+    ready.release_control()
+    wait_for(lambda: not Path(f"/proc/{keep_alive.pid}").exists())
