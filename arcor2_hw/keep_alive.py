@@ -2,14 +2,17 @@
 
 import contextlib
 import os
+import select
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
+from arcor2_hw.exceptions import DeviceTimeout
 from arcor2_hw.keep_alive_process import FROZEN_AFTER as FROZEN_AFTER
 from arcor2_hw.keep_alive_process import PULSE
 
@@ -17,6 +20,8 @@ PULSE_PERIOD: Final = 0.05
 """Seconds between pulses, where a driver does not work at a rhythm of its own."""
 BUSY_FOR: Final = 0.3
 """Seconds of running time that a caller waits for a fresh reading which a busy process may not have taken yet."""
+STARTS_WITHIN: Final = 5.0
+"""Seconds for the child process to start; it takes 0.03 on an idle computer."""
 LONGEST_STEP: Final = 0.05
 """Most seconds that `RunningTime` counts between two readings."""
 TOO_SLOW: Final = "this computer was too slow for the {}'s watchdog"
@@ -38,6 +43,9 @@ class KeepAlive:
 
     fd: file descriptor of the device's line; `message` must be taken by the device in the middle of other traffic.
     quiet: seconds without a pulse before the first message, for lines where messages could collide with answers.
+
+    Raises:
+        DeviceTimeout: the process did not start; arm the watchdog only afterwards.
     """
 
     def __init__(self, fd: int, message: bytes, period: float, quiet: float = 0.0) -> None:
@@ -45,10 +53,17 @@ class KeepAlive:
             [sys.executable, "-I", "-S", str(_SCRIPT), message.hex(), str(period), str(quiet)],
             stdin=subprocess.PIPE,
             stdout=fd,
+            stderr=subprocess.PIPE,
             start_new_session=True,  # its own share of a busy computer
         )
         assert self._process.stdin is not None
+        assert self._process.stderr is not None
         os.set_blocking(self._process.stdin.fileno(), False)
+        with self._process.stderr as ready:
+            if not (select.select([ready], [], [], STARTS_WITHIN)[0] and ready.read(1)):
+                self.close()
+                raise DeviceTimeout(f"The process that keeps watchdogs quiet did not start within {STARTS_WITHIN:g} s.")
+        self.pulse()
 
     @property
     def pid(self) -> int:
@@ -100,6 +115,15 @@ def result_within(future: "Future[T]", timeout: float) -> T:
         except TimeoutError:
             if future.done() or clock() >= timeout:
                 raise
+
+
+def acquire_within(lock: threading.Lock, timeout: float) -> bool:
+    """Return whether a lock was acquired within `timeout` s of running time: its owner may have been held up too."""
+    clock = RunningTime()
+    while not lock.acquire(timeout=LONGEST_STEP / 2.0):
+        if clock() >= timeout:
+            return False
+    return True
 
 
 def once_within(holds: Callable[[], Any], timeout: float, pause: float) -> bool:

@@ -57,8 +57,12 @@ class Parent:
 
 
 def main(message: bytes, period: float, quiet: float) -> None:
-    """Write `message` to standard output each `period` s while the parent lives and was silent for `quiet` s."""
+    """Write `message` to standard output each `period` s while the parent lives and was silent for `quiet` s.
+
+    A line on standard error reports that it is ready.
+    """
     parent, sent = Parent(), 0.0
+    os.write(2, b"\n")  # ready
     while parent.ended is None:
         due = max(sent + period, parent.pulse + quiet)
         parent.lines(due - time.monotonic())

@@ -1,18 +1,21 @@
 """Stops: from the call of a driver's stop to its frame at the device, all that move moving at once in one process.
 
-Each fake stamps what comes on the machine's monotonic clock, which is the one that the call is stamped by.
+Each fake stamps what comes on the machine's monotonic clock, which is the one that the call is stamped by. Once in a
+process that does nothing else, once next to an action that computes and one that keeps the interpreter for 0.4 s.
 """
 
 import asyncio
+import contextlib
 import logging
 import random
+import sys
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Final
 
-from arcor2_hw.exceptions import DeviceError
+from arcor2_hw.exceptions import Cancelled
 from arcor2_hw.objects import Generic
 from arcor2_hw.testing.bench import Bench
 from benchmarks.figures import Figure, Report, median, percentile
@@ -22,9 +25,16 @@ from tests.drivers.benches.dobot_magician_bench import DobotMagicianBench
 from tests.drivers.benches.robotiq_2f_bench import Robotiq2FBench
 from tests.drivers.benches.two_axis_robot_bench import TwoAxisRobotBench
 from tests.drivers.benches.universal_robots_bench import UR5eBench
+from tests.drivers.busy import stall
 
 STOPS: Final = 100
 """For each driver."""
+LONG_STOPS: Final = 500
+"""For each driver in a busy process, with `--long`."""
+KEEPS: Final = 0.4
+"""Seconds for which an action keeps the interpreter."""
+PAUSES: Final = 0.6
+"""Seconds until it does so again."""
 PHASES: Final = 0.3
 """s from the begin of a motion to its stop, at most."""
 BEGINS_WITHIN: Final = 10.0
@@ -99,7 +109,7 @@ class Motion:
 
     def stopped(self) -> None:
         self._thread.join(ENDS_WITHIN)
-        if self._thread.is_alive() or not isinstance(self._error, DeviceError):
+        if self._thread.is_alive() or not isinstance(self._error, Cancelled):
             raise RuntimeError(f"a stopped motion of {self._bench.name()} did not end as one: {self._error!r}")
 
 
@@ -118,30 +128,89 @@ def one_stop(bench: Bench, device: Any, stamps: Callable[[], Iterable[float]]) -
     return min(arrived) - called
 
 
-def stops_of(kind: type[Bench]) -> list[float]:
-    """Give how late each stop of a driver was, s."""
+def stops_of(kind: type[Bench], count: int) -> tuple[list[float], list[str]]:
+    """Return how late each stop of a driver was, s, and what went wrong with the others."""
     bench = kind()
     bench.start()
+    late, wrong = [], []
     try:
         bench.reset()
         device, stamps = bench.controlled(), _stamps(bench)
-        return [one_stop(bench, device, stamps) for _ in range(STOPS)]
+        for _ in range(count):
+            try:
+                late.append(one_stop(bench, device, stamps))
+            except RuntimeError as error:
+                wrong.append(str(error))
+                bench.release()
+                bench.reset()
+                device = bench.controlled()
     finally:
         bench.release()
         bench.end()
+    return late, wrong
+
+
+@contextlib.contextmanager
+def busy() -> Iterator[None]:
+    """Have one action compute in Python and one keep the interpreter in a C call, again and again."""
+    ending = threading.Event()
+
+    def compute() -> None:
+        while not ending.is_set():
+            sum(i * i for i in range(10_000))
+
+    def keep() -> None:
+        while not ending.wait(PAUSES):
+            stall(KEEPS)
+
+    threads = [threading.Thread(target=each) for each in (compute, keep)]
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(0.0005)  # as in the cell host
+    for thread in threads:
+        thread.start()
+    try:
+        yield
+    finally:
+        ending.set()
+        for thread in threads:
+            thread.join()
+        sys.setswitchinterval(interval)
+
+
+def _stop_all(count: int) -> tuple[dict[type[Bench], list[float]], list[str]]:
+    with ThreadPoolExecutor(len(BENCHES), thread_name_prefix="stopping") as pool:
+        results = list(pool.map(lambda kind: stops_of(kind, count), BENCHES))
+    wrong = [text for _, texts in results for text in texts]
+    return {kind: late for kind, (late, _) in zip(BENCHES, results, strict=True)}, wrong
+
+
+def measure_busy(count: int) -> list[Figure]:
+    """Measure in a busy process, on this thread."""
+    with busy():
+        found, wrong = _stop_all(count)
+    late = [each for samples in found.values() for each in samples]
+    notes = ", ".join(f"{kind.type_name()} {percentile(found[kind], 99) * 1e3:.0f}" for kind in found if found[kind])
+    done = count * len(BENCHES)
+    return [
+        Figure("busy_stops_lost", len(wrong), done, "; ".join(wrong[:5])),
+        Figure("busy_stop_p99_ms", percentile(late, 99) * 1e3, len(late), f"p99 of each: {notes}"),
+    ]
 
 
 def measure() -> Figure:
     """Measure on this thread."""
-    with ThreadPoolExecutor(len(BENCHES), thread_name_prefix="stopping") as pool:
-        found = dict(zip(BENCHES, pool.map(stops_of, BENCHES), strict=True))
+    found, wrong = _stop_all(STOPS)
+    if wrong:
+        raise RuntimeError("; ".join(wrong))
     p99 = {kind.type_name(): percentile(samples, 99) * 1e3 for kind, samples in found.items()}
     notes = [f"{kind.type_name()} {p99[kind.type_name()]:.1f} ({median(found[kind]) * 1e3:.1f})" for kind in found]
     note = f"p99 (median) of each: {', '.join(notes)}; {STOPS} stops each"
     return Figure("driver_stop_p99_ms", max(p99.values()), STOPS * len(BENCHES), note)
 
 
-async def run(report: Report) -> None:
+async def run(report: Report, long: bool) -> None:
     """Measure everything in this room."""
     logging.getLogger("arcor2_hw").setLevel(logging.ERROR)
     report.add(await asyncio.to_thread(measure))
+    for figure in await asyncio.to_thread(measure_busy, LONG_STOPS if long else STOPS):
+        report.add(figure)

@@ -18,6 +18,7 @@ from arcor2_hw.exceptions import (
     NotInControl,
     Refused,
 )
+from arcor2_hw.keep_alive import PULSE_PERIOD, KeepAlive
 
 from .motion_lines import LAST_SEQUENCE, LONGEST_LINE, MEANING, VERSION, Answer, Code, Status, answer, line
 
@@ -89,7 +90,7 @@ class ArmLine:
         self._numbering = threading.Lock()
         self._asking = threading.Lock()
         self._over = threading.Event()
-        self._period = 0.1
+        self._keep_alive: KeepAlive | None = None
         self._heard = 0.0
         self._thread: threading.Thread | None = None
 
@@ -148,15 +149,23 @@ class ArmLine:
         return raw
 
     def attach(self, commands: socket.socket, watch: socket.socket, watchdog: float) -> None:
-        """Begin to keep the other end alive, by sockets that are open; they are closed at the end of the line."""
+        """Keep the server's watchdog quiet on sockets that are open; they are closed at the end of the line."""
         for each in (commands, watch):
             each.settimeout(0.2)
         self._commands, self._watch = _Socket(commands), _Socket(watch)
-        self._period, self._heard = watchdog / KEEP_ALIVES, time.monotonic()
+        message = line(self._next(), Code.KEEP_ALIVE)
+        try:
+            self._keep_alive = KeepAlive(watch.fileno(), message, watchdog / KEEP_ALIVES)
+        except DeviceTimeout:
+            self._close()
+            raise
+        self._heard = time.monotonic()
         self._thread = threading.Thread(target=self._run, name=f"watching {self.who}", daemon=True)
         self._thread.start()
 
     def _close(self) -> None:
+        if self._keep_alive is not None:
+            self._keep_alive.close()
         for each in (self._commands, self._watch):
             if each is not None:
                 each.raw.close()
@@ -269,16 +278,13 @@ class ArmLine:
             self._told_ended(why)
 
     def _serve(self) -> None:
-        commands, watch = self._commands, self._watch
+        commands, watch, keep_alive = self._commands, self._watch, self._keep_alive
         assert commands is not None
         assert watch is not None
-        due = time.monotonic()
+        assert keep_alive is not None
         while not self._over.is_set():
-            now = time.monotonic()
-            if now >= due:
-                watch.send(line(self._next(), Code.KEEP_ALIVE))
-                due = now + self._period
-            ready, _, _ = select.select([commands.raw, watch.raw], [], [], max(due - time.monotonic(), 0.0))
+            keep_alive.pulse()
+            ready, _, _ = select.select([commands.raw, watch.raw], [], [], PULSE_PERIOD)
             for each in (commands, watch):
                 if each.raw in ready:
                     for raw in each.lines():

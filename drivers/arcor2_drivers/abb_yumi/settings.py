@@ -21,6 +21,10 @@ def within(name: str, value: float, low: float, high: float) -> None:
         raise OutOfRange(f"{name} must be {low:g} to {high:g}, not {value!r}")
 
 
+LONGEST_WATCHDOG = 0.5
+"""s: up to this value an arm stops within the time that the type declares (`loss_reaction`)."""
+
+
 @dataclasses.dataclass
 class YumiSettings(Settings):
     """SI units. Poses of a TCP are in the flange of its arm (tool0); its orientation is a rotation vector.
@@ -116,8 +120,7 @@ class YumiSettings(Settings):
         within("max_tcp_speed", self.max_tcp_speed, 0.01, 1.5)
         within("max_joint_speed", self.max_joint_speed, 0.01, math.pi)
         within("clearance", self.clearance, 0.0, 0.08)  # the shoulders themselves are 0.1 m apart
-        # Above 0.6 s an arm could not rest within the second that the type declares.
-        within("watchdog", self.watchdog, 0.2, 0.6)
+        within("watchdog", self.watchdog, 0.2, LONGEST_WATCHDOG)
         within("poll_period", self.poll_period, 0.02, 0.5)
 
     def port(self, arm: str) -> int:

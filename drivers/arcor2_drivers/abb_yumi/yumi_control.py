@@ -20,6 +20,7 @@ from arcor2_hw.exceptions import (
     Refused,
     SafetyStop,
 )
+from arcor2_hw.keep_alive import FROZEN_AFTER
 
 from .observer import UNITS, Panel, Sample, holder, lead_through_path, read_panel, read_running
 from .rws import Rws
@@ -31,12 +32,14 @@ from .session import (
     request_mastership,
     start_rapid,
 )
-from .settings import ARMS, YumiSettings
+from .settings import ARMS, LONGEST_WATCHDOG, YumiSettings
 from .states import AUTOMATIC, COLLISION, MOTORS_ON, REMEDIES, safety_of
 from .yumi_observed import YumiObserved
 
 MOTORS_WITHIN: Final = 5.0
 """Seconds the controller may take to switch the motors on; a real one takes one or two."""
+BRAKES_WITHIN: Final = 0.2
+"""Seconds to brake from full speed."""
 GIVEN_BACK_WITHIN: Final = 0.5
 """Seconds that `disconnect` waits for a controller that has fallen silent just now, or is slow."""
 log = logging.getLogger(__name__)
@@ -46,7 +49,7 @@ class YumiControl(YumiObserved):
     """A YuMi whose control is taken and given back."""
 
     _ABSTRACT = True
-    loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(1.0)
+    loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(FROZEN_AFTER + LONGEST_WATCHDOG + BRAKES_WITHIN)
 
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: YumiSettings) -> None:
         super().__init__(obj_id, name, pose, settings)

@@ -2,6 +2,7 @@
 
 import contextlib
 import logging
+import queue
 import socket
 import struct
 import threading
@@ -11,19 +12,20 @@ from typing import Any, Final
 
 import can
 import canopen
-from can.interfaces.slcan import slcanBus
 from canopen.sdo.client import SdoClient
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotConnected
+from arcor2_hw.keep_alive import LONGEST_STEP, RunningTime, acquire_within
 
 from .cia402 import Entry
 from .settings import CanInterface, ConveyorSettings
+from .slcan import SlcanBus
 from .socketcand import SocketcandBus
 
 LOOK: Final = 0.05
 """s the receiver waits for a frame before it looks whether it should end."""
-WRITE_TIMEOUT: Final = 0.5
+WRITE_TIMEOUT: Final = 1.0
 """s the adapter has to take a frame. When this process stands still for that long in sending, pyserial raises, too."""
 NMT_START: Final = 1
 HEARTBEAT: Final = 0x700
@@ -48,10 +50,27 @@ class _Network(canopen.Network):
             bus.send(message, timeout=WRITE_TIMEOUT)
 
 
+class _Responses(queue.Queue[bytes]):
+    """Answers, waited for by running time: after a stall of this process one may be there, and not be received yet."""
+
+    def get(self, block: bool = True, timeout: float | None = None) -> bytes:
+        clock = RunningTime()
+        while True:
+            try:
+                return super().get(block, timeout and min(timeout, LONGEST_STEP / 2.0))
+            except queue.Empty:
+                if not block or timeout is None or clock() >= timeout:
+                    raise
+
+
 class _Sdo(SdoClient):
     """An SDO client that hears only the answer to what was asked for, by index and subindex."""
 
     _expected = b""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)  # type: ignore[no-untyped-call]
+        self.responses = _Responses()
 
     def send_request(self, request: Any) -> None:
         self._expected = bytes(request[1:4])
@@ -97,7 +116,7 @@ class CanLink:
         network = _Network(bus)
         self._network = network
         node, od = settings.node_id, canopen.ObjectDictionary()  # type: ignore[no-untyped-call]
-        sdo = _Sdo(0x600 + node, 0x580 + node, od)  # type: ignore[no-untyped-call]
+        sdo = _Sdo(0x600 + node, 0x580 + node, od)
         sdo.network, sdo.RESPONSE_TIMEOUT = network, settings.sdo_timeout
         network.subscribe(0x580 + node, sdo.on_response)
         self._sdo, self._closing = sdo, threading.Event()
@@ -108,7 +127,6 @@ class CanLink:
 
     def _connected(self, timeout: float) -> can.BusABC:
         settings = self._settings
-        options: dict[str, Any] = {}
         if settings.channel.startswith("socket://"):
             host, port, name = settings.server
             if settings.interface is CanInterface.SOCKETCAND:
@@ -116,8 +134,8 @@ class CanLink:
             # See that somebody listens: pyserial itself waits five seconds for that, whatever it is told.
             socket.create_connection((host, port), timeout).close()
         if settings.interface is CanInterface.SLCAN:
-            options = {"bitrate": settings.bitrate, "sleep_after_open": 0.0, "timeout": LOOK}
-        return can.Bus(channel=settings.channel, interface=settings.interface.value, **options)
+            return SlcanBus(settings.channel, bitrate=settings.bitrate, sleep_after_open=0.0, timeout=LOOK)
+        return can.Bus(channel=settings.channel, interface=settings.interface.value)
 
     def close(self) -> None:
         """Close; harmless when closed."""
@@ -130,7 +148,7 @@ class CanLink:
         if isinstance(bus, SocketcandBus):
             with contextlib.suppress(OSError):  # the other end was quicker
                 bus.wake()
-        if isinstance(bus, slcanBus) and raw is not None:
+        if isinstance(bus, SlcanBus) and raw is not None:
             with contextlib.suppress(can.CanError, OSError):
                 bus.close()  # the adapter's channel
             with contextlib.suppress(OSError):
@@ -214,7 +232,7 @@ class CanLink:
 
     def _request(self, send: Callable[[Any], Any], what: str) -> bytes:
         limit = self._settings.sdo_timeout
-        if not self._one_request.acquire(timeout=4.0 * limit):
+        if not acquire_within(self._one_request, 4.0 * limit):
             raise DeviceTimeout(f"{self.who}: {what} found the drive busy with other requests")
         try:
             sdo = self._sdo

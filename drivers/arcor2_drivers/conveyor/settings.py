@@ -53,7 +53,7 @@ class ConveyorSettings(Settings):
     :param homing_speed: m/s
     :param homing_timeout: seconds homing may take
     :param tolerance: how far from its target a move may end, m
-    :param heartbeat_ms: ms without our heartbeat after which the drive stops
+    :param heartbeat_ms: ms without our heartbeat after which the drive stops; below 700 a busy computer stops it
     :param sdo_timeout: seconds the drive has to answer a request
     :param pdo_period_ms: ms between the PDOs by which the drive tells its state while we have control; 0: it is asked
     :param belt_speed: m/s the belt runs with when it is started as a machine; negative for backwards
@@ -74,7 +74,7 @@ class ConveyorSettings(Settings):
     homing_speed: float = 0.1
     homing_timeout: float = 30.0
     tolerance: float = 0.002
-    heartbeat_ms: int = 600
+    heartbeat_ms: int = 800
     sdo_timeout: float = 0.2
     pdo_period_ms: int = 10
     belt_speed: float = 0.2

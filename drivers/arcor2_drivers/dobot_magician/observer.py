@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from arcor2_hw.data.base import Data, Timestamp, now
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotConnected, Stale
+from arcor2_hw.keep_alive import BUSY_FOR, LONGEST_STEP, RunningTime, acquire_within, once_within
 from arcor2_hw.objects.observing import Observing
 
 from .alarms import RESET, codes
@@ -69,24 +70,28 @@ class Observer:
     def sample(self, max_age: float = MAX_AGE) -> Sample:
         """Give the last sample. Raises NotConnected, ConnectionLost, Stale when it is older than `max_age` s."""
         self.check()
+        once_within(lambda: self._age() <= max_age or not self.observing.online, BUSY_FOR, PERIOD)
+        self.check()
         sample = self._newest
-        if sample is None or time.monotonic() - sample.monotonic > max_age:
+        if sample is None or self._age() > max_age:
             raise Stale(f"{self.who} has told nothing for {max_age:g} s")
         return sample
 
+    def _age(self) -> float:
+        return math.inf if self._newest is None else time.monotonic() - self._newest.monotonic
+
     def after(self, moment: float, timeout: float = MAX_AGE) -> Sample:
         """Give a sample begun after a moment of the monotonic clock. Raises as `sample`."""
-        deadline = time.monotonic() + timeout
+        clock = RunningTime()
         with self.came:
             while True:
                 sample = self.sample(math.inf) if self._newest is not None else None
                 if sample is not None and sample.monotonic > moment:
                     return sample
-                left = deadline - time.monotonic()
-                if left <= 0.0:
+                if clock() >= timeout:
                     raise Stale(f"{self.who} has told nothing for {timeout:g} s")
                 self.check()
-                self.came.wait(left)
+                self.came.wait(LONGEST_STEP)
 
     def check(self) -> None:
         """Return when the arm is observed. Raises NotConnected or ConnectionLost."""
@@ -117,7 +122,7 @@ class Observer:
     def _ask(self, command: Command, control: int, parameters: bytes) -> bytes:
         self.check()
         limit = self._settings.answer_timeout
-        if not self._turn.acquire(timeout=2.0 * limit):
+        if not acquire_within(self._turn, 2.0 * limit):
             raise DeviceTimeout(f"{self.who} is busy with another question")
         try:
             port = self._port

@@ -1,19 +1,20 @@
 """The serial port of the arm: one question, one answer."""
 
 import contextlib
-import time
 from typing import Final
 
 import serial
 
 from arcor2_hw.exceptions import ConnectionLost, DeviceTimeout, NotConnected
+from arcor2_hw.keep_alive import RunningTime
 
 from .frames import FrameBuffer, encode
 
 BAUD_RATE: Final = 115200
 LOOK: Final = 0.02
 """Seconds a read waits for the first byte before it is seen whether the time is up."""
-WRITE_TIMEOUT: Final = 0.2
+WRITE_TIMEOUT: Final = 1.0
+"""Seconds to write a question. A process that stands still in writing must not take that for a port that is stuck."""
 
 
 class Port:
@@ -40,7 +41,7 @@ class Port:
 
         With `first` an answer to another question before it is a DeviceTimeout: the arm lags behind.
         """
-        deadline = time.monotonic() + timeout
+        clock = RunningTime()
         try:
             self._serial.write(encode(command, control, parameters))
             while True:
@@ -52,7 +53,7 @@ class Port:
                         return frame.parameters
                     if first:
                         raise DeviceTimeout(f"{self.who} lags behind", f"{frame.command} came before {command}")
-                if time.monotonic() >= deadline:
+                if clock() >= timeout:
                     raise DeviceTimeout(
                         f"{self.who} did not answer within {timeout:g} s",
                         f"id {command}, {self.garbage} bytes of garbage so far",

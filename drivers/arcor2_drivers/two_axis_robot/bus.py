@@ -23,6 +23,8 @@ POLL: Final = 0.002
 """s for which a read waits for bytes: the library alone would spin."""
 LONGEST: Final = 0.35
 """s for one exchange whatever comes; the library's own limit is not looked at while bytes keep coming."""
+WRITE_TIMEOUT: Final = 1.0
+"""s to write a packet. A process that stands still in writing must not take that for a port that is stuck."""
 PATIENCE: Final = 0.25
 """s that the first byte of an answer is waited for; the library's 0.034 are few on a busy computer."""
 QUIET: Final = 0.03
@@ -104,7 +106,7 @@ class Bus:
             port.openPort()
             port.ser.exclusive = True
             port.ser.timeout = POLL
-            port.ser.write_timeout = LONGEST
+            port.ser.write_timeout = WRITE_TIMEOUT
         except (OSError, ValueError, termios.error) as e:
             if port.ser is not None:
                 with contextlib.suppress(OSError, termios.error):

@@ -19,12 +19,10 @@ from arcor2_hw.exceptions import (
     SafetyStop,
     Stale,
 )
+from tests.drivers.busy import BUSY, stall
 
 from .conftest import Doing, FakeYumi, make, under_way, wait
 from .test_yumi_motion import turned
-
-BUSY = 0.5
-"""s that a busy machine may add to a time of the device's own."""
 
 
 def far(robot: YuMi, arm: str = "left") -> list[Joint]:
@@ -44,6 +42,26 @@ def stands_still(fake: FakeYumi, seconds: float = 0.5) -> None:
     time.sleep(seconds)
     after = fake.truth()["arms"]
     assert {arm: each["joints"] for arm, each in before.items()} == {arm: each["joints"] for arm, each in after.items()}
+
+
+def test_a_stall_of_half_a_second_does_not_stop_the_arms(fake: FakeYumi, ready: YuMi) -> None:
+    left, right = moving_far(fake, ready), moving_far(fake, ready, "right")
+    stall(BUSY)
+    assert all(arm["moving"] for arm in fake.truth()["arms"].values())
+    time.sleep(0.2)
+    ready.stop()
+    for doing in (left, right):
+        with pytest.raises(Cancelled):
+            doing.result()
+    assert ready.control_owner() == "us"
+
+
+def test_a_frozen_host_stops_the_arms(fake: FakeYumi, ready: YuMi) -> None:
+    doing = moving_far(fake, ready)
+    stall(YuMi.loss_reaction.within)
+    assert not any(arm["moving"] for arm in fake.truth()["arms"].values())
+    with pytest.raises(DeviceError):
+        doing.result()
 
 
 def test_the_watchdog_stops_the_arms(fake: FakeYumi, ready: YuMi) -> None:

@@ -50,7 +50,7 @@ class YuMiBench(Bench):
         return self.fake.host
 
     def make(self) -> YuMi:
-        return YuMi("robot_id", "both arms", Pose(), settings(self.fake.host, watchdog=0.6))
+        return YuMi("robot_id", "both arms", Pose(), settings(self.fake.host, watchdog=0.5))
 
     def absent(self) -> tuple[Generic, str]:
         return YuMi("robot_id", "both arms", Pose(), YumiSettings(ABSENT)), ABSENT

@@ -9,13 +9,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import can
 import pytest
 import yaml
 
 import arcor2_drivers.conveyor as package
 from arcor2_drivers.conveyor.conveyor import Conveyor
+from arcor2_drivers.conveyor.settings import ConveyorSettings
+from arcor2_drivers.conveyor.slcan import SlcanBus
 from arcor2_hw.data.device import Connection, Health
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected, NotInControl
+from tests.drivers.busy import BUSY, stall
 from tests.fakes.conftest import FakeProcess
 
 QUICK: dict[str, Any] = {"sdo_timeout": 0.15, "heartbeat_ms": 600}
@@ -173,6 +177,40 @@ def test_the_drive_stops_when_the_drivers_process_is_killed(fake: FakeProcess) -
         owner.wait(5.0)
         assert owner.stdout is not None
         owner.stdout.close()
+
+
+def test_a_stall_of_half_a_second_does_not_stop_a_belt(fake: FakeProcess, make: Callable[..., Conveyor]) -> None:
+    default = ConveyorSettings("can0")
+    belt = make(fake.ready["can"], heartbeat_ms=default.heartbeat_ms, sdo_timeout=default.sdo_timeout)
+    belt.connect()
+    belt.take_control()
+    belt.run(0.2)
+    stall(BUSY)
+    assert fake.truth()["velocity"] == pytest.approx(2000)
+    assert belt.velocity().value == pytest.approx(0.2)
+    belt.run(0.1)
+    belt.stop()
+    assert belt.control_owner() == "us"
+
+
+def test_an_adapter_is_read_in_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Byte by byte, a process in which an action computes falls behind the drive's state."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        bus = SlcanBus("socket://{}:{}".format(*server.getsockname()), sleep_after_open=0.0)
+        adapter = server.accept()[0]
+    with adapter:
+        monkeypatch.setattr(bus.serialPortOrig, "read", pytest.fail)
+        adapter.sendall(b"t1851AA\rt7051")
+        frame = bus.recv(1.0)
+        assert frame is not None
+        assert (frame.arbitration_id, frame.data) == (0x185, b"\xaa")
+        adapter.sendall(b"7F\rt7050\r")
+        assert [frame.arbitration_id for frame in (bus.recv(1.0), bus.recv(1.0)) if frame is not None] == [0x705, 0x705]
+        assert bus.recv(0.0) is None
+    with pytest.raises(can.CanOperationError, match="adapter"):
+        bus.recv(1.0)
+    bus.serialPortOrig.close()
+    can.BusABC.shutdown(bus)  # the adapter is gone: there is nobody to be told
 
 
 def test_the_heartbeat_ceases_when_the_drive_is_not_heard(fake: FakeProcess, belt: Conveyor) -> None:

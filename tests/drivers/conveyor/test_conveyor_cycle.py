@@ -204,7 +204,7 @@ def test_control_is_refused_while_another_master_has_it(
         ("max_position", -200.0),
         ("homing_speed", 0.6),
         ("heartbeat_ms", 1001),
-        ("sdo_timeout", 0.4),
+        ("sdo_timeout", 0.5),
     ],
 )
 def test_settings_are_checked_by_name(name: str, value: Any) -> None:

@@ -16,6 +16,7 @@ from arcor2_drivers.dobot_magician.dobot_magician import DobotMagician
 from arcor2_drivers.dobot_magician.frames import encode
 from arcor2_hw.data.device import Connection, Health
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected, NotInControl, Refused
+from tests.drivers.busy import BUSY, stall
 from tests.drivers.dobot_magician.test_dm_working import in_background, joints
 from tests.fakes.conftest import FakeProcess
 
@@ -30,6 +31,14 @@ def write(port: str, *frames: bytes) -> None:
         for frame in frames:
             line.write(frame)
             assert line.read(14 if frame[4] == 3 else 6)
+
+
+def test_a_stall_of_half_a_second_costs_no_connection(fake: FakeProcess, arm: DobotMagician) -> None:
+    for _ in range(3):
+        stall(BUSY)
+        assert arm.connection is Connection.ONLINE
+        arm.robot_joints()
+    assert arm.control_owner() == "us"
 
 
 def test_a_port_that_is_not_there_or_in_use(fake: FakeProcess, make: Callable[..., DobotMagician]) -> None:

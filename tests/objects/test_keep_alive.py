@@ -1,0 +1,140 @@
+"""Watchdogs kept quiet by a child process, and deadlines by running time."""
+
+import os
+import select
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from concurrent.futures import Future
+
+import pytest
+
+from arcor2_hw.keep_alive import KeepAlive, RunningTime, acquire_within, once_within, pulse, result_within
+from arcor2_hw.keep_alive_process import FROZEN_AFTER, Parent, ParentEnd
+from tests.drivers.busy import BUSY, stall
+
+MESSAGE = b"kick\r"
+OWNER = """
+import sys, time
+from arcor2_hw.keep_alive import KeepAlive
+keep_alive = KeepAlive(1, b"kick", 0.02)
+while True:
+    keep_alive.pulse()
+    time.sleep(0.02)
+"""
+
+
+@pytest.fixture
+def line() -> Iterator[tuple[int, int]]:
+    """Both ends of a device's line: what the child writes to, and what the device reads from."""
+    reading, writing = os.pipe()
+    yield writing, reading
+    os.close(reading)
+    os.close(writing)
+
+
+def last_message(reading: int, silence: float) -> float:
+    """Return when the last message came, once none has come for `silence` s."""
+    last = 0.0
+    while select.select([reading], [], [], silence)[0] and os.read(reading, 4096):
+        last = time.monotonic()
+    return last
+
+
+def test_messages_are_written_while_pulses_come_and_cease_when_they_do(line: tuple[int, int]) -> None:
+    writing, reading = line
+    keep_alive = KeepAlive(writing, MESSAGE, 0.02)
+    try:
+        until = time.monotonic() + 0.3
+        while time.monotonic() < until:
+            keep_alive.pulse()
+            time.sleep(0.05)
+        stall(BUSY)  # a busy process costs nothing
+        keep_alive.pulse()
+        pulsed = time.monotonic()
+        assert len(os.read(reading, 65536)) >= 20 * len(MESSAGE)
+        last = last_message(reading, 0.4)
+        assert FROZEN_AFTER - 0.1 < last - pulsed < FROZEN_AFTER + 0.3
+    finally:
+        keep_alive.close()
+        keep_alive.close()
+        keep_alive.pulse()
+
+
+def test_a_line_with_answers_is_left_alone_while_the_parent_works(line: tuple[int, int]) -> None:
+    writing, reading = line
+    keep_alive = KeepAlive(writing, MESSAGE, 0.02, quiet=0.3)
+    try:
+        until = time.monotonic() + 0.4
+        while time.monotonic() < until:
+            keep_alive.pulse()
+            time.sleep(0.02)
+        assert not select.select([reading], [], [], 0.0)[0]
+        assert select.select([reading], [], [], 1.0)[0]
+    finally:
+        keep_alive.close()
+
+
+def test_messages_cease_at_once_when_the_parent_dies() -> None:
+    with subprocess.Popen([sys.executable, "-c", OWNER], stdout=subprocess.PIPE) as owner:
+        assert owner.stdout is not None
+        assert owner.stdout.read(4) == b"kick"
+        owner.kill()
+        killed = time.monotonic()
+        owner.stdout.read()  # to the end: the child has closed the line as well
+        assert time.monotonic() - killed < FROZEN_AFTER / 2.0
+
+
+def test_a_parent_is_judged_by_when_a_pulse_was_sent() -> None:
+    reading, writing = os.pipe()
+    try:
+        parent = Parent(reading)
+        os.write(writing, b'{"n": 1}\n' + pulse() + b"half")
+        assert parent.lines(1.0) == [b'{"n": 1}']
+        parent.pulse -= FROZEN_AFTER  # as if this child had not run for so long
+        os.write(writing, b" a line\n" + pulse())
+        assert parent.lines(0.0) == [b"half a line"]
+        assert (parent.ended, parent.lines(0.0)) == (None, [])
+        parent.pulse -= FROZEN_AFTER
+        assert parent.lines(1.0) == []
+        assert parent.ended is ParentEnd.FROZEN
+        parent = Parent(reading)
+        os.close(writing)
+        assert parent.lines(1.0) == []
+        assert parent.ended is ParentEnd.GONE
+    finally:
+        os.close(reading)
+
+
+def test_a_stall_does_not_count_as_waiting() -> None:
+    clock, future, lock, ready = RunningTime(), Future[int](), threading.Lock(), threading.Event()
+    results: list[object] = []
+    lock.acquire()
+
+    def answer() -> None:
+        """Answer 0.1 s after the stall: later than the others wait by the wall clock."""
+        ready.wait()
+        time.sleep(0.1)
+        future.set_result(1)
+        lock.release()
+
+    waiters = [
+        threading.Thread(target=lambda: results.append(result_within(future, 0.3))),
+        threading.Thread(target=lambda: results.append(acquire_within(lock, 0.3))),
+        threading.Thread(target=lambda: results.append(once_within(future.done, 0.3, 0.01))),
+    ]
+    answering = threading.Thread(target=answer)
+    for thread in (*waiters, answering):
+        thread.start()
+    stall(BUSY)
+    assert clock() < 0.3
+    ready.set()
+    for thread in (*waiters, answering):
+        thread.join()
+    assert sorted(map(bool, results)) == [True, True, True]
+    with pytest.raises(TimeoutError):
+        result_within(Future(), 0.05)
+    assert not acquire_within(lock, 0.05)
+    assert not once_within(lambda: False, 0.05, 0.01)
