@@ -133,9 +133,12 @@ from arcor2_hw.data.rpc.history import (
     UndoData,
 )
 from arcor2_hw.data.rpc.locks import (
+    LockHolder,
     LockType,
     ReadLockArgs,
     ReadUnlockArgs,
+    TakeOverLocksArgs,
+    TakeOverLocksData,
     UpdateLockArgs,
     WriteLockArgs,
     WriteUnlockArgs,
@@ -838,6 +841,11 @@ class Requests(ABC):
         )
         return answer
 
+    async def list_locks(self, *, timeout: float | None = None) -> list[LockHolder]:
+        """ListLocks. Needs the role operator."""
+        answer: list[LockHolder] = await self.call("ListLocks", timeout=timeout)
+        return answer
+
     async def list_packages(self, *, timeout: float | None = None) -> list[PackageSummary]:
         """ListPackages. Needs the role operator."""
         answer: list[PackageSummary] = await self.call("ListPackages", timeout=timeout)
@@ -1448,6 +1456,15 @@ class Requests(ABC):
     async def system_info(self, *, timeout: float | None = None) -> SystemInfoData:
         """SystemInfo. Needs the role operator."""
         answer: SystemInfoData = await self.call("SystemInfo", timeout=timeout)
+        return answer
+
+    async def take_over_locks(
+        self, user: str, *, dry_run: bool = False, timeout: float | None = None
+    ) -> TakeOverLocksData:
+        """TakeOverLocks: a user who left. Needs the role standard user."""
+        answer: TakeOverLocksData = await self.call(
+            "TakeOverLocks", TakeOverLocksArgs(user=user), dry_run=dry_run, timeout=timeout
+        )
         return answer
 
     async def temporary_package(

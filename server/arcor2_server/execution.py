@@ -151,16 +151,20 @@ class Execution(KeptPackages):
         self._require_not_reserved()
         await self._run(package_id, how or How())
 
-    async def run_through(self, package_id: str, how: How) -> None:
+    async def run_through(
+        self, package_id: str, how: How, *, temporary: bool = True, started: "asyncio.Future[None] | None" = None
+    ) -> None:
         """Run a package and wait for its end, after which clients are not sent to the list of packages."""
         over = self._over = asyncio.get_running_loop().create_future()
         try:
-            await self._run(package_id, how)
+            await self._run(package_id, how, temporary=temporary)
+            if started is not None and not started.done():
+                started.set_result(None)
             await over
         finally:
             self._over = None
 
-    async def _run(self, package_id: str, how: How) -> None:
+    async def _run(self, package_id: str, how: How, *, temporary: bool = False) -> None:
         self._require_idle()
         requested_at = time.monotonic()
         directory = await asyncio.to_thread(self.packages.directory, package_id)
@@ -185,7 +189,7 @@ class Execution(KeptPackages):
             assets=shapes_put_in(self._services),
         )
         self._run_number = self._services.runs.begin(
-            package_id, by=how.by, temporary=self._over is not None, start_paused=how.start_paused
+            package_id, by=how.by, temporary=temporary, start_paused=how.start_paused
         )
         self._spawn(self._begin(message), "program start")
         self._spawn(self._note_run(package_id, self._run_number), "note of the run")

@@ -75,6 +75,8 @@ class LockTable:
         self._where: dict[str, str] = {}
         self._announced: dict[str, dict[str, set[str]]] = {}
         self._reads: dict[str, list[str]] = {}
+        self._since: dict[tuple[str, str], str] = {}
+        """When a client locked an id, by user and id."""
         self._changed: asyncio.Event = asyncio.Event()
 
     # ------------------------------------------------------------------------------------------------ what is held
@@ -132,6 +134,18 @@ class LockTable:
         """Give exactly the ids on which the user holds announced write locks, without those locked by a tree."""
         return list(self._announced.get(user, ()))
 
+    def read_by(self, user: str) -> list[str]:
+        """Return the ids on which the user's client holds read locks."""
+        return list(dict.fromkeys(self._reads.get(user, ())))
+
+    def owners(self) -> list[str]:
+        """Return the users whose clients hold write or read locks."""
+        return sorted({user for held in (self._announced, self._reads) for user, ids in held.items() if ids})
+
+    def since(self, user: str, item: str) -> str:
+        """Return when the user's client locked an id."""
+        return self._since[user, item]
+
     def could_lock_tree(self, user: str, item: str) -> bool:
         """Tell whether the user holds the tree of an id, or could lock it now (a dry run asks this)."""
         if self.holds(user, item, tree=True):
@@ -160,9 +174,11 @@ class LockTable:
         for item in ids:
             root_id = self._where.pop(item, None)
             for user, reads in list(self._reads.items()):
+                self._since.pop((user, item), None)
                 if item in reads:
                     self._reads[user] = [read for read in reads if read != item]
             for user, held in self._announced.items():
+                self._since.pop((user, item), None)
                 freed.setdefault(user, set()).update(held.pop(item, ()))
                 for covered in held.values():
                     covered.discard(item)
@@ -196,6 +212,7 @@ class LockTable:
     def release_all(self, user: str) -> list[str]:
         """Free all that a client locked, for one who does not come back; gives the announced ids."""
         for item in self._reads.pop(user, []):
+            self._since.pop((user, item), None)
             self._free_read(user, item)
         return self.release_announced(user, list(self._announced.get(user, ())))
 
@@ -205,6 +222,7 @@ class LockTable:
         self._where.clear()
         self._announced.clear()
         self._reads.clear()
+        self._since.clear()
         self._notify()
 
     # ------------------------------------------------------------------------------------------------ inside
@@ -269,6 +287,7 @@ class LockTable:
 
     def _free_write(self, user: str, item: str) -> set[str]:
         freed = self._announced.get(user, {}).pop(item, None) or {item}
+        self._since.pop((user, item), None)
         if user in self._announced and not self._announced[user]:
             del self._announced[user]
         root_id = self._where.get(item)
@@ -297,6 +316,8 @@ class LockTable:
 
     def _forget_read(self, user: str, item: str) -> None:
         self._reads[user].remove(item)
+        if item not in self._reads[user]:
+            self._since.pop((user, item), None)
         if not self._reads[user]:
             del self._reads[user]
 

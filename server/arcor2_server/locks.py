@@ -5,6 +5,7 @@ from collections.abc import AsyncIterator, Callable, Iterable
 from contextlib import asynccontextmanager
 from typing import Any, Final
 
+from arcor2_hw.data.base import now
 from arcor2_hw.exceptions import NotFound
 from arcor2_server.lock_table import (
     ACTION,
@@ -47,6 +48,7 @@ class Locks(LockTable):
         if tree:
             ids |= {root_id, *self.tree.tree_of(root_id)}
         self._announced.setdefault(user, {})[item] = ids
+        self._since[user, item] = now()
         return sorted(ids)
 
     async def write_unlock(self, user: str, item: str) -> list[str]:
@@ -60,6 +62,7 @@ class Locks(LockTable):
         """Lock for reading, for a client. Locked, NotFound."""
         self._take_read(user, (await self._enter([item]))[item], item)
         self._reads.setdefault(user, []).append(item)
+        self._since.setdefault((user, item), now())
 
     async def read_unlock(self, user: str, item: str) -> None:
         """Unlock for reading, for a client. Locked when he holds none."""
@@ -80,6 +83,7 @@ class Locks(LockTable):
             raise Locked(f"The lock of {item!r} is of that type already.")
         whole = {root_id, *self.tree.tree_of(root_id)} - {item}
         announced = self._announced.setdefault(user, {})
+        self._since.setdefault((user, item), now())
         if tree:
             if len(root.writers) > 1:
                 raise Locked(f"Other locks are held in the tree of {item!r}.")

@@ -1,11 +1,13 @@
 """Who is there, and what each user looks at and edits."""
 
+from collections.abc import Iterable
 from typing import Final
 
 from msgspec import UNSET
 
 from arcor2_hw.data.editor import Presence, UserPresenceData
 from arcor2_hw.data.events import Event
+from arcor2_hw.data.role import Role
 from arcor2_server.client import Client
 from arcor2_server.hub import Hub, encode
 from arcor2_server.newest import Newest
@@ -30,6 +32,19 @@ class PresenceBoard:
     def everybody(self) -> list[Event]:
         """Give the events that tell of all who are there."""
         return [self._event(name) for name in self._users.names()]
+
+    def users_of(self, documents: Iterable[str]) -> list[str]:
+        """Return the users who have one of these scenes or projects open.
+
+        A user whose client does not say what it shows counts, unless the role is too low to open anything.
+        """
+        shown, found = set(documents), []
+        for name in self._users.names():
+            client, said = self._users.client_of(name), self._said.get(name)
+            may_edit = client is not None and client.role >= Role.STANDARD_USER
+            if said.document in shown if said is not None else may_edit:
+                found.append(name)
+        return found
 
     def say(self, client: Client, presence: Presence) -> None:
         """Take what a user's client says, and tell it. RequestRefused for what cannot be sent on."""

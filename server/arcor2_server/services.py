@@ -115,7 +115,7 @@ class Services:
         self.presence = PresenceBoard(self.hub, self.users)
         self.edit_news = EditNews(self)
         self.reachability = ReachabilityBoard(self)
-        self.storage.on_deleted += [self.views.forget, self.breakpoints.forget]
+        self.storage.on_deleted += [self.views.forget, self.breakpoints.forget, self.session.forget_history]
 
     async def close_shared(self) -> None:
         """End what `share` brought up."""

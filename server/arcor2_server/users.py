@@ -6,7 +6,8 @@ from typing import Final
 
 import structlog
 
-from arcor2_hw.data.events import Event, LockData
+from arcor2_hw.data.base import now
+from arcor2_hw.data.events import Event, LockData, NotificationData, NotificationLevel
 from arcor2_server.client import Client
 from arcor2_server.hub import Hub
 from arcor2_server.locks import Locks
@@ -18,6 +19,12 @@ log = structlog.get_logger(__name__)
 PONG_WITHIN: Final = 1.0
 """Seconds in which the other connection of a name has to answer to keep it (protocol, section 3)."""
 
+NOTICES_OF_USER: Final = 20
+"""Number of notices, the newest, that a user gets on returning."""
+
+USERS_WITH_NOTICES: Final = 200
+"""Number of users who left for whom notices are stored."""
+
 
 class Users:
     """Names of people, each at one connection."""
@@ -28,6 +35,8 @@ class Users:
         self._timeout = settings.lock_timeout
         self._clients: dict[str, Client] = {}
         self._releases: dict[str, asyncio.TimerHandle] = {}
+        self._left: dict[str, str] = {}
+        self._notices: dict[str, list[str]] = {}
         self.on_enter: list[Callable[[str], None]] = []
         self.on_leave: list[Callable[[str], None]] = []
         """Called with the name of who logged in, or is logged out."""
@@ -39,6 +48,23 @@ class Users:
     def names(self) -> list[str]:
         """Give who is logged in."""
         return list(self._clients)
+
+    def left_at(self, user: str) -> str | None:
+        """Return when the connection of a user with locks ended; None while the user is connected."""
+        return self._left.get(user)
+
+    def require_left(self, user: str) -> None:
+        """Raise RequestRefused while a user is connected."""
+        if user in self._clients:
+            raise RequestRefused(f"{user} is connected. Ask {user} to unlock it.")
+
+    def release(self, user: str, notice: str) -> list[str]:
+        """Release all locks of a user who left and return their ids; the user gets the notice on returning."""
+        waiting = self._notices.pop(user, [])
+        self._notices[user] = [*waiting, notice][-NOTICES_OF_USER:]
+        while len(self._notices) > USERS_WITH_NOTICES:
+            del self._notices[next(iter(self._notices))]
+        return self._locks.release_all(user)
 
     async def register(self, client: Client, name: str) -> list[Event]:
         """Log in; gives the events that tell this connection alone who holds which locks.
@@ -61,6 +87,7 @@ class Users:
         if holder is not client:
             for tell in self.on_enter:
                 tell(name)
+        self._left.pop(name, None)
         if (handle := self._releases.pop(name, None)) is not None:
             handle.cancel()
         log.info("user registered", user=name, client=client.number)
@@ -71,6 +98,8 @@ class Users:
         ]
         if own := self._locks.written_by(name):
             events.append(make_event("ObjectsLocked", LockData(own, name)))
+        notices = [NotificationData(notice, NotificationLevel.WARN) for notice in self._notices.pop(name, [])]
+        events += [make_event("Notification", notice) for notice in notices]
         return events
 
     def disconnected(self, client: Client) -> None:
@@ -80,6 +109,7 @@ class Users:
 
     def _leave(self, name: str) -> None:
         del self._clients[name]
+        self._left[name] = now()
         for tell in self.on_leave:
             tell(name)
         if (handle := self._releases.pop(name, None)) is not None:
@@ -88,6 +118,7 @@ class Users:
 
     def _release(self, name: str) -> None:
         self._releases.pop(name, None)
+        self._left.pop(name, None)
         if ids := self._locks.release_all(name):
             log.info("locks released after time-out", user=name, ids=ids)
             self._hub.broadcast(make_event("ObjectsUnlocked", LockData(ids, name)))

@@ -77,9 +77,13 @@ from arcor2_hw.data.rpc.history import RestoreRevisionArgs as RestoreRevisionArg
 from arcor2_hw.data.rpc.history import RestoreRevisionData as RestoreRevisionData
 from arcor2_hw.data.rpc.history import UndoArgs as UndoArgs
 from arcor2_hw.data.rpc.history import UndoData as UndoData
+from arcor2_hw.data.rpc.locks import HeldLock as HeldLock
+from arcor2_hw.data.rpc.locks import LockHolder as LockHolder
 from arcor2_hw.data.rpc.locks import LockType as LockType
 from arcor2_hw.data.rpc.locks import ReadLockArgs as ReadLockArgs
 from arcor2_hw.data.rpc.locks import ReadUnlockArgs as ReadUnlockArgs
+from arcor2_hw.data.rpc.locks import TakeOverLocksArgs as TakeOverLocksArgs
+from arcor2_hw.data.rpc.locks import TakeOverLocksData as TakeOverLocksData
 from arcor2_hw.data.rpc.locks import UpdateLockArgs as UpdateLockArgs
 from arcor2_hw.data.rpc.locks import WriteLockArgs as WriteLockArgs
 from arcor2_hw.data.rpc.locks import WriteUnlockArgs as WriteUnlockArgs
@@ -251,6 +255,7 @@ RPCS: Final = {
             args_optional=True,
             additional=True,
         ),
+        Rpc("ListLocks", None, list[LockHolder], Role.OPERATOR, additional=True),
         Rpc("ListPackages", None, list[PackageSummary], Role.OPERATOR),
         Rpc("ListProjects", None, list[ListProjectsData], Role.OPERATOR),
         Rpc("ListRuns", ListRunsArgs, ListRunsData, Role.OPERATOR, args_optional=True, additional=True),
@@ -323,6 +328,7 @@ RPCS: Final = {
         Rpc("StreamRobot", StreamRobotArgs, None, Role.OPERATOR, additional=True),
         Rpc("SubscribeEvents", SubscribeEventsArgs, None, Role.OPERATOR, additional=True),
         Rpc("SystemInfo", None, SystemInfoData, Role.OPERATOR),
+        Rpc("TakeOverLocks", TakeOverLocksArgs, TakeOverLocksData, Role.STANDARD_USER, dry_run=True, additional=True),
         Rpc("TemporaryPackage", TemporaryPackageArgs, None, Role.STANDARD_USER, args_optional=True),
         Rpc("Undo", UndoArgs, UndoData, Role.STANDARD_USER, args_optional=True, dry_run=True, additional=True),
         Rpc("UpdateAction", UpdateActionArgs, None, Role.STANDARD_USER, dry_run=True),

@@ -2,7 +2,7 @@
 
 import enum
 
-from arcor2_hw.data.base import Data
+from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
 
 
 class ReadLockArgs(Data, frozen=True):
@@ -42,3 +42,32 @@ class WriteUnlockArgs(Data, frozen=True):
     """Arguments of WriteUnlock."""
 
     object_id: str
+
+
+class HeldLock(Data, frozen=True):
+    """One lock: what is locked, its name if it has one, and since when. `type` is left out for a read lock."""
+
+    object_id: str
+    name: str
+    since: Timestamp
+    type: LockType | Unset = UNSET
+
+
+class LockHolder(Data, frozen=True):
+    """A user with locks. `left` is when the connection ended; left out while the user is connected."""
+
+    user: str
+    locks: list[HeldLock]
+    left: Timestamp | Unset = UNSET
+
+
+class TakeOverLocksArgs(Data, frozen=True):
+    """Arguments of TakeOverLocks: a user who left."""
+
+    user: str
+
+
+class TakeOverLocksData(Data, frozen=True):
+    """What TakeOverLocks answers: the locks that were released."""
+
+    locks: list[HeldLock]

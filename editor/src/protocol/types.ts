@@ -539,6 +539,14 @@ export interface HandTeachingModeData {
 /** Condition of a device (NAMUR NE 107). */
 export type Health = "normal" | "check_function" | "off_spec" | "maintenance_required" | "failure";
 
+/** One lock: what is locked, its name if it has one, and since when. `type` is left out for a read lock. */
+export interface HeldLock {
+  object_id: string;
+  name: string;
+  since: string;
+  type?: LockType;
+}
+
 /** Arguments of History: at most so many edits, the newest ones before that number. */
 export interface HistoryArgs {
   limit?: number;
@@ -720,6 +728,13 @@ export interface ListScenesData {
 export interface LockData {
   object_ids: string[];
   owner: string;
+}
+
+/** A user with locks. `left` is when the connection ended; left out while the user is connected. */
+export interface LockHolder {
+  user: string;
+  locks: HeldLock[];
+  left?: string;
 }
 
 /** Kinds of write lock. */
@@ -1590,6 +1605,16 @@ export interface SystemInfoData {
   supported_rpc_requests: string[];
 }
 
+/** Arguments of TakeOverLocks: a user who left. */
+export interface TakeOverLocksArgs {
+  user: string;
+}
+
+/** What TakeOverLocks answers: the locks that were released. */
+export interface TakeOverLocksData {
+  locks: HeldLock[];
+}
+
 /** What kind of work takes its time. */
 export type TaskKind = "scene_start" | "scene_stop" | "build" | "calibration" | "upload" | "download" | "computation";
 
@@ -1877,6 +1902,7 @@ export interface Requests {
   InverseKinematics: { args: InverseKinematicsArgs; data: Joint[] };
   JogRobot: { args: JogRobotArgs; data: JogRobotData };
   ListCalibrations: { args: ListCalibrationsArgs | undefined; data: ListCalibrationsData };
+  ListLocks: { args: undefined; data: LockHolder[] };
   ListPackages: { args: undefined; data: PackageSummary[] };
   ListProjects: { args: undefined; data: ListProjectsData[] };
   ListRuns: { args: ListRunsArgs | undefined; data: ListRunsData };
@@ -1940,6 +1966,7 @@ export interface Requests {
   StreamRobot: { args: StreamRobotArgs; data: undefined };
   SubscribeEvents: { args: SubscribeEventsArgs; data: undefined };
   SystemInfo: { args: undefined; data: SystemInfoData };
+  TakeOverLocks: { args: TakeOverLocksArgs; data: TakeOverLocksData };
   TemporaryPackage: { args: TemporaryPackageArgs | undefined; data: undefined };
   Undo: { args: UndoArgs | undefined; data: UndoData };
   UpdateAction: { args: UpdateActionArgs; data: undefined };
@@ -2097,6 +2124,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   InverseKinematics: 2,
   JogRobot: 2,
   ListCalibrations: 1,
+  ListLocks: 1,
   ListPackages: 1,
   ListProjects: 1,
   ListRuns: 1,
@@ -2160,6 +2188,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   StreamRobot: 1,
   SubscribeEvents: 1,
   SystemInfo: 1,
+  TakeOverLocks: 2,
   TemporaryPackage: 2,
   Undo: 2,
   UpdateAction: 2,

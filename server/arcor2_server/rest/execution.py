@@ -17,6 +17,7 @@ from arcor2_hw.exceptions import InvalidData
 from arcor2_server.packages import MAX_UPLOAD
 from arcor2_server.rest.build import ZIP
 from arcor2_server.rest.operations import MIB, Binary, Upload, operation
+from arcor2_server.rpc import left_open
 from arcor2_server.rpc.registry import make_event
 from arcor2_server.runs import How
 from arcor2_server.services import Services
@@ -145,8 +146,8 @@ async def delete_package(services: Services, id: str) -> None:  # noqa: A002
 # ------------------------------------------------------------------------------------------------ the program
 @operation("PUT", "/packages/{id}/start", EXECUTION, Role.OPERATOR)
 async def start_package(services: Services, id: str, person: str) -> None:  # noqa: A002
-    """Run a package."""
-    await services.execution.run(id, How(by=person))
+    """Run a package; a scene or project that nobody uses any more does not prevent it."""
+    await left_open.run_package(services, id, How(by=person))
 
 
 @operation("PUT", "/packages/{id}/breakpoints", EXECUTION, Role.OPERATOR)
@@ -167,7 +168,7 @@ async def get_breakpoints(services: Services, id: str) -> list[str]:  # noqa: A0
 async def debug_package(services: Services, id: str, query: DebugQuery, person: str) -> None:  # noqa: A002
     """Run a package with its breakpoints."""
     breakpoints = await Beside(services.storage).breakpoints(id)
-    await services.execution.run(id, How(query.break_on_first_action, breakpoints, by=person))
+    await left_open.run_package(services, id, How(query.break_on_first_action, breakpoints, by=person))
 
 
 @operation("PUT", "/packages/stop", EXECUTION, Role.OPERATOR)

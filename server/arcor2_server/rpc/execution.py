@@ -14,6 +14,7 @@ from arcor2_hw.data.rpc import (
 )
 from arcor2_server.cell.actions import RunningAction, execute, prepare
 from arcor2_server.locks import ACTION
+from arcor2_server.rpc import left_open
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
 from arcor2_server.runs import How
 
@@ -118,8 +119,8 @@ async def rename_package(context: Context, args: RenamePackageArgs) -> None:
 
 @rpc("RunPackage")
 async def run_package(context: Context, args: RunPackageArgs) -> None:
-    """Run a package."""
-    await context.services.execution.run(args.id, how(context, args))
+    """Run a package; a scene or project that nobody uses any more does not prevent it."""
+    await left_open.run_package(context.services, args.id, how(context, args))
 
 
 def how(context: Context, args: RunPackageArgs | TemporaryPackageArgs) -> How:

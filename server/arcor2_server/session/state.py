@@ -9,19 +9,13 @@ import structlog
 from msgspec.structs import replace
 
 from arcor2_hw.data.base import now
-from arcor2_hw.data.events import Event, OpenProjectData, OpenSceneData, SceneStateData
 from arcor2_hw.data.project import (
-    Action,
-    BareActionPoint,
     BareProject,
-    NamedOrientation,
     Project,
-    ProjectParameter,
-    ProjectRobotJoints,
 )
-from arcor2_hw.data.scene import BareScene, Scene, SceneObject
+from arcor2_hw.data.scene import BareScene, Scene
 from arcor2_hw.exceptions import NotFound, StorageError
-from arcor2_server.rpc.registry import RequestRefused, make_event
+from arcor2_server.rpc.registry import RequestRefused
 from arcor2_server.session.changes import OF_SCENE, Change, Edit, How, Kind
 from arcor2_server.session.checks import scene_problems
 from arcor2_server.session.closed import ClosedHistories
@@ -29,6 +23,7 @@ from arcor2_server.session.document import Document
 from arcor2_server.session.history import History
 from arcor2_server.session.journal import Journal
 from arcor2_server.session.journal_records import ALL, Base, Recovered, Times
+from arcor2_server.session.open_document import OpenDocument
 from arcor2_server.session.unsaved import Unsaved
 
 if TYPE_CHECKING:
@@ -45,30 +40,23 @@ class _Pending(NamedTuple):
     project: Times
 
 
-class Session:
+class Session(OpenDocument):
     """What is open. Between two awaits of a handler nobody else changes it."""
 
     def __init__(self, services: "Services") -> None:
+        super().__init__(services)
         settings = services.settings
-        self.document = Document()
         self.removed_types: set[str] = set()
         """Object types of objects that were removed: those made for one object are deleted when the scene is saved."""
         self.history = History(settings.history_limit)
         self.on_change: list[Callable[[Edit | None], None]] = []
         """Called with each edit once it is on the disk, and with None when another document is open."""
-        self._services = services
         self._limit = settings.history_limit
         self._journal = Journal(settings.journal_database, self._take_back)
         self._closed = ClosedHistories(settings.history_dir)
-        services.storage.on_deleted.append(self._closed.forget)
         self._number = 0
         self._based_on = 0
-        self._scene_times = Times()
-        self._project_times = Times()
-        self._unsaved = Unsaved()
         self._pending: deque[_Pending] = deque()
-        self._scene: Scene | None = None
-        self._project: Project | None = None
 
     # ------------------------------------------------------------------------------------------ life
     async def open(self) -> None:
@@ -127,104 +115,6 @@ class Session:
         self._scene_times = self._scene_times.settled(differs=self._unsaved.scene)
         self._project_times = self._project_times.settled(differs=self._unsaved.project)
         self._forget_snapshots()
-
-    def _name(self, kind: Kind) -> str | None:
-        return next((item.value.name for item in self.document.of_kind(kind)), None)
-
-    # ------------------------------------------------------------------------------------------ what is open
-    @property
-    def scene(self) -> Scene | None:
-        """The open scene as it is now, None when there is none."""
-        if self._scene is None and (scene := self.document.scene) is not None:
-            self._scene = replace(scene, **self._scene_times.fields())
-        return self._scene
-
-    @property
-    def project(self) -> Project | None:
-        """The open project as it is now, None when there is none."""
-        if self._project is None and (project := self.document.project) is not None:
-            self._project = replace(project, **self._project_times.fields())
-        return self._project
-
-    def require_scene(self) -> Scene:
-        """Give the open scene; RequestRefused when there is none."""
-        if (scene := self.scene) is None:
-            raise RequestRefused("No scene is open: open one first.")
-        return scene
-
-    def require_project(self) -> Project:
-        """Give the open project; RequestRefused when there is none."""
-        self.require_project_open()
-        assert self.project is not None
-        return self.project
-
-    def require_scene_open(self) -> Document:
-        """Give the document when a scene is open, with or without a project; else RequestRefused."""
-        if not self.document.count(Kind.SCENE):
-            raise RequestRefused("No scene is open: open one first.")
-        return self.document
-
-    def require_scene_alone(self) -> Document:
-        """Give the document when a scene is open and no project; else RequestRefused."""
-        document = self.require_scene_open()
-        if document.count(Kind.PROJECT):
-            raise RequestRefused("The scene cannot be changed while a project is open: close the project first.")
-        return document
-
-    def require_project_open(self) -> Document:
-        """Give the document when a project is open; else RequestRefused."""
-        self.require_scene_open()
-        if not self.document.count(Kind.PROJECT):
-            raise RequestRefused("No project is open: open one first.")
-        return self.document
-
-    def require_nothing_open(self) -> None:
-        """RequestRefused when a scene or project is open."""
-        if self.document.count(Kind.PROJECT):
-            raise RequestRefused(f"The project {self._name(Kind.PROJECT)} is open: close it first.")
-        if self.document.count(Kind.SCENE):
-            raise RequestRefused(f"The scene {self._name(Kind.SCENE)} is open: close it first.")
-
-    def bare_scene(self) -> BareScene:
-        """Give the open scene without its objects."""
-        value = self.document.of_kind(Kind.SCENE)[0].value
-        return BareScene(name=value.name, description=value.description, id=value.id, **self._scene_times.fields())
-
-    def bare_project(self) -> BareProject:
-        """Give the open project without its content."""
-        value = self.document.of_kind(Kind.PROJECT)[0].value
-        return BareProject(
-            name=value.name,
-            scene_id=value.scene_id,
-            description=value.description,
-            has_logic=value.has_logic,
-            id=value.id,
-            **self._project_times.fields(),
-        )
-
-    @property
-    def scene_changed(self) -> bool:
-        """Whether the open scene has changes that are not saved."""
-        return bool(self.document.count(Kind.SCENE)) and self._scene_times.unsaved
-
-    @property
-    def project_changed(self) -> bool:
-        """Whether the open project has changes that are not saved."""
-        return bool(self.document.count(Kind.PROJECT)) and self._project_times.unsaved
-
-    @property
-    def has_changes(self) -> bool:
-        """Whether closing would lose something."""
-        return self.scene_changed or self.project_changed
-
-    def greeting(self) -> list[Event]:
-        """Give the events that tell a new connection what is open; none when nothing is."""
-        if (scene := self.scene) is None:
-            return []
-        state = make_event("SceneState", SceneStateData(self._services.cell.state))
-        if (project := self.project) is not None:
-            return [make_event("OpenProject", OpenProjectData(scene, project)), state]
-        return [make_event("OpenScene", OpenSceneData(scene)), state]
 
     # ------------------------------------------------------------------------------------------ edits
     @property
@@ -297,10 +187,6 @@ class Session:
         base = Base(self.document.items(), self._number, self._scene_times, self._project_times, forget)
         return self._journal.rebase(base)
 
-    def _forget_snapshots(self) -> None:
-        self._scene = None
-        self._project = None
-
     # ------------------------------------------------------------------------------------------ opening, saving
     async def show(self, scene: Scene, project: Project | None = None) -> None:
         """Open a scene, or a project on its scene, in place of what is open; its history is continued."""
@@ -323,14 +209,42 @@ class Session:
         self._scene_times = self._project_times = Times()
         self._replace(Document())
 
+    async def forget_history(self, document: str) -> None:
+        """Delete the history of a closed scene or project. Raises OSError."""
+        await self._closed.forget(document)
+
+    def set_aside(self) -> Callable[[], None]:
+        """Hide what is open and return the function that shows it again, as it was with its unsaved changes.
+
+        Nothing else may be opened meanwhile. The journal is not changed: after a restart the document is open.
+        Raises RequestRefused while an edit is on its way to the disk.
+        """
+        if self._pending:
+            raise RequestRefused("Something is being changed. Try again.")
+        hidden = self.document, self.history, self.removed_types, self._scene_times, self._project_times, self._unsaved
+        number, based_on = self._number, self._based_on
+
+        def show_again() -> None:
+            document, self.history, self.removed_types, self._scene_times, self._project_times, unsaved = hidden
+            self._number, self._based_on = number, based_on
+            self._show(document, unsaved)
+
+        self.history, self.removed_types = History(self._limit), set()
+        self._scene_times = self._project_times = Times()
+        self._number = self._based_on = 0
+        self._show(Document(), Unsaved())
+        return show_again
+
     def _replace(self, document: Document, edits: Sequence[Edit] = ()) -> None:
-        self.document = document
         self.history.clear()
         for edit in edits:
             self.history.append(edit)
         self.removed_types.clear()
         self._number = self._based_on = edits[-1].number if edits else 0
-        self._unsaved = Unsaved()
+        self._show(document, Unsaved())
+
+    def _show(self, document: Document, unsaved: Unsaved) -> None:
+        self.document, self._unsaved = document, unsaved
         self._forget_snapshots()
         for tell in self.on_change:
             tell(None)
@@ -363,36 +277,3 @@ class Session:
     def scene_problems(self, scene: Scene) -> list[str]:
         """Give what is wrong with a scene, empty when it can be opened."""
         return scene_problems(scene, self._services.types)
-
-    # ------------------------------------------------------------------------------------------ look-ups
-    def scene_object(self, object_id: str) -> SceneObject:
-        """Give an object of the scene; NotFound."""
-        return self.document.scene_object(object_id)
-
-    def action_point(self, action_point_id: str) -> BareActionPoint:
-        """Give an action point without its lists; NotFound."""
-        return self.document.action_point(action_point_id)
-
-    def orientation(self, orientation_id: str) -> tuple[BareActionPoint, NamedOrientation]:
-        """Give an orientation with its action point; NotFound."""
-        return self.document.orientation(orientation_id)
-
-    def joints(self, joints_id: str) -> tuple[BareActionPoint, ProjectRobotJoints]:
-        """Give joints with their action point; NotFound."""
-        return self.document.joints(joints_id)
-
-    def action(self, action_id: str) -> tuple[BareActionPoint, Action]:
-        """Give an action with its action point; NotFound."""
-        return self.document.action(action_id)
-
-    def parameter(self, parameter_id: str) -> ProjectParameter:
-        """Give a project parameter; NotFound."""
-        return self.document.parameter(parameter_id)
-
-    def root_of(self, item: str) -> str:
-        """Give the root of the lock tree that an id belongs to; NotFound."""
-        return self.document.root_of(item)
-
-    def tree_of(self, root: str) -> list[str]:
-        """Give the ids below a root of a lock tree."""
-        return self.document.tree_of(root)

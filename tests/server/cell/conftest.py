@@ -5,7 +5,6 @@ import contextlib
 import json
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import msgspec
@@ -23,6 +22,7 @@ from arcor2_server.cell.told import tell_hosts
 from arcor2_server.execution import Execution
 from arcor2_server.hub import Hub
 from arcor2_server.locks import Locks
+from arcor2_server.presence import PresenceBoard
 from arcor2_server.rpc import execution as _execution  # noqa: F401 - for their handlers
 from arcor2_server.rpc import robot as _robot  # noqa: F401 - for their handlers
 from arcor2_server.rpc import runs as _runs  # noqa: F401 - for their handlers
@@ -31,6 +31,7 @@ from arcor2_server.services import Services
 from arcor2_server.session import Session
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import AssetStore
+from arcor2_server.users import Users
 from tests.runtime.conftest import type_code
 
 PATIENCE = 15.0
@@ -42,6 +43,7 @@ class Recorder:
     def __init__(self, user: str | None) -> None:
         self.user = user
         self.name = user or ""
+        self.number = 1
         self.role = Role.PROGRAMMER
         self.got: list[dict[str, Any]] = []
         self._news = asyncio.Event()
@@ -137,8 +139,8 @@ async def running_server(data_dir: Path) -> AsyncIterator[Server]:
     settings = ServerSettings(data_dir=data_dir, streaming_period=0.05)
     hub, locks, types = Hub(), Locks(2, 0.05), Types()
     none: Any = None
-    given: dict[str, Any] = dict.fromkeys(("access", "users", "storage", "session", "cell", "execution", "build"), none)
-    given["storage"] = SimpleNamespace(on_deleted=[])
+    given: dict[str, Any] = dict.fromkeys(("access", "storage", "session", "cell", "execution", "build"), none)
+    given["users"] = Users(hub, locks, settings)
     given["assets"] = await AssetStore.open(settings.assets_dir)
     services = Services(settings=settings, hub=hub, locks=locks, types=types, **given)  # type: ignore[arg-type]
     services.session = Session(services)
@@ -146,10 +148,14 @@ async def running_server(data_dir: Path) -> AsyncIterator[Server]:
     services.cell = OnlineCell(services)
     services.execution = Execution(services)
     tell_hosts(services)
+    services.presence = PresenceBoard(hub, services.users)
     locks.tree = services.session
+    server = Server(services, types)
+    await services.users.register(server.client, server.client.name)  # type: ignore[arg-type]
     try:
-        yield Server(services, types)
+        yield server
     finally:
+        services.presence.close()
         await services.cell.close()
         await services.session.close()
 
