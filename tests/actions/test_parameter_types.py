@@ -1,7 +1,6 @@
 """The ten parameter types: exact kinds, ranges, references, what a script and an event get."""
 
 import ast
-import json
 import math
 
 import msgspec
@@ -19,6 +18,7 @@ from arcor2_hw.data.project_index import ProjectIndex
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import InvalidData
+from tests.protocol import PROTOCOL
 
 QUARTER = Orientation(0, 0, math.sin(math.pi / 4), math.cos(math.pi / 4))
 
@@ -67,8 +67,8 @@ def check(kind: str, value: str, index: ProjectIndex | None = None, extra: str |
     PARAMETER_TYPES[kind].check(Parameter("p", kind, value), meta, index, **more)
 
 
-def test_exactly_the_types_of_the_protocol(spec) -> None:
-    assert sorted(PARAMETER_TYPES) == json.loads((spec / "protocol.json").read_text())["supported_parameter_types"]
+def test_exactly_the_types_of_the_protocol() -> None:
+    assert sorted(PARAMETER_TYPES) == PROTOCOL["parameter_types"]
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ import json
 import re
 import textwrap
 import time
-from pathlib import Path
 
 import msgspec
 import pytest
@@ -12,6 +11,7 @@ import pytest
 from arcor2_hw.analysis import BUILT_IN, Library, SourceFile, TypeAnalysis, module_name
 from arcor2_hw.data.object_type import ObjectAction
 from arcor2_hw.exceptions import InvalidData, NotFound
+from tests.protocol import PROTOCOL, session
 
 NEW = """
     from arcor2_hw.actions import IntEnum, StrEnum, action
@@ -72,8 +72,8 @@ def without_texts(value: object) -> object:
     return [without_texts(each) for each in value] if isinstance(value, list) else value
 
 
-def test_the_built_in_types_are_those_of_the_protocol(spec: Path) -> None:
-    stated = json.loads((spec / "protocol.json").read_text())["built_in_object_types"]
+def test_the_built_in_types_are_those_of_the_protocol() -> None:
+    stated = PROTOCOL["built_in_object_types"]
     empty = Library()
     assert sorted(stated) == sorted(BUILT_IN) == sorted(empty.names())
     for name, wanted in stated.items():
@@ -247,19 +247,19 @@ DOBOT = {
 }
 
 
-def recorded(spec: Path) -> dict[str, list]:
+def recorded() -> dict[str, list]:
     """Give the data of the answers in the first recorded session."""
     answers = {}
-    for line in (spec / "traces" / "01_connect_register.jsonl").read_text().splitlines():
-        message = json.loads(line)["msg"]
+    for line in session("01_connect_register"):
+        message = line["msg"]
         if isinstance(message, dict) and message.get("response") in ("GetObjectTypes", "GetActions", "GetRobotMeta"):
             answers[message["response"]] = message["data"]
     assert len(answers) == 3
     return answers
 
 
-def test_types_of_a_recorded_session_come_out_as_recorded(spec: Path) -> None:
-    answers = recorded(spec)
+def test_types_of_a_recorded_session_come_out_as_recorded() -> None:
+    answers = recorded()
     lib = Library(SourceFile(name, module_name(name), textwrap.dedent(source)) for name, source in DOBOT.items())
     metas = {meta["type"]: meta for meta in answers["GetObjectTypes"]}
     for name in DOBOT:

@@ -75,7 +75,7 @@ async def put_lamps(storage: Storage) -> None:
         await storage.put_object_type(ObjectTypeSource(name, source))
 
 
-async def test_built_in_and_installed_types_are_known(types: ObjectTypes, spec: Path) -> None:
+async def test_built_in_and_installed_types_are_known(types: ObjectTypes) -> None:
     assert all(meta.built_in for meta in types.metas()), "nothing is uploaded yet"
     assert set(types.names()) > {
         "Camera",

@@ -1,22 +1,15 @@
 """The Structs say exactly what protocol.json says: every request, event, type, field, default and enum value."""
 
 import enum
-from pathlib import Path
 from typing import Any
 
 import msgspec
-import pytest
 from msgspec import UNSET, inspect
 
 from arcor2_hw.data.events import EVENTS, ChangeType
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import RPCS
-
-
-@pytest.fixture(scope="module")
-def protocol(spec: Path) -> Any:
-    return msgspec.json.decode((spec / "protocol.json").read_bytes())
-
+from tests.protocol import PROTOCOL
 
 ADDED = {
     "ObjectTypeMeta": {"category", "icon"},
@@ -121,10 +114,10 @@ class Comparison:
         return msgspec.to_builtins(value)
 
 
-def test_requests(protocol: Any) -> None:
-    comparison = Comparison(protocol["types"])
-    assert {name for name, rpc in RPCS.items() if not rpc.additional} == set(protocol["arserver_rpcs"])
-    for name, theirs in protocol["arserver_rpcs"].items():
+def test_requests() -> None:
+    comparison = Comparison(PROTOCOL["types"])
+    assert {name for name, rpc in RPCS.items() if not rpc.additional} == set(PROTOCOL["requests"])
+    for name, theirs in PROTOCOL["requests"].items():
         ours = RPCS[name]
         assert (ours.args is None) == (theirs["args"] is None), name
         assert (ours.data is None) == (theirs["response_data"] is None), name
@@ -137,10 +130,10 @@ def test_requests(protocol: Any) -> None:
     assert comparison.differences == []
 
 
-def test_events(protocol: Any) -> None:
-    comparison = Comparison(protocol["types"])
-    assert {name for name, event in EVENTS.items() if not event.additional} == set(protocol["events"])
-    for name, theirs in protocol["events"].items():
+def test_events() -> None:
+    comparison = Comparison(PROTOCOL["types"])
+    assert {name for name, event in EVENTS.items() if not event.additional} == set(PROTOCOL["events"])
+    for name, theirs in PROTOCOL["events"].items():
         ours = EVENTS[name]
         assert (ours.data is None) == (theirs["data"] is None), name
         if theirs["data"] is not None:
@@ -149,18 +142,18 @@ def test_events(protocol: Any) -> None:
     assert comparison.differences == []
 
 
-def test_no_type_is_left_out(protocol: Any) -> None:
-    comparison = Comparison(protocol["types"])
-    for name, theirs in protocol["arserver_rpcs"].items():
+def test_no_type_is_left_out() -> None:
+    comparison = Comparison(PROTOCOL["types"])
+    for name, theirs in PROTOCOL["requests"].items():
         for kind, ours in ((theirs["args"], RPCS[name].args), (theirs["response_data"], RPCS[name].data)):
             if kind is not None:
                 comparison.same(name, kind, inspect.type_info(ours))
-    for name, theirs in protocol["events"].items():
+    for name, theirs in PROTOCOL["events"].items():
         if theirs["data"] is not None:
             comparison.same(name, theirs["data"], inspect.type_info(EVENTS[name].data))
     # The envelope, and the answer of a request that ARServer does not expose.
     outside = {"Event", "Event.Type", "Version.Response.Data"}
-    assert set(protocol["types"]) - comparison.compared == outside
+    assert set(PROTOCOL["types"]) - comparison.compared == outside
 
 
 def test_every_request_and_event_declares_its_least_role() -> None:
@@ -168,11 +161,11 @@ def test_every_request_and_event_declares_its_least_role() -> None:
         assert isinstance(declared.role, Role), declared.name
 
 
-def test_comparison_finds_a_misspelt_field(protocol: Any) -> None:
+def test_comparison_finds_a_misspelt_field() -> None:
     class Wrong(msgspec.Struct):
         object_id: str
         lock_trees: bool = False
 
-    comparison = Comparison(protocol["types"])
+    comparison = Comparison(PROTOCOL["types"])
     comparison.same("WriteLock", {"kind": "object", "name": "WriteLock.Request.Args"}, inspect.type_info(Wrong))
     assert len(comparison.differences) == 1

@@ -3,20 +3,20 @@
 from typing import Any
 
 from arcor2_hw.data.object_type import Box, ObjectModel, ObjectTypeSource
-from tests.server.session.desk import trace
+from tests.protocol import session
 
 ROBOT = "DobotMagician"
 """Like the other recorded types it takes the place of an installed one, which has other parameters."""
 
 
 def _answer(name: str, number: int) -> Any:
-    return next(m["msg"]["data"] for m in trace(name) if m["msg"].get("id") == number and "data" in m["msg"])
+    return next(m["msg"]["data"] for m in session(name) if m["msg"].get("id") == number and "data" in m["msg"])
 
 
 def source() -> str:
     """Give the robot's module, with the joints and poses that were recorded."""
-    session = "03_scene_online_robot"
-    joints, pose, solved = _answer(session, 47), _answer(session, 53), _answer(session, 55)
+    scene_session = "03_scene_online_robot"
+    joints, pose, solved = _answer(scene_session, 47), _answer(scene_session, 53), _answer(scene_session, 55)
     return f'''
 from dataclasses import dataclass
 
@@ -161,8 +161,3 @@ def uploads() -> list[ObjectTypeSource]:
         ObjectTypeSource("RandomActions", RANDOM.lstrip()),
         ObjectTypeSource("WeighingMachine", SCALE.lstrip(), model=model),
     ]
-
-
-def session(name: str) -> list[dict[str, Any]]:
-    """Return a recorded session."""
-    return trace(name)

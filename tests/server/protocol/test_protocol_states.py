@@ -1,16 +1,14 @@
 """What every request answers in six server states when its arguments name nothing, as the spec recorded it."""
 
-import json
 import re
 from pathlib import Path
 from typing import Any
 
 from arcor2_hw.data.rpc import RPCS
+from tests.protocol import STATES
 from tests.server.protocol.stage import Actor, Stage, open_stage
-from tests.server.session.desk import SPEC
 from tests.server.session.test_session_states import example
 
-MATRIX: dict[str, dict[str, str]] = json.loads((SPEC / "state_matrix.json").read_text())
 CLASSES = {
     "needs a registered user": re.compile("You are not logged in"),
     "needs an open scene": re.compile("No scene is open"),
@@ -89,7 +87,7 @@ async def test_every_request_in_every_state(tmp_path: Path) -> None:
     async with open_stage(tmp_path, lock_retries=1, lock_retry_wait=0.01) as stage:
         alice, stranger = await stage.person("alice"), await stage.person()
         compared = 0
-        for state, rows in MATRIX.items():
+        for state, rows in STATES.items():
             await enter(stage, alice, state)
             person = stranger if state.startswith("unregistered") else alice
             for name, recorded in rows.items():
@@ -108,7 +106,7 @@ DIFFERENT: dict[str, str] = {}
 
 
 def test_the_matrix_leaves_out_what_would_change_the_state() -> None:
-    left_out = set(RPCS) - set(MATRIX["no_scene"])
+    left_out = set(RPCS) - set(STATES["no_scene"])
     additional = {name for name, declared in RPCS.items() if declared.additional}
     assert left_out - additional == {
         "ListPackages",

@@ -5,20 +5,15 @@ has to be there and to speak of it. Nothing of protocol.json may be left over.
 """
 
 import ast
-import json
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from tests.server.protocol.recorded import session
+from tests.protocol import PROTOCOL, STATES, session
 from tests.server.protocol.test_protocol_traces import DIFFERENT, SESSIONS
-from tests.server.session.desk import SPEC
 
 TESTS = Path(__file__).resolve().parents[2]
-PROTOCOL: dict[str, Any] = json.loads((SPEC / "protocol.json").read_text())
-MATRIX: dict[str, dict[str, str]] = json.loads((SPEC / "state_matrix.json").read_text())
 
 EDITING = "server/protocol/test_protocol_editing.py"
 VALUES = "server/protocol/test_protocol_values.py"
@@ -154,7 +149,7 @@ def test_the_named_test_looks_for_a_refusal(name: str, test: str) -> None:
 
 def test_every_request_is_shown_granted() -> None:
     granted = recorded()[0] | GRANTED.keys() | CHECKED_BY_ITSELF
-    assert set(PROTOCOL["arserver_rpcs"]) - granted == set()
+    assert set(PROTOCOL["requests"]) - granted == set()
     assert GRANTED.keys() & recorded()[0] == set(), "the recorded sessions show these already"
 
 
@@ -163,9 +158,9 @@ CHECKED_BY_ITSELF = {"GetActions", "GetObjectTypes", "GetRobotMeta", "SystemInfo
 
 
 def test_every_request_is_shown_refused() -> None:
-    in_matrix = {name for rows in MATRIX.values() for name, outcome in rows.items() if outcome.startswith("refused")}
+    in_matrix = {name for rows in STATES.values() for name, outcome in rows.items() if outcome.startswith("refused")}
     shown = recorded()[1] | in_matrix | REFUSED.keys()
-    assert set(PROTOCOL["arserver_rpcs"]) - shown == NEVER_REFUSED
+    assert set(PROTOCOL["requests"]) - shown == NEVER_REFUSED
 
 
 def test_every_event_is_shown() -> None:

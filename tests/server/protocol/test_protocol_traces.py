@@ -12,7 +12,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tests.server.protocol.recorded import ROBOT, session, uploads
+from tests.protocol import session
+from tests.server.protocol.recorded import ROBOT, uploads
 from tests.server.protocol.stage import Actor, Stage, open_stage, until
 from tests.server.session.test_session_traces import Mapping, plain
 

@@ -16,6 +16,7 @@ import schemathesis
 from arcor2_server.rest import OPERATIONS
 from arcor2_server.rest.documents import document
 from arcor2_server.rest.naming import camel
+from tests.protocol import openapi
 
 SERVICES = {
     "storage": "Storage",
@@ -74,8 +75,8 @@ class Comparison:
 
 
 @pytest.mark.parametrize("name", SERVICES)
-def test_it_says_what_the_original_says(spec: Path, name: str) -> None:
-    theirs = json.loads((spec / "openapi" / f"{name}.json").read_text())
+def test_it_says_what_the_original_says(name: str) -> None:
+    theirs = openapi(name)
     ours = document(SERVICES[name])
     compare = Comparison(theirs, ours)
     differences = compare.differences

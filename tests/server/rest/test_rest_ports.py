@@ -14,6 +14,7 @@ from arcor2_hw.exceptions import InvalidData
 from arcor2_server.classic import SOCKET, classic_ports
 from arcor2_server.execution_socket import EVENTS, REQUESTS
 from arcor2_server.tokens import TokenFile
+from tests.protocol import PROTOCOL
 from tests.server.core.serving import ServerProcess, Talker, running, talking
 from tests.server.rest.asking import granted
 from tests.server.rest.test_rest_build_and_run import as_file, base, prepare, published
@@ -178,10 +179,9 @@ async def test_it_serves_packages_and_nothing_else(tmp_path: Path) -> None:
         assert names <= EVENTS, "ShowMainScreen is for ARServer's clients"
 
 
-def test_it_is_what_the_protocol_says(spec: Path) -> None:
-    protocol = json.loads((spec / "protocol.json").read_text())
-    assert {*REQUESTS, "Version"} == set(protocol["execution_rpcs"])
-    assert set(protocol["execution_events"]) == EVENTS
+def test_it_is_what_the_protocol_says() -> None:
+    assert {*REQUESTS, "Version"} == set(PROTOCOL["execution_requests"])
+    assert set(PROTOCOL["execution_events"]) == EVENTS
 
 
 async def test_it_asks_for_a_token_too(tmp_path: Path) -> None:

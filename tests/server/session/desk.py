@@ -1,4 +1,4 @@
-"""A server without a socket: the real endpoint, hub, locks, storage, journal; object types as recorded in the spec.
+"""A server without a socket: the real endpoint, hub, locks, storage, journal; object types as recorded.
 
 What is missing of a whole server is the network, the cell host and the analysis of object types: they have tests of
 their own, and the same requests are sent to a real server process elsewhere.
@@ -49,20 +49,14 @@ from arcor2_server.storage import Storage
 from arcor2_server.type_changes import Changes
 from arcor2_server.users import Users
 from arcor2_server.wire import EXTENSION
-
-SPEC = Path(__file__).resolve().parents[4] / "shared" / "spec"
-
-
-def trace(name: str) -> list[dict[str, Any]]:
-    """Give a recorded session of the spec."""
-    return [json.loads(line) for line in (SPEC / "traces" / f"{name}.jsonl").read_text().splitlines()]
+from tests.protocol import session
 
 
 class RecordedTypes:
     """The object types of the recorded sessions, in place of the registry that analyses sources."""
 
     def __init__(self) -> None:
-        answers = {m["msg"].get("response"): m["msg"] for m in trace("01_connect_register") if m["who"] == "A<"}
+        answers = {m["msg"].get("response"): m["msg"] for m in session("01_connect_register") if m["who"] == "A<"}
         metas = msgspec.convert(answers["GetObjectTypes"]["data"], list[ObjectTypeMeta])
         self._metas = {meta.type: meta for meta in metas}
         dobot = msgspec.convert(answers["GetActions"]["data"], list[ObjectAction])

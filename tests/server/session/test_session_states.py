@@ -1,6 +1,5 @@
 """What each editing request is refused for first, in the server states that the spec recorded."""
 
-import json
 from typing import Any
 
 import msgspec
@@ -20,7 +19,8 @@ from arcor2_server.rpc import (
     scene_objects,
 )
 from arcor2_server.rpc.registry import HANDLERS
-from tests.server.session.desk import SPEC, Desk, Person
+from tests.protocol import STATES
+from tests.server.session.desk import Desk, Person
 
 MODULES = {
     module.__name__
@@ -38,7 +38,6 @@ MODULES = {
     )
 }
 OURS = sorted(name for name, handler in HANDLERS.items() if handler.__module__ in MODULES)
-MATRIX = json.loads((SPEC / "state_matrix.json").read_text())
 REASONS = {
     "needs a registered user": "not logged in",
     "needs an open scene": "is open: open one first",
@@ -86,7 +85,7 @@ def request(name: str) -> dict[str, Any]:
 
 def test_these_are_all_of_them() -> None:
     assert len(OURS) >= 55
-    assert set(OURS) <= MATRIX["no_scene"].keys()
+    assert set(OURS) <= STATES["no_scene"].keys()
 
 
 @pytest.mark.parametrize("state", ["unregistered_no_scene", "no_scene", "scene_offline"])
@@ -96,7 +95,7 @@ async def test_first_reason(desk: Desk, alice: Person, stranger: Person, state: 
     person = stranger if state.startswith("unregistered") else alice
     wrong, compared = {}, 0
     for name in OURS:
-        recorded = MATRIX[state][name].removeprefix("refused: ")
+        recorded = STATES[state][name].removeprefix("refused: ")
         answer = await person.send(request(name))
         said = "ok" if answer["result"] else answer["messages"][0]
         assert "are wrong:" not in said, said

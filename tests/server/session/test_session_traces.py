@@ -11,7 +11,8 @@ import pytest
 from arcor2_hw.data.events import SceneStateEnum
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint
-from tests.server.session.desk import Desk, Person, trace
+from tests.protocol import session
+from tests.server.session.desk import Desk, Person
 
 ID = re.compile(r"\b(?:scn|obj|pro|acp|ori|joi|act|lit|pco|pkg)_[0-9a-f]{32}\b")
 
@@ -75,7 +76,7 @@ def exchanges(name: str) -> Iterator[tuple[str, dict[str, Any], dict[str, list[d
     """Give each request with what every client received until the next one."""
     who, request = "", {}
     received: dict[str, list[dict[str, Any]]] = {"A": [], "B": []}
-    for line in trace(name):
+    for line in session(name):
         if line["who"].endswith(">"):
             if request:
                 yield who, request, received
@@ -127,7 +128,7 @@ async def people(alice: Person, bob: Person) -> dict[str, Person]:
 
 
 def recorded_answer(name: str, number: int) -> Any:
-    return next(m["msg"]["data"] for m in trace(name) if m["msg"].get("id") == number and "data" in m["msg"])
+    return next(m["msg"]["data"] for m in session(name) if m["msg"].get("id") == number and "data" in m["msg"])
 
 
 async def test_the_recorded_session_plays_the_same(desk: Desk, people: dict[str, Person]) -> None:
