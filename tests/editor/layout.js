@@ -20,15 +20,49 @@
     }
     return false;
   };
-  // Below a window nothing can be touched.
-  const scope = [...document.querySelectorAll(".overlay")].at(-1) ?? document;
+  // The part of an element's box that its scrolling ancestors show.
+  const visibleBox = (element) => {
+    let { left, top, right, bottom } = element.getBoundingClientRect();
+    for (let each = element; each.parentElement && getComputedStyle(each).position !== "fixed"; each = each.parentElement) {
+      if (getComputedStyle(each.parentElement).overflow === "visible") continue;
+      const clip = each.parentElement.getBoundingClientRect();
+      left = Math.max(left, clip.left);
+      top = Math.max(top, clip.top);
+      right = Math.min(right, clip.right);
+      bottom = Math.min(bottom, clip.bottom);
+    }
+    return { left, top, right, bottom };
+  };
+  const overlap = (p, q) =>
+    Math.min(p.right, q.right) - Math.max(p.left, q.left) > 1 && Math.min(p.bottom, q.bottom) - Math.max(p.top, q.top) > 1;
+  // No control reaches into the Stop dock, on any layer of the page, and nothing covers the Stop button.
+  const stopFaults = () => {
+    const stop = document.querySelector(".stop");
+    if (!stop) return [];
+    const found = [];
+    const dock = stop.closest(".dock");
+    const button = stop.getBoundingClientRect();
+    if (!dock) found.push("Stop has no dock");
+    for (const element of document.querySelectorAll(controls)) {
+      if (element === stop || !shown(element)) continue;
+      const taken = dock?.contains(element) ? button : (dock ?? stop).getBoundingClientRect();
+      if (overlap(visibleBox(element), taken)) found.push(`${name(element)}: in the Stop dock`);
+    }
+    if (stop.scrollHeight > stop.clientHeight || stop.scrollWidth > stop.clientWidth) found.push("Stop: its text is cut off");
+    for (const [x, y] of [[0.5, 0.5], [0.05, 0.5], [0.95, 0.5], [0.5, 0.05], [0.5, 0.95]]) {
+      const top = document.elementFromPoint(button.left + x * button.width, button.top + y * button.height);
+      if (!stop.contains(top)) found.push(`Stop: covered by ${top ? name(top) : "the edge of the screen"}`);
+    }
+    return found;
+  };
+  // Below a dialog or menu nothing can be touched.
+  const scope = [...document.querySelectorAll(".overlay, .popover")].at(-1) ?? document;
   const name = (element) =>
     (element.getAttribute("aria-label") || element.textContent || element.tagName).trim().slice(0, 40);
-  const touched = [
-    ...scope.querySelectorAll(
-      "button, input, select, textarea, a[href], [role=tab], [role=option], [role=menuitem], summary",
-    ),
-  ].filter((element) => shown(element) && !element.closest("[aria-hidden=true]"));
+  const controls = "button, input, select, textarea, a[href], [role=tab], [role=option], [role=menuitem], summary";
+  const touched = [...scope.querySelectorAll(controls)].filter(
+    (element) => shown(element) && !element.closest("[aria-hidden=true]"),
+  );
   for (const element of touched) {
     const box = element.getBoundingClientRect();
     const area = element.matches("input[type=checkbox]") ? element.closest("label").getBoundingClientRect() : box;
@@ -45,6 +79,7 @@
       faults.push(`${name(element)}: covered by ${name(top)}`);
     }
   }
+  faults.push(...stopFaults());
   if (document.documentElement.scrollWidth > innerWidth + 1) faults.push("the page scrolls sideways");
   const labels = [...document.querySelectorAll(".view-label")]
     .filter(shown)

@@ -18,6 +18,7 @@ ARGUMENTS: Final = [
 ]
 VIEWPORTS: Final = {
     "tablet": {"width": 1280, "height": 800},
+    "ipad": {"width": 1180, "height": 820},
     "small tablet": {"width": 1024, "height": 768},
     "desktop": {"width": 1920, "height": 1080},
     "portrait": {"width": 800, "height": 1280},

@@ -30,7 +30,7 @@ async def test_which_kinematics_are_in_force_is_said_beside_the_robot(
         await client.call("AddObjectToScene", rpc.AddObjectToSceneArgs("arm", "UR5e", Pose(), [host]))
         async with screen_of(browser, cell.url) as screen:
             await screen.join("Eva")
-            await screen.page.get_by_role("button", name=re.compile("^Robot in hand")).click()
+            await screen.page.get_by_role("button", name=re.compile("^Active robot")).click()
             await screen.sees("Computed as arms of this type are, off by some millimetres")
             await client.call("StartScene")
             await scene_state(client, SceneStateEnum.STARTED)

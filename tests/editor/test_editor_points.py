@@ -308,7 +308,7 @@ async def test_the_robot_is_shown_at_what_is_taught_goes_there_and_turns_as_it_i
     await place.client.call("UpdateActionPointOrientation", rpc.UpdateActionPointOrientationArgs(down, yawed))
     await place.client.call("WriteUnlock", rpc.WriteUnlockArgs(down))
     await screen.until(f"(ids) => ({as_taught})(ids).turned > 0.1", [place.robot, down])
-    await page.get_by_role("button", name=re.compile("^Robot in hand")).click()
+    await page.get_by_role("button", name=re.compile("^Active robot")).click()
     await page.get_by_role("radiogroup", name="How to move it").get_by_role("radio", name="Tool", exact=True).click()
     await place.button("Turn as down").click()
     await until(reached, "the tool is turned as the orientation", 20)

@@ -62,7 +62,7 @@ class Place:
     async def robot_panel(self, way: str) -> None:
         page = self.screen.page
         if not await page.get_by_role("complementary", name="Robot").count():
-            await page.get_by_role("button", name=re.compile("^Robot in hand")).click()
+            await page.get_by_role("button", name=re.compile("^Active robot")).click()
         await self.choose("How to move it", way)
 
     async def choose(self, group: str, what: str) -> None:

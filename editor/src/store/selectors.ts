@@ -7,6 +7,8 @@ import type { State } from "./state";
 export const RUNNING: ReadonlySet<PackageStateEnum> = new Set(["started", "running", "stopping", "pausing", "paused", "resuming"]);
 
 export const isRunning = (state: State): boolean => RUNNING.has(state.program.state);
+/** Whether something may move at the program's or a user's command: the scene is online, or a program runs. */
+export const isLive = (state: State): boolean => state.live.state === "started" || state.live.state === "stopping" || isRunning(state);
 export const isConnected = (state: State): boolean => state.connection.status === "ready";
 export const isOnline = (state: State): boolean => state.live.state === "started";
 

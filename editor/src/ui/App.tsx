@@ -1,13 +1,14 @@
-/** Which screen is shown: to join, what there is, or the workplace that is open. */
+/** Choose the screen (join, home, workplace or operator) and frame it: connection and result above, Stop dock below. */
 
 import { Suspense, useEffect, useState, useSyncExternalStore } from "react";
-import { isRunning, openId } from "../store/selectors";
+import { isLive, isRunning, openId } from "../store/selectors";
 import { rememberPerson } from "../session/memory";
 import { now, useEditor } from "../store/store";
 import { Join } from "./join/Join";
 import { Waiting } from "./kit/kit";
 import { lazily } from "./kit/lazily";
 import { LostConnection } from "./connection/LostConnection";
+import { Dock } from "./dock/Dock";
 import { Overlays } from "./search/Overlays";
 import { keepRecent } from "./home/kept";
 import { useScreenSettings } from "./settings/Settings";
@@ -33,6 +34,7 @@ export function App() {
   useScreenSettings();
   const status = useEditor((state) => state.connection.status);
   const open = useEditor((state) => state.doc !== null);
+  const live = useEditor(isLive);
   const document = useEditor((state) => (state.connection.status === "ready" && !isRunning(state) ? openId(state) : ""));
   useEffect(() => {
     if (document) keepRecent(document);
@@ -40,25 +42,35 @@ export function App() {
   useEffect(() => {
     if (status === "ready") rememberPerson(now().connection.user);
   }, [status]);
-  // Who has been in stays on his screen when the connection is lost.
+  // A lost connection does not bring users back to the join screen.
   const [been, setBeen] = useState(false);
   if (status === "ready" && !been) setBeen(true);
   if ((status === "left" || status === "refused") && been) setBeen(false);
-  if (!been) return <Join />;
+  if (!been) {
+    return (
+      <div className="screen">
+        <Join />
+      </div>
+    );
+  }
+  const operator = hash.startsWith("#/operator");
   return (
     <>
       <LostConnection />
-      {hash.startsWith("#/operator") ? (
-        <Suspense fallback={<Waiting>Preparing the screen…</Waiting>}>
-          <Operator kiosk={hash.includes("kiosk")} />
-        </Suspense>
-      ) : open ? (
-        <Workplace />
-      ) : (
-        <Suspense fallback={<Waiting>Reading the lists…</Waiting>}>
-          <Home />
-        </Suspense>
-      )}
+      <div className="screen">
+        {operator ? (
+          <Suspense fallback={<Waiting>Preparing the screen…</Waiting>}>
+            <Operator kiosk={hash.includes("kiosk")} />
+          </Suspense>
+        ) : open ? (
+          <Workplace />
+        ) : (
+          <Suspense fallback={<Waiting>Reading the lists…</Waiting>}>
+            <Home />
+          </Suspense>
+        )}
+      </div>
+      {live && <Dock />}
       <Overlays />
     </>
   );

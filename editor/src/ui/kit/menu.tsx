@@ -29,7 +29,7 @@ export default function MoreMenu({ label, choices, icon = "more", children, look
       <Button look={look} icon={icon} aria-label={label}>
         {children}
       </Button>
-      <Popover className="popover">
+      <Popover className="popover" boundaryElement={document.querySelector(".screen") ?? undefined}>
         <Menu
           className="menu"
           aria-label={label}

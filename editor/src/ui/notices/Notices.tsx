@@ -1,9 +1,12 @@
 /**
- * The tray: work that takes its time, and what the server or a device has said. Nothing of it blocks; errors stay
- * until somebody has seen them, the rest goes by itself.
+ * Running tasks and messages. Errors stay until they are dismissed, other messages disappear by themselves.
+ *
+ * While nothing can move, they float above the screen. Otherwise they are shown in the Stop dock, where they cannot
+ * cover a control: the newest message and the newest task, each in a fixed space. A tap shows all messages.
  */
 
 import { useEffect } from "react";
+import { isLive } from "../../store/selectors";
 import { dismiss, store, useEditor } from "../../store/store";
 import { without } from "../../store/records";
 import type { TaskStateData } from "../../protocol/types";
@@ -12,44 +15,54 @@ import { Button } from "../kit/kit";
 import { openOverlay } from "../search/Overlays";
 import "./notices.css";
 
-/** s that what is no error stays. */
+/** How long a message that is not an error stays, s. */
 const STAY = 6;
-/** So many are shown at once, the newest. */
+/** Number of messages above the screen, newest first. */
 const SHOWN = 3;
 
-export function Notices() {
+export function Notices({ docked = false }: { docked?: boolean }) {
   const notices = useEditor((state) => state.notices);
   const tasks = useEditor((state) => state.tasks);
+  const live = useEditor(isLive);
   const passing = notices.find((each) => each.level !== "error");
   useEffect(() => {
     if (!passing) return;
     const timer = setTimeout(() => dismiss(passing.id), Math.max(0, passing.time + STAY * 1000 - Date.now()));
     return () => clearTimeout(timer);
   }, [passing]);
+  if (live !== docked) return null;
+  const shown = current(Object.values(tasks)).filter((each) => each.state !== "cancelled");
+  const number = docked ? 1 : SHOWN;
+  const more = notices.length - number;
   return (
-    <section className="tray" aria-label="Tasks and messages" aria-live="polite">
-      {current(Object.values(tasks))
-        .filter((each) => each.state !== "cancelled")
-        .map((each) => (
-          <Task key={each.id} task={each} />
-        ))}
-      {notices.slice(-SHOWN).map((each) => (
+    <section className={docked ? "docked-notices" : "tray"} aria-label="Tasks and messages" aria-live="polite">
+      {shown.slice(docked ? -1 : 0).map((each) => (
+        <Task key={each.id} task={each} />
+      ))}
+      {notices.slice(-number).map((each) => (
         <div key={each.id} className={`notice ${each.level}`} role={each.level === "error" ? "alert" : undefined}>
           <Icon name={each.level === "info" ? "info" : "warn"} />
-          <p>{each.text}</p>
+          {docked ? (
+            <button type="button" className="notice-text" title="Show all messages" onClick={() => openOverlay("messages")}>
+              <span>{each.text}</span>
+              {more > 0 && <span className="tag">+{more}</span>}
+            </button>
+          ) : (
+            <p>{each.text}</p>
+          )}
           <Button look="plain" icon="close" aria-label="Dismiss" onPress={() => dismiss(each.id)} />
         </div>
       ))}
-      {notices.length > SHOWN && (
+      {!docked && more > 0 && (
         <Button className="notices-before" onPress={() => openOverlay("messages")}>
-          and {notices.length - SHOWN} before
+          {more} more
         </Button>
       )}
     </section>
   );
 }
 
-/** What was begun anew takes the place of what has failed before, or is over. */
+/** Leave out finished tasks that were started again. */
 function current(tasks: TaskStateData[]): TaskStateData[] {
   return tasks.filter((each, n) => each.state === "running" || !tasks.slice(n + 1).some(({ kind, title }) => kind === each.kind && title === each.title));
 }

@@ -16,7 +16,6 @@ import { People } from "../people/People";
 import { History } from "../run/History";
 import { RunButtons, STATES } from "../run/RunBar";
 import { Settings } from "../settings/Settings";
-import { StopMotion } from "../workplace/StopMotion";
 import "../run/run.css";
 import "./operator.css";
 
@@ -93,7 +92,6 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
         )}
         <History />
       </main>
-      <StopMotion />
       <Notices />
     </div>
   );

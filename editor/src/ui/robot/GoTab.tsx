@@ -13,6 +13,7 @@ import { Button } from "../kit/kit";
 import { nameOf } from "../names";
 import { type GoalAnswer, LiveGoal } from "./liveGoal";
 import { mannerNow, useManner } from "./manner";
+import { PadDock } from "./PadDock";
 import { useGoalGizmo } from "./useGoalGizmo";
 import { usePlaceTap } from "./usePlaceTap";
 import { useTelemetry } from "./useTelemetry";
@@ -77,27 +78,6 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
         choices={[["move", "Move it"], ["turn", "Turn it"]]}
         onChange={(next) => setTurning(next === "turn")}
       />
-      <div className="actions start">
-        <Button look="primary" why={why || notYet} onPress={() => void moveToPose(chosen, goal, mannerNow()).then(setRefused)}>
-          Move there
-        </Button>
-        <Button onPress={giveUp}>Back to the tool</Button>
-        {selected && (
-          <Button
-            onPress={() => {
-              const { doc, ui } = now();
-              if (doc) show(ui.selection?.kind === "orientation" ? worldOf(doc, ui.selection.id) : { ...goal, position: worldOf(doc, ui.selection?.id).position });
-            }}
-          >
-            At {selected}
-          </Button>
-        )}
-      </div>
-      {refused && (
-        <p className="error small" role="alert">
-          {refused}
-        </p>
-      )}
       <Answer answer={answer && answer.problem} />
       <WayWords answer={answer} />
       <div className="amounts">
@@ -119,6 +99,24 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
           />
         ))}
       </div>
+      <PadDock chosen={chosen} refused={refused} hint={why || notYet}>
+        <div className="actions start">
+          <Button look="primary" why={why || notYet} onPress={() => void moveToPose(chosen, goal, mannerNow()).then(setRefused)}>
+            Move there
+          </Button>
+          <Button onPress={giveUp}>Back to the tool</Button>
+          {selected && (
+            <Button
+              onPress={() => {
+                const { doc, ui } = now();
+                if (doc) show(ui.selection?.kind === "orientation" ? worldOf(doc, ui.selection.id) : { ...goal, position: worldOf(doc, ui.selection?.id).position });
+              }}
+            >
+              At {selected}
+            </Button>
+          )}
+        </div>
+      </PadDock>
     </>
   );
 }

@@ -1,4 +1,4 @@
-/** The joints one by one, with their limits: a step at a tap, or as long as it is held. */
+/** Move single joints within their limits: one step per press, or as long as a button is held. */
 
 import { useState } from "react";
 import { holdJog } from "../../commands/holds";
@@ -10,6 +10,7 @@ import { telemetry } from "../../store/telemetry";
 import { Amount, OneOf } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { HoldButton } from "./HoldButton";
+import { HOLD_HINT, PadDock } from "./PadDock";
 import { FASTEST, mannerNow, setManner, useManner } from "./manner";
 import { useTelemetry } from "./useTelemetry";
 
@@ -23,7 +24,7 @@ export interface ShownJoint extends Joint {
   upper: number;
 }
 
-/** Joints with what the robot's model says of them; without limits where it says nothing. */
+/** Return joints with the limits of the robot's model; infinite where the model states none. */
 export function shownJoints(robotId: string, joints: readonly Joint[]): ShownJoint[] {
   const limits = theEngine()?.limits(robotId) ?? [];
   return joints.map((joint) => {
@@ -42,7 +43,7 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
   const [refused, setRefused] = useState("");
   const hold = way === "hold" && features?.jog === true;
   const cannot = why || (hold || features?.move_to_joints ? "" : "This robot does not move to joints.");
-  if (!joints) return <p className="quiet">Its joints are not known: it reports none.</p>;
+  if (!joints) return <p className="quiet">The robot reports no joint positions.</p>;
   const shown = shownJoints(robotId, [...joints].map(([name, value]) => ({ name, value })));
 
   const go = (name: string, value: number) => {
@@ -58,52 +59,49 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
   return (
     <>
       <OneOf label="A press" quiet value={hold ? "hold" : "step"} onChange={(next) => setManner({ way: next })} choices={features?.jog ? [["step", "Step"], ["hold", "Hold to move"]] : [["step", "Step"]]} />
-      <ul className="joints">
-        {shown.map((joint) => {
-          const prismatic = joint.unit === "mm";
-          const step = prismatic ? distance : angle;
-          return (
-            <li key={joint.name}>
-              <div className="joint-head">
-                <span>{joint.name.replaceAll("_", " ")}</span>
-                <Limits joint={joint} />
-              </div>
-              {([-1, 1] as const).map((sign) => {
-                const words = `${joint.name.replaceAll("_", " ")} ${sign > 0 ? "up" : "down"}${hold ? ", as long as it is held" : ""}`;
-                return hold ? (
-                  <HoldButton key={sign} label={words} why={cannot} onHold={() => jog(joint.name, sign, prismatic)} onOver={setRefused}>
-                    {sign > 0 ? "+" : "−"}
-                  </HoldButton>
-                ) : (
-                  <Button
-                    key={sign}
-                    aria-label={words}
-                    why={cannot || beyond(joint, joint.value + sign * step)}
-                    onPress={() => go(joint.name, (telemetry.latest(robotId)?.joints.get(joint.name) ?? joint.value) + sign * step)}
-                  >
-                    {sign > 0 ? "+" : "−"}
-                  </Button>
-                );
-              })}
-              <Amount
-                label={`${joint.name.replaceAll("_", " ")} to`}
-                unit={joint.unit}
-                value={joint.value * joint.scale}
-                least={joint.lower * joint.scale}
-                most={joint.upper * joint.scale}
-                isDisabled={cannot !== ""}
-                onChange={(next) => go(joint.name, next / joint.scale)}
-              />
-            </li>
-          );
-        })}
-      </ul>
-      {refused && (
-        <p className="error small" role="alert">
-          {refused}
-        </p>
-      )}
       {!hold && <Amount label="Step" unit="°" digits={2} value={angle * DEGREES} least={0.01} most={180} onChange={(next) => setManner({ angle: next / DEGREES })} />}
+      <PadDock chosen={chosen} refused={refused} hint={cannot || (hold ? HOLD_HINT : "Each press moves one joint by one step.")}>
+        <ul className="joints">
+          {shown.map((joint) => {
+            const prismatic = joint.unit === "mm";
+            const step = prismatic ? distance : angle;
+            return (
+              <li key={joint.name}>
+                <div className="joint-head">
+                  <span>{joint.name.replaceAll("_", " ")}</span>
+                  <Limits joint={joint} />
+                </div>
+                {([-1, 1] as const).map((sign) => {
+                  const words = `${joint.name.replaceAll("_", " ")} ${sign > 0 ? "up" : "down"}${hold ? ", as long as it is held" : ""}`;
+                  return hold ? (
+                    <HoldButton key={sign} label={words} why={cannot} onHold={() => jog(joint.name, sign, prismatic)} onOver={setRefused}>
+                      {sign > 0 ? "+" : "−"}
+                    </HoldButton>
+                  ) : (
+                    <Button
+                      key={sign}
+                      aria-label={words}
+                      why={cannot || beyond(joint, joint.value + sign * step)}
+                      onPress={() => go(joint.name, (telemetry.latest(robotId)?.joints.get(joint.name) ?? joint.value) + sign * step)}
+                    >
+                      {sign > 0 ? "+" : "−"}
+                    </Button>
+                  );
+                })}
+                <Amount
+                  label={`${joint.name.replaceAll("_", " ")} to`}
+                  unit={joint.unit}
+                  value={joint.value * joint.scale}
+                  least={joint.lower * joint.scale}
+                  most={joint.upper * joint.scale}
+                  isDisabled={cannot !== ""}
+                  onChange={(next) => go(joint.name, next / joint.scale)}
+                />
+              </li>
+            );
+          })}
+        </ul>
+      </PadDock>
     </>
   );
 }
@@ -113,7 +111,7 @@ function beyond({ name, lower, upper, scale, unit }: ShownJoint, value: number):
   return `${name.replaceAll("_", " ")} goes from ${(lower * scale).toFixed(0)} to ${(upper * scale).toFixed(0)} ${unit}.`;
 }
 
-/** Where the joint stands between its limits. */
+/** Show the position of a joint between its limits. */
 export function Limits({ joint: { value, lower, upper, scale, unit } }: { joint: ShownJoint }) {
   if (!Number.isFinite(lower) || !Number.isFinite(upper)) return null;
   const part = Math.min(1, Math.max(0, (value - lower) / (upper - lower)));

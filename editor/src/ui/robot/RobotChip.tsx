@@ -1,4 +1,4 @@
-/** In the corner of the view: the robot in hand, always visible, and its place kept as a point by one tap. */
+/** In the corner of the view: the active robot, and a button that adds a point at its pose. */
 
 import { useState } from "react";
 import { addPointFromRobot } from "../../commands/points";
@@ -35,10 +35,10 @@ export default function RobotChip() {
   };
   return (
     <div className="robot-chip">
-      <button type="button" className="button" aria-pressed={open} aria-label={`Robot in hand: ${words}`} onClick={() => setUi({ tool: open ? "" : "robot" })}>
+      <button type="button" className="button" aria-pressed={open} aria-label={`Active robot: ${words}`} onClick={() => setUi({ tool: open ? "" : "robot" })}>
         <Icon name="robot" />
         <span className="chip-words">{words}</span>
-        {moving && <span className="tag warn">moves</span>}
+        {moving && <span className="tag warn">moving</span>}
       </button>
       {online && project && (
         <button type="button" className="button primary" aria-disabled={why !== "" || asking || undefined} aria-label="Keep the robot's place as a point" onClick={keep} disabled={asking}>

@@ -1,4 +1,4 @@
-/** The robot in hand: how it is, and the ways to move it. */
+/** The active robot: its state, and the ways to move it. */
 
 import { useState } from "react";
 import { chosenRobot, notReady } from "../../commands/robot";
@@ -10,6 +10,7 @@ import { HandTab } from "./HandTab";
 import { JointsTab } from "./JointsTab";
 import { Kinematics } from "./Kinematics";
 import { MannerFields } from "./MannerFields";
+import { PadPlace } from "./PadDock";
 import { RobotChooser } from "./RobotChooser";
 import { Status } from "./Status";
 import { ToolTab } from "./ToolTab";
@@ -22,7 +23,7 @@ const WAYS = [
   ["go", "Go to"],
 ] as const;
 
-/** The way that was chosen last, while the page is open. */
+/** The way that was selected last, while the page is open. */
 let last: (typeof WAYS)[number][0] = "tool";
 
 export default function RobotPanel() {
@@ -30,34 +31,38 @@ export default function RobotPanel() {
   const name = useEditor((state) => (chosen ? nameOf(state, chosen.robotId) : ""));
   const why = useEditor((state) => notReady(state, chosen));
   const [way, setWay] = useState(last);
+  const [place, setPlace] = useState<HTMLElement | null>(null);
   if (!chosen) return <p className="quiet">There is no robot in this scene.</p>;
   return (
-    <>
-      <div className="robot-head">
-        <h3>
-          {name}
-          {chosen.effector && <span className="quiet"> · {chosen.effector}</span>}
-        </h3>
-        {why && <p className="quiet small">{why}</p>}
+    <PadPlace value={place}>
+      <div className="robot-scroll">
+        <div className="robot-head">
+          <h3>
+            {name}
+            {chosen.effector && <span className="quiet"> · {chosen.effector}</span>}
+          </h3>
+          {why && <p className="quiet small">{why}</p>}
+        </div>
+        <RobotChooser />
+        {!why && <Status chosen={chosen} />}
+        <OneOf
+          label="How to move it"
+          quiet
+          value={way}
+          choices={WAYS}
+          onChange={(next) => {
+            last = next;
+            setWay(next);
+          }}
+        />
+        {way === "tool" && <ToolTab chosen={chosen} />}
+        {way === "joints" && <JointsTab chosen={chosen} />}
+        {way === "hand" && <HandTab chosen={chosen} />}
+        {way === "go" && <GoTab chosen={chosen} key={`${chosen.robotId}/${chosen.armId}/${chosen.effector}`} />}
+        {way !== "hand" && <MannerFields />}
         <Kinematics robotId={chosen.robotId} />
       </div>
-      <RobotChooser />
-      {!why && <Status chosen={chosen} />}
-      <OneOf
-        label="How to move it"
-        quiet
-        value={way}
-        choices={WAYS}
-        onChange={(next) => {
-          last = next;
-          setWay(next);
-        }}
-      />
-      {way === "tool" && <ToolTab chosen={chosen} />}
-      {way === "joints" && <JointsTab chosen={chosen} />}
-      {way === "hand" && <HandTab chosen={chosen} />}
-      {way === "go" && <GoTab chosen={chosen} key={`${chosen.robotId}/${chosen.armId}/${chosen.effector}`} />}
-      {way !== "hand" && <MannerFields />}
-    </>
+      <div className="pad-dock" ref={setPlace} />
+    </PadPlace>
   );
 }

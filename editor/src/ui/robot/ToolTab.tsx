@@ -1,4 +1,4 @@
-/** The tool moved along and about axes: a step at a tap, or as long as it is held. */
+/** Move the tool along and about axes: one step per press, or as long as a button is held. */
 
 import { useState } from "react";
 import { holdJog } from "../../commands/holds";
@@ -10,12 +10,13 @@ import { Amount, OneOf } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { nameOf } from "../names";
 import { HoldButton } from "./HoldButton";
+import { HOLD_HINT, PadDock } from "./PadDock";
 import { ANGLES, DISTANCES, FASTEST, type FrameName, mannerNow, setManner, useManner } from "./manner";
 
 const AXES: readonly StepAxis[] = ["x", "y", "z"];
 const DEGREES = 180 / Math.PI;
 
-/** What has a frame of its own among what can be selected. */
+/** Return whether a kind of item has a frame of its own. */
 function framed(kind: string | undefined): boolean {
   return kind === "object" || kind === "point" || kind === "orientation";
 }
@@ -51,6 +52,7 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
       ...(chosen.armId ? { arm_id: chosen.armId } : {}),
     });
   };
+  const hint = hold ? HOLD_HINT : `Each press ${turning ? "turns" : "moves"} the tool one step.`;
   const words = (axis: StepAxis, sign: number) => `${turning ? "Turn about" : "Move along"} ${sign > 0 ? "+" : "−"}${axis.toUpperCase()}${hold ? ", as long as it is held" : ""}`;
 
   return (
@@ -63,32 +65,6 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
         onChange={(next) => setManner({ frame: next })}
         choices={[["world", "World"], ["robot", "Robot"], ["tool", "Tool"], ...(selected ? [["selected", selected] as const] : [])]}
       />
-      <div className="jog-pad">
-        {AXES.flatMap((axis) =>
-          [-1, 1].map((sign) => {
-            const content = (
-              <>
-                <span className={`axis-${axis}`}>{axis.toUpperCase()}</span>
-                {sign > 0 ? "+" : "−"}
-              </>
-            );
-            return hold ? (
-              <HoldButton key={`${axis}${sign}`} label={words(axis, sign)} why={cannot} onHold={() => jog(axis, sign)} onOver={setRefused}>
-                {content}
-              </HoldButton>
-            ) : (
-              <Button key={`${axis}${sign}`} aria-label={words(axis, sign)} why={cannot} onPress={() => press(axis, sign)}>
-                {content}
-              </Button>
-            );
-          }),
-        )}
-      </div>
-      {refused && (
-        <p className="error small" role="alert">
-          {refused}
-        </p>
-      )}
       {!hold && (turning ? <Angles angle={angle} /> : <Distances distance={distance} />)}
       <div className="actions start">
         <Button why={why || (features?.inverse_kinematics ? "" : "This robot computes no joints for a pose.")} onPress={() => void alignDown(chosen, mannerNow()).then(setRefused)}>
@@ -100,11 +76,34 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
           </Button>
         )}
       </div>
+      <PadDock chosen={chosen} refused={refused} hint={cannot || hint}>
+        <div className="jog-pad">
+          {[1, -1].flatMap((sign) =>
+            AXES.map((axis) => {
+              const content = (
+                <>
+                  <span className={`axis-${axis}`}>{axis.toUpperCase()}</span>
+                  {sign > 0 ? "+" : "−"}
+                </>
+              );
+              return hold ? (
+                <HoldButton key={`${axis}${sign}`} label={words(axis, sign)} why={cannot} onHold={() => jog(axis, sign)} onOver={setRefused}>
+                  {content}
+                </HoldButton>
+              ) : (
+                <Button key={`${axis}${sign}`} aria-label={words(axis, sign)} why={cannot} onPress={() => press(axis, sign)}>
+                  {content}
+                </Button>
+              );
+            }),
+          )}
+        </div>
+      </PadDock>
     </>
   );
 }
 
-/** The frame whose axes are meant, in the world; undefined for those that the server knows. */
+/** Return the pose in the world of the frame whose axes are used; undefined for frames that the server knows. */
 function poseOf(frame: FrameName, chosen: Chosen): Pose | undefined {
   if (frame === "tool") return effectorPose(chosen);
   const { doc, ui } = now();

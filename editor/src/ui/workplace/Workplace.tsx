@@ -1,4 +1,4 @@
-/** The frame around the open workplace: bar above, tools at the left, the view, a panel at the right, the stop. */
+/** The frame around the open workplace: bar above, tools at the left, the view, a panel at the right. */
 
 import { Suspense } from "react";
 import { useEditor } from "../../store/store";
@@ -6,11 +6,10 @@ import { lazily } from "../kit/lazily";
 import { Notices } from "../notices/Notices";
 import { Centre } from "./Centre";
 import { Rail } from "./Rail";
-import { StopMotion } from "./StopMotion";
 import { TopBar } from "./TopBar";
 import "./workplace.css";
 
-/** Loaded soon after the view, before a hand can open it. */
+/** Loaded soon after the view, before a user can open it. */
 const Panel = lazily(() => import("./Panel"));
 
 export function Workplace() {
@@ -26,7 +25,6 @@ export function Workplace() {
         </Suspense>
       )}
       <Notices />
-      <StopMotion />
     </div>
   );
 }

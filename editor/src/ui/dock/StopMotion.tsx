@@ -1,18 +1,13 @@
-/**
- * The stop: always there while a robot is live or a program runs, past every panel. It acts on press, not on release.
- * It stops motion by software, and says that it is no emergency stop.
- */
+/** The Stop button. It acts on press, not on release. It stops motion by software and is not an emergency stop. */
 
 import { useEffect, useRef, useState } from "react";
 import { stopMotion } from "../../commands/operation";
 import { useEditor } from "../../store/store";
-import { RUNNING } from "../../store/selectors";
 
-/** ms between two presses of Escape that belong together. */
+/** Longest interval between two presses of Escape that together stop motion, ms. */
 const TWICE = 700;
 
 export function StopMotion() {
-  const live = useEditor((state) => state.live.state === "started" || state.live.state === "stopping" || RUNNING.has(state.program.state));
   const connected = useEditor((state) => state.connection.status === "ready");
   const [stopping, setStopping] = useState(false);
   const stop = () => {
@@ -22,9 +17,8 @@ export function StopMotion() {
   const latest = useRef(stop);
   latest.current = stop;
   useEffect(() => {
-    if (!live) return;
     let before = -Infinity;
-    // Before any window or menu that is open takes the key for itself.
+    // Captured, because an open dialog or menu also handles Escape.
     const key = (event: KeyboardEvent) => {
       if (event.key !== "Escape" || event.repeat) return;
       if (event.timeStamp - before < TWICE) latest.current();
@@ -32,8 +26,7 @@ export function StopMotion() {
     };
     window.addEventListener("keydown", key, { capture: true });
     return () => window.removeEventListener("keydown", key, { capture: true });
-  }, [live]);
-  if (!live) return null;
+  }, []);
   return (
     <button
       type="button"
@@ -47,7 +40,7 @@ export function StopMotion() {
       onKeyDown={(event) => {
         if (!event.repeat && (event.key === "Enter" || event.key === " ")) stop();
       }}
-      // A screen reader presses by a click alone, without pointer or key.
+      // Screen readers send a click without pointer or key events.
       onClick={(event) => {
         if (event.detail === 0 && !stopping) stop();
       }}
@@ -58,7 +51,7 @@ export function StopMotion() {
       </svg>
       <span>
         <strong>{stopping ? "Stopping…" : "Stop motion"}</strong>
-        <small>{connected ? <>no emergency stop<span className="stop-key"> · Esc twice</span></> : "no connection: use the emergency stop"}</small>
+        <small>{connected ? <>Not an emergency stop<span className="stop-key"> · Esc twice</span></> : "No connection: use the emergency stop"}</small>
       </span>
     </button>
   );

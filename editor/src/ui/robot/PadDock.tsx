@@ -1,0 +1,53 @@
+/** The fixed lower part of the robot panel: the buttons that move the robot, below a message area of fixed height. */
+
+import { createContext, type ReactNode, useContext } from "react";
+import { createPortal } from "react-dom";
+import type { Chosen } from "../../commands/robot";
+import { useEditor } from "../../store/store";
+import { nameOf } from "../names";
+
+/** What to know before the first hold. */
+export const HOLD_HINT = "Motion stops as soon as you release the button.";
+
+/** The element of the panel in which the pad is shown. */
+export const PadPlace = createContext<HTMLElement | null>(null);
+
+interface PadDockProps {
+  chosen: Chosen;
+  /** Why the last request was refused; empty if it was not. */
+  refused: string;
+  /** Shown while there is nothing to report. */
+  hint: string;
+  children: ReactNode;
+}
+
+/** Show the pad in its place. Neither a message nor anything else in the panel changes its position. */
+export function PadDock({ chosen, refused, hint, children }: PadDockProps) {
+  const place = useContext(PadPlace);
+  if (!place) return null;
+  return createPortal(
+    <>
+      <MotionNote chosen={chosen} refused={refused} hint={hint} />
+      {children}
+    </>,
+    place,
+  );
+}
+
+const PHASES = { start: "Moving", end: "Reached", failed: "Not reached" };
+
+/** Report why a request was refused, who moves the robot, or how its last motion ended. */
+function MotionNote({ chosen: { robotId }, refused, hint }: Omit<PadDockProps, "children">) {
+  const motion = useEditor((state) => state.live.motions[robotId]);
+  const goal = useEditor((state) => (motion?.goal ? nameOf(state, motion.goal) : ""));
+  const hold = useEditor((state) => state.live.holds[robotId]);
+  const moved = motion && `${PHASES[motion.phase]}${goal && ` ${motion.phase === "start" ? "to " : ""}${goal}`}${motion.phase === "start" ? "…" : "."} ${motion.message}`;
+  const held = hold && `${hold.user} is ${hold.kind === "jog" ? "jogging" : "hand-teaching"}.`;
+  const tone = refused ? "error" : held ? "warn" : motion ? motion.phase : "quiet";
+  const words = refused || held || moved || hint;
+  return (
+    <p className={`pad-note small ${tone}`} role={refused ? "alert" : "status"} tabIndex={refused ? 0 : undefined} title={words}>
+      {words}
+    </p>
+  );
+}

@@ -1,0 +1,146 @@
+"""The Stop dock and the jog pad: no control is ever below Stop, and nothing moves or is covered during a hold."""
+
+import time
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import pytest_asyncio
+from playwright.async_api import Browser, Page
+
+from arcor2_hw.client import Client
+from arcor2_hw.data import rpc
+from arcor2_hw.data.editor import ViewScope
+from arcor2_hw.data.events import SceneStateEnum
+from arcor2_hw.data.project import Project
+from tests.e2e.harness import Cell, scene_state, until
+from tests.editor.screen import VIEWPORTS, Screen, screen_of
+
+pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(240)]
+
+SIZES = ("tablet", "desktop", "ipad", "phone")
+BUTTONS = {"Tool": 6, "By hand": 1}
+"""Visible buttons of the pad. How many joints are visible at once depends on the screen."""
+TOOLS = ("Things", "Robot", "Points", "Program", "Run", "Devices")
+_WATCH = Path(__file__).with_name("pad.js").read_text()
+
+
+@dataclass
+class Online:
+    """A project whose scene another user has brought online."""
+
+    colleague: Client
+    project: Project
+    robot: str
+
+    async def ask_for_robot(self) -> None:
+        """Send a message to the user who has locked the robot."""
+        wish = {f"asked/{self.robot}": {"by": "colleague", "at": time.time() * 1000}}
+        await self.colleague.call("SetViewState", rpc.SetViewStateArgs(ViewScope.SHARED, wish, self.project.id))
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def online(cell: Cell) -> AsyncIterator[Online]:
+    client = await cell.client("colleague")
+    scene, project = await cell.open(client)
+    await client.call("StartScene")
+    await scene_state(client, SceneStateEnum.STARTED, 60)
+    yield Online(client, project, next(each.id for each in scene.objects if each.name == "robot"))
+
+
+async def resize(screen: Screen, size: str) -> None:
+    await screen.page.set_viewport_size(VIEWPORTS[size])  # type: ignore[arg-type]
+    await screen.settle()
+
+
+async def open_tool(page: Page, name: str) -> None:
+    if not await page.get_by_role("complementary", name=name).count():
+        await page.get_by_role("navigation").get_by_role("button", name=name, exact=True).click()
+    await page.get_by_role("complementary").get_by_role("heading", name=name, exact=True).wait_for()
+
+
+async def test_no_control_reaches_into_the_stop_dock(online: Online, cell: Cell, browser: Browser) -> None:
+    async with screen_of(browser, cell.url, touch=True) as screen:
+        page = screen.page
+        stop = page.get_by_role("button", name="Stop motion")
+        found: dict[str, list[str]] = {}
+
+        async def check(what: str, picture: bool = True) -> None:
+            await screen.settle()
+            if faults := await screen.faults():
+                found[what] = faults
+            if picture:
+                await screen.picture(f"dock {what}")
+
+        await screen.join("Eva")
+        await stop.wait_for()
+        for size in SIZES:
+            await resize(screen, size)
+            for tool in TOOLS:
+                await open_tool(page, tool)
+                await check(f"{tool}, {size}", tool == "Robot")
+            await page.get_by_role("button", name="Undo", exact=True).click(force=True)  # says that nothing can be undone
+            await page.get_by_text("There is nothing to undo.").first.wait_for()
+            await check(f"message, {size}")
+            await screen.press("Settings")
+            await page.get_by_role("menu").wait_for()
+            await check(f"menu, {size}")
+            await page.get_by_role("menuitem", name="Messages").click()
+            await page.get_by_role("dialog").wait_for()
+            await check(f"dialog, {size}")
+            await stop.click(trial=True)
+            await page.get_by_role("dialog").get_by_role("button", name="Close").click()
+        await open_tool(page, "Robot")
+        await screen.press("Make the panel larger")
+        await check("large sheet, phone")
+        await page.evaluate("location.hash = '#/operator'")
+        for size in SIZES:
+            await resize(screen, size)
+            await stop.wait_for()
+            await check(f"operator, {size}")
+        assert not found, "\n".join(f"{what}: {fault}" for what, faults in found.items() for fault in faults)
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("tab", ["Tool", "Joints", "By hand"])
+async def test_nothing_moves_or_is_covered_during_a_hold(
+    tab: str, size: str, online: Online, cell: Cell, browser: Browser
+) -> None:
+    async with screen_of(browser, cell.url, size) as screen:
+        page = screen.page
+        await screen.join("Eva")
+        await page.get_by_role("button", name="Stop motion").wait_for()
+        await open_tool(page, "Robot")
+        panel = page.get_by_role("complementary")
+        ways = panel.get_by_role("radiogroup", name="How to move it")
+        await ways.get_by_role("radio", name=tab, exact=True).click()
+        if tab != "By hand":
+            await panel.get_by_role("radio", name="Hold to move").click()
+        pad = panel.locator("button.hold:not([aria-disabled])")
+        await pad.last.wait_for()
+        await screen.settle()
+        button = pad.last
+        await button.hover()
+        shown = await page.evaluate(_WATCH, "button.hold")
+        assert shown == BUTTONS.get(tab, shown) and shown >= 1, f"{shown} buttons are visible"
+
+        async def held_and_reported() -> bool:
+            """The server has reported the hold. A press that ends by itself is made again, as a user would."""
+            if await button.get_attribute("data-held") != "true":
+                await page.mouse.up()
+                await page.mouse.down()
+            return await panel.get_by_text("Eva is ").count() > 0
+
+        await until(held_and_reported, "the hold is shown", 20)
+        # A message comes during the hold.
+        await online.ask_for_robot()
+        await page.get_by_text("colleague asks for").wait_for()
+        frames = await page.evaluate("window.padFrames")
+        await screen.until("(before) => window.padFrames > before + 3", frames)
+        await screen.picture(f"hold {tab} {size}")
+        assert await page.evaluate("window.padFaults()") == []
+        await page.mouse.up()
+        await screen.until("() => !document.querySelector('[data-held=true]')")
+        await screen.settle()
+        assert await page.evaluate("window.padFaults()") == []
