@@ -254,14 +254,14 @@ async def test_packages_come_live_and_go_as_files(
         await expect(screen.page.locator(".card")).to_have_count(1)
 
         # It is run from its tile: here to look first. Afterwards the tile says that it has.
-        await more(screen, "sorting 1", "Run, paused at the start")
+        await more(screen, "sorting 1", "Start paused")
         program = screen.page.get_by_role("group", name="The program")
         await program.get_by_text("Paused").wait_for()
         await screen.picture("home package paused")
         await program.get_by_role("button", name="Stop").click()
         await screen.page.get_by_role("radio", name="Packages").wait_for()
         await tab(screen, "Packages")
-        await screen.sees("has run just now")
+        await screen.sees("last run just now: stopped")
         (run,) = (await client.call("ListRuns")).runs
         assert (run.package_name, run.started_by, run.stopped_by) == ("sorting 1", "Eva", "Eva")
 

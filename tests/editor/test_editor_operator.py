@@ -1,4 +1,4 @@
-"""The operator's screen in Chromium on the real server: packages, start, pause, stop, errors in plain words."""
+"""The operator's screen in Chromium on the real server: packages, start, pause, stop, results of runs."""
 
 from collections.abc import AsyncIterator
 
@@ -15,7 +15,7 @@ from tests.editor.screen import VIEWPORTS, Screen, screen_of
 pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(240)]
 
 BEGUN = 60_000
-"""ms until a program that was started is there."""
+"""Time until a started program is shown, ms."""
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
@@ -43,11 +43,10 @@ async def test_what_is_built_appears_is_run_and_its_error_is_plain(
         await page.get_by_role("radio", name=project.name).wait_for()
         await screen.press("Start")
         await page.get_by_role("button", name="Stop motion").wait_for(timeout=BEGUN)
-        # No board is there: the reader finds no code.
-        trouble = page.get_by_role("alert").filter(has_text="It failed in scan")
-        await trouble.wait_for(timeout=25000)
-        await expect(trouble).to_contain_text("no code was read")
-        await screen.sees("It stopped with an error")
+        # There is no board, so the reader finds no code.
+        state = page.get_by_role("status", name="State")
+        await expect(state).to_contain_text("Run failed in scan", timeout=25_000)
+        await expect(state).to_contain_text("no code was read")
         assert [each.end.value for each in (await colleague.call("ListRuns")).runs] == ["failed"]
         for name, size in VIEWPORTS.items():
             await page.set_viewport_size(size)  # type: ignore[arg-type]
@@ -56,20 +55,67 @@ async def test_what_is_built_appears_is_run_and_its_error_is_plain(
             await screen.picture(f"operator {name}")
 
 
-async def test_pause_go_on_and_stop(cell: Cell, colleague: Client, browser: Browser) -> None:
+async def test_failed_run_is_shown_on_every_screen_until_it_is_dismissed(
+    cell: Cell, colleague: Client, browser: Browser
+) -> None:
+    (package,) = await colleague.call("ListPackages")
+    async with screen_of(browser, cell.url) as watcher, screen_of(browser, cell.url) as operator:
+        # A user of the editor watches a run that someone else starts, until the server shows the lists again.
+        await watcher.join("Wendy")
+        await colleague.call("RunPackage", rpc.RunPackageArgs(package.id, start_paused=True))
+        await watcher.page.get_by_text("before more_boards").wait_for(timeout=BEGUN)
+        await colleague.call("ResumePackage")
+        await watcher.page.get_by_role("heading", name="Workplace").wait_for()
+        banner = watcher.page.get_by_role("alert").filter(has_text="Run failed in scan")
+        await expect(banner).to_contain_text("no code was read")
+        await expect(banner).to_contain_text(package.package_meta.name)
+        await watcher.sees("last run just now: failed")
+        await watcher.picture("run failed, lists")
+
+        # An operator who comes later does not see "Ready" either, nor after a reload, until they dismiss the result.
+        state = operator.page.get_by_role("status", name="State")
+        await at_the_machine(operator)
+        for _ in ("first", "reloaded"):
+            await expect(state).to_contain_text("Run failed in scan")
+            await expect(state).not_to_contain_text("Ready")
+            await operator.page.reload()
+        await state.get_by_role("button", name="Dismiss").click()
+        for _ in ("dismissed", "reloaded"):
+            await expect(state).to_contain_text("Ready")
+            await expect(state).to_contain_text("failed")
+            await operator.page.reload()
+
+        # Each user dismisses it for themselves. The open project keeps the result of its last run.
+        await expect(banner).to_be_visible()
+        await colleague.call("OpenProject", rpc.IdArgs((await colleague.call("ListProjects"))[0].id))
+        await watcher.page.get_by_role("navigation").get_by_role("button", name="Run", exact=True).click()
+        last = watcher.page.get_by_role("region", name="Last run")
+        await expect(last).to_contain_text("Run failed in scan")
+        await watcher.picture("run failed, project")
+        await watcher.press("Dismiss the result")
+        await expect(banner).to_have_count(0)
+        await watcher.page.reload()
+        await watcher.page.get_by_role("navigation").get_by_role("button", name="Run", exact=True).click()
+        await expect(last).to_contain_text("no code was read")
+        await expect(banner).to_have_count(0)
+        await colleague.call("CloseProject")
+
+
+async def test_pause_step_and_stop(cell: Cell, colleague: Client, browser: Browser) -> None:
     (package,) = await colleague.call("ListPackages")
     async with screen_of(browser, cell.url) as screen:
         page = screen.page
         await at_the_machine(screen)
-        # Somebody else has started it, paused: it can be stepped, taken on and stopped from here.
+        # A run that another user has started paused can be stepped and stopped from here.
         await colleague.call("RunPackage", rpc.RunPackageArgs(package.id, start_paused=True))
         await page.get_by_text("before more_boards").wait_for(timeout=BEGUN)
-        await screen.press("One action")
+        await screen.press("Step")
         await page.get_by_text("before scan").wait_for()
         await screen.press("Stop")
         while (await colleague.next_event("PackageState", timeout=20)).data.state is not PackageStateEnum.STOPPED:
             pass
         await page.get_by_role("button", name="Start", exact=True).wait_for()
+        await screen.sees("Run stopped by Olga")
         run = (await colleague.call("ListRuns")).runs[0]
         assert (run.end.value, run.stopped_by) == ("stopped", "Olga")
         await screen.press("To the editor")

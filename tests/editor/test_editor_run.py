@@ -107,8 +107,8 @@ async def test_runs_to_an_action_in_two_taps_steps_and_tells_where_it_failed(wor
         await until(lambda: is_broken_at(work), "it is gone for everybody")
     await expect(work.panel.get_by_role("button", name="Do not pause at scan")).to_have_count(0)
 
-    await work.tap_button("One action", bar)
-    fault = work.panel.get_by_role("alert").filter(has_text="It failed in scan")
+    await work.tap_button("Step", bar)
+    fault = work.panel.get_by_role("region", name="Last run").filter(has_text="Run failed in scan")
     await fault.wait_for()
     await expect(fault).to_contain_text("no code was read")
     await state(work, PackageStateEnum.STOPPED)
@@ -124,7 +124,7 @@ async def test_runs_to_an_action_in_two_taps_steps_and_tells_where_it_failed(wor
 async def test_stop_acts_at_once_and_the_project_can_be_edited_again(work: Work) -> None:
     page = work.screen.page
     await work.tool("Run")
-    await work.tap_button("Run paused", work.panel)
+    await work.tap_button("Start paused", work.panel)
     bar = page.get_by_role("group", name="The program")
     await bar.get_by_role("button", name="Stop", exact=True).wait_for(timeout=BEGUN)
     await bar.get_by_text("before more_boards").wait_for()

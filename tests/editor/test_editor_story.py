@@ -151,7 +151,7 @@ async def test_the_first_day(workplace: Run, browser: Browser) -> None:
         bar = page.get_by_role("group", name="The program")
         await expect(bar).to_contain_text(f"before {move}", timeout=60_000)
         await screen.picture("story paused")
-        await bar.get_by_role("button", name="Go on").click()
+        await bar.get_by_role("button", name="Resume").click()
         await until(user.moving, "the arm moves")
         tapped = time.monotonic()
         await page.get_by_role("button", name="Stop motion").click()

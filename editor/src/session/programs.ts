@@ -1,33 +1,44 @@
-/** Asks for what belongs to programs and comes by no event at first: actions of types, runs, the trace of what runs. */
+/** Request the data of programs that events only update: actions of types, the run history, the trace of the running program. */
 
+import { withRuns } from "../store/reduce";
 import { isRunning } from "../store/selectors";
 import type { State } from "../store/state";
 import { now, store } from "../store/store";
 import { actionsOf, call, serves } from "./session";
 
 const asked = new Set<string>();
-let runsAsked = false;
+/** Projects whose runs were requested; the empty string stands for the newest runs of all projects. */
+const runsAsked = new Set<string>();
 let traced = false;
 
 export function forgetPrograms(): void {
   asked.clear();
-  runsAsked = traced = false;
+  runsAsked.clear();
+  traced = false;
 }
 
 /** Called with each state. */
 export function followPrograms(state: State): void {
   if (state.connection.status !== "ready") return;
   followActions(state);
-  if (!runsAsked && serves("ListRuns")) {
-    runsAsked = true;
-    void call("ListRuns", { limit: 100 }).then(({ runs }) => store.setState(({ program }) => ({ program: { ...program, runs } })), () => {});
-  }
-  // Who comes while a program runs sees what it has done so far.
+  followRuns(state);
+  // A user who joins while a program is running sees its trace from the start.
   if (isRunning(state) && !traced && serves("GetExecutionTrace")) {
     traced = true;
     void call("GetExecutionTrace", { limit: 1000 }).then(takeTrace, () => {});
   }
   if (!isRunning(state)) traced = false;
+}
+
+/** Request the newest runs, and those of the open project, which may be older. */
+function followRuns(state: State): void {
+  if (!serves("ListRuns")) return;
+  for (const project_id of ["", state.doc?.project?.id ?? ""]) {
+    if (runsAsked.has(project_id)) continue;
+    runsAsked.add(project_id);
+    const wanted = project_id ? { limit: 20, project_id } : { limit: 100 };
+    void call("ListRuns", wanted).then(({ runs }) => store.setState(({ program }) => ({ program: withRuns(program, runs) })), () => {});
+  }
 }
 
 function followActions(state: State): void {

@@ -1,6 +1,6 @@
 /** What an event makes of the state: a pure function; what is not named stays. */
 
-import type { ServerEvent, TaskStateData } from "../protocol/types";
+import type { Run, ServerEvent, TaskStateData } from "../protocol/types";
 import { changed, opened } from "./document";
 import { put, without } from "./records";
 import { NO_PROGRAM, OFFLINE, type Notice, type State } from "./state";
@@ -231,6 +231,13 @@ function live(state: State, event: ServerEvent): Partial<State> | null {
   }
 }
 
+/** Return the program with runs added to its history. */
+export function withRuns(program: State["program"], added: Run[]): State["program"] {
+  const runs = [...new Map([...program.runs, ...added].map((run) => [run.number, run])).values()].sort((a, b) => b.number - a.number);
+  const watched = Math.max(program.watched, ...added.filter((run) => run.end === "running").map((run) => run.number));
+  return { ...program, runs, watched };
+}
+
 /** The program in operation; null when the event is about something else. */
 function program(state: State, event: ServerEvent): Partial<State> | null {
   const now = state.program;
@@ -238,7 +245,7 @@ function program(state: State, event: ServerEvent): Partial<State> | null {
   switch (event.event) {
     case "PackageState": {
       const { state: next, package_id = "" } = event.data;
-      if (next === "started") return { program: { ...NO_PROGRAM, runs: now.runs, state: next, packageId: package_id } };
+      if (next === "started") return { program: { ...NO_PROGRAM, runs: now.runs, watched: now.watched, state: next, packageId: package_id } };
       return become({
         state: next,
         packageId: package_id || now.packageId,
@@ -257,16 +264,12 @@ function program(state: State, event: ServerEvent): Partial<State> | null {
     }
     case "ActionStateAfter":
       return become({ running: now.running.filter((each) => each !== event.data.action_id) });
-    case "ProjectException":
-      return become({ exception: event.data });
     case "ExecutionTrace": {
       const rest = now.trace.filter((each) => each.run === event.data.run && each.number !== event.data.number);
       return become({ trace: [...rest, event.data].slice(-TRACE) });
     }
-    case "RunChanged": {
-      const rest = now.runs.filter((each) => each.number !== event.data.number);
-      return become({ runs: [event.data, ...rest].sort((a, b) => b.number - a.number) });
-    }
+    case "RunChanged":
+      return { program: withRuns(now, [event.data]) };
     default:
       return null;
   }

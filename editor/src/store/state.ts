@@ -27,7 +27,6 @@ import type {
   PackageSummary,
   Parameter,
   Pose,
-  ProjectExceptionData,
   ProjectLogicIf,
   ProjectParameter,
   ProjectRobotJoints,
@@ -132,9 +131,11 @@ export interface Program {
   packageName: string;
   /** Actions that run now. */
   running: string[];
-  exception: ProjectExceptionData | null;
   trace: TraceEntry[];
+  /** The run history of the server, newest first. */
   runs: Run[];
+  /** Number of the newest run that was running while this page was open. */
+  watched: number;
 }
 
 /** How an action that was tried by itself ended. */
@@ -257,9 +258,9 @@ export const NO_PROGRAM: Program = {
   packageId: "",
   packageName: "",
   running: [],
-  exception: null,
   trace: [],
   runs: [],
+  watched: 0,
 };
 
 export function initialState(): State {

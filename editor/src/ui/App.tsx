@@ -17,6 +17,7 @@ import { Workplace } from "./workplace/Workplace";
 /** Screens of which most see one: each is a chunk of its own. */
 const Home = lazily(() => import("./home/Home").then((module) => ({ default: module.Home })));
 const Operator = lazily(() => import("./operator/Operator"));
+const ResultBanner = lazily(() => import("./run/ResultBanner"));
 
 /** The part of the address behind the hash, which chooses between the editor and the operator's screen. */
 function useHash(): string {
@@ -57,6 +58,11 @@ export function App() {
   return (
     <>
       <LostConnection />
+      {!operator && (
+        <Suspense fallback={null}>
+          <ResultBanner />
+        </Suspense>
+      )}
       <div className="screen">
         {operator ? (
           <Suspense fallback={<Waiting>Preparing the screen…</Waiting>}>

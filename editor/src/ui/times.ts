@@ -1,4 +1,6 @@
-/** Times as people say them. */
+/** Times in words. */
+
+import { useEffect, useState } from "react";
 
 const STEPS: [number, Intl.RelativeTimeFormatUnit][] = [
   [60, "second"],
@@ -7,6 +9,15 @@ const STEPS: [number, Intl.RelativeTimeFormatUnit][] = [
   [7 * 86_400, "day"],
 ];
 const format = new Intl.RelativeTimeFormat("en", { numeric: "auto" });
+
+/** Redraw the component every 20 s, so that its relative times stay correct. */
+export function useTicking(): void {
+  const [, tick] = useState(0);
+  useEffect(() => {
+    const timer = setInterval(() => tick((count) => count + 1), 20_000);
+    return () => clearInterval(timer);
+  }, []);
+}
 
 /** "5 minutes ago", or the date when that is longer than a week ago. `time` is RFC 3339. */
 export function ago(time: string, present = Date.now()): string {

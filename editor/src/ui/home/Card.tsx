@@ -7,12 +7,13 @@ import { downloadPackage } from "../../commands/packages";
 import { runPackage } from "../../commands/run";
 import { keepGeneral } from "../../commands/viewstate";
 import { count, type Entry } from "../../home/entries";
-import type { Requests } from "../../protocol/types";
+import type { Requests, Run } from "../../protocol/types";
 import { keepOwnPicture, useOwn } from "../../commands/thumbnail";
 import { isRunning } from "../../store/selectors";
 import { now, tell, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { AskName, Button, type Choice, More } from "../kit/kit";
+import { WORDS } from "../run/History";
 import { ago } from "../times";
 import { Deleting } from "./Deleting";
 import { Inline } from "./Inline";
@@ -53,6 +54,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
   };
   const whyOpen = why("open") || (running ? "A program runs: stop it first." : "");
   const whyThis = whyOpen || (problems.length > 0 ? "Something is wrong with it, see its problems: it can be opened once they are mended." : "");
+  const run = useEditor((state) => (kind === "package" ? state.program.runs.find((each) => each.package_id === id) : undefined));
   const template = useEditor((state) => isTemplate(state, id));
   const own = useOwn((all) => all[id] ?? false);
   const picture = useRef<HTMLInputElement>(null);
@@ -68,7 +70,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
   const close = () => setDoing("");
   const choices: Choice[] = [
     ...(kind === "scene" ? [{ id: "project", label: "New project on it…", not: barred({ ...now(), connection }, "NewProject"), act: () => onProject(id) }] : []),
-    ...(kind === "package" ? [{ id: "paused", label: "Run, paused at the start", not: whyOpen, act: () => open(true) }] : []),
+    ...(kind === "package" ? [{ id: "paused", label: "Start paused", not: whyOpen, act: () => open(true) }] : []),
     ...(kind === "package"
       ? [{ id: "download", label: "Download", act: () => void downloadPackage(id, name).then((wrong) => wrong && tell("error", wrong)) }]
       : [
@@ -112,7 +114,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
           </Button>
         </div>
         <p className="quiet small">
-          {detail(entry)}
+          {detail(entry, run)}
           {entry.time && ` · ${kind === "package" ? "built" : "changed"} ${ago(entry.time)}`}
         </p>
         {template && (
@@ -147,10 +149,11 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
   );
 }
 
-function detail({ kind, from, projects, executed }: Entry): string {
+function detail({ kind, from, projects, executed }: Entry, run: Run | undefined): string {
   if (kind === "scene") return count(projects ?? 0, "project");
   if (kind === "project") return `on ${from?.name ?? "a scene that is gone"}`;
-  return [from && `from ${from.name}`, executed ? `has run ${ago(executed)}` : "has not run yet"].filter(Boolean).join(" · ");
+  const last = run ? `${ago(run.started)}: ${WORDS[run.end]}` : executed ? ago(executed) : "";
+  return [from && `from ${from.name}`, last ? `last run ${last}` : "not run yet"].filter(Boolean).join(" · ");
 }
 
 /** What it belongs to, or what belongs to it. */

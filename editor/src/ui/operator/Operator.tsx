@@ -1,35 +1,60 @@
 /**
- * The screen of who runs the machine: what it does, start and stop, and in plain words what went wrong. At
- * `/#/operator`; `/#/operator?kiosk` has no way out of it. Needs no more than the operator's role.
+ * The operator's screen, at `/#/operator`: state of the machine, Start and Stop, and what went wrong. It needs the
+ * operator role only. `/#/operator?kiosk` has no link to the editor.
  */
 
 import { useState } from "react";
 import { barred } from "../../commands/asking";
 import * as commands from "../../commands/run";
+import { keepGeneral } from "../../commands/viewstate";
+import { dismissal, lastRun, type Result, resultOf, undismissedRun } from "../../program/results";
 import { isRunning } from "../../store/selectors";
-import { now, useEditor } from "../../store/store";
-import { Icon } from "../kit/icons";
+import type { State } from "../../store/state";
+import { useEditor } from "../../store/store";
+import { Icon, type IconName } from "../kit/icons";
 import { Button } from "../kit/kit";
 import { nameOf, withNames } from "../names";
 import { Notices } from "../notices/Notices";
 import { People } from "../people/People";
-import { History } from "../run/History";
+import { History, WORDS } from "../run/History";
+import { ICONS } from "../run/Result";
 import { RunButtons, STATES } from "../run/RunBar";
 import { Settings } from "../settings/Settings";
+import { ago, useTicking } from "../times";
 import "../run/run.css";
 import "./operator.css";
 
+const TONES: Record<Result["tone"], string> = { good: "done", bad: "broken", warn: "interrupted", "": "idle" };
+
+interface Shown {
+  tone: string;
+  word: string | undefined;
+  icon: IconName;
+}
+
+/** Return what the state area shows. A result takes precedence over "Ready" until it is dismissed. */
+function shownState(state: State, starting: boolean, result: Result | null): Shown {
+  const { state: phase } = state.program;
+  if (starting) return { tone: "idle", word: "Starting…", icon: "play" };
+  if (isRunning(state)) return phase === "paused" ? { tone: "paused", word: STATES[phase], icon: "pause" } : { tone: "running", word: STATES[phase], icon: "play" };
+  if (result) return { tone: TONES[result.tone], word: result.title, icon: ICONS[result.tone] };
+  if (state.live.state === "started") return { tone: "idle", word: "Devices are in use by the editor", icon: "plug" };
+  return { tone: "idle", word: "Ready", icon: "check" };
+}
+
 export default function Operator({ kiosk }: { kiosk: boolean }) {
   const state = useEditor((each) => each);
-  const { program, lists, live, doc } = state;
+  const { program, lists, doc } = state;
   const runs = isRunning(state);
   const packages = [...(lists.packages ?? [])].sort((a, b) => b.package_meta.built.localeCompare(a.package_meta.built));
   const [chosen, setChosen] = useState("");
   const [starting, setStarting] = useState(false);
   const known = packages.find((each) => each.id === chosen) ?? packages.find((each) => each.id === program.packageId) ?? packages[0];
-  const run = program.runs[0];
-  const broken = !runs && (program.exception !== null || (program.state !== "undefined" && run?.end === "failed"));
-  const tone = runs ? (program.state === "paused" ? "paused" : "running") : broken ? "broken" : "idle";
+  const idle = !runs && !starting;
+  const run = idle ? undismissedRun(state) : null;
+  const result = resultOf(run ?? undefined);
+  useTicking();
+  const { tone, word, icon } = shownState(state, starting, result);
   const why = !known
     ? "There is no package yet: build one in the editor."
     : doc && !runs
@@ -54,18 +79,30 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
       </header>
       <main>
         <section className="operator-state" aria-label="State" role="status">
-          <Icon name={tone === "broken" ? "warn" : tone === "running" ? "play" : tone === "paused" ? "pause" : "check"} size={56} />
+          <Icon name={icon} size={56} />
           <div>
-            <p className="operator-word">{starting ? "Starting…" : runs ? STATES[program.state] : broken ? "It stopped with an error" : live.state === "started" ? "Devices are in use by the editor" : "Ready"}</p>
+            <p className="operator-word">{word}</p>
             {doing && (
               <p>
                 {program.state === "paused" ? "before " : ""}
                 {doing}
               </p>
             )}
+            {run && result && (
+              <p>
+                {result.name}, {ago(run.ended ?? run.started)}
+              </p>
+            )}
+            {result?.detail && <p>{withNames(state, result.detail)}</p>}
+            {result?.tone === "bad" && <p className="operator-advice">Fix the cause, then press Start. If it fails again, call a programmer.</p>}
+            {idle && !run && <LastRun />}
           </div>
+          {run && (
+            <Button className="operator-dismiss" onPress={() => keepGeneral(dismissal(run))}>
+              Dismiss
+            </Button>
+          )}
         </section>
-        {broken && <Trouble />}
         <Devices />
         {runs ? (
           <div className="operator-buttons">
@@ -83,7 +120,7 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
                   </label>
                 </li>
               ))}
-              {packages.length === 0 && <p className="quiet">There is no package yet. Who programs the machine builds one in the editor, under Run.</p>}
+              {packages.length === 0 && <p className="quiet">There is no package yet. Build one in the editor, under Run.</p>}
             </ul>
             <Button look="primary" icon="play" className="operator-go" why={why} isDisabled={starting} onPress={() => void start()}>
               Start
@@ -97,24 +134,18 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
   );
 }
 
-/** What ended the last run, and what to do. */
-function Trouble() {
-  const exception = useEditor((state) => state.program.exception);
-  const run = useEditor((state) => state.program.runs[0]);
-  const message = exception?.message ?? run?.error ?? "";
-  const where = run?.last_action?.name;
+/** Report in one line how the last run ended. */
+function LastRun() {
+  const run = useEditor((state) => lastRun(state));
+  if (!run) return null;
   return (
-    <section className="exception" role="alert">
-      <p>
-        <Icon name="warn" /> <strong>{where ? `It failed in ${where}` : "It failed"}</strong>
-      </p>
-      <p>{withNames(now(), message)}</p>
-      <p className="quiet small">See to the cause, then press Start. If it fails again, call who programs the machine.</p>
-    </section>
+    <p className="operator-advice">
+      Last run {ago(run.ended ?? run.started)}: {WORDS[run.end]}
+    </p>
   );
 }
 
-/** Devices that are in trouble, by their names; nothing while all is well. */
+/** List the devices that are not connected; nothing if there are none. */
 function Devices() {
   const live = useEditor((state) => state.live);
   const doc = useEditor((state) => state.doc);

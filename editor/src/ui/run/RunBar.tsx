@@ -1,4 +1,4 @@
-/** While a program runs: how it is, and what can be done with it. Always in the view, whichever panel is open. */
+/** State and controls of the running program, shown in the view whichever panel is open. */
 
 import { barred } from "../../commands/asking";
 import * as commands from "../../commands/run";
@@ -11,10 +11,8 @@ export const STATES: Record<string, string> = {
   running: "Running",
   pausing: "Pausing…",
   paused: "Paused",
-  resuming: "Going on…",
+  resuming: "Resuming…",
   stopping: "Stopping…",
-  stopped: "Stopped",
-  undefined: "Has not run",
 };
 
 export default function RunBar() {
@@ -32,7 +30,7 @@ export default function RunBar() {
   );
 }
 
-/** Pause, go on, one action further, stop: those that the state allows. */
+/** Pause, resume, step and stop, as far as the state allows. */
 export function RunButtons() {
   const phase = useEditor((state) => state.program.state);
   const why = useEditor((state) => barred(state, "StopPackage"));
@@ -46,10 +44,10 @@ export function RunButtons() {
       {phase === "paused" && (
         <>
           <Button icon="play" look="primary" why={why} onPress={() => void commands.resume()}>
-            Go on
+            Resume
           </Button>
           <Button icon="step" why={why} onPress={() => void commands.step()}>
-            One action
+            Step
           </Button>
         </>
       )}

@@ -1,4 +1,4 @@
-/** Runs the open project, and follows it: state, what went wrong, each action with what went in and came out. */
+/** Run the open project and follow it: state, result, and each action with its parameters and results. */
 
 import { useState } from "react";
 import { notEditable } from "../../commands/program";
@@ -8,8 +8,8 @@ import { isRunning } from "../../store/selectors";
 import { select, setUi, useEditor } from "../../store/store";
 import { AskName, Button } from "../kit/kit";
 import { nameOf } from "../names";
-import { Exception } from "./Exception";
 import { History } from "./History";
+import { LastResult } from "./Result";
 import { RunButtons, STATES } from "./RunBar";
 import { Trace } from "./Trace";
 import "./run.css";
@@ -30,10 +30,13 @@ export default function RunPanel() {
   const broken = Object.keys(breakpoints).filter((id) => nameOf(state, id));
   return (
     <>
-      <p className="run-state" role="status">
-        <strong>{busy && !runs ? "Building…" : (STATES[program.state] ?? program.state)}</strong>
-        {program.running.length > 0 && <span> {program.state === "paused" && "before "}{program.running.map((id) => nameOf(state, id)).join(", ")}</span>}
-      </p>
+      {!runs && !busy && doc?.project && <LastResult projectId={doc.project.id} />}
+      {(runs || busy) && (
+        <p className="run-state" role="status">
+          <strong>{runs ? STATES[program.state] : "Building…"}</strong>
+          {program.running.length > 0 && <span> {program.state === "paused" && "before "}{program.running.map((id) => nameOf(state, id)).join(", ")}</span>}
+        </p>
+      )}
       {runs ? (
         <div className="row">
           <RunButtons />
@@ -45,19 +48,18 @@ export default function RunPanel() {
               {doc?.unsaved ? "Save and run" : "Run"}
             </Button>
             <Button icon="step" why={why} isDisabled={busy} onPress={() => void begin(true)}>
-              Run paused
+              Start paused
             </Button>
             <Button icon="box" why={cannotBuild} isDisabled={busy} onPress={() => setAsking(true)}>
               Build…
             </Button>
           </div>
-          <p className="quiet small">{doc?.unsaved ? "What was changed is saved first. " : ""}“Build” makes a package that stays, for the operator's screen.</p>
+          <p className="quiet small">{doc?.unsaved ? "Unsaved changes are saved first. " : ""}“Build” makes a package for the operator's screen.</p>
         </>
       )}
-      <Exception />
       {broken.length > 0 && (
         <section className="run-part" aria-label="Breakpoints">
-          <h3>It pauses before</h3>
+          <h3>Pauses before</h3>
           <ul className="row">
             {broken.map((id) => (
               <li key={id}>
@@ -88,7 +90,7 @@ function Follow() {
   return (
     <label className="check">
       <input type="checkbox" checked={on} onChange={(event) => setUi({ follow: event.target.checked })} />
-      <span>The view follows the action that runs</span>
+      <span>The view follows the running action</span>
     </label>
   );
 }

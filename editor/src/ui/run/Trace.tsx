@@ -49,7 +49,7 @@ function Detail({ entry, onChoose }: { entry: TraceEntry; onChoose: (actionId: s
       {entry.parameters && entry.parameters.length > 0 && <Values names={names} values={entry.parameters} />}
       {entry.results && entry.results.length > 0 && (
         <>
-          <p className="small quiet">told</p>
+          <p className="small quiet">Results</p>
           <Values names={action?.flows[0]?.outputs ?? []} values={entry.results} />
         </>
       )}

@@ -1,0 +1,43 @@
+/** The result of the last run of a project, with its error and a way to the action that failed. */
+
+import { lastRun, type Result, resultOf } from "../../program/results";
+import { theEngine } from "../../session/engine";
+import { now, select, setUi, useEditor } from "../../store/store";
+import { Icon, type IconName } from "../kit/icons";
+import { Button } from "../kit/kit";
+import { nameOf, selectionOf, withNames } from "../names";
+import { ago, useTicking } from "../times";
+
+export const ICONS: Record<Result["tone"], IconName> = { good: "check", bad: "warn", warn: "warn", "": "stop" };
+
+export function LastResult({ projectId }: { projectId: string }) {
+  const run = useEditor((state) => lastRun(state, projectId));
+  const result = resultOf(run);
+  useTicking();
+  if (!run || !result) return <p className="run-state">Not run yet</p>;
+  return (
+    <section className={`last-result ${result.tone}`} aria-label="Last run">
+      <p>
+        <Icon name={ICONS[result.tone]} /> <strong>{result.title}</strong> <span className="small">{ago(run.ended ?? run.started)}</span>
+      </p>
+      {result.detail && <p>{withNames(now(), result.detail)}</p>}
+      {result.tone === "bad" && <ShowAction id={result.actionId} />}
+    </section>
+  );
+}
+
+/** A button that selects an action of the open project; nothing if the project is not open. */
+export function ShowAction({ id }: { id: string }) {
+  const name = useEditor((state) => (id ? nameOf(state, id) : ""));
+  if (!name) return null;
+  const show = () => {
+    setUi({ tool: "" });
+    select(selectionOf(now(), id));
+    theEngine()?.focus(id);
+  };
+  return (
+    <Button icon="zoom" onPress={show}>
+      Show {name}
+    </Button>
+  );
+}

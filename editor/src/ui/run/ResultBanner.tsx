@@ -1,0 +1,28 @@
+/** The result of the last run, above every screen of the editor until the user dismisses it or starts another run. */
+
+import { keepGeneral } from "../../commands/viewstate";
+import { dismissal, resultOf, undismissedRun } from "../../program/results";
+import { now, useEditor } from "../../store/store";
+import { Icon } from "../kit/icons";
+import { Button } from "../kit/kit";
+import { withNames } from "../names";
+import { ago, useTicking } from "../times";
+import { ICONS, ShowAction } from "./Result";
+import "./banner.css";
+
+export default function ResultBanner() {
+  const run = useEditor(undismissedRun);
+  const result = resultOf(run ?? undefined);
+  useTicking();
+  if (!run || !result) return null;
+  return (
+    <div className={`result-banner ${result.tone}`} role={result.tone === "bad" ? "alert" : "status"}>
+      <Icon name={ICONS[result.tone]} />
+      <p>
+        <strong>{result.title}</strong> <span className="small">{`${result.name}, ${ago(run.ended ?? run.started)}. ${withNames(now(), result.detail)}`}</span>
+      </p>
+      {result.tone === "bad" && <ShowAction id={result.actionId} />}
+      <Button look="plain" icon="close" aria-label="Dismiss the result" onPress={() => keepGeneral(dismissal(run))} />
+    </div>
+  );
+}
