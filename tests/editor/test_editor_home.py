@@ -231,7 +231,7 @@ async def test_packages_come_live_and_go_as_files(
         await client.call("CloseProject")
         await tab(screen, "Packages")
         await screen.page.get_by_role("heading", name="sorting 1").wait_for()
-        await screen.sees("has not run yet")
+        await screen.sees("not run yet")
         async with screen.page.expect_download() as downloading:
             await more(screen, "sorting 1", "Download")
         file = await (await downloading.value).path()

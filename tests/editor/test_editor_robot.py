@@ -358,7 +358,7 @@ async def test_stop_reaches_the_robot_in_mid_move(place: Place, by: str) -> None
             const press = () => (window.pressed = performance.now());
             for (const kind of ['pointerdown', 'keydown']) addEventListener(kind, press, { capture: true });
             WebSocket.prototype.send = function (text) {
-                if (text.includes('StopRobot')) window.asked = performance.now();
+                if (text.includes('StopAll')) window.asked = performance.now();
                 return send.call(this, text);
             };
         }"""

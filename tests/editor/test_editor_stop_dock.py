@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 import pytest_asyncio
-from playwright.async_api import Browser, Page
+from playwright.async_api import Browser, Locator, Page
 
 from arcor2_hw.client import Client
 from arcor2_hw.data import rpc
@@ -80,7 +80,7 @@ async def test_no_control_reaches_into_the_stop_dock(online: Online, cell: Cell,
             for tool in TOOLS:
                 await open_tool(page, tool)
                 await check(f"{tool}, {size}", tool == "Robot")
-            await page.get_by_role("button", name="Undo", exact=True).click(force=True)  # says that nothing can be undone
+            await page.get_by_role("button", name="Undo", exact=True).click(force=True)
             await page.get_by_text("There is nothing to undo.").first.wait_for()
             await check(f"message, {size}")
             await screen.press("Settings")
@@ -94,6 +94,10 @@ async def test_no_control_reaches_into_the_stop_dock(online: Online, cell: Cell,
         await open_tool(page, "Robot")
         await screen.press("Make the panel larger")
         await check("large sheet, phone")
+        await resize(screen, "tablet")
+        await page.evaluate("() => { document.documentElement.style.fontSize = '200%'; }")
+        await check("large text, tablet")
+        await page.evaluate("() => { document.documentElement.style.fontSize = ''; }")
         await page.evaluate("location.hash = '#/operator'")
         for size in SIZES:
             await resize(screen, size)
@@ -102,45 +106,56 @@ async def test_no_control_reaches_into_the_stop_dock(online: Online, cell: Cell,
         assert not found, "\n".join(f"{what}: {fault}" for what, faults in found.items() for fault in faults)
 
 
-@pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("tab", ["Tool", "Joints", "By hand"])
-async def test_nothing_moves_or_is_covered_during_a_hold(
-    tab: str, size: str, online: Online, cell: Cell, browser: Browser
-) -> None:
-    async with screen_of(browser, cell.url, size) as screen:
-        page = screen.page
+async def hold(page: Page, button: Locator) -> None:
+    """Hold a button until the panel shows who moves the robot. A press that ends by itself is repeated."""
+
+    async def reported() -> bool:
+        if await button.get_attribute("data-held") != "true":
+            await page.mouse.up()
+            await button.hover()
+            await page.mouse.down()
+        return await page.get_by_role("complementary").get_by_text("Eva is ").count() > 0
+
+    await until(reported, "the hold is shown", 20)
+
+
+async def faults_during_hold(online: Online, screen: Screen, tab: str, size: str) -> list[str]:
+    """Hold a button of a pad while a message arrives, and return what moved or was covered."""
+    page = screen.page
+    panel = page.get_by_role("complementary")
+    await panel.get_by_role("radiogroup", name="How to move it").get_by_role("radio", name=tab, exact=True).click()
+    if tab != "By hand":
+        await panel.get_by_role("radio", name="Hold to move").click()
+    button = panel.locator("button.hold:not([aria-disabled])").last
+    await button.hover()
+    await screen.settle()
+    shown = await page.evaluate(_WATCH, "button.hold")
+    assert shown >= 1, "no button is visible"
+    assert shown == BUTTONS.get(tab, shown), f"only {shown} buttons are visible"
+    await hold(page, button)
+    await online.ask_for_robot()
+    message = page.get_by_text("colleague asks for").first
+    await message.wait_for()
+    frames = await page.evaluate("window.padFrames")
+    await screen.until("(before) => window.padFrames > before + 3", frames)
+    await screen.picture(f"hold {tab} {size}")
+    await page.mouse.up()
+    await screen.until("() => !document.querySelector('[data-held=true]')")
+    await screen.settle()
+    faults: list[str] = await page.evaluate("window.padFaults()")
+    await page.get_by_role("button", name="Dismiss").first.click()
+    return faults
+
+
+async def test_nothing_moves_or_is_covered_during_a_hold(online: Online, cell: Cell, browser: Browser) -> None:
+    async with screen_of(browser, cell.url) as screen:
         await screen.join("Eva")
-        await page.get_by_role("button", name="Stop motion").wait_for()
-        await open_tool(page, "Robot")
-        panel = page.get_by_role("complementary")
-        ways = panel.get_by_role("radiogroup", name="How to move it")
-        await ways.get_by_role("radio", name=tab, exact=True).click()
-        if tab != "By hand":
-            await panel.get_by_role("radio", name="Hold to move").click()
-        pad = panel.locator("button.hold:not([aria-disabled])")
-        await pad.last.wait_for()
-        await screen.settle()
-        button = pad.last
-        await button.hover()
-        shown = await page.evaluate(_WATCH, "button.hold")
-        assert shown == BUTTONS.get(tab, shown) and shown >= 1, f"{shown} buttons are visible"
-
-        async def held_and_reported() -> bool:
-            """The server has reported the hold. A press that ends by itself is made again, as a user would."""
-            if await button.get_attribute("data-held") != "true":
-                await page.mouse.up()
-                await page.mouse.down()
-            return await panel.get_by_text("Eva is ").count() > 0
-
-        await until(held_and_reported, "the hold is shown", 20)
-        # A message comes during the hold.
-        await online.ask_for_robot()
-        await page.get_by_text("colleague asks for").wait_for()
-        frames = await page.evaluate("window.padFrames")
-        await screen.until("(before) => window.padFrames > before + 3", frames)
-        await screen.picture(f"hold {tab} {size}")
-        assert await page.evaluate("window.padFaults()") == []
-        await page.mouse.up()
-        await screen.until("() => !document.querySelector('[data-held=true]')")
-        await screen.settle()
-        assert await page.evaluate("window.padFaults()") == []
+        await screen.page.get_by_role("button", name="Stop motion").wait_for()
+        await open_tool(screen.page, "Robot")
+        found = {}
+        for size in SIZES:
+            await resize(screen, size)
+            for tab in ("Tool", "Joints", "By hand"):
+                if faults := await faults_during_hold(online, screen, tab, size):
+                    found[f"{tab}, {size}"] = faults
+        assert not found, "\n".join(f"{what}: {fault}" for what, faults in found.items() for fault in faults)
