@@ -116,7 +116,7 @@ class ArmCalibrations:
         if not services.cell.online:
             self._asked.clear()
             return
-        there = {state.object_id for state in services.cell.object_states() if state.state in _THERE}
+        there = {state.object_id for state in services.cell.board.states() if state.state in _THERE}
         self._asked &= there
         for robot in services.session.require_scene().objects:
             if robot.id in there - self._asked and self._can_tell(robot):

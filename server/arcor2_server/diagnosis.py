@@ -65,8 +65,8 @@ def parts(services: Services) -> dict[str, Any]:
         "devices.json": {
             "scene": cell.state,
             "package": execution.state,
-            "devices": execution.devices() or cell.devices(),
-            "objects": execution.object_states() or cell.object_states(),
+            "devices": execution.board.statuses() or cell.board.statuses(),
+            "objects": execution.board.states() or cell.board.states(),
             "unsaved": session.has_changes,
         },
         "runs.json": services.runs.newest(RUNS, None, None, None),

@@ -5,7 +5,7 @@ import contextlib
 import time
 from collections.abc import Coroutine
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final
 
 import msgspec
 import structlog
@@ -15,18 +15,16 @@ from arcor2_hw.data.editor import RunEnd
 from arcor2_hw.data.events import (
     Event,
     MainScreen,
-    ObjectStateData,
     PackageInfoData,
     PackageStateData,
     ProjectExceptionData,
     ShowMainScreenData,
 )
-from arcor2_hw.data.operation import ObjectHealthData
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.exceptions import Arcor2Error, NotFound
 from arcor2_hw.runtime import messages as m
 from arcor2_server.build.versions import check_versions
-from arcor2_server.cell.devices import DeviceBoard, DeviceStatus, overlay_for
+from arcor2_server.cell.devices import DeviceBoard, overlay_for
 from arcor2_server.cell.host import CellHost
 from arcor2_server.cell.opening import shapes_put_in
 from arcor2_server.cell.streams import RobotStreams
@@ -39,7 +37,6 @@ if TYPE_CHECKING:
     from arcor2_server.services import Services
 
 log = structlog.get_logger(__name__)
-T = TypeVar("T")
 S = PackageStateEnum
 
 STOP_WITHIN: Final = 5.0
@@ -94,18 +91,6 @@ class Execution(KeptPackages):
     def active(self) -> bool:
         """Tell whether a program is starting, running or ending."""
         return self.state not in _IDLE
-
-    def devices(self) -> list[DeviceStatus]:
-        """Give what the devices of the running program say of themselves."""
-        return self.board.statuses() if self.busy else []
-
-    def object_states(self) -> list[ObjectStateData]:
-        """Give the connections of the objects of the running program."""
-        return self.board.states() if self.busy else []
-
-    def object_healths(self) -> list[ObjectHealthData]:
-        """Give the health of the objects of the running program."""
-        return self.board.healths() if self.busy else []
 
     def streams_of(self, robot_id: str) -> RobotStreams:
         """Give who is sent what of a robot of the running program. NotFound; RequestRefused while it comes up."""

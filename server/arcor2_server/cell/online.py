@@ -8,15 +8,14 @@ import msgspec
 import structlog
 
 from arcor2_hw.data.base import UNSET
-from arcor2_hw.data.events import ActionResultData, Event, ObjectStateData, SceneStateData, SceneStateEnum
+from arcor2_hw.data.events import ActionResultData, Event, SceneStateData, SceneStateEnum
 from arcor2_hw.data.geometry import Pose
-from arcor2_hw.data.operation import ObjectHealthData
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import Arcor2Error, ConnectionLost
 from arcor2_hw.runtime import messages as m
 from arcor2_server.cell.actions import LastStop, RunningAction
-from arcor2_server.cell.devices import DeviceBoard, DeviceStatus
+from arcor2_server.cell.devices import DeviceBoard
 from arcor2_server.cell.holding import HeldRobots
 from arcor2_server.cell.host import CellHost, json_of
 from arcor2_server.cell.hosts import CellHosts
@@ -82,18 +81,6 @@ class OnlineCell:
         """RequestRefused unless the scene is offline."""
         if self.state is not SceneStateEnum.STOPPED:
             raise RequestRefused("The scene is online: stop it first.")
-
-    def devices(self) -> list[DeviceStatus]:
-        """Give what the devices of the scene say of themselves; none while it is offline."""
-        return self.board.statuses() if self.state is not SceneStateEnum.STOPPED else []
-
-    def object_states(self) -> list[ObjectStateData]:
-        """Give the connections of the scene's objects; none while it is offline."""
-        return self.board.states() if self.state is not SceneStateEnum.STOPPED else []
-
-    def object_healths(self) -> list[ObjectHealthData]:
-        """Give the health of the scene's objects; none while it is offline."""
-        return self.board.healths() if self.state is not SceneStateEnum.STOPPED else []
 
     async def settled(self) -> SceneStateEnum:
         """Wait until the scene neither comes up nor goes down; gives its state then."""

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 log = structlog.get_logger(__name__)
 
-SILENT: Final = "the process that controls the devices does not answer"
+SILENT: Final = "the process that controls the devices does not answer; go offline to end it"
 
 
 async def stop_all(services: "Services", by: str) -> StopAllData:

@@ -27,4 +27,4 @@ async def how_to_join(services: Services, port: int) -> Joining:
 @operation("GET", "/api/devices", SERVER, Role.OPERATOR, plain=True)
 async def devices(services: Services) -> list[DeviceStatus]:
     """Give connection, health, alarms and owner of control of each device; empty when nothing is in operation."""
-    return services.execution.devices() or services.cell.devices()
+    return services.execution.board.statuses() or services.cell.board.statuses()

@@ -102,10 +102,10 @@ async def subscribe_events(context: Context, args: SubscribeEventsArgs) -> None:
         return
     tell = context.events_to_caller
     if "ObjectState" in args.events:
-        states = services.execution.object_states() or services.cell.object_states()
+        states = services.execution.board.states() or services.cell.board.states()
         tell += [make_event("ObjectState", state) for state in states]
     if "ObjectHealth" in args.events:
-        healths = services.execution.object_healths() or services.cell.object_healths()
+        healths = services.execution.board.healths() or services.cell.board.healths()
         tell += [make_event("ObjectHealth", health) for health in healths]
     if "RobotHold" in args.events:
         tell += [make_event("RobotHold", hold) for hold in services.cell.held.states()]

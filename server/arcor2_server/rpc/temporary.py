@@ -108,7 +108,7 @@ class _Run:
         if services.execution.busy:
             raise RequestRefused("A program is running: stop it first.")
         if services.cell.running_action is not None:
-            raise RequestRefused("An action is running: wait for it, or cancel it.")
+            raise RequestRefused("An action is running: wait for it, or stop it.")
         if services.cell.state not in (SceneStateEnum.STOPPED, SceneStateEnum.STARTED):
             raise RequestRefused(f"The scene is {services.cell.state.value}: wait until that is over.")
         name = f"Temporary package for project '{project.name}'."

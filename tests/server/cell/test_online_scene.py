@@ -176,7 +176,7 @@ async def test_up_and_down(arm: Server) -> None:
     await client.state("started")
     assert cell.online
     assert arm.services.locks.locked_roots() == []
-    assert [(d.name, d.type, d.answering) for d in cell.devices()] == [("arm", "Arm", True)]
+    assert [(d.name, d.type, d.answering) for d in cell.board.statuses()] == [("arm", "Arm", True)]
     with pytest.raises(RequestRefused):
         await arm.ask("StartScene")
     await arm.ask("StopScene")
@@ -269,11 +269,11 @@ async def test_silence_is_reported_and_forgiven(arm: Server) -> None:
     told = await arm.client.event("ObjectState", lambda data: data.get("answering") is False)
     assert time.monotonic() - began < 2.0
     assert told == {"object_id": OBJ, "state": "online", "answering": False}
-    assert not cell.devices()[0].answering
-    assert cell.object_states()[0].answering is False, "whoever subscribes now is told, too"
+    assert not cell.board.statuses()[0].answering
+    assert cell.board.states()[0].answering is False, "whoever subscribes now is told, too"
     await call
     assert await arm.client.event("ObjectState") == {"object_id": OBJ, "state": "online"}
-    assert cell.devices()[0].answering
+    assert cell.board.statuses()[0].answering
     assert cell.online
 
 
