@@ -1,8 +1,8 @@
 """`make bench`: all figures, as JSON lines on standard output and a table on standard error.
 
-`python -m benchmarks [--long] [ROOM ...]`: all rooms, or those named; `--long` is for recovery (50 cycles,
-not 3), for stops (500 for each driver in a busy process, not 100), for calibration (2,000 pictures of each kind, not
-200) and for robot_pose (300 views, not 30).
+`python -m benchmarks [--long] [ROOM ...]`: all rooms, or those named. `--long` is for recovery (50 cycles, not 3), for
+stops (500 for each driver in a busy process, not 100), for demo (5 runs, not 1), for calibration (2,000 pictures of
+each kind, not 200) and for robot_pose (300 views, not 30).
 """
 
 import asyncio
@@ -20,6 +20,7 @@ from benchmarks import (
     calibration,
     camera,
     computing,
+    demo,
     documents,
     hung,
     kinematics,
@@ -56,6 +57,7 @@ ROOMS: Final[dict[str, Callable[[Report, Path], Awaitable[None]]]] = {
     "hung": hung.run,
     "kinematics": lambda report, _: kinematics.run(report),
     "stops": lambda report, _: stops.run(report, LONG in sys.argv),
+    "demo": lambda report, folder: demo.run(report, folder, LONG in sys.argv),
     "recovery": lambda report, _: recovery.run(report, LONG in sys.argv),
 }
 

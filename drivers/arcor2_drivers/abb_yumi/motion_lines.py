@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Final, NamedTuple
 
 from arcor2_hw.exceptions import DeviceFault
+from arcor2_hw.keep_alive import TOO_SLOW
 
 VERSION: Final = 1
 LONGEST_LINE: Final = 79
@@ -70,7 +71,7 @@ class Status(enum.IntEnum):
 
 MEANING: Final = {
     Status.STOPPED: "stopped",
-    Status.WATCHDOG: "stopped by its watchdog",
+    Status.WATCHDOG: f"stopped by its watchdog: {TOO_SLOW.format('robot')}",
     Status.BAD_CHECK: "the check of the line was wrong",
     Status.BAD_CODE: "the code is not known to the RAPID modules",
     Status.BAD_COUNT: "the number of arguments was wrong",

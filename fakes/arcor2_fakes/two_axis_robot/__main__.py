@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
 import sys
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Annotated, Any
 from cyclopts import App, Parameter, validators
 
 from arcor2_fakes.control import ControlServer, parse_address
-from arcor2_fakes.process import announce, run, until_told_to_end
+from arcor2_fakes.process import OwnTime, announce, run, until_told_to_end
 from arcor2_fakes.serial_line import PtyLine
 from arcor2_fakes.two_axis_robot.bus import Bus
 from arcor2_fakes.two_axis_robot.servo import TICKS, VELOCITY_UNIT, Servo
@@ -103,10 +102,10 @@ def main(
         return 2
 
     async def body() -> None:
-        real = asyncio.get_running_loop().time
+        own = OwnTime()
 
         def clock() -> float:
-            return real() * time_scale
+            return own() * time_scale
 
         bus = Bus([Servo(number, clock, time_scale=time_scale) for number in ids], lambda frame: line.send(frame))
         line = PtyLine(bus.feed, link)
@@ -126,6 +125,7 @@ def main(
         channel.command("unplug", unplug)
         channel.source("truth", lambda: truth(bus, line))
         channel.source("motion", lambda: motion(bus))
+        own.run()
         await line.plug()
         try:
             announce(name="two_axis_robot", port=line.port, control=await channel.start())

@@ -23,7 +23,7 @@ from arcor2_fakes.wire import TcpWire, register_faults
 log = logging.getLogger("main")
 
 _POLYSCOPE_X = 10  # has no dashboard server
-_MOST_AT_ONCE = 250  # control cycles made up for after the process was held up
+_MOST_AT_ONCE = 100  # control cycles made up for after the process was held up: kicks that waited count as one
 _CHUNK = 10  # of them without reading what has come in
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from arcor2_drivers.two_axis_robot.two_axis_robot import TwoAxisRobot
 from arcor2_hw.data.robot import Joint
-from arcor2_hw.exceptions import Cancelled
+from arcor2_hw.exceptions import Cancelled, NotInControl
 from tests.drivers.busy import BUSY, stall
 from tests.fakes.conftest import FakeProcess
 
@@ -66,6 +66,18 @@ def test_a_killed_owner_stops_the_servos_at_once(fake: FakeProcess, owner: "subp
     began = time.monotonic()
     fake.control.wait_until(standing, within=2.0)
     assert time.monotonic() - began < 0.4 + 0.3  # the watchdog of its settings, and what a busy machine adds
+
+
+def test_a_watchdog_that_tripped_is_named(fake: FakeProcess, ready: TwoAxisRobot) -> None:
+    keep_alive = ready._observer._keep_alive
+    assert keep_alive is not None
+    os.kill(keep_alive.pid, signal.SIGKILL)  # as if this computer had not run it
+    doing = Doing(ready.move_to_joints, FAR, 0.15)
+    moving(fake)
+    stall(0.7)
+    assert trips(fake) == 2
+    with pytest.raises(NotInControl, match="this computer was too slow for the robot's watchdog"):
+        doing.result(2.0)
 
 
 def test_control_given_back_ends_the_child_process(ready: TwoAxisRobot, wait_for: Callable[..., object]) -> None:
