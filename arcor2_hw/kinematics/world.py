@@ -81,7 +81,10 @@ class CollisionWorld(Contents):
         return True
 
     def contacts(self, robot: str, q: Array) -> list[Contact]:
-        """Give everything that a robot in joint values, or what it holds, is in collision with. Raises NotFound."""
+        """Return all contacts of a robot in joint values and of the parts that it holds, those of parts first.
+
+        A part at a pose of the end effector collides in every configuration that reaches it. Raises NotFound.
+        """
         mine = self.robot(robot)
         mine.pose(q, everything=True)
         found = [
@@ -94,6 +97,7 @@ class CollisionWorld(Contents):
             if other is not mine:
                 other.pose(other.q, everything=True)
                 found += self._contacts_between(mine, other, self.margin)
+        found.sort(key=lambda each: each.first not in mine.held)
         return list({(each.first, each.second): each for each in found}.values())
 
     def _contacts_with(self, mine: StandingRobot, bodies: Iterable[Body], margin: float) -> Iterator[Contact]:

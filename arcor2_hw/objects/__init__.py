@@ -2,6 +2,7 @@
 
 from arcor2_hw.objects.camera import Camera
 from arcor2_hw.objects.generic import CollisionObject, Generic, GenericWithPose, VirtualCollisionObject
+from arcor2_hw.objects.gripping import HoldsParts, PartSize
 from arcor2_hw.objects.machine import Machine, MachineCommand, MachineState, UnitMode
 from arcor2_hw.objects.robot import MultiArmRobot, Robot, RobotException
 from arcor2_hw.objects.settings import Settings
@@ -29,12 +30,14 @@ __all__ = [
     "GripResult",
     "Gripper",
     "HasPoints",
+    "HoldsParts",
     "IOBlock",
     "Machine",
     "MachineCommand",
     "MachineState",
     "MultiArmRobot",
     "NoRead",
+    "PartSize",
     "Printer",
     "Reader",
     "Robot",

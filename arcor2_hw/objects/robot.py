@@ -71,7 +71,7 @@ class Robot(GenericWithPose):
         return part
 
     def on_parts_changed(self, listener: Callable[[], None]) -> None:
-        """Call `listener` on any thread whenever the held parts change."""
+        """Call `listener`, on any thread, whenever the held parts change."""
         self._parts_listener = listener
 
     def _notify_parts(self) -> None:

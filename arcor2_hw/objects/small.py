@@ -9,6 +9,7 @@ from arcor2_hw.data.device import LossReaction, Reading
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.exceptions import Arcor2NotImplemented
 from arcor2_hw.objects.generic import Generic
+from arcor2_hw.objects.gripping import HoldsParts
 
 
 class GripperState(enum.StrEnum):
@@ -28,8 +29,8 @@ class GripResult(NamedTuple):
     width: float
 
 
-class Gripper(Generic):
-    """A gripper with fingers; it holds on when it loses us.
+class Gripper(HoldsParts, Generic):
+    """A gripper with fingers; it keeps its grip when the connection is lost.
 
     tcp: its tool centre point, closed, in the flange. mass: kg. Both of the class, or of an object whose settings say
     which model it is.
@@ -58,7 +59,7 @@ class Gripper(Generic):
         """Tell what it is doing."""
 
 
-class Suction(Generic):
+class Suction(HoldsParts, Generic):
     """A suction cup."""
 
     category: ClassVar[str] = "Grippers"

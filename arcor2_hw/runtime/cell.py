@@ -135,6 +135,25 @@ class Cell:
                 return device.require()
         raise NotFound(f"the scene has no object {name}")
 
+    def find_robot(self, name: str) -> Robot:
+        """Return a robot by its name or id, for a gripper; for an empty name the only robot of the scene.
+
+        Raises:
+            NotFound: There is no such robot, or several when no name is given.
+            NotConnected: The robot does not exist yet, or has failed.
+        """
+        if name:
+            found = self.find(name)
+            if not isinstance(found, Robot):
+                raise NotFound(f"{name} is no robot")
+            return found
+        robots = [device for device in self if issubclass(device.recipe.cls, Robot)]
+        if len(robots) != 1:
+            raise NotFound(f"the scene has {len(robots)} robots; name the one that carries the gripper in its settings")
+        robot = robots[0].require()
+        assert isinstance(robot, Robot)
+        return robot
+
     # -------------------------------------------------------------------------------- up and down
     def open(self, how: Iterable[Recipe], failed: Callable[[SceneFault], None] | None = None) -> None:
         """Create and connect all objects at once; SceneFault with the first that fails, as soon as it fails.
@@ -172,7 +191,7 @@ class Cell:
 
     def _make(self, how: Recipe) -> Device:
         surroundings = SceneSurroundings(how.scene_object.id, self, self.assets, self.told)
-        device = Device(how, lambda device: self.changed(device), self.find, surroundings)
+        device = Device(how, lambda device: self.changed(device), self.find, surroundings, self.find_robot)
         self._devices[device.id] = device
         return device
 

@@ -15,7 +15,7 @@ from arcor2_hw.exceptions import (
     InvalidData,
     NotConnected,
 )
-from arcor2_hw.objects import Axis, CollisionObject, Generic, MultiArmRobot, Robot
+from arcor2_hw.objects import Axis, CollisionObject, Generic, HoldsParts, MultiArmRobot, Robot
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.observing import Observing, listening
 from arcor2_hw.objects.surroundings import Surroundings
@@ -80,7 +80,7 @@ class Device:
     """One object of the scene. Every call on the instance is made on one of its lanes.
 
     `changed` is called when its connection changes, on the thread that keeps the connection. `find` gives the instance
-    of another object of the scene. `surroundings` is for a robot.
+    of another object of the scene, `find_robot` the robot that carries a gripper. `surroundings` is for a robot.
     """
 
     def __init__(
@@ -89,8 +89,10 @@ class Device:
         changed: "Callable[[Device], None]" = lambda _: None,
         find: Callable[[str], Generic] | None = None,
         surroundings: Surroundings | None = None,
+        find_robot: Callable[[str], Robot] | None = None,
     ) -> None:
         self.recipe = recipe
+        self._find_robot = find_robot
         self._surroundings = surroundings
         self._find = find
         self._changed = changed
@@ -131,6 +133,10 @@ class Device:
                 instance.tell_enabled(lambda: self._changed(self))
             if self._find is not None:
                 instance.attach(self._find)
+                if isinstance(instance, HoldsParts) and self._find_robot is not None:
+                    instance.mount(self._find, self._find_robot)
+            if isinstance(instance, Robot):
+                instance.on_parts_changed(lambda: self._changed(self))
             if isinstance(instance, Robot) and self._surroundings is not None:
                 instance.surround(self._surroundings)
             instance.connect()

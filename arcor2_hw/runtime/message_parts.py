@@ -23,6 +23,15 @@ class PutIn(Struct, frozen=True):
     touching: list[str] = field(default_factory=list)
 
 
+class HeldPart(Struct, frozen=True):
+    """A part that a link of a robot holds, pose in the frame of that. model: None for an object of the scene."""
+
+    name: str
+    link: str
+    pose: Pose
+    model: ObjectModel | None = None
+
+
 class DeviceStop(Struct, frozen=True):
     """The result of a stop on one device.
 

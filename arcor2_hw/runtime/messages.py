@@ -18,6 +18,7 @@ from arcor2_hw.data.robot import Joint, KinematicCalibration
 from arcor2_hw.data.scene import Scene, SceneObjectOverride
 from arcor2_hw.framing import PREFIX_SIZE as PREFIX_SIZE
 from arcor2_hw.runtime.message_parts import DeviceStop as DeviceStop
+from arcor2_hw.runtime.message_parts import HeldPart as HeldPart
 from arcor2_hw.runtime.message_parts import PutIn as PutIn
 
 MAX_MESSAGE: Final = 64 * 1024 * 1024
@@ -322,7 +323,7 @@ class HandTeachingEnded(ToServer, frozen=True):
 class DeviceChanged(ToServer, frozen=True):
     """A device's connection, health, alarms or owner of control changed; `reason` why the connection is lost.
 
-    in_the_way: false for a collision object that is disabled for now.
+    in_the_way: false for a collision object that is disabled for now. held: the parts that a robot holds.
     """
 
     object_id: str
@@ -332,6 +333,7 @@ class DeviceChanged(ToServer, frozen=True):
     control_owner: str | None = None
     reason: str = ""
     in_the_way: bool = True
+    held: list[HeldPart] = field(default_factory=list)
 
 
 class LogLine(ToServer, frozen=True):

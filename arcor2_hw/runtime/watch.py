@@ -6,12 +6,13 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from arcor2_hw.data.device import Alarm, Connection, Health
+from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.exceptions import DeviceTimeout
-from arcor2_hw.objects import CollisionObject, Generic
+from arcor2_hw.objects import CollisionObject, Generic, Robot
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.device import Device, overrides
 from arcor2_hw.runtime.lane import Job
-from arcor2_hw.runtime.messages import DeviceChanged
+from arcor2_hw.runtime.messages import DeviceChanged, HeldPart
 
 OBSERVE_PERIOD: Final = 0.25
 """Seconds between two looks at a device's connection and health (memory, by contract)."""
@@ -101,13 +102,23 @@ class Watch:
             if before is not None and connection is was:
                 reason = before.reason  # that of the loss: what further attempts meet is no news
             in_the_way = _told(lambda: not isinstance(instance, CollisionObject) or instance.enabled, True)
-            found = DeviceChanged(device.id, connection, *asked, reason, in_the_way)
+            held = _told(lambda: _held_parts(instance), [])
+            found = DeviceChanged(device.id, connection, *asked, reason, in_the_way, held)
             if found == before:
                 return
             self._known[device.id] = found
             self._tell(found)
         if connection is Connection.LOST and was is not Connection.LOST:
             self._lost(device, reason)
+
+
+def _held_parts(instance: Generic) -> list[HeldPart]:
+    if not isinstance(instance, Robot):
+        return []
+    return [
+        HeldPart(part.name, part.link, part.in_link, None if part.model is None else ObjectModel.of(part.model))
+        for part in instance.parts.values()
+    ]
 
 
 def _told(ask: Callable[[], Any], otherwise: Any) -> Any:

@@ -13,6 +13,7 @@ from arcor2_hw.data.events import PackageInfoData
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import Box, Cylinder, Mesh, Models, Sphere
 from arcor2_hw.exceptions import NotFound
+from arcor2_hw.runtime.messages import HeldPart
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services
@@ -96,27 +97,44 @@ class CollisionWorld:
 
 
 def _standing(services: "Services") -> Iterator[tuple[str, Placed]]:
-    """Give what stands in the scene in operation: the one that is online, or that of the program that runs."""
+    """Return the collision models of the scene that is online, or of the running program, by id.
+
+    A part that a robot holds is in the frame of the link that holds it.
+    """
     scene = services.session.scene
     if scene is not None and services.cell.online:
-        disabled = services.cell.board.not_in_the_way()
-        for placed in scene.objects:
-            model = services.types.meta(placed.type).object_model
-            if not isinstance(model, Unset) and not isinstance(placed.pose, Unset) and placed.id not in disabled:
-                yield placed.id, Placed(model.model(), placed.pose)
+        board = services.cell.board
+        placed = [
+            (obj.id, obj.name, Placed(model.model(), obj.pose))
+            for obj in scene.objects
+            if not isinstance(model := services.types.meta(obj.type).object_model, Unset)
+            and not isinstance(obj.pose, Unset)
+        ]
     elif (encoded := services.execution.state_and_info()[1]) is not None:
-        disabled = services.execution.board.not_in_the_way()
-        yield from (one for one in _of_program(encoded) if one[0] not in disabled)
+        board, placed = services.execution.board, list(_of_program(encoded))
+    else:
+        return
+    disabled, held = board.not_in_the_way(), board.held_parts()
+    for key, name, one in placed:
+        if key not in disabled:
+            yield key, _held(one, *held[name]) if name in held else one
+    for name, (robot, part) in held.items():
+        if part.model is not None:
+            yield name, _held(Placed(part.model.model(), part.pose), robot, part)
+
+
+def _held(placed: Placed, robot: str, part: HeldPart) -> Placed:
+    return Placed(placed.model, part.pose, placed.scale, Holder(robot, part.link))
 
 
 @functools.lru_cache(maxsize=1)
-def _of_program(encoded: bytes) -> tuple[tuple[str, Placed], ...]:
+def _of_program(encoded: bytes) -> tuple[tuple[str, str, Placed], ...]:
     info = msgspec.json.decode(encoded, type=_InfoEvent).data
     kinds = info.collision_models
     every: list[Models] = [*kinds.boxes, *kinds.spheres, *kinds.cylinders, *kinds.meshes]
     models = {one.id: one for one in every}
     return tuple(
-        (placed.id, Placed(models[placed.type], placed.pose))
+        (placed.id, placed.name, Placed(models[placed.type], placed.pose))
         for placed in info.scene.objects
         if placed.type in models and not isinstance(placed.pose, Unset)
     )

@@ -73,6 +73,7 @@ class ReachabilityBoard:
         self._arms = StandingArms(services)
         services.session.on_change.append(lambda edit: self.look() if edit is not None else self._begin_anew())
         services.collisions.on_change.append(self.look)
+        services.cell.board.on_obstacles_changed.append(self.look)
         services.arm_calibrations.on_change.append(lambda _: self.look())
 
     # -------------------------------------------------------------------------------- asked

@@ -15,6 +15,28 @@ from arcor2_hw.objects import Robot
 from arcor2_hw.objects.surroundings import Obstacle
 
 
+class Carrier(Robot):
+    """A robot that only carries a gripper."""
+
+    def __init__(self) -> None:
+        super().__init__("carrier_id", "carrier", Pose())
+
+    def get_end_effectors_ids(self) -> set[str]:
+        return {"tcp"}
+
+    def get_end_effector_pose(self, end_effector: str) -> Pose:
+        return Pose()
+
+    def robot_joints(self, include_gripper: bool = False) -> list[Joint]:
+        return []
+
+    def grippers(self) -> set[str]:
+        return set()
+
+    def suctions(self) -> set[str]:
+        return set()
+
+
 class Around:
     def __init__(self) -> None:
         self.boxes: dict[str, tuple[Position, tuple[float, float, float]]] = {}

@@ -9,7 +9,9 @@ import trimesh
 
 import arcor2_drivers
 from arcor2_hw.data import object_type
+from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.robot import DhParameters, Joint, KinematicCalibration
 from arcor2_hw.data.scene import SceneObject
@@ -76,6 +78,33 @@ class SlowArm(Arm):
 WALL = """
 class Wall(CollisionObject):
     _ABSTRACT = False
+"""
+CLAW = """
+from arcor2_hw.objects import Gripper
+from arcor2_hw.objects.small import GripperState
+
+@dataclass
+class ClawSettings(Settings):
+    robot: str = ""
+
+class Claw(Gripper):
+    _ABSTRACT = False
+
+    def __init__(self, obj_id: str, name: str, settings: ClawSettings) -> None:
+        super().__init__(obj_id, name, settings)
+
+    def activate(self) -> None:
+        ...
+
+    def grip(self, width: float, force: float, speed: float) -> tuple[bool, float]:
+        self.attach_part()
+        return True, width
+
+    def release(self) -> None:
+        self.detach_part()
+
+    def state(self) -> GripperState:
+        return GripperState.HOLDING
 """
 MODELS = {"Wall": object_type.ObjectModel.of(object_type.Box("Wall", 0.04, 0.5, 1.0))}
 
@@ -254,6 +283,39 @@ def test_what_is_held_collides_where_the_arm_alone_would_not(scene: HostProcess)
     assert line(scene, beside) is None
     scene.send(box("rod", TIP + beside, 0.03, 0.03, 0.3))
     collision(line(scene, beside), "rod")
+
+
+def held(host: HostProcess) -> list[tuple[str, str]]:
+    """Return the names of the parts that the arm holds, and the links, as the host reported them last."""
+    reported = [each for each in host.seen if isinstance(each, m.DeviceChanged) and each.object_id == "obj_arm"]
+    return [(part.name, part.link) for part in reported[-1].held]
+
+
+@pytest.mark.parametrize("alone", [True, False])
+def test_a_gripped_part_collides_where_the_arm_alone_would_not(host: HostProcess, alone: bool) -> None:
+    named = [] if alone else [Parameter("robot", "string", '"arm"')]
+    objects = [
+        placed("arm", "Arm", Pose()),
+        placed("wall", "Wall", Pose(Position(0.0, 9.0, 0.0))),
+        SceneObject("claw", "Claw", UNSET, named, "obj_claw"),
+    ]
+    if not alone:
+        objects.append(placed("other", "Arm", Pose(Position(5.0, 0.0, 0.0))))
+    types = [type_code("Arm", ARM), type_code("Wall", WALL), type_code("Claw", CLAW)]
+    host.send(open_scene(types, *objects, models=MODELS, assets={"arm.urdf": str(URDF)}))
+    host.expect(m.SceneOpened)
+    beside = Position(0.0, 0.25, 0.0)
+    host.send(box("table", TIP + beside + Position(0.0, 0.0, -0.2), 0.1, 0.1, 0.02))
+    assert go(host, READY) is None
+    assert host.call("obj_claw", "set_part", size_x=0.05, size_y=0.05, size_z=0.3, offset_z=0.16) is None
+    assert line(host, beside) is None
+    assert go(host, READY) is None
+    assert host.call("obj_claw", "grip", width=0.0, force=1.0, speed=1.0)[0]
+    assert held(host) == [("part of claw", "tcp")]
+    collision(line(host, beside), "part of claw", "table")
+    assert host.call("obj_claw", "release") is None
+    assert held(host) == []
+    assert line(host, beside) is None
 
 
 def test_another_arm_is_in_the_way_where_it_is_now(host: HostProcess) -> None:

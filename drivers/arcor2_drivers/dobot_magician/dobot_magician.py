@@ -7,6 +7,7 @@ from arcor2_hw.actions import StrEnum, action
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.project import ProjectRobotJoints
 from arcor2_hw.exceptions import DeviceFault
+from arcor2_hw.objects import HoldsParts
 
 from .dobot_arm import JOINT_TO_POSE, JUMP, LINE_TO_POSE, DobotArm
 from .frames import Command
@@ -33,7 +34,7 @@ def behind(pose: Pose, distance: float) -> Pose:
     return pose * Pose(Position(0.0, 0.0, -distance))
 
 
-class DobotMagician(DobotArm):
+class DobotMagician(HoldsParts, DobotArm):
     """Dobot Magician: four axes, 0.5 kg, 320 mm, with suction cup or gripper."""
 
     _ABSTRACT = False
@@ -116,6 +117,7 @@ class DobotMagician(DobotArm):
         :param on: whether to suck
         """
         self._switch("suck", Command.SUCTION_CUP, on, self._dobot.suction_time, self._stops)
+        self._part_switched(on, hanging=True)
 
     @action
     def gripper(self, closed: bool, *, an: str | None = None) -> None:
@@ -124,6 +126,7 @@ class DobotMagician(DobotArm):
         :param closed: whether to close it
         """
         self._switch("gripper", Command.GRIPPER, closed, self._dobot.gripper_time, self._stops)
+        self._part_switched(closed, hanging=False)
 
     @action
     def conveyor(self, speed: float, *, an: str | None = None) -> None:
@@ -144,7 +147,14 @@ class DobotMagician(DobotArm):
         self._move_pose(above, JOINT_TO_POSE, speed, stops)
         self._move_pose(pose, LINE_TO_POSE, slow_speed, stops)
         self._switch(what, Command.SUCTION_CUP, suck, self._dobot.suction_time, stops)
+        self._part_switched(suck, hanging=True)
         self._move_pose(above, LINE_TO_POSE, slow_speed, stops)
+
+    def _part_switched(self, held: bool, *, hanging: bool) -> None:
+        if held:
+            self.attach_part(hanging=hanging)
+        else:
+            self.detach_part()
 
     def _switch(self, what: str, command: Command, on: bool, seconds: float, stops: int) -> None:
         """Switch the pump's valve, see it switched, and give it its time. Raises DeviceFault when it does not."""

@@ -5,6 +5,7 @@ import math
 
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
+from arcor2_hw.objects.gripping import check_part_size
 from arcor2_hw.objects.settings import check_serial_port
 
 
@@ -33,6 +34,9 @@ class DobotMagicianSettings(Settings):
     :param conveyor_port: stepper port of the conveyor belt, 0 or 1; -1: there is none
     :param conveyor_pulses: pulses per metre of the belt; the vendor's belt has 32000 per turn of a 36 mm roller
     :param home_timeout: time that homing may take, s
+    :param part_size_x: edge of a gripped part along the x axis of the tool, m; 0: unknown, safe moves ignore the part
+    :param part_size_y: edge of a gripped part along the y axis of the tool, m
+    :param part_size_z: edge of a gripped part along the z axis of the tool, m
     """
 
     port: str
@@ -50,6 +54,9 @@ class DobotMagicianSettings(Settings):
     conveyor_port: int = -1
     conveyor_pulses: float = 282942.0
     home_timeout: float = 60.0
+    part_size_x: float = 0.0
+    part_size_y: float = 0.0
+    part_size_z: float = 0.0
 
     def __post_init__(self) -> None:
         check_serial_port("port", self.port, sockets=False)
@@ -68,3 +75,4 @@ class DobotMagicianSettings(Settings):
             raise OutOfRange(f"conveyor_port must be 0 or 1, or -1 for none, not {self.conveyor_port!r}")
         within("conveyor_pulses", self.conveyor_pulses, 1000.0, 1e7)
         within("home_timeout", self.home_timeout, 1.0, 300.0)
+        check_part_size(self, within)

@@ -18,7 +18,7 @@ from arcor2_hw.exceptions import (
     OutOfRange,
     Refused,
 )
-from arcor2_hw.objects import Gripper, GripResult
+from arcor2_hw.objects import Gripper, GripResult, PartSize
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.small import GripperState
 
@@ -36,6 +36,8 @@ TAKEN_WITHIN: Final = 1.0
 STANDS_WITHIN: Final = 2.0
 """s from a stop to fingers at rest."""
 LONGEST_ACTION: Final = 300.0
+PAD_HEIGHT: Final = 0.022
+"""Height of the fingers' pads, m: a part of unknown size is at least between them, above the tool centre point."""
 
 
 def link_of(name: str, settings: Robotiq2FSettings) -> Link:
@@ -172,8 +174,10 @@ class Robotiq2F(Gripper):
         if not status.active:
             self._held = self._lost = False
             self._commanded = None
+            self.detach_part()
         elif self._held and status.go_to and status.object not in HELD:
             self._held, self._lost = False, True
+            self.detach_part()
         commanded = self._commanded
         if commanded is None:
             return
@@ -326,14 +330,22 @@ class Robotiq2F(Gripper):
         """
         status = self._move(width, force, speed, f"grip to {width:g} m")
         held = status.object in HELD
+        gripped = scaling.width(self._s, status.position)
         if held:
             self._held = True
-        return GripResult(held, scaling.width(self._s, status.position))
+            self.attach_part(PartSize(gripped, gripped, PAD_HEIGHT, -PAD_HEIGHT / 2.0))
+        else:
+            self.detach_part()
+        return GripResult(held, gripped)
 
     @action(deadline=LONGEST_ACTION)
     def release(self, *, an: str | None = None) -> None:
         """Open fully; fails when the fingers are blocked."""
-        status = self._move(self._s.stroke, self._s.min_force, self._s.max_speed, "release")
+        try:
+            status = self._move(self._s.stroke, self._s.min_force, self._s.max_speed, "release")
+        finally:
+            if not self._held:  # it was told to open
+                self.detach_part()
         if status.object is not Object.ARRIVED:
             opened = scaling.width(self._s, status.position)
             raise DeviceFault(f"{self._who}: release ended at {opened:.4f} m: the fingers are blocked")

@@ -7,6 +7,7 @@ from typing import Final
 from arcor2_hw.actions import StrEnum
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
+from arcor2_hw.objects.gripping import check_part_size
 from arcor2_hw.objects.settings import check_host, check_serial_port
 
 
@@ -71,6 +72,11 @@ class Robotiq2FSettings(Settings):
     :param max_force: force for the value 255, N
     :param min_speed: speed for the value 0, m/s
     :param max_speed: speed for the value 255, m/s
+    :param robot: name of the robot that carries the gripper; empty: the only robot of the scene
+    :param part_size_x: edge of a gripped part along the x axis of the tool, m; 0: unknown, its width counts
+    :param part_size_y: edge of a gripped part along the y axis of the tool, m
+    :param part_size_z: edge of a gripped part along the z axis of the tool, m
+    :param part_offset_z: from the tool center point to the center of a gripped part along the tool, m
     """
 
     model: Model = Model.TWO_F_85
@@ -91,6 +97,11 @@ class Robotiq2FSettings(Settings):
     max_force: float = 0.0
     min_speed: float = 0.0
     max_speed: float = 0.0
+    robot: str = ""
+    part_size_x: float = 0.0
+    part_size_y: float = 0.0
+    part_size_z: float = 0.0
+    part_offset_z: float = 0.0
 
     def __post_init__(self) -> None:
         data = MODELS[self.model]
@@ -114,3 +125,4 @@ class Robotiq2FSettings(Settings):
         within("max_force", self.max_force, self.min_force + 1.0, 500.0, "N")
         within("min_speed", self.min_speed, 0.001, 0.5, "m/s")
         within("max_speed", self.max_speed, self.min_speed + 0.001, 0.5, "m/s")
+        check_part_size(self, within)

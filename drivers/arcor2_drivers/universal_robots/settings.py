@@ -6,6 +6,7 @@ import math
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
+from arcor2_hw.objects.gripping import check_part_size
 from arcor2_hw.objects.settings import check_host
 
 SLOWEST_WATCHDOG = 2.5
@@ -45,6 +46,10 @@ class UrSettings(Settings):
     :param gripper_output: digital output of the gripper, 0 to 17; -1: there is none
     :param part_sensor_input: digital input that tells of a held part, 0 to 17; -1: there is none
     :param gripper_time: time the gripper takes to open or close, s
+    :param part_size_x: edge of a gripped part along the x axis of the tool, m; 0: unknown, safe moves ignore the part
+    :param part_size_y: edge of a gripped part along the y axis of the tool, m
+    :param part_size_z: edge of a gripped part along the z axis of the tool, m
+    :param part_offset_z: from the tool center point to the center of a gripped part along the tool, m
     """
 
     host: str
@@ -68,6 +73,10 @@ class UrSettings(Settings):
     gripper_output: int = 0
     part_sensor_input: int = -1
     gripper_time: float = 0.3
+    part_size_x: float = 0.0
+    part_size_y: float = 0.0
+    part_size_z: float = 0.0
+    part_offset_z: float = 0.0
 
     def __post_init__(self) -> None:
         check_host(self.host)
@@ -88,6 +97,7 @@ class UrSettings(Settings):
         if self.part_sensor_input != -1:
             within("part_sensor_input", self.part_sensor_input, 0, 17)
         within("gripper_time", self.gripper_time, 0.0, 10.0)
+        check_part_size(self, within)
 
     @property
     def tcp(self) -> Pose:

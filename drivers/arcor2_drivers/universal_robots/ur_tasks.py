@@ -10,6 +10,7 @@ from arcor2_hw.data.device import Reading
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.project import ProjectRobotJoints
 from arcor2_hw.exceptions import Cancelled, DeviceFault, DeviceTimeout, OutOfRange, Refused
+from arcor2_hw.objects import HoldsParts
 from arcor2_hw.objects.small import IOPoint, OnLoss, PointDirection, PointKind
 
 from .ur_paths import UrPathed
@@ -50,7 +51,7 @@ def behind(pose: Pose, distance: float) -> Pose:
     return pose * Pose(Position(0.0, 0.0, -distance))
 
 
-class UrTasks(UrPathed):
+class UrTasks(HoldsParts, UrPathed):
     """A Universal Robots arm at work."""
 
     _ABSTRACT = True
@@ -172,11 +173,14 @@ class UrTasks(UrPathed):
         self._move_pose(pose, True, slow_speed, 0.5, stops)
         self._switch(output, True)
         held = self._part_comes(True, stops)
+        if held:
+            self.attach_part()
         self._move_pose(above, True, slow_speed, 0.5, stops)
         if not held:
             self._switch(output, False)
             raise DeviceFault(f"{self.name} picked nothing", f"input {self._ur.part_sensor_input}", NOTHING_HELD)
         if self._senses_part() and not self.get_digital_input(self._ur.part_sensor_input):
+            self.detach_part()
             raise DeviceFault(f"{self.name} lost the part on the way up", fault_code=PART_LOST)
 
     @action
@@ -197,6 +201,7 @@ class UrTasks(UrPathed):
         above = behind(pose, approach)
         self._move_pose(above, False, speed, 0.5, stops)
         if self._senses_part() and not self.get_digital_input(self._ur.part_sensor_input):
+            self.detach_part()
             raise DeviceFault(f"{self.name} lost the part on the way", fault_code=PART_LOST)
         self._move_pose(pose, True, slow_speed, 0.5, stops)
         self._switch(output, False)
@@ -291,6 +296,8 @@ class UrTasks(UrPathed):
         if not 0 <= output <= 17:
             raise OutOfRange(f"{self.name}: output must be 0 to 17, not {output}")
         self._controlled().set_output(output, value)
+        if output == self._ur.gripper_output and not value:
+            self.detach_part()
         if not self._within(OUTPUT_WITHIN, lambda: bool(self._observer.sample().outputs >> output & 1) is value):
             raise DeviceFault(f"output {output} of {self.name} did not switch {'on' if value else 'off'}")
 

@@ -5,6 +5,7 @@ import math
 
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
+from arcor2_hw.objects.gripping import check_part_size
 
 
 def within(name: str, value: float, low: float, high: float) -> None:
@@ -27,6 +28,10 @@ class VacuumGripperSettings(Settings):
     :param release_time: longest time for a part to be gone; without a sensor the time that is waited, s
     :param blow_time: length of the blast of air, s
     :param lost_after: a part is lost when it is not sensed for that long, s
+    :param robot: name of the robot that carries the gripper; empty: the carrier, or the only robot of the scene
+    :param part_size_x: edge of a gripped part along the x axis of the tool, m; 0: unknown, safe moves ignore the part
+    :param part_size_y: edge of a gripped part along the y axis of the tool, m
+    :param part_size_z: edge of a gripped part along the z axis of the tool, m
     """
 
     carrier: str
@@ -39,6 +44,10 @@ class VacuumGripperSettings(Settings):
     release_time: float = 1.0
     blow_time: float = 0.2
     lost_after: float = 0.1
+    robot: str = ""
+    part_size_x: float = 0.0
+    part_size_y: float = 0.0
+    part_size_z: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("carrier", "vacuum_output"):
@@ -52,3 +61,4 @@ class VacuumGripperSettings(Settings):
         within("release_time", self.release_time, 0.0, 60.0)
         within("blow_time", self.blow_time, 0.01, 10.0)
         within("lost_after", self.lost_after, 0.0, 10.0)
+        check_part_size(self, within)

@@ -10,7 +10,7 @@ from arcor2_hw.actions import action
 from arcor2_hw.data.base import Timestamp, now
 from arcor2_hw.data.device import Alarm, Connection, Health, LossReaction, Reading, Severity
 from arcor2_hw.exceptions import Arcor2Error, Cancelled, DeviceError, DeviceFault, NotFound, Refused
-from arcor2_hw.objects import Generic, Suction
+from arcor2_hw.objects import Generic, Robot, Suction
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.small import PointDirection, PointKind
 
@@ -131,6 +131,11 @@ class SuctionGripper(Suction):
             raise NotFound(f"{self.name} has no alarm {code}")
         self._lost_since = None
 
+    def _carrying_robot(self) -> Robot | None:
+        """Return the robot that the settings name, else the carrier when that is a robot, else the only robot."""
+        carrier = self._carrier.object
+        return carrier if isinstance(carrier, Robot) and not self._set.robot else super()._carrying_robot()
+
     def stop(self) -> None:
         """End what waits here with Cancelled, and a blast of air. The vacuum stays as it is: no part falls."""
         self._stops += 1
@@ -172,6 +177,7 @@ class SuctionGripper(Suction):
         """Switch the vacuum off, and do not wait."""
         self._end_watch()
         self._carrier.write(self._set.vacuum_output, False)
+        self.detach_part()
 
     @action(deadline=90.0)
     def grip(self, *, an: str | None = None) -> None:
@@ -183,7 +189,9 @@ class SuctionGripper(Suction):
             self._carrier.write(self._set.vacuum_output, True)
             if not self._sensed(True, self._set.grip_time, stops):
                 self._carrier.write(self._set.vacuum_output, False)
+                self.detach_part()
                 raise DeviceFault(f"{self.name} holds nothing", f"within {self._set.grip_time:g} s", NOTHING_HELD)
+            self.attach_part(hanging=True)
             if self.senses:
                 self._begin_watch()
 
@@ -200,6 +208,7 @@ class SuctionGripper(Suction):
                 raise DeviceFault(f"{self.name} had lost its part before it was let go", fault_code=PART_LOST)
             if not self._sensed(False, self._set.release_time, stops):
                 raise DeviceFault(f"the part sticks to {self.name}", fault_code=PART_STICKS)
+            self.detach_part()
 
     @action(deadline=30.0)
     def blow_off(self, *, an: str | None = None) -> None:
@@ -209,6 +218,7 @@ class SuctionGripper(Suction):
         with _Turn(self) as stops:
             self._end_watch()
             self._carrier.write(self._set.vacuum_output, False)
+            self.detach_part()
             self._blow(stops)
 
     @action
@@ -282,6 +292,7 @@ class SuctionGripper(Suction):
                 missing = moment
             if not held and moment - missing >= self._set.lost_after:
                 self._lost_since = now()
+                self.detach_part()
                 log.warning("%s lost its part", self.name)
                 return
 

@@ -12,7 +12,7 @@ from arcor2_hw.data.events import ObjectStateData
 from arcor2_hw.data.operation import ObjectHealthData
 from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.exceptions import NotFound
-from arcor2_hw.runtime.messages import DeviceChanged
+from arcor2_hw.runtime.messages import DeviceChanged, HeldPart
 from arcor2_server.hub import Hub
 from arcor2_server.rpc.registry import RequestRefused, make_event
 
@@ -61,6 +61,8 @@ class DeviceBoard:
     """
 
     def __init__(self, hub: Hub, told: Callable[[], None] = lambda: None) -> None:
+        self.on_obstacles_changed: list[Callable[[], None]] = []
+        """Called when a collision object was enabled or disabled, or a robot gripped or released a part."""
         self._hub = hub
         self._told = told
         self._overlaid: Mapping[str, list[str]] = {}
@@ -86,9 +88,15 @@ class DeviceBoard:
         for said in before.values():
             if said.connection is not Connection.OFFLINE:
                 self._tell(ObjectStateData(said.object_id, Connection.OFFLINE, reason or UNSET))
+        if any(_obstacles(said) != _obstacles(None) for said in before.values()):
+            self._notify_obstacles()
         self._objects.clear()
         self._overlaid = {}
         self.answering = True
+
+    def _notify_obstacles(self) -> None:
+        for notify in self.on_obstacles_changed:
+            notify()
 
     def show(self, objects: Iterable[SceneObject], overlaid: Mapping[str, list[str]]) -> None:
         """Take the objects of a scene; those that have said nothing yet are offline.
@@ -112,6 +120,8 @@ class DeviceBoard:
             self._tell(self._state(message))
         if before is None or _health(before) != _health(message):
             self._hub.broadcast(make_event("ObjectHealth", _health(message)))
+        if _obstacles(before) != _obstacles(message):
+            self._notify_obstacles()
 
     def healths(self) -> list[ObjectHealthData]:
         """Give the health of every object, in the order of the scene."""
@@ -134,6 +144,10 @@ class DeviceBoard:
     def not_in_the_way(self) -> frozenset[str]:
         """Give the collision objects that do not count for now."""
         return frozenset(said.object_id for said in self._said.values() if not said.in_the_way)
+
+    def held_parts(self) -> dict[str, tuple[str, HeldPart]]:
+        """Return the parts that robots hold, by name, each with the id of its robot."""
+        return {part.name: (said.object_id, part) for said in self._said.values() for part in said.held}
 
     def _word(self, object_id: str) -> DeviceChanged:
         return self._said.get(object_id) or DeviceChanged(object_id, Connection.OFFLINE, Health.NORMAL)
@@ -163,6 +177,11 @@ class DeviceBoard:
                 )
             )
         return found
+
+
+def _obstacles(said: DeviceChanged | None) -> tuple[bool, list[HeldPart]]:
+    """Return what a device contributes to the obstacles: whether it counts, and the parts that it holds."""
+    return (True, []) if said is None else (said.in_the_way, said.held)
 
 
 def _health(said: DeviceChanged) -> ObjectHealthData:

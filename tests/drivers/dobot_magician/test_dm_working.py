@@ -157,19 +157,24 @@ def test_stop_passes_a_motion_and_nothing_follows(
 
 
 def test_pick_and_place_switch_at_the_part(fake: FakeProcess, arm: DobotMagician) -> None:
+    arm.set_part(0.03, 0.03, 0.02)
     arm.pick(at(0.22, 0.05, -0.02), approach=0.04, speed=1.0, slow_speed=0.5)
     truth = fake.truth()
     assert truth["suction"] == [1, 1]
     assert truth["tool"][2] == pytest.approx(20.0, abs=0.1)
     assert truth["motions"] == 3
+    assert list(arm.parts) == ["part of arm"]
+    assert arm.parts["part of arm"].in_link.position.z == pytest.approx(0.01), "it hangs below the cup"
     arm.stop()
     assert fake.truth()["suction"] == [1, 1]  # a stop lets nothing fall
     arm.place(at(0.22, -0.05, -0.02), approach=0.04, speed=1.0, slow_speed=0.5)
     assert fake.truth()["suction"] == [1, 0]
+    assert arm.parts == {}
     arm.suck(True)
     assert fake.truth()["suction"] == [1, 1]
     arm.gripper(True)
     assert fake.truth()["gripper"] == [1, 1]
+    assert arm.parts["part of arm"].in_link.position.z == 0.0, "between the fingers"
     arm.gripper(False)
     assert fake.truth()["gripper"] == [1, 0]
     assert fake.truth()["longest_queue"] == 1

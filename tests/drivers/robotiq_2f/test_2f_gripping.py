@@ -15,6 +15,7 @@ from arcor2_drivers.robotiq_2f.robotiq_2f import Robotiq2F
 from arcor2_drivers.robotiq_2f.settings import Model, Robotiq2FSettings, Wire
 from arcor2_drivers.robotiq_2f.status import FAULTS
 from arcor2_hw.data.device import Connection, Health
+from arcor2_hw.data.object_type import Box
 from arcor2_hw.exceptions import (
     Arcor2Error,
     Cancelled,
@@ -26,6 +27,7 @@ from arcor2_hw.exceptions import (
     Refused,
 )
 from arcor2_hw.objects.small import GripperState
+from tests.drivers.around import Carrier
 from tests.fakes.conftest import FakeProcess
 
 
@@ -109,6 +111,32 @@ def test_lost_part_is_noticed(fake: FakeProcess, gripper: Robotiq2F, wait_for: C
     assert gripper.state() is GripperState.LOST  # until the next command
     gripper.release()
     assert gripper.state() is GripperState.AT_POSITION
+
+
+def test_the_gripped_part_is_attached_to_the_robot(
+    fake: FakeProcess, gripper: Robotiq2F, wait_for: Callable[..., Any]
+) -> None:
+    robot = Carrier()
+    gripper.mount(lambda name: robot, lambda name: robot)
+    fake.control.do("put_part", width=0.04)
+    gripper.grip(0.0, speed=0.15)
+    (part,) = robot.parts.values()
+    assert part.name == "part of gripper"
+    assert isinstance(part.model, Box)
+    assert part.model.size_x == pytest.approx(0.036, abs=1e-3)  # the width that was gripped
+    assert part.in_link.position.z + part.model.size_z / 2.0 <= 0.0, "between the fingers, not beyond"
+    gripper.set_part(0.05, 0.06, 0.07)
+    gripper.grip(0.0, speed=0.15)
+    (part,) = robot.parts.values()
+    assert isinstance(part.model, Box)
+    assert part.model.size_z == pytest.approx(0.066)
+    gripper.release()
+    assert robot.parts == {}
+    gripper.grip(0.0, speed=0.15)
+    assert robot.parts
+    fake.control.do("remove_part")
+    wait_for(lambda: robot.parts, lambda parts: not parts)
+    assert gripper.state() is GripperState.LOST
 
 
 def test_blocked_release_fails(fake: FakeProcess, gripper: Robotiq2F) -> None:

@@ -507,7 +507,8 @@ def test_outputs_and_inputs(ready: UR5e, fake: FakeUr) -> None:
 
 
 def test_pick_and_place_by_the_sensors_word(fake: FakeUr) -> None:
-    robot = make(fake.host, gripper_output=0, part_sensor_input=1)
+    size = {"part_size_x": 0.1, "part_size_y": 0.08, "part_size_z": 0.02, "part_offset_z": 0.01}
+    robot = make(fake.host, gripper_output=0, part_sensor_input=1, **size)
     robot.connect(3.0)
     try:
         robot.take_control()
@@ -517,11 +518,14 @@ def test_pick_and_place_by_the_sensors_word(fake: FakeUr) -> None:
             robot.pick(target, approach=0.05, slow_speed=0.5)
         assert fault.value.fault_code == "nothing_held"
         assert not fake.truth()["digital_outputs"] & 1
+        assert robot.parts == {}
         picking = Doing(robot.pick, target, approach=0.05, slow_speed=0.5)
         fake.control.wait_until(lambda t: t["digital_outputs"] & 1)
         at = robot.get_end_effector_pose("tcp").position
         fake.do("set_input", bit=1, on=True)
         picking.result()
+        part = robot.parts["part of ur"]
+        assert (part.link, part.in_link.position.z) == ("tcp", 0.01)
         assert at.distance_to(target.position) < 0.002, "it grips at the part"
         up = target.position - Position(*Position(0.0, 0.0, 0.05).rotated(target.orientation))
         assert robot.get_end_effector_pose("tcp").position.distance_to(up) < 0.002
@@ -529,6 +533,7 @@ def test_pick_and_place_by_the_sensors_word(fake: FakeUr) -> None:
         fake.control.wait_until(lambda t: not t["digital_outputs"] & 1)
         fake.do("set_input", bit=1, on=False)
         placing.result()
+        assert robot.parts == {}
         with pytest.raises(AssertionError):
             robot.pick(target, approach=0.9)
     finally:

@@ -25,6 +25,7 @@ from arcor2_hw.exceptions import (
     Refused,
     Stale,
 )
+from tests.drivers.around import Carrier
 from tests.fakes.conftest import FakeProcess
 
 from .conftest import Make
@@ -104,6 +105,28 @@ def test_nothing_held_is_an_error_and_the_vacuum_is_off(make: Make, fake: FakePr
     assert not output(fake, VACUUM)
     with pytest.raises(DeviceFault, match="lost its part"):
         gripper.check_part()
+
+
+def test_the_part_is_attached_to_the_robot_until_it_is_released_or_lost(make: Make, fake: FakeProcess) -> None:
+    robot = Carrier()
+    gripper = make(part_size_x=0.1, part_size_y=0.08, part_size_z=0.02, release_time=0.2)
+    gripper.mount(lambda name: robot, lambda name: robot)
+    gripper.connect()
+    gripper.take_control()
+    part(fake, True)
+    gripper.grip()
+    assert [held.name for held in robot.parts.values()] == ["part of gripper"]
+    assert robot.parts["part of gripper"].in_link.position.z == pytest.approx(0.01), "it hangs below the cup"
+    with pytest.raises(DeviceFault, match="sticks"):
+        gripper.release()
+    assert robot.parts, "it sticks"
+    gripper.blow_off()
+    assert robot.parts == {}
+    gripper.grip()
+    assert robot.parts
+    part(fake, False)
+    wait_for(lambda: robot.parts == {})
+    assert [alarm.code for alarm in gripper.alarms()] == ["part_lost"]
 
 
 def test_a_part_that_sticks_is_an_error(make: Make, fake: FakeProcess) -> None:

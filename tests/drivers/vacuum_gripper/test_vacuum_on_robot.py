@@ -9,7 +9,7 @@ import pytest
 from arcor2_drivers.universal_robots.ur5e import UR5e
 from arcor2_drivers.vacuum_gripper.settings import VacuumGripperSettings
 from arcor2_drivers.vacuum_gripper.suction_gripper import SuctionGripper
-from arcor2_hw.exceptions import NotInControl
+from arcor2_hw.exceptions import NotFound, NotInControl
 from tests.drivers.universal_robots.conftest import Doing, FakeUr, make, moving, wait
 
 
@@ -78,6 +78,21 @@ def test_it_grips_while_the_robot_moves_and_keeps_its_part_at_a_stop(
     began = time.monotonic()
     gripper.blow_off()
     assert time.monotonic() - began >= 0.2
+
+
+def test_the_carrier_holds_the_part(robot: UR5e, gripper: SuctionGripper, ur: FakeUr) -> None:
+    gripper.mount(lambda _: robot, lambda name: _no_robot())
+    gripper.take_control()
+    gripper.set_part(0.1, 0.1, 0.02)
+    ur.do("set_input", bit=16, on=True)
+    gripper.grip()
+    assert list(robot.parts) == ["part of gripper"]
+    gripper.off()
+    assert robot.parts == {}
+
+
+def _no_robot() -> UR5e:
+    raise NotFound("the scene has 2 robots")
 
 
 def test_it_grips_during_a_path_of_the_robots_own_program(robot: UR5e, gripper: SuctionGripper, ur: FakeUr) -> None:

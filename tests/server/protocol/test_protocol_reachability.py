@@ -10,6 +10,7 @@ import msgspec
 
 from arcor2_hw.compute.kinematics_tasks import DescribeRobot
 from arcor2_hw.compute.task import Room
+from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import Box, ObjectModel, ObjectTypeSource
 from arcor2_hw.data.project import ProjectRobotJoints
@@ -158,6 +159,9 @@ class Led(Arm):
 
     def move_to_joints(self, target_joints: list[Joint], speed: float, safe: bool = True) -> None:
         self._now = target_joints
+
+    def get_end_effectors_ids(self) -> set[str]:
+        return {"tcp"}
 """
 
 
@@ -199,6 +203,69 @@ async def test_two_arms_are_in_each_others_way_where_they_stand(tmp_path: Path) 
         await reach(free | {stage.ids["arm"]: "in_collision"})
         await stage.stop(alice)
         await reach(free)
+
+
+CLAW = """
+from arcor2_hw.objects import Gripper
+from arcor2_hw.objects.small import GripperState
+
+
+class Claw(Gripper):
+    _ABSTRACT = False
+
+    def activate(self) -> None:
+        self.set_part(0.05, 0.05, 0.15, 0.09)
+
+    def grip(self, width: float, force: float, speed: float) -> tuple[bool, float]:
+        self.attach_part()
+        return True, width
+
+    def release(self) -> None:
+        self.detach_part()
+
+    def state(self) -> GripperState:
+        return GripperState.HOLDING
+"""
+
+
+async def test_a_gripped_part_counts_online(tmp_path: Path) -> None:
+    async with open_stage(tmp_path, "Arm") as stage:
+        alice, bob = await stage.person("alice"), await stage.person("bob")
+        crate = ObjectModel.of(Box("Crate", 0.2, 0.2, 0.2))
+        for kind, source, model in (("Led", LED, UNSET), ("Claw", CLAW, UNSET), ("Crate", CRATE, crate)):
+            await stage.services.types.add(ObjectTypeSource(kind, source.lstrip(), model=model))
+        await alice.ask("NewScene", name="scene")
+        robot = await add(alice, stage, "arm", "Led", Pose())
+        await add(alice, stage, "crate", "Crate", Pose(Position(0.134, 0.492, 0.238)))
+        await alice.ask("AddObjectToScene", name="claw", type="Claw", parameters=[])
+        stage.ids |= {obj.name: obj.id for obj in stage.services.session.require_scene().objects}
+        await alice.ask("SaveScene")
+        await alice.ask("NewProject", scene_id=stage.services.session.require_scene().id, name="project")
+        _, above = await point(alice, stage, "above", 0.134, 0.492, 0.488)
+        await alice.ask("SaveProject")
+        await bob.ask("SubscribeEvents", events=["ReachabilityChanged"])
+        await until(lambda: told(bob) == {above: "reachable"})
+        await stage.start(alice)
+
+        async def claw(method: str, **args: float) -> None:
+            await stage.services.cell.call(stage.ids["claw"], method, args)
+
+        await claw("activate")
+        bob.take()
+        await claw("grip", width=0.0, force=1.0, speed=1.0)
+        await until(lambda: told(bob) == {above: "in_collision"})
+        (row,) = await alice.ask("Reachability", robot_id=robot, ids=[above])
+        assert "part of claw and crate" in row["items"][0]["reason"]
+        assert "part of claw" in stage.services.collisions.everything(stage.services)
+        bob.take()
+        await claw("release")
+        await until(lambda: told(bob) == {above: "reachable"})
+        bob.take()
+        await claw("grip", width=0.0, force=1.0, speed=1.0)
+        await until(lambda: told(bob) == {above: "in_collision"})
+        bob.take()
+        await stage.stop(alice)
+        await until(lambda: told(bob) == {above: "reachable"})
 
 
 async def test_it_ends_with_the_document_and_survives_the_worker(tmp_path: Path) -> None:
