@@ -2,7 +2,8 @@
 
 import builtins
 import enum
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Final, TypeVar, overload
 
 from arcor2_hw.data.object_type import ActionMetadata
@@ -13,7 +14,10 @@ DEFAULT_DEADLINE: Final = 120.0
 OLDER_DEADLINE: Final = 3600.0
 """Seconds for an action marked in the older way, which says nothing of its own: the peer waits for ever."""
 
+NOTHING_RENAMED: Final[Mapping[str, str]] = MappingProxyType({})
+
 F = TypeVar("F", bound=Callable[..., object])
+V = TypeVar("V")
 
 
 class StrEnum(enum.StrEnum):
@@ -45,6 +49,7 @@ def action(
     deadline: float | None = DEFAULT_DEADLINE,
     category: str = "",
     icon: str = "",
+    renamed: Mapping[str, str] = NOTHING_RENAMED,
 ) -> Callable[[F], F]: ...
 
 
@@ -58,6 +63,7 @@ def action(
     deadline: float | None = DEFAULT_DEADLINE,
     category: str = "",  # noqa: ARG001 - read from the source
     icon: str = "",  # noqa: ARG001
+    renamed: Mapping[str, str] = NOTHING_RENAMED,
 ) -> F | Callable[[F], F]:
     """Mark a method as an action.
 
@@ -65,12 +71,14 @@ def action(
     quick: it neither waits nor moves anything and returns within 1 s, so that there is nothing to stop.
     deadline: seconds after which the call is given up as failed; None for one that ends only when it is stopped.
     category, icon: how the editor shows it, where that is not as its type has it.
+    renamed: present names of parameters by former names, which older projects and scripts give.
     """
 
     def mark(function: F) -> F:
         function.__action__ = ActionMetadata(composite=composite, hidden=hidden)  # type: ignore[attr-defined]
         function.__deadline__ = deadline  # type: ignore[attr-defined]
         function.__quick__ = quick  # type: ignore[attr-defined]
+        function.__renamed__ = renamed  # type: ignore[attr-defined]
         return function
 
     return mark if method is None else mark(method)
@@ -85,6 +93,12 @@ def metadata_of(method: object) -> ActionMetadata | None:
 def is_quick(method: object) -> bool:
     """Tell whether an action declares that it returns within 1 s."""
     return bool(getattr(method, "__quick__", False))
+
+
+def with_present_names(method: object, given: Mapping[str, V]) -> dict[str, V]:
+    """Return arguments of an action by the present names of its parameters."""
+    renamed: Mapping[str, str] = getattr(method, "__renamed__", NOTHING_RENAMED)
+    return {renamed.get(name, name): value for name, value in given.items()}
 
 
 def deadline_of(method: object) -> float | None:

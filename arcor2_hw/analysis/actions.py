@@ -14,7 +14,7 @@ from arcor2_hw.actions.parameter_types import Extra, ParameterType
 from arcor2_hw.analysis.constants import EnumMember, constant, enum_members
 from arcor2_hw.analysis.hierarchy import Hierarchy
 from arcor2_hw.analysis.hints import parameter_type_of, results, without_none
-from arcor2_hw.analysis.module import ClassInfo, FunctionNode
+from arcor2_hw.analysis.module import ClassInfo, FunctionNode, Value
 from arcor2_hw.analysis.presentation import of_action, of_type
 from arcor2_hw.analysis.source import Broken, sendable
 from arcor2_hw.analysis.symbols import External, framework_name
@@ -73,8 +73,30 @@ class ActionReader:
                 result[node.name] = ObjectAction(node.name, disabled=True, problem=str(error.problem))
                 continue
             found = self._action(info, node, metadata, seen_from)
-            result[node.name] = replace(found, category=category, icon=icon)
+            result[node.name] = replace(
+                found, category=category, icon=icon, former_names=_former_names(info, node.name) or UNSET
+            )
         return result
+
+    def _renamed(self, owner: ClassInfo, node: FunctionNode) -> dict[str, list[str]]:
+        """Return the former names of parameters that `@action(renamed=...)` states, by their present names."""
+        found: dict[str, list[str]] = {}
+        for decorator in node.decorator_list:
+            if not isinstance(decorator, ast.Call):
+                continue
+            if framework_name(self._resolver.expression(decorator.func, owner.module, owner)) != "action":
+                continue
+            for keyword in decorator.keywords:
+                if keyword.arg == "renamed":
+                    renamed = constant(keyword.value, owner.module, owner, self._resolver)
+                    arguments = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+                    names = {argument.arg for argument in arguments}
+                    if not isinstance(renamed, dict) or not names.issuperset(renamed.values()) or names & set(renamed):
+                        text = f"{node.name}: `renamed` is {{former name: name of a parameter}}"
+                        raise owner.problem(text, keyword.value)
+                    for former, present in renamed.items():
+                        found.setdefault(present, []).append(str(former))
+        return found
 
     def _marked(self, info: ClassInfo) -> list[tuple[FunctionNode, ActionMetadata | Broken]]:
         """Give the methods of a class that are actions to be told of, by name; or what is wrong with their mark."""
@@ -170,6 +192,7 @@ class ActionReader:
         descriptions = described_parameters(text)
         dynamic = self._dynamic(seen_from)
         ranges = _ranges(node)
+        renamed = self._renamed(info, node)
         result = []
         for argument in [*positional, *arguments.kwonlyargs][1:-1]:
             name = argument.arg
@@ -193,6 +216,7 @@ class ActionReader:
                     descriptions.get(name, UNSET),
                     default,
                     extra,
+                    renamed.get(name, UNSET),
                 )
             )
         return result
@@ -249,6 +273,15 @@ class ActionReader:
             return kind.encode(value)
         except InvalidData as error:
             raise info.problem(f"default: {error}", expression) from None
+
+
+def _former_names(owner: ClassInfo, action: str) -> list[str]:
+    """Return the names that a class body gives to an action besides its own: `random_integer = random_int`."""
+    return [
+        name
+        for name, member in owner.members.items()
+        if isinstance(member, Value) and isinstance(member.expression, ast.Name) and member.expression.id == action
+    ]
 
 
 def unit_extra(description: str) -> str | Unset:

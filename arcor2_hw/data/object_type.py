@@ -1,6 +1,7 @@
 """Object types as clients see them: metadata, actions, collision models."""
 
 import enum
+from collections.abc import Iterable
 
 from msgspec import field
 
@@ -104,7 +105,10 @@ class ObjectModel(Data, frozen=True):
 
 
 class ParameterMeta(Data, frozen=True):
-    """One parameter of an action or setting; `extra` and `default_value` are JSON in strings."""
+    """One parameter of an action or setting; `extra` and `default_value` are JSON in strings.
+
+    former_names: names under which older projects give it (ours, beside the protocol).
+    """
 
     name: str
     type: str
@@ -113,6 +117,7 @@ class ParameterMeta(Data, frozen=True):
     description: str | Unset = UNSET
     default_value: str | Unset = UNSET
     extra: str | Unset = UNSET
+    former_names: list[str] | Unset = UNSET
 
 
 class ActionMetadata(Data, frozen=True):
@@ -124,7 +129,10 @@ class ActionMetadata(Data, frozen=True):
 
 
 class ObjectAction(Data, frozen=True):
-    """One action of an object type; category and icon are ours, beside the protocol."""
+    """One action of an object type; category, icon and former_names are ours, beside the protocol.
+
+    former_names: names under which older projects call it.
+    """
 
     name: str
     description: str | Unset = UNSET
@@ -136,6 +144,22 @@ class ObjectAction(Data, frozen=True):
     problem: str | Unset = UNSET
     category: str | Unset = UNSET
     icon: str | Unset = UNSET
+    former_names: list[str] | Unset = UNSET
+
+    def present_name(self, parameter: str) -> str:
+        """Return the present name of a parameter that may be given by a former one."""
+        for each in self.parameters:
+            if not isinstance(each.former_names, Unset) and parameter in each.former_names:
+                return each.name
+        return parameter
+
+
+def find_action(actions: Iterable[ObjectAction], name: str) -> ObjectAction | None:
+    """Return the action that has a name, else one that had it formerly, None if there is neither."""
+    actions = list(actions)
+    present = next((action for action in actions if action.name == name), None)
+    formerly = (each for each in actions if not isinstance(each.former_names, Unset) and name in each.former_names)
+    return present or next(formerly, None)
 
 
 class ObjectTypeMeta(Data, frozen=True):

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, cast
 
 from arcor2_hw.actions import deadline_of, metadata_of
+from arcor2_hw.actions.marking import with_present_names
 from arcor2_hw.exceptions import InvalidData, ProgramFinished, ProgramStopped
 from arcor2_hw.objects import Generic
 from arcor2_hw.runtime.device import PLAIN, STOP_DEADLINE, Device
@@ -56,6 +57,7 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
     what = f"{device.name}.{name}"
 
     def run(an: str | None, arguments: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
+        keywords = with_present_names(bound, keywords)
         shown = _bind(bound, arguments, keywords) if keywords else arguments
         action = program.action_begins(what, an, shown)
         if an is not None:

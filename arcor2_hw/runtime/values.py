@@ -11,6 +11,7 @@ from typing import Any, Final
 import msgspec
 
 from arcor2_hw.actions.json_values import decode_json, decode_picture, encode
+from arcor2_hw.actions.marking import with_present_names
 from arcor2_hw.exceptions import InvalidData
 
 OBJECTS: Final = "arcor2_hw.objects"
@@ -114,7 +115,7 @@ def decode_arguments(bound: Any, arguments: Mapping[str, bytes], whose: str) -> 
         hints = _inherited(cls, function.__name__)
         own = _own_names(cls, function, arguments)
         hints = {own.get(name, name): hint for name, hint in hints.items()} | dict(_signature(function)[1])
-        arguments = {own.get(name, name): raw for name, raw in arguments.items()}
+        arguments = with_present_names(function, {own.get(name, name): raw for name, raw in arguments.items()})
     parameters = list(signature.parameters.values())
     takes_any = any(p.kind is p.VAR_KEYWORD for p in parameters)
     result: dict[str, Any] = {}

@@ -22,7 +22,7 @@ from arcor2_hw.analysis import (
     snapshot,
 )
 from arcor2_hw.data.base import UNSET, Data, Unset
-from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ObjectTypeSource
+from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ObjectTypeSource, find_action
 from arcor2_hw.data.robot import RobotMeta
 from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_hw.runtime.messages import TypeCode
@@ -190,10 +190,9 @@ class ObjectTypes:
             metas[name] = meta
         for name, installed in self._installed.items():
             if installed.file is None and name not in self._uploaded:
-                metas[name] = ObjectTypeMeta(
-                    name, built_in=True, abstract=True, disabled=True, problem=str(installed.problem)
-                )
-                analyses[name] = TypeAnalysis(metas[name], problem=installed.problem)
+                meta = ObjectTypeMeta(name, "", built_in=True, abstract=True, disabled=True)
+                metas[name] = meta = replace(meta, problem=str(installed.problem))
+                analyses[name] = TypeAnalysis(meta, problem=installed.problem)
         robots = {name: self._with_asset(a.robot) for name, a in analyses.items() if a.robot and name in metas}
         metas, robots = dict(sorted(metas.items())), dict(sorted(robots.items()))
         actions = [analyses[name].actions for name in metas]
@@ -270,10 +269,9 @@ class ObjectTypes:
         return [action for action in self._analysis(name).actions if not action.meta.hidden]
 
     def action(self, type_name: str, name: str) -> ObjectAction:
-        """Give one action, also a hidden one."""
-        for action in self._analysis(type_name).actions:
-            if action.name == name:
-                return action
+        """Return one action, by its name or a former one."""
+        if (action := find_action(self._analysis(type_name).actions, name)) is not None:
+            return action
         raise NotFound(f"The object type {type_name} has no action {name!r}.")
 
     def enumerations(self, name: str) -> dict[tuple[str, str], Enumeration]:
@@ -301,8 +299,8 @@ class ObjectTypes:
 
     def files(self) -> list[SourceFile]:
         """Return the sources of installed and then of uploaded types, to be put into another library in this order."""
-        installed = [each.file for each in self._installed.values() if each.file is not None]
-        return [*installed, *(self._library.file(name) for name in self._uploaded)]
+        installed = (each.file for each in self._installed.values() if each.file is not None)
+        return [*installed, *map(self._library.file, self._uploaded)]
 
     def is_uploaded(self, name: str) -> bool:
         """Tell whether a type was uploaded, and so can be changed and deleted."""
@@ -398,7 +396,5 @@ class ObjectTypes:
         if name in BUILT_IN:
             raise InvalidData(f"The object type {name} is built in and cannot be deleted.")
         if name in self._installed and name not in self._uploaded:
-            raise InvalidData(
-                f"The object type {name} belongs to {self._origin(name) or 'an installed distribution'}"
-                " and cannot be deleted. Uninstall that instead."
-            )
+            origin = self._origin(name) or "an installed distribution"
+            raise InvalidData(f"The object type {name} belongs to {origin} and cannot be deleted: uninstall that.")

@@ -463,6 +463,23 @@ class T(bases.Generic):
     assert [p.dynamic_value for p in act.parameters] == [True, True, False, False]
 
 
+def test_former_names_of_actions_and_parameters() -> None:
+    action = the_action(
+        """
+        @action(renamed={"low": "minimum", "least": "minimum", "high": "maximum"})
+        def draw(self, minimum: int, maximum: int, *, an: str | None = None) -> int: ...
+
+        pull = draw
+        """
+    )
+    assert (action.name, action.former_names) == ("draw", ["pull"])
+    assert [parameter.former_names for parameter in action.parameters] == [["low", "least"], ["high"]]
+    assert action.present_name("least") == "minimum"
+    assert action.present_name("other") == "other"
+    plain_action = the_action("@action\ndef draw(self, *, an: str | None = None) -> int: ...")
+    assert plain_action.former_names is msgspec.UNSET
+
+
 AN = "*, an: str | None = None"
 
 
@@ -491,6 +508,8 @@ AN = "*, an: str | None = None"
         (f"def act(self, a: Odd, {AN}) -> None: ...", "Odd.A is no StrEnum member: 1"),
         (f"def act(self, a: enum.Enum, {AN}) -> None: ...", "the type enum.Enum is not supported"),
         (f"@staticmethod\ndef act(self, {AN}) -> None: ...", "an ordinary method"),
+        (f"@action(renamed={{'b': 'c'}})\ndef act(self, a: int, {AN}) -> None: ...", "act: `renamed` is {former name"),
+        (f"@action(renamed={{'a': 'b'}})\ndef act(self, a: int, b: int, {AN}) -> None: ...", "act: `renamed` is"),
     ],
 )
 def test_what_disables_an_action_and_nothing_but_the_action(method: str, problem: str) -> None:

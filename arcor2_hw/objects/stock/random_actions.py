@@ -26,27 +26,31 @@ class RandomActions(Generic):
         super().__init__(obj_id, name, settings)
         self._random = random.Random((settings.seed if settings is not None else 0) or None)
 
-    @action
-    def random_double(self, minimum: float = 0.0, maximum: float = 1.0, *, an: str | None = None) -> float:
-        """Give a number between two others, all equally likely.
+    @action(renamed={"minimum": "range_min", "maximum": "range_max"})
+    def random_double(self, range_min: float = 0.0, range_max: float = 1.0, *, an: str | None = None) -> float:
+        """Return a random number from a range, all equally likely.
 
-        :param minimum: the lowest that may come
-        :param maximum: the highest that may come
+        :param range_min: smallest possible number
+        :param range_max: largest possible number
         """
-        if minimum > maximum:
-            raise InvalidData(f"{self.name}: the minimum {minimum} is above the maximum {maximum}")
-        return self._random.uniform(minimum, maximum)
+        self._check_range(range_min, range_max)
+        return self._random.uniform(range_min, range_max)
 
-    @action
-    def random_integer(self, minimum: int = 1, maximum: int = 6, *, an: str | None = None) -> int:
-        """Give a whole number out of a range, all equally likely.
+    @action(renamed={"minimum": "range_min", "maximum": "range_max"})
+    def random_int(self, range_min: int = 1, range_max: int = 6, *, an: str | None = None) -> int:
+        """Return a random integer from a range, both ends included, all equally likely.
 
-        :param minimum: the lowest that may come
-        :param maximum: the highest that may come
+        :param range_min: smallest possible integer
+        :param range_max: largest possible integer
         """
-        if minimum > maximum:
-            raise InvalidData(f"{self.name}: the minimum {minimum} is above the maximum {maximum}")
-        return self._random.randint(minimum, maximum)
+        self._check_range(range_min, range_max)
+        return self._random.randint(range_min, range_max)
+
+    random_integer = random_int
+
+    def _check_range(self, range_min: float, range_max: float) -> None:
+        if range_min > range_max:
+            raise InvalidData(f"{self.name}: range_min {range_min} is above range_max {range_max}")
 
     @action
     def random_bool(self, probability: float = 0.5, *, an: str | None = None) -> bool:

@@ -860,7 +860,11 @@ export interface NotificationData {
 /** Values of Level in Notification. */
 export type NotificationLevel = "Info" | "Warn" | "Error";
 
-/** One action of an object type; category and icon are ours, beside the protocol. */
+/**
+ * One action of an object type; category, icon and former_names are ours, beside the protocol.
+ *
+ * former_names: names under which older projects call it.
+ */
 export interface ObjectAction {
   name: string;
   description?: string;
@@ -872,6 +876,7 @@ export interface ObjectAction {
   problem?: string;
   category?: string;
   icon?: string;
+  former_names?: string[];
 }
 
 /** Arguments of ObjectAimingAddPoint. */
@@ -1011,7 +1016,11 @@ export interface Parameter {
   value: string;
 }
 
-/** One parameter of an action or setting; `extra` and `default_value` are JSON in strings. */
+/**
+ * One parameter of an action or setting; `extra` and `default_value` are JSON in strings.
+ *
+ * former_names: names under which older projects give it (ours, beside the protocol).
+ */
 export interface ParameterMeta {
   name: string;
   type: string;
@@ -1020,6 +1029,7 @@ export interface ParameterMeta {
   description?: string;
   default_value?: string;
   extra?: string;
+  former_names?: string[];
 }
 
 /** Values of PivotEnum in UpdateObjectPoseUsingRobot. */

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 import msgspec
 
 from arcor2_hw.analysis import Enumeration, Library, SourceFile, TypeAnalysis, module_name
-from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ObjectTypeSource
+from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ObjectTypeSource, find_action
 from arcor2_hw.data.robot import RobotMeta
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import InvalidData, InvalidPackage, NotFound
@@ -44,10 +44,9 @@ class Candidates:
         return found.meta if given is None else msgspec.structs.replace(found.meta, object_model=given.model)
 
     def action(self, type_name: str, name: str) -> ObjectAction:
-        """Give one action, also a hidden one."""
-        for action in self.analysis(type_name).actions:
-            if action.name == name:
-                return action
+        """Return one action, by its name or a former one."""
+        if (action := find_action(self.analysis(type_name).actions, name)) is not None:
+            return action
         raise NotFound(f"The object type {type_name} has no action {name!r}.")
 
     def robot_meta(self, name: str) -> RobotMeta:

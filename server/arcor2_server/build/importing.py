@@ -21,6 +21,7 @@ from arcor2_server.build import package, script, snapshot
 from arcor2_server.build.candidates import Candidates
 from arcor2_server.build.reading import from_script
 from arcor2_server.session.checks import complete_parameters, project_problems
+from arcor2_server.session.renaming import with_present_names
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services
@@ -229,7 +230,7 @@ def _from_script(given: Imported, types: Candidates) -> Project:
     if given.needs_source:
         raise InvalidProject(f"The project {given.project.name} has no logic that its script could be read back into.")
     facts = types.facts(given.scene)
-    project = from_script(given.script, given.scene, given.project, facts)
+    project = from_script(given.script, given.scene, with_present_names(given.scene, given.project, types), facts)
     type_of = {obj.id: obj.type for obj in given.scene.objects}
 
     def filled(action: Action) -> Action:

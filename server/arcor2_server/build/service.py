@@ -19,6 +19,7 @@ from arcor2_hw.exceptions import InvalidProject, NotFound
 from arcor2_server.build import package, points, script, snapshot, versions
 from arcor2_server.build.frame import TypeFacts
 from arcor2_server.object_types import ObjectTypes, PackageType
+from arcor2_server.session.renaming import with_present_names
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services
@@ -130,6 +131,7 @@ class BuildService:
         storage, types = self._services.storage, self._services.types
         project = await storage.project(project_id)
         scene = await storage.scene(project.scene_id)
+        project = with_present_names(scene, project, types)
         used = dict.fromkeys(obj.type for obj in scene.objects)
         for name in used:
             if (meta := types.meta(name)).disabled:

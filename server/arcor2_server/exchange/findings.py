@@ -6,7 +6,7 @@ from typing import Literal
 
 from arcor2_hw.analysis import SourceFile
 from arcor2_hw.data.base import Data, Unset
-from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta
+from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, find_action
 from arcor2_hw.data.project import END, START, Project
 from arcor2_hw.data.robot import RobotMeta
 from arcor2_hw.data.scene import Scene
@@ -15,6 +15,7 @@ from arcor2_server.build import script
 from arcor2_server.build.candidates import Candidates
 from arcor2_server.exchange.archive import PROJECT, SCENE, SCRIPT, Archive, mesh_of
 from arcor2_server.session.checks import project_findings, scene_findings
+from arcor2_server.session.renaming import with_present_names
 
 
 class Finding(Data, frozen=True):
@@ -59,10 +60,9 @@ class Known:
         """Give one action; NotFound."""
         if not self._from_elsewhere(type_name):
             return self.candidates.action(type_name, name)
-        try:
-            return self._actions[type_name][name]
-        except KeyError:
-            raise NotFound(f"The object type {type_name} has no action {name!r}.") from None
+        if (action := find_action(self._actions.get(type_name, {}).values(), name)) is not None:
+            return action
+        raise NotFound(f"The object type {type_name} has no action {name!r}.")
 
     def robot_meta(self, name: str) -> RobotMeta:
         """Give the features of a robot type; NotFound when it is none."""
@@ -96,7 +96,8 @@ def find(archive: Archive, types: Known, assets: Iterable[str] | None = None) ->
         errors = True
         yield Finding(entry, text)
     if archive.project is not None and archive.scene is not None:
-        yield from _program(archive, archive.scene, archive.project, types, errors)
+        project = with_present_names(archive.scene, archive.project, types)
+        yield from _program(archive, archive.scene, project, types, errors)
 
 
 def _document_findings(archive: Archive, types: Known) -> Iterator[tuple[str, str]]:

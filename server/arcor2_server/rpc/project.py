@@ -27,6 +27,7 @@ from arcor2_server.rpc.registry import Context, RequestRefused, rpc
 from arcor2_server.rpc.scene import save_open_scene
 from arcor2_server.session.changes import Kind
 from arcor2_server.session.checks import project_problems
+from arcor2_server.session.renaming import with_present_names
 
 _BARE = BareProject.__struct_fields__
 
@@ -110,7 +111,7 @@ async def open_project(context: Context, args: IdArgs) -> None:
         if problems := project_problems(scene, project, services.types):
             raise RequestRefused(f"{project.name} cannot be opened. {' '.join(problems)}")
         await _save_scene_changes(context)
-        await session.show(session.scene or scene, project)
+        await session.show(session.scene or scene, with_present_names(scene, project, services.types))
         _tell_opened(context)
 
 

@@ -17,6 +17,7 @@ from arcor2_server.rpc.registry import Context, RequestRefused, make_event, rpc
 from arcor2_server.runs import How
 from arcor2_server.services import Services
 from arcor2_server.session.checks import project_problems
+from arcor2_server.session.renaming import with_present_names
 
 log = structlog.get_logger(__name__)
 
@@ -163,6 +164,7 @@ async def _open(services: Services, project_id: str) -> OpenProjectData:
     scene = await services.storage.scene(project.scene_id)
     if problems := project_problems(scene, project, services.types):
         raise RequestRefused(" ".join(problems))
+    project = with_present_names(scene, project, services.types)
     await services.session.show(scene, project)
     return OpenProjectData(scene, project)
 

@@ -30,6 +30,7 @@ from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound
 from arcor2_server.session.document import Document
 from arcor2_server.session.placing import check_parent
+from arcor2_server.session.renaming import with_present_name
 
 
 class Types(Protocol):
@@ -188,7 +189,8 @@ def check_outputs_unique(document: Document, action: Action) -> None:
 
 
 def complete_parameters(action: Action, meta: ObjectAction) -> Action:
-    """Give the action with what is missing filled in from the defaults of the method."""
+    """Return the action with present names, and what is missing filled in from the defaults of the method."""
+    action = with_present_name(action, meta)
     given = {parameter.name: parameter for parameter in action.parameters}
     if len(given) != len(action.parameters):
         raise InvalidData(f"{action.name}: a parameter is given twice.")

@@ -24,6 +24,7 @@ from arcor2_server.session.history import History
 from arcor2_server.session.journal import Journal
 from arcor2_server.session.journal_records import ALL, Base, Recovered, Times
 from arcor2_server.session.open_document import OpenDocument
+from arcor2_server.session.renaming import with_present_names
 from arcor2_server.session.unsaved import Unsaved
 
 if TYPE_CHECKING:
@@ -105,7 +106,7 @@ class Session(OpenDocument):
             saved = await storage.scene(scene.id)
             self._scene_times = replace(Times.of(saved), changed=self._scene_times.changed)
             if project is not None:
-                saved_project = await storage.project(project.id)
+                saved_project = with_present_names(saved, await storage.project(project.id), self._services.types)
                 self._project_times = replace(Times.of(saved_project), changed=self._project_times.changed)
         except NotFound:
             pass  # it was never saved, or is deleted

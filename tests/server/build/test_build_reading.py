@@ -463,6 +463,17 @@ def test_parameters_that_have_a_name_only() -> None:
         from_script(source.replace("speed=0.5", "0.5"), workplace.scene(), workplace.project(), facts)
 
 
+def test_former_names_are_read_as_the_present_ones() -> None:
+    pick = workplace.FACTS["Arm"].actions["pick"]
+    parameters = [replace(each, former_names=[f"old_{each.name}"]) for each in pick.parameters]
+    renamed = {"pick": replace(pick, former_names=["grab"], parameters=parameters)}
+    arm = dataclasses.replace(workplace.FACTS["Arm"], actions={**workplace.FACTS["Arm"].actions, **renamed})
+    older = PICK.replace(".pick(", ".grab(").replace("grip=", "old_grip=")
+    facts = {**workplace.FACTS, "Arm": arm}
+    project = from_script(edited((PICK, older)), workplace.scene(), workplace.project(), facts)
+    assert project == from_script(edited(), workplace.scene(), workplace.project(), facts)
+
+
 def replace_facts(keyword_only: frozenset[tuple[str, str]]) -> TypeFacts:
     return dataclasses.replace(workplace.FACTS["Arm"], keyword_only=keyword_only)
 

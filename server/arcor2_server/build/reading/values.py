@@ -97,11 +97,12 @@ class Values:
                 raise NotUnderstood(keyword.value.lineno, "arguments have to be written one by one")
             if keyword.arg == "an":
                 continue
-            if keyword.arg not in names:
-                raise NotUnderstood(keyword.value.lineno, f"{declared.name} has no parameter {keyword.arg}")
-            if keyword.arg in given:
-                raise NotUnderstood(keyword.value.lineno, f"the parameter {keyword.arg} is given twice")
-            given[keyword.arg] = keyword.value
+            name = declared.present_name(keyword.arg)
+            if name not in names:
+                raise NotUnderstood(keyword.value.lineno, f"{declared.name} has no parameter {name}")
+            if name in given:
+                raise NotUnderstood(keyword.value.lineno, f"the parameter {name} is given twice")
+            given[name] = keyword.value
         for meta in declared.parameters:
             if meta.name not in given and isinstance(meta.default_value, Unset):
                 raise NotUnderstood(call.lineno, f"the parameter {meta.name} of {declared.name} is missing")

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
-from arcor2_hw.data.object_type import ObjectAction
+from arcor2_hw.data.object_type import ObjectAction, find_action
 from arcor2_server.build.flow import BRANCHABLE, END_NODE, Condition
 from arcor2_server.build.frame import NOTE, Frame
 from arcor2_server.build.reading.errors import NotUnderstood, shown
@@ -127,7 +127,7 @@ class Ways:
             case _:
                 raise NotUnderstood(call.lineno, f"{shown(call.func)} is no action of an object of the scene")
         obj = self._frame.index.scene_object(object_id)
-        declared = self._frame.types[obj.type].actions.get(method)
+        declared = find_action(self._frame.types[obj.type].actions.values(), method)
         if declared is None:
             raise NotUnderstood(call.lineno, f"{obj.type} has no action {method}")
         if declared.disabled:

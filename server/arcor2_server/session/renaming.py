@@ -1,0 +1,41 @@
+"""Actions of projects that were made before their object type renamed a method or a parameter."""
+
+from typing import Protocol
+
+from msgspec.structs import replace
+
+from arcor2_hw.data.object_type import ObjectAction
+from arcor2_hw.data.project import Action, Project
+from arcor2_hw.data.scene import Scene
+from arcor2_hw.exceptions import NotFound
+
+
+class Types(Protocol):
+    """What is needed of the object types."""
+
+    def action(self, type_name: str, name: str) -> ObjectAction:
+        """Return the action that has a name or had it formerly; NotFound."""
+
+
+def with_present_name(action: Action, meta: ObjectAction) -> Action:
+    """Return an action that calls its method, and names its parameters, as its object type does now."""
+    object_id, _, method = action.type.partition("/")
+    parameters = [replace(each, name=meta.present_name(each.name)) for each in action.parameters]
+    if parameters != action.parameters:
+        action = replace(action, parameters=parameters)
+    return action if method == meta.name else replace(action, type=f"{object_id}/{meta.name}")
+
+
+def with_present_names(scene: Scene, project: Project, types: Types) -> Project:
+    """Return a project whose actions are called as their object types call them now; unknown ones stay as they are."""
+    type_of = {placed.id: placed.type for placed in scene.objects}
+
+    def renamed(action: Action) -> Action:
+        object_id, _, method = action.type.partition("/")
+        try:
+            return with_present_name(action, types.action(type_of.get(object_id, ""), method))
+        except NotFound:
+            return action
+
+    points = [replace(point, actions=[renamed(action) for action in point.actions]) for point in project.action_points]
+    return project if points == project.action_points else replace(project, action_points=points)
