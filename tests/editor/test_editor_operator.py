@@ -1,5 +1,6 @@
 """The operator's screen in Chromium on the real server: packages, start, pause, stop, results of runs."""
 
+import re
 from collections.abc import AsyncIterator
 
 import pytest
@@ -8,6 +9,7 @@ from playwright.async_api import Browser, expect
 
 from arcor2_hw.client import Client
 from arcor2_hw.data import rpc
+from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.package import PackageStateEnum
 from tests.e2e.harness import Cell
 from tests.editor.screen import VIEWPORTS, Screen, screen_of
@@ -120,3 +122,49 @@ async def test_pause_step_and_stop(cell: Cell, colleague: Client, browser: Brows
         assert (run.end.value, run.stopped_by) == ("stopped", "Olga")
         await screen.press("To the editor")
         await page.get_by_role("heading", name="Workplace").wait_for()
+
+
+async def test_what_a_user_left_open_and_locked_is_no_obstacle(cell: Cell, colleague: Client, browser: Browser) -> None:
+    await colleague.update_presence(view="test")  # shows no project
+    if not await colleague.call("ListPackages"):
+        await cell.build(colleague, (await cell.open(colleague))[1])
+    async with screen_of(browser, cell.url, touch=True) as screen:
+        page = screen.page
+        await at_the_machine(screen)
+        async with Client(cell.url, "Wendy", reconnect=False) as wendy:
+            _, project = await cell.open(wendy)
+            point = project.action_points[0]
+            await wendy.call("AddActionPoint", rpc.AddActionPointArgs("unsaved", Position()))
+            await wendy.call("WriteLock", rpc.WriteLockArgs(point.id))
+            start = page.get_by_role("button", name="Start")
+            why = re.compile(f"not now: Wendy has {project.name} open in the editor")
+            await expect(start).to_have_accessible_name(why)
+        await screen.sees(f"{project.name} was left open in the editor.")
+        gone = page.get_by_role("button", name="Wendy left and still holds locks")
+        await gone.wait_for()
+        asked = page.get_by_role("alertdialog", name="Take over from Wendy?")
+        for name, size in VIEWPORTS.items():
+            await page.set_viewport_size(size)  # type: ignore[arg-type]
+            await screen.settle()
+            assert await screen.faults() == [], name
+            await screen.picture(f"left open {name}")
+            await gone.click()
+            await expect(asked).to_contain_text(
+                re.compile(rf"lost the connection .* holds:{point.name}, since \d\d:\d\d")
+            )
+            await screen.settle()
+            assert await screen.faults() == [], name
+            await screen.picture(f"take over {name}")
+            await asked.get_by_role("button", name="Cancel").click()
+        await gone.click()
+        await asked.get_by_role("button", name="Take over").click()
+        await screen.sees(f"You took over from Wendy: {point.name}.")
+        await expect(gone).to_have_count(0)
+        await screen.press("Start")
+        await page.get_by_role("button", name="Stop", exact=True).click(timeout=BEGUN)
+        await screen.sees(f"{project.name} was left open in the editor.")
+        async with Client(cell.url, "Wendy", reconnect=False) as wendy:
+            opened = (await wendy.next_event("OpenProject", timeout=10)).data.project
+            assert "unsaved" in [each.name for each in opened.action_points]
+            notice = (await wendy.next_event("Notification", timeout=10)).data.message
+            assert notice.startswith("Olga took over what you had locked")

@@ -15,7 +15,13 @@ export function forgetPresence(): void {
   told = "";
 }
 
+/** The operator's screen shows no document: what is open there does not keep a program from starting. */
+function atOperatorScreen(): boolean {
+  return typeof location !== "undefined" && location.hash.startsWith("#/operator");
+}
+
 export function presenceOf(state: State): Presence {
+  if (atOperatorScreen()) return { document: "", selected: [], view: "operator" };
   const { selection, aimed } = state.ui;
   return {
     document: openId(state),

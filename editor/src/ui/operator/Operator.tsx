@@ -3,14 +3,16 @@
  * operator role only. `/#/operator?kiosk` has no link to the editor.
  */
 
-import { useState } from "react";
+import { useEffect, useState } from "react";
 import { barred } from "../../commands/asking";
 import * as commands from "../../commands/run";
 import { keepGeneral } from "../../commands/viewstate";
 import { dismissal, lastRun, type Result, resultOf, undismissedRun } from "../../program/results";
+import { tellPresence } from "../../session/presence";
+import { usersOfDocument } from "../../store/left";
 import { isRunning } from "../../store/selectors";
 import type { State } from "../../store/state";
-import { useEditor } from "../../store/store";
+import { now, useEditor } from "../../store/store";
 import { Icon, type IconName } from "../kit/icons";
 import { Button } from "../kit/kit";
 import { nameOf, withNames } from "../names";
@@ -38,7 +40,7 @@ function shownState(state: State, starting: boolean, result: Result | null): Sho
   if (starting) return { tone: "idle", word: "Starting…", icon: "play" };
   if (isRunning(state)) return phase === "paused" ? { tone: "paused", word: STATES[phase], icon: "pause" } : { tone: "running", word: STATES[phase], icon: "play" };
   if (result) return { tone: TONES[result.tone], word: result.title, icon: ICONS[result.tone] };
-  if (state.live.state === "started") return { tone: "idle", word: "Devices are in use by the editor", icon: "plug" };
+  if (state.live.state === "started" && usersOfDocument(state).length > 0) return { tone: "idle", word: "Devices are in use by the editor", icon: "plug" };
   return { tone: "idle", word: "Ready", icon: "check" };
 }
 
@@ -55,10 +57,17 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
   const result = resultOf(run ?? undefined);
   useTicking();
   const { tone, word, icon } = shownState(state, starting, result);
+  // Which screen is shown is no part of the state that the presence follows.
+  useEffect(() => {
+    tellPresence(now(), now);
+    return () => tellPresence(now(), now);
+  }, []);
+  const opened = doc && !runs ? (doc.project?.name ?? doc.scene.name) : "";
+  const users = usersOfDocument(state);
   const why = !known
     ? "There is no package yet: build one in the editor."
-    : doc && !runs
-      ? `${doc.project?.name ?? doc.scene.name} is open in the editor: close it first.`
+    : opened && users.length > 0
+      ? `${new Intl.ListFormat("en").format(users)} ${users.length === 1 ? "has" : "have"} ${opened} open in the editor. Ask them to close it.`
       : barred(state, "RunPackage");
   const start = async () => {
     if (!known) return;
@@ -125,6 +134,7 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
             <Button look="primary" icon="play" className="operator-go" why={why} isDisabled={starting} onPress={() => void start()}>
               Start
             </Button>
+            {opened && <p className="quiet">{users.length > 0 ? why : `${opened} was left open in the editor. It is set aside while the program runs and keeps its unsaved changes.`}</p>}
           </section>
         )}
         <History />

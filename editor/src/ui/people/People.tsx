@@ -1,10 +1,17 @@
-/** Who is here. */
+/** Who is connected, and who left and still holds locks. */
 
+import { Suspense, useState } from "react";
+import { serves } from "../../session/session";
+import { goneHolders } from "../../store/left";
 import { now, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
+import { Button } from "../kit/kit";
+import { lazily } from "../kit/lazily";
 import { nameOf } from "../names";
 import { colourOf, initials } from "./colours";
 import "./people.css";
+
+const TakeOver = lazily(() => import("./TakeOver"));
 
 export function People() {
   const users = useEditor((state) => state.users);
@@ -30,6 +37,33 @@ export function People() {
           <Icon name="people" size={16} />+{names.length - shown.length}
         </span>
       )}
+      <Gone />
     </div>
+  );
+}
+
+/** Users who left and still hold locks; pressing one offers to take over. */
+function Gone() {
+  // Joined to a text: a selector has to return the same value for the same state.
+  const gone = useEditor((state) => goneHolders(state).join("\n"));
+  const [asked, setAsked] = useState("");
+  if (!serves("TakeOverLocks")) return null;
+  return (
+    <>
+      {gone.split("\n").filter(Boolean).map((name) => (
+        <Button key={name} look="plain" className="gone" aria-label={`${name} left and still holds locks: take over`} onPress={() => setAsked(name)}>
+          <span className="person" aria-hidden="true">
+            {initials(name)}
+          </span>
+          <Icon name="lock" size={16} />
+          <span className="gone-word">{name} left</span>
+        </Button>
+      ))}
+      {asked && (
+        <Suspense fallback={null}>
+          <TakeOver user={asked} onClose={() => setAsked("")} />
+        </Suspense>
+      )}
+    </>
   );
 }

@@ -1,13 +1,17 @@
 /** Who else holds the selected thing, since when, and what can be done about it. */
 
-import { useEffect, useState } from "react";
+import { Suspense, useEffect, useState } from "react";
 import { askFor, noLongerAsk } from "../../../commands/handover";
 import { hasAsked } from "../../../store/handover";
 import { heldBy } from "../../../store/selectors";
 import { useEditor } from "../../../store/store";
+import { serves } from "../../../session/session";
 import { Icon } from "../../kit/icons";
 import { Button } from "../../kit/kit";
+import { lazily } from "../../kit/lazily";
 import { ago } from "../../times";
+
+const TakeOver = lazily(() => import("../../people/TakeOver"));
 
 export default function Holder({ id }: { id: string }) {
   const holder = useEditor((state) => heldBy(state, id));
@@ -15,16 +19,17 @@ export default function Holder({ id }: { id: string }) {
   const here = useEditor((state) => state.users[holder]?.online === true);
   const asked = useEditor((state) => hasAsked(state, id));
   const [, tick] = useState(0);
+  const [taking, setTaking] = useState(false);
   useEffect(() => {
     const timer = setInterval(() => tick((count) => count + 1), 20_000);
     return () => clearInterval(timer);
   }, []);
   if (!holder) return null;
-  const how = here ? `It is free when ${holder} is done with it, or some minutes after ${holder}'s connection is lost.` : `${holder} is not connected: it becomes free by itself within some minutes.`;
+  const how = here ? `It is free when ${holder} is done with it, or a few minutes after ${holder} loses the connection.` : `${holder} lost the connection. It is free in a few minutes, or when somebody takes over.`;
   return (
     <div className="holder" role="status">
       <p className="tag warn">
-        <Icon name="lock" size={16} /> {holder} works on it
+        <Icon name="lock" size={16} /> {here ? `${holder} works on it` : `Locked by ${holder}, who left`}
       </p>
       <p className="quiet small">
         {since > 0 && `Since ${new Date(since).toLocaleTimeString("en-GB", { hour: "2-digit", minute: "2-digit" })}, ${ago(new Date(since).toISOString())}. `}
@@ -40,6 +45,16 @@ export default function Holder({ id }: { id: string }) {
             Ask {holder} for it
           </Button>
         ))}
+      {!here && serves("TakeOverLocks") && (
+        <Button icon="lock" onPress={() => setTaking(true)}>
+          Take over…
+        </Button>
+      )}
+      {taking && (
+        <Suspense fallback={null}>
+          <TakeOver user={holder} onClose={() => setTaking(false)} />
+        </Suspense>
+      )}
     </div>
   );
 }

@@ -1,0 +1,24 @@
+/** Users who left: what they still hold, and whether anybody still has the open document open. Pure. */
+
+import type { State } from "./state";
+
+/** Users who hold locks but are not connected. */
+export function goneHolders(state: State): string[] {
+  if (state.connection.status !== "ready") return [];
+  const owners = new Set(Object.values(state.locks));
+  return [...owners].filter((name) => name !== state.connection.user && !state.users[name]?.online).sort();
+}
+
+/** Others who have the open document open, by the server's rule for RunPackage (docs/protocol.md). */
+export function usersOfDocument(state: State): string[] {
+  if (!state.doc) return [];
+  const ids = [state.doc.project?.id, state.doc.scene.id];
+  const owners = new Set(Object.values(state.locks));
+  return Object.values(state.users)
+    .filter(({ user, online, role, presence }) => {
+      if (!online || user === state.connection.user) return false;
+      return owners.has(user) || (presence ? ids.includes(presence.document) : role !== "operator");
+    })
+    .map(({ user }) => user)
+    .sort();
+}
