@@ -102,7 +102,7 @@ def test_a_killed_owner_stops_the_arm_at_once(owner: Owner, fake: FakeUr) -> Non
     process.kill()
     stopped_within(fake, 0.5)
     wait(lambda: not child.is_running() or child.status() == psutil.STATUS_ZOMBIE, 1.0)
-    assert fake.truth()["program"] is None
+    fake.control.wait_until(lambda t: t["program"] is None, 1.0)
 
 
 def test_the_controllers_watchdog_stops_the_arm_when_the_computer_dies(owner: Owner, fake: FakeUr) -> None:
