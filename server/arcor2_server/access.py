@@ -13,6 +13,7 @@ from litestar.handlers import BaseRouteHandler, WebsocketRouteHandler
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.connection_limits import CONNECTION
 from arcor2_server.rest.answers import OPEN, PERSON, ROLE
 from arcor2_server.settings import ServerSettings
 from arcor2_server.tokens import FILE, Token, TokenFile
@@ -158,6 +159,9 @@ def role_needed(connection: ASGIConnection[Any, Any, Any, Any], handler: BaseRou
     except AccessRefused as error:
         raise NotAuthorizedException(str(error), headers={"WWW-Authenticate": "Bearer"}) from None
     role = admission.role
+    extensions: dict[str, Any] = connection.scope.get("extensions") or {}
+    if role is not None and CONNECTION in extensions:
+        extensions[CONNECTION].admit()
     if admission.token is not None:
         connection.state[PERSON] = admission.token.name
     if role is None:

@@ -47,6 +47,9 @@ class Wire(Protocol):
     async def close(self, code: int, reason: str) -> None:
         """Send a close frame and end the connection."""
 
+    def admit(self) -> None:
+        """Count the connection among those of admitted clients."""
+
     def abort(self) -> None:
         """Drop the connection at once."""
 
@@ -88,6 +91,7 @@ class Client:
     def admit(self, role: Role, token: Token | None = None) -> None:
         """Let the client in."""
         self.role, self.token, self.admitted = role, token, True
+        self._wire.admit()
         if token is not None:
             log.info("client admitted", client=self.number, token=token.id, name=token.name, role=role.name.lower())
 

@@ -100,6 +100,7 @@ class _SocketWire:
         self.send = protocol.send_text
         self.send_now = protocol.send_text_now
         self.ping = protocol.ping
+        self.admit = protocol.admit
         self.abort = protocol.abort
 
     async def close(self, code: int, reason: str) -> None:

@@ -79,6 +79,12 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     outgoing_age: float = 10.0
     """A client that takes nothing for so long is closed, as is one with more than the two numbers above waiting."""
     ping_interval: float = 20.0
+    connections: int = 0
+    """Connections that the server holds at most; 0: as many as the limit of open files allows, 4000 at most."""
+    connections_per_address: int = 200
+    """Connections from one address at most whose client is not, or not yet, admitted."""
+    request_timeout: float = 10.0
+    """Seconds for a TLS handshake, for the head of a request, and for a body or an answer that makes no progress."""
 
     def __post_init__(self) -> None:
         for proxy in self.trusted_proxies:
@@ -188,6 +194,9 @@ _VARIABLES: Final = {
     "ARCOR2_HW_OUTGOING_BYTES": "outgoing_bytes",
     "ARCOR2_HW_OUTGOING_AGE": "outgoing_age",
     "ARCOR2_HW_PING_INTERVAL": "ping_interval",
+    "ARCOR2_HW_CONNECTIONS": "connections",
+    "ARCOR2_HW_CONNECTIONS_PER_ADDRESS": "connections_per_address",
+    "ARCOR2_HW_REQUEST_TIMEOUT": "request_timeout",
 }
 _LISTS: Final = {"allowed_hosts": ",", "trusted_proxies": ",", "device_files": os.pathsep}
 """Settings that are lists, with the separator."""

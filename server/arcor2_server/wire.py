@@ -2,22 +2,31 @@
 
 import asyncio
 import secrets
-from typing import Any
+from typing import Any, Final
 
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.exceptions import InvalidState
 from websockets.frames import Frame
 from websockets.http11 import Request
 
-EXTENSION = "arcor2_hw.wire"
+from arcor2_server.connection_limits import Connection
+
+CLOSE_WITHIN: Final = 1.0
+"""Seconds that a client without a pong has to take the close frame."""
+LONGEST_UNADMITTED: Final = 64 * 1024
+"""Bytes of a message at most from a client that is not admitted; a longer one closes the connection."""
+EXTENSION: Final = "arcor2_hw.wire"
 """The key under which an ASGI scope's extensions hold the connection's WireProtocol."""
 
 
 class WireProtocol(WebSocketsSansIOProtocol):
     """uvicorn's protocol, which ASGI alone does not let send a ping, drop a connection or write encoded text."""
 
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
+    def __init__(self, *args: Any, connection: Connection, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
+        self._connection = connection
+        self._max_size = self.conn.max_message_size
+        self.conn.max_message_size = LONGEST_UNADMITTED
         self._pongs: dict[bytes, asyncio.Future[None]] = {}
 
     def handle_connect(self, event: Request) -> None:
@@ -34,9 +43,25 @@ class WireProtocol(WebSocketsSansIOProtocol):
         elif not waiter.done():
             waiter.set_result(None)
 
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Take over a connection whose handshake is to be answered."""
+        super().connection_made(transport)
+        self._connection.drop = self.abort
+
+    def admit(self) -> None:
+        """Count the connection among those of admitted clients, and take its long messages."""
+        self._connection.admit()
+        self.conn.max_message_size = self._max_size
+
+    def keepalive_timeout(self) -> None:
+        """Close the connection; drop it where the other side does not even take the close frame."""
+        super().keepalive_timeout()
+        self.loop.call_later(CLOSE_WITHIN, self.abort)
+
     def connection_lost(self, exc: Exception | None) -> None:
         """Tell those who wait for a pong that there will be none."""
         super().connection_lost(exc)
+        self._connection.close()
         for waiter in self._pongs.values():
             if not waiter.done():
                 waiter.set_exception(ConnectionError("the connection is lost"))

@@ -9,13 +9,12 @@ import importlib
 import signal
 import socket
 import sys
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from pathlib import Path
 from typing import IO, Annotated, Literal
 
 import msgspec
 import structlog
-import uvicorn
 import uvloop
 from cyclopts import Parameter, validators
 
@@ -46,9 +45,6 @@ PREPARED_AFTER = 0.5
 
 COLLECTION = (700, 10, 10)
 """The interpreter's default thresholds, which `main` raises for the imports."""
-
-GRACE = 2
-"""Seconds that open requests get to end; the contract allows 5 for everything."""
 
 
 class CannotServe(Exception):
@@ -253,6 +249,8 @@ async def run(
     StorageError when the data cannot be used.
     """
     from arcor2_server.app import create_app, running_services
+    from arcor2_server.connection_limits import ConnectionLimits
+    from arcor2_server.http_server import Server, configuration
 
     async with running_services(settings) as services:
         for notice in services.damage.notices:
@@ -270,7 +268,7 @@ async def run(
 
         loop = asyncio.get_running_loop()
         config = configuration(create_app(services), settings, certificate)
-        server = Server(config, settings.host, legacy, when_ready)
+        server = Server(config, settings, ConnectionLimits.of(settings), legacy, when_ready)
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, server.end)
         try:
@@ -280,74 +278,6 @@ async def run(
             if error.errno != errno.EADDRINUSE:
                 raise
             raise _no_port(settings.host, listeners[0].getsockname()[1], error) from error
-
-
-def configuration(
-    app: object, settings: ServerSettings, certificate: tuple[Path, Path] | None = None
-) -> uvicorn.Config:
-    """Give uvicorn's configuration: one process, no compression, our websocket."""
-    from arcor2_server.wire import WireProtocol
-
-    return uvicorn.Config(
-        app,  # type: ignore[arg-type]
-        ws=WireProtocol,
-        http="httptools",
-        log_config=None,
-        access_log=False,
-        server_header=False,
-        proxy_headers=bool(settings.trusted_proxies),
-        forwarded_allow_ips=list(settings.trusted_proxies),
-        ws_max_size=settings.drained_size,
-        ws_ping_interval=settings.ping_interval,
-        ws_ping_timeout=settings.ping_interval,
-        ws_per_message_deflate=False,
-        timeout_graceful_shutdown=GRACE,
-        ssl_certfile=certificate[0] if certificate else None,
-        ssl_keyfile=certificate[1] if certificate else None,
-    )
-
-
-class Server(uvicorn.Server):
-    """uvicorn's server, which says when it is ready and leaves signals to us."""
-
-    def __init__(
-        self, config: uvicorn.Config, host: str, legacy: socket.socket | None, when_ready: Callable[[], None]
-    ) -> None:
-        super().__init__(config)
-        self._host = host
-        self._legacy = legacy
-        self._when_ready = when_ready
-
-    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Start, then say where."""
-        await super().startup(sockets=sockets)
-        if self.started and sockets:
-            if self._legacy is not None:
-                self.servers.append(await self._listen_without_tls(self._legacy))
-            scheme = "wss" if self.config.is_ssl else "ws"
-            host = f"[{self._host}]" if ":" in self._host else self._host
-            sys.stdout.write(f"ready {scheme}://{host}:{sockets[0].getsockname()[1]}\n")
-            sys.stdout.flush()
-            self._when_ready()
-
-    async def _listen_without_tls(self, listener: socket.socket) -> asyncio.Server:
-        """Serve at one more socket; uvicorn itself gives all of them the same TLS."""
-
-        def connected() -> asyncio.Protocol:
-            return self.config.http_protocol_class(  # type: ignore[call-arg]
-                config=self.config, server_state=self.server_state, app_state=self.lifespan.state
-            )
-
-        return await asyncio.get_running_loop().create_server(connected, sock=listener, backlog=self.config.backlog)
-
-    @contextlib.contextmanager
-    def capture_signals(self) -> Generator[None, None, None]:
-        """Leave the signals alone: uvicorn would raise them again at the end, and the status were not 0."""
-        yield
-
-    def end(self) -> None:
-        """End in order."""
-        self.should_exit = True
 
 
 @contextlib.contextmanager

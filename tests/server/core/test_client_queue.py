@@ -37,6 +37,8 @@ class ValveWire(Wire):
         await self.open.wait()
         self.closed = (code, reason)
 
+    def admit(self) -> None: ...
+
     def abort(self) -> None:
         self.aborted = True
         self.open.set()

@@ -183,6 +183,8 @@ class _Socket:
     async def ping(self) -> None:
         raise ConnectionError
 
+    def admit(self) -> None: ...
+
     def abort(self) -> None: ...
 
 
