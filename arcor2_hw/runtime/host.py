@@ -96,6 +96,7 @@ class Host:
     def run(self) -> int:
         """Serve until the scene or the program is over; gives the exit status."""
         logging.basicConfig(level=logging.INFO, format="%(name)s: %(message)s", handlers=[_LogHandler(self.link)])
+        logging.getLogger("httpx").setLevel(logging.WARNING)  # it logs every request, and drivers poll
         self.clock.every(m.HEARTBEAT_PERIOD, lambda: self.link.post(m.Heartbeat()))
         self.clock.every(OBSERVE_PERIOD, lambda: self._watch.look())
         self.clock.every(NUDGE_PERIOD, self._nudge)

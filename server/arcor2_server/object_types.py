@@ -20,6 +20,7 @@ from arcor2_hw.analysis import (
     installed_types,
     module_name,
     snapshot,
+    worker,
 )
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ObjectTypeSource, find_action
@@ -146,7 +147,8 @@ class ObjectTypes:
                 log.warning("uploaded object type shadows an installed one", type=name, of=self._origin(name))
             self._uploaded[name] = one
         # Off the event loop: a hundred types take a moment to read.
-        known = await asyncio.to_thread(self._analyse, await self._storage.types_without_model())
+        complete = await self._analyse_huge()
+        known = await asyncio.to_thread(self._analyse, await self._storage.types_without_model(), complete)
         self._known = known
         self._pending.set_current(known.metas)
         if first:
@@ -169,8 +171,8 @@ class ObjectTypes:
         installed = self._installed[name]
         return f"{installed.distribution} {installed.version}".strip()
 
-    def _analyse(self, without_model: set[str]) -> _Known:
-        if self._stored_analysis is not None and not self._restored(self._stored_analysis):
+    def _analyse(self, without_model: set[str], store: bool) -> _Known:
+        if store and self._stored_analysis is not None and not self._restored(self._stored_analysis):
             self._store(self._stored_analysis)
         analyses = {name: self._library.analyse(name) for name in self._library.names()}
         metas = {}
@@ -198,6 +200,24 @@ class ObjectTypes:
         actions = [analyses[name].actions for name in metas]
         digest = hashlib.sha256(msgspec.msgpack.encode((metas, robots, actions))).hexdigest()
         return _Known(analyses, metas, robots, digest)
+
+    async def _analyse_huge(self) -> bool:
+        """Analyse all types in another process if one of them would keep this one busy for long.
+
+        Return whether the results may be stored: not if the analysis failed, which disables the huge types.
+        """
+        if not worker.is_needed(self._library) or (
+            self._stored_analysis is not None and await asyncio.to_thread(self._restored, self._stored_analysis)
+        ):
+            return True
+        try:
+            encoded = await worker.analyse(self._library)
+        except InvalidData as error:
+            log.error("huge object types not analysed", reason=str(error), detail=error.detail)
+            worker.give_up(self._library, f"{error} Split the source into modules.")
+            return False
+        await asyncio.to_thread(snapshot.restore, self._library, encoded)
+        return True
 
     def _restored(self, file: Path) -> bool:
         """Take over the analysis stored by an earlier process; return False if it is missing or outdated."""

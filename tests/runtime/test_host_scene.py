@@ -341,3 +341,22 @@ def test_an_object_reaches_another_by_name_while_that_is_busy(host: HostProcess)
     assert host.call("obj_a", "ask", name="obj_b") == "quick"
     assert host.call("obj_a", "ask", name="c").code == "not_found"
     assert host.answer(hang) == "late", "b was busy all the time"
+
+
+def test_a_polled_service_does_not_fill_the_log(host: HostProcess) -> None:
+    source = """
+    import logging
+
+    class Poller(Generic):
+        _ABSTRACT = False
+
+        def poll(self) -> None:
+            logging.getLogger("httpx").info("HTTP Request: POST http://127.0.0.1/orders/next")
+            logging.getLogger("httpx").warning("httpx warns")
+            logging.getLogger("poller").info("an order")
+    """
+    host.send(open_scene([type_code("Poller", source)], scene_object("poller", "Poller")))
+    host.expect(m.SceneOpened)
+    assert host.call("obj_poller", "poll") is None
+    lines = [each.text for each in host.seen if isinstance(each, m.LogLine)]
+    assert lines == ["httpx: httpx warns", "poller: an order"]

@@ -6,7 +6,6 @@ Bodies and queries travel in camelCase, results are read back into snake_case, e
 
 import enum
 import io
-import logging
 import threading
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, overload
 
@@ -65,7 +64,6 @@ class _Session:
     def client(self) -> httpx.Client:
         with self._lock:
             if self._client is None:
-                logging.getLogger("httpx").setLevel(logging.WARNING)  # it would tell of each call
                 # Devices stand in the local network: no proxy of the environment.
                 self._client = httpx.Client(trust_env=False, follow_redirects=True)
             return self._client

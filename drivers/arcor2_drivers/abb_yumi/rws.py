@@ -1,7 +1,6 @@
 """Robot Web Services 1.0 (RobotWare 6): a session with digest authentication, questions, acts, ABB's own errors."""
 
 import contextlib
-import logging
 import math
 import ssl
 import threading
@@ -22,8 +21,6 @@ Fields = dict[str, str]
 
 _NO_TLS: Final = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
 """Trusts nobody and is never used; without it every new client reads the certificates of the system, 20 ms long."""
-
-logging.getLogger("httpx").setLevel(logging.WARNING)  # it tells of every request otherwise, sixty a second
 
 
 class Rws:

@@ -1,12 +1,17 @@
 """The registry of object types on a storage, and what clients are told of it."""
 
+import ast
 import re
+import shutil
+import sys
 from collections.abc import AsyncIterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from msgspec import UNSET
 
+from arcor2_hw.analysis import Library, worker
 from arcor2_hw.data.object_type import Box, Mesh, ObjectModel, ObjectTypeSource, Sphere
 from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_server.object_types import ObjectTypes
@@ -49,6 +54,13 @@ COLOURS = """
 class Colours:
     pass
 """
+
+
+HUGE = (
+    "from arcor2_hw.actions import action\nfrom arcor2_hw.objects import Generic\n\n\nclass Huge(Generic):\n"
+    "    _ABSTRACT = False\n"
+    + "".join(f"    @action\n    def act_{n}(self, *, an: str | None = None) -> None: ...\n" for n in range(1000))
+)
 
 
 @pytest.fixture
@@ -456,3 +468,56 @@ def test_defaults_are_not_shared() -> None:
     assert Changes().added is not Changes().added
     assert not Changes()
     assert ObjectTypeSource("x", "").model is UNSET
+
+
+# ------------------------------------------------------------------------------------------------ huge sources
+@pytest.fixture
+def parsed(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The lengths of the sources that this process parses."""
+    lengths: list[int] = []
+    parse = ast.parse
+
+    def noted(source: str | bytes, *args: Any, **kwargs: Any) -> Any:
+        lengths.append(len(source))
+        return parse(source, *args, **kwargs)
+
+    monkeypatch.setattr(ast, "parse", noted)
+    return lengths
+
+
+async def test_a_huge_source_is_parsed_by_another_process(
+    types: ObjectTypes, storage: Storage, parsed: list[int]
+) -> None:
+    assert len(HUGE) > worker.HUGE
+    meta = await types.add(ObjectTypeSource("Huge", HUGE))
+    assert not meta.disabled
+    assert len(types.actions("Huge")) == 1000
+    await put_lamps(storage)
+    await types.take_in()
+    assert "Lamp" in types.names()
+    assert len(types.type_code("Huge").source) == len(HUGE)
+    assert not [length for length in parsed if length > worker.HUGE]
+
+
+async def test_a_huge_source_that_takes_too_long_is_disabled(
+    storage: Storage, assets: AssetStore, tmp_path: Path, parsed: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stored = tmp_path / "analysis"
+    types = ObjectTypes(storage, assets, stored)
+    await types.load()
+    before = stored.read_bytes()
+    monkeypatch.setattr(worker, "WITHIN", 0.0)
+    meta = await types.add(ObjectTypeSource("Huge", HUGE))
+    assert meta.disabled
+    assert "not analysed within 0 s. Split the source" in str(meta.problem)
+    await put_lamps(storage)
+    await types.take_in()
+    assert not types.meta("Lamp").disabled
+    assert stored.read_bytes() == before, "what failed once is tried again at the next start"
+    assert not [length for length in parsed if length > worker.HUGE]
+
+
+async def test_a_process_that_fails_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "executable", shutil.which("false"))
+    with pytest.raises(InvalidData, match="failed"):
+        await worker.analyse(Library())

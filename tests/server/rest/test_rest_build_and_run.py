@@ -306,7 +306,7 @@ async def test_an_upload_of_a_hundred_megabytes_does_not_stop_the_others(server:
         # Who goes away in the middle has given it up.
         _, writer = await asyncio.open_connection(*base(server).removeprefix("http://").split(":"))
         writer.write(
-            b"POST /packages/pkg_cut HTTP/1.1\r\nHost: x\r\nContent-Length: 5000000\r\n"
+            b"POST /packages/pkg_cut HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5000000\r\n"
             b"Content-Type: multipart/form-data; boundary=cut\r\n\r\n--cut\r\n"
             b'Content-Disposition: form-data; name="executionPackage"; filename="a.zip"\r\n\r\n' + bytes(1_000_000)
         )

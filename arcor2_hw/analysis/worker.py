@@ -1,0 +1,82 @@
+"""The analysis of a library in a process of its own: parsing one huge source keeps the interpreter lock for seconds.
+
+`python -m arcor2_hw.analysis.worker` reads the sources from standard input and writes the results to standard output.
+"""
+
+import asyncio
+import sys
+from typing import Final
+
+import msgspec
+
+from arcor2_hw.analysis.library import BUILT_IN, Library
+from arcor2_hw.analysis.snapshot import StoredSource, take
+from arcor2_hw.analysis.source import Problem
+from arcor2_hw.analysis.type_analysis import TypeAnalysis
+from arcor2_hw.data.object_type import ObjectTypeMeta
+from arcor2_hw.exceptions import InvalidData
+
+HUGE: Final = 64 * 1024
+"""Characters of a source that is analysed in a process of its own; a shorter one is parsed in some 20 ms."""
+WITHIN: Final = 30.0
+"""Seconds for the analysis of all sources."""
+_encode = msgspec.msgpack.Encoder().encode
+
+
+def _huge(library: Library) -> list[str]:
+    return [name for name in library.names() if name not in BUILT_IN and len(library.file(name).source) > HUGE]
+
+
+def is_needed(library: Library) -> bool:
+    """Return whether a library holds a source that is too long to be parsed in the process of the server."""
+    return bool(_huge(library))
+
+
+def give_up(library: Library, reason: str) -> None:
+    """Disable the types of huge sources, whose analysis failed."""
+    library.put_analyses(
+        {
+            name: TypeAnalysis(
+                ObjectTypeMeta(name, abstract=True, disabled=True, problem=reason), problem=Problem(reason, name, 1)
+            )
+            for name in _huge(library)
+        },
+        {},
+    )
+
+
+async def analyse(library: Library) -> bytes:
+    """Analyse all types of a library in another process, and return the results encoded for `snapshot.restore`.
+
+    Raises:
+        InvalidData: The process failed, or took longer than `WITHIN` seconds and was ended.
+    """
+    sources = [StoredSource.of(library.file(name)) for name in library.names() if name not in BUILT_IN]
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-P", "-m", __name__),
+        stdin=asyncio.subprocess.PIPE,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.PIPE,
+    )
+    try:
+        async with asyncio.timeout(WITHIN):
+            encoded, errors = await process.communicate(_encode(sources))
+    except TimeoutError:
+        raise InvalidData(f"The sources were not analysed within {WITHIN:g} s.") from None
+    finally:
+        if process.returncode is None:
+            process.kill()
+            await process.wait()
+    if process.returncode != 0:
+        raise InvalidData("The analysis of the sources failed.", errors.decode(errors="replace")[-2000:])
+    return encoded
+
+
+def main() -> None:
+    """Analyse what comes by standard input."""
+    sources = msgspec.msgpack.decode(sys.stdin.buffer.read(), type=list[StoredSource])
+    sys.stdout.buffer.write(take(Library(stored.file() for stored in sources)))
+
+
+if __name__ == "__main__":
+    main()
