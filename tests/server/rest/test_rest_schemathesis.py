@@ -49,7 +49,9 @@ class Loop:
 
     async def _serve(self) -> None:
         self._loop.set_default_executor(ThreadPoolExecutor(1))
-        async with running_services(ServerSettings(data_dir=self._directory)) as services:
+        # schemathesis calls an application in this process "testserver".
+        settings = ServerSettings(data_dir=self._directory, allowed_hosts=frozenset({"testserver"}))
+        async with running_services(settings) as services:
             services.cell.hosts.prepare()
             await until(lambda: psutil.Process().children())
             await start_workers(services)
