@@ -87,7 +87,7 @@ def test_inverse_kinematics_is_the_controllers_in_a_configuration_that_is_free(r
     blind = ready.inverse_kinematics("tcp", pose, near, avoid_collisions=False)
     assert [joint.value for joint in blind] == pytest.approx(goal, abs=1e-6)
     around.boxes["crate"] = pose.position, (0.2, 0.2, 0.2)
-    with pytest.raises(ready.KinematicsException, match=r"ur reaches the pose only in collision: ur/.* and "):
+    with pytest.raises(ready.KinematicsException, match="ur reaches the pose only in collision: tool of ur and crate"):
         ready.inverse_kinematics("tcp", pose, near)
 
 
