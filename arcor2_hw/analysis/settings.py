@@ -1,7 +1,7 @@
 """The settings of an object type: the dataclass that its constructor asks for."""
 
 import ast
-from typing import Final
+from typing import Final, NamedTuple
 
 from arcor2_hw.actions.json_values import encode
 from arcor2_hw.actions.parameter_types import Extra
@@ -14,9 +14,19 @@ from arcor2_hw.analysis.source import Broken
 from arcor2_hw.analysis.symbols import External, framework_name, is_framework
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.object_type import ParameterMeta
+from arcor2_hw.data.secret import HIDDEN, is_secret_name
 from arcor2_hw.exceptions import InvalidData
 
 _KINDS: Final = frozenset({"boolean", "integer", "double", "string", "string_enum", "integer_enum"})
+
+
+class _Field(NamedTuple):
+    """A field of a dataclass. `secret` is None where its metadata does not say."""
+
+    default: ast.expr | None
+    in_constructor: bool = True
+    keyword_only: bool = False
+    secret: bool | None = None
 
 
 class SettingsReader:
@@ -72,12 +82,12 @@ class SettingsReader:
                 if symbol == External("dataclasses.KW_ONLY"):
                     after = True
                     continue
-                expression, in_constructor, kw_only = self._field(member, each)
-                if not in_constructor:
+                field = self._field(member, each)
+                if not field.in_constructor:
                     continue
-                ordinary[name] = self._setting(each, name, member.annotation, expression, descriptions.get(name, UNSET))
+                ordinary[name] = self._setting(each, name, member.annotation, field, descriptions.get(name, UNSET))
                 keyword_only.discard(name)
-                if after or kw_only:
+                if after or field.keyword_only:
                     keyword_only.add(name)
         return [
             *(meta for name, meta in ordinary.items() if name not in keyword_only),
@@ -91,8 +101,7 @@ class SettingsReader:
                 return decorator
         return None
 
-    def _field(self, member: Value, info: ClassInfo) -> tuple[ast.expr | None, bool, bool]:
-        """Give default, whether the constructor takes the field, whether by keyword only."""
+    def _field(self, member: Value, info: ClassInfo) -> _Field:
         expression = member.expression
         if isinstance(expression, ast.Call) and self._resolver.expression(
             expression.func, info.module, info
@@ -101,11 +110,12 @@ class SettingsReader:
             if "default_factory" in given:
                 raise info.problem("the default of a setting has to stand in the source", expression)
             in_constructor = not _is(given.get("init"), False)
-            return given.get("default"), in_constructor, _is(given.get("kw_only"), True)
-        return expression, True, False
+            secret = _secret(given.get("metadata"))
+            return _Field(given.get("default"), in_constructor, _is(given.get("kw_only"), True), secret)
+        return _Field(expression)
 
     def _setting(
-        self, info: ClassInfo, name: str, hint: ast.expr, expression: ast.expr | None, description: str | Unset
+        self, info: ClassInfo, name: str, hint: ast.expr, field: _Field, description: str | Unset
     ) -> ParameterMeta:
         try:
             kind, enumeration = parameter_type_of(hint, info.module, info, self._resolver)
@@ -116,16 +126,32 @@ class SettingsReader:
             if enumeration is not None:
                 members = enum_members(enumeration, self._resolver) or {}
                 extra = encode(Extra(allowed_values=list(dict.fromkeys(members.values()))))
-            default = self._actions.default(info, kind, enumeration, expression)
+            default = self._actions.default(info, kind, enumeration, field.default)
+            if field.secret and kind.name != "string":
+                raise info.problem(f"a secret setting must be of type str, not {kind.name}", hint)
         except Broken as error:
             raise Broken(f"setting {name}: {error}", error.problem.path, error.problem.line) from None
         except InvalidData as error:
             raise info.problem(f"setting {name}: {error}", hint) from None
-        return ParameterMeta(name, kind.name, description=description, default_value=default, extra=extra)
+        secret = kind.name == "string" and (is_secret_name(name) if field.secret is None else field.secret)
+        if secret and default not in (UNSET, '""'):
+            default = encode(HIDDEN)
+        return ParameterMeta(
+            name, kind.name, description=description, default_value=default, extra=extra, secret=secret or UNSET
+        )
 
 
 def _is(expression: ast.expr | None, value: bool) -> bool:
     return isinstance(expression, ast.Constant) and expression.value is value
+
+
+def _secret(metadata: ast.expr | None) -> bool | None:
+    """Return what `field(metadata={"secret": ...})` says, None where it says nothing."""
+    if isinstance(metadata, ast.Dict):
+        for key, value in zip(metadata.keys, metadata.values, strict=True):
+            if isinstance(key, ast.Constant) and key.value == "secret" and isinstance(value, ast.Constant):
+                return bool(value.value)
+    return None
 
 
 def _keyword(decorator: ast.expr, name: str) -> bool:

@@ -1,6 +1,6 @@
 """cell.yaml: the devices of one workplace, by name: what they are and where they are reached."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,6 +11,7 @@ from arcor2_hw.data.base import UNSET, Data, Unset, is_valid_name
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.scene import Scene, SceneObjectOverride
+from arcor2_hw.data.secret import is_reference
 from arcor2_hw.exceptions import InvalidData, NotFound
 
 MAX_SIZE: Final = 1 << 20
@@ -99,19 +100,27 @@ def parameters_of(device: CellDevice) -> list[Parameter]:
 
 
 def exported(scene: Scene, left_out: Collection[str] = ()) -> Cell:
-    """Give the objects of a scene as a cell, besides those whose type is left out."""
+    """Return the objects of a scene as a cell without secrets, besides those whose type is left out."""
     return Cell(
         [
             CellDevice(
                 scene_object.name,
                 scene_object.type,
-                {one.name: msgspec.json.decode(one.value) for one in scene_object.parameters},
+                {
+                    one.name: value
+                    for one in scene_object.parameters
+                    if not is_reference(value := msgspec.json.decode(one.value))
+                },
                 scene_object.pose,
             )
             for scene_object in scene.objects
             if scene_object.type not in left_out
         ]
     )
+
+
+def _values(parameters: Iterable[Parameter]) -> list[tuple[str, Any]]:
+    return [(one.name, msgspec.json.decode(one.value)) for one in parameters]
 
 
 def strangers(cell: Cell, scene: Scene) -> list[str]:

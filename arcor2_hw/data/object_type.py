@@ -108,6 +108,7 @@ class ParameterMeta(Data, frozen=True):
     """One parameter of an action or setting; `extra` and `default_value` are JSON in strings.
 
     former_names: names under which older projects give it (ours, beside the protocol).
+    secret: the value of this setting is stored by the server and never sent to clients.
     """
 
     name: str
@@ -118,6 +119,7 @@ class ParameterMeta(Data, frozen=True):
     default_value: str | Unset = UNSET
     extra: str | Unset = UNSET
     former_names: list[str] | Unset = UNSET
+    secret: bool | Unset = UNSET
 
 
 class ActionMetadata(Data, frozen=True):

@@ -21,7 +21,12 @@ _HOST: Final = re.compile(r"[\w.-]+|\[?[0-9A-Fa-f:.]*:[0-9A-Fa-f:.]*(%[\w.-]+)?\
 
 @dataclasses.dataclass
 class Settings:
-    """Base of every settings dataclass: fields are bool, int, float, str or enumerations."""
+    """Base of every settings dataclass: fields are bool, int, float, str or enumerations.
+
+    A secret is declared by its metadata: `password: str = field(default="", repr=False, metadata={"secret": True})`.
+    The server stores its value apart and never sends it to clients. A str whose name says that it is secret
+    (`password`, `token`, `api_key`, ...) is treated the same unless its metadata has `"secret": False`.
+    """
 
 
 def check_host(host: str, port: int = 1) -> None:

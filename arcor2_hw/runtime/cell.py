@@ -4,6 +4,7 @@ import importlib
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from queue import Empty, SimpleQueue
+from types import MappingProxyType
 from typing import Final
 
 from msgspec.structs import replace
@@ -42,8 +43,9 @@ def recipes(
     models: Mapping[str, ObjectModel],
     overridden: Iterable[SceneObjectOverride] = (),
     failed: Callable[[SceneFault], None] | None = None,
+    secrets: Mapping[str, str] = MappingProxyType({}),
 ) -> list[Recipe]:
-    """Work out how every object is made.
+    """Work out how every object is made; `secrets` has the values of secret settings by reference.
 
     SceneFault names the first that cannot be; with `failed`, that is told of each instead.
     """
@@ -54,7 +56,7 @@ def recipes(
             cls = classes.get(scene_object.type)
             if cls is None:
                 raise NotFound(f"{scene_object.name}: object type {scene_object.type} is not there")
-            found.append(recipe(scene_object, cls, models.get(scene_object.type), overridden))
+            found.append(recipe(scene_object, cls, models.get(scene_object.type), overridden, secrets))
         except Arcor2Error as error:
             fault = SceneFault(scene_object.id, error)
             if failed is None:
@@ -90,7 +92,7 @@ def scene_recipes(
                 raise fault
             failed(fault)
     rest = replace(message.scene, objects=[one for one in objects if one.type not in broken])
-    return recipes(rest, classes, message.models, message.overrides, failed)
+    return recipes(rest, classes, message.models, message.overrides, failed, message.secrets)
 
 
 def _before_threads(classes: Iterable[type[Generic]]) -> None:

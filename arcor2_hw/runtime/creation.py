@@ -11,7 +11,7 @@ import tempfile
 import typing
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from types import ModuleType
+from types import MappingProxyType, ModuleType
 from typing import Any, Final
 
 import humps
@@ -22,6 +22,7 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.scene import SceneObject, SceneObjectOverride
+from arcor2_hw.data.secret import is_reference
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound
 from arcor2_hw.objects import CollisionObject, Generic, GenericWithPose, Settings
 from arcor2_hw.runtime import older
@@ -151,6 +152,22 @@ def _setting(hint: Any, parameter: Parameter) -> Any:
     return msgspec.convert(value, hint)
 
 
+def with_secrets(name: str, parameters: Mapping[str, Parameter], secrets: Mapping[str, str]) -> dict[str, Parameter]:
+    """Replace references to secrets by their values; InvalidData for one that is not stored."""
+    found = dict(parameters)
+    for key, parameter in parameters.items():
+        reference = parameter.value.strip('"')
+        if not is_reference(reference):
+            continue
+        if reference not in secrets:
+            raise InvalidData(
+                f"{name}: the secret setting {key} is not stored on this server. Enter it in the settings of {name}, "
+                "or in the cell file."
+            )
+        found[key] = Parameter(key, parameter.type, msgspec.json.encode(secrets[reference]).decode())
+    return found
+
+
 def fill_settings(cls: type[Generic], name: str, parameters: Mapping[str, Parameter]) -> Settings | None:
     """Make the settings of object `name` from its parameters; InvalidData names the object and the parameter."""
     kind = settings_type(cls)
@@ -223,8 +240,12 @@ def recipe(
     cls: type[Generic],
     model: ObjectModel | None,
     overrides: Iterable[SceneObjectOverride] = (),
+    secrets: Mapping[str, str] = MappingProxyType({}),
 ) -> Recipe:
-    """Work out the constructor's arguments (protocol, section 9.2); InvalidData names object and parameter."""
+    """Work out the constructor's arguments (protocol, section 9.2); InvalidData names object and parameter.
+
+    secrets: values of secret settings by reference.
+    """
     name = scene_object.name
     if cls.abstract():
         raise InvalidData(f"{name}: object type {cls.__name__} is abstract")
@@ -232,7 +253,7 @@ def recipe(
     for override in overrides:
         if override.id == scene_object.id:
             parameters |= {parameter.name: parameter for parameter in override.parameters}
-    settings = fill_settings(cls, name, parameters)
+    settings = fill_settings(cls, name, with_secrets(name, parameters, secrets))
     arguments: list[Any] = [scene_object.id, name]
     if issubclass(cls, GenericWithPose):
         if isinstance(scene_object.pose, Unset):

@@ -195,6 +195,7 @@ class Host:
             breakpoints=frozenset(message.breakpoints),
             shared_breakpoints=frozenset(message.shared_breakpoints),
             here=message.cell,
+            secrets=message.secrets,
         )
         self._cell = program.cell
         self._cell.assets, self._cell.told = message.assets, self._told

@@ -57,7 +57,8 @@ class OpenScene(ToHost, frozen=True):
 
     keep_going: an object that cannot be made or connected is told as failed by DeviceChanged, and the others come up.
     assets: files of the meshes and of robots' models that were uploaded, by id. bodies: what stands in the way besides.
-    calibrations: kinematics of robots as their controllers told them, by id.
+    calibrations: kinematics of robots as their controllers told them, by id. secrets: values of secret settings by
+    reference.
     """
 
     scene: Scene
@@ -70,6 +71,7 @@ class OpenScene(ToHost, frozen=True):
     assets: dict[str, str] = field(default_factory=dict)
     bodies: list[PutIn] = field(default_factory=list)
     calibrations: dict[str, KinematicCalibration] = field(default_factory=dict)
+    secrets: dict[str, str] = field(default_factory=dict)
 
 
 class RetryObject(ToHost, frozen=True):
@@ -84,7 +86,7 @@ class RunPackage(ToHost, frozen=True):
 
     cell: the settings of devices at this place, which win over those of the package. breakpoints: ids of action points
     and actions, which must be there. shared_breakpoints: more of them, left out where the project lacks them. assets,
-    bodies, calibrations: as in OpenScene.
+    bodies, calibrations, secrets: as in OpenScene.
     """
 
     package_id: str
@@ -97,6 +99,7 @@ class RunPackage(ToHost, frozen=True):
     assets: dict[str, str] = field(default_factory=dict)
     bodies: list[PutIn] = field(default_factory=list)
     calibrations: dict[str, KinematicCalibration] = field(default_factory=dict)
+    secrets: dict[str, str] = field(default_factory=dict)
 
 
 class PutBody(ToHost, frozen=True):

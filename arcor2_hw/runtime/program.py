@@ -4,7 +4,8 @@ import itertools
 import threading
 import time
 import traceback
-from collections.abc import Sequence, Set
+from collections.abc import Mapping, Sequence, Set
+from types import MappingProxyType
 from typing import Any, Final, Protocol
 
 import msgspec
@@ -70,10 +71,13 @@ class Program:
         breakpoints: Set[str] = frozenset(),
         shared_breakpoints: Set[str] = frozenset(),
         here: CellFile | None = None,
+        secrets: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
         self.channel = channel
         self.here = here
         """The settings of devices at this place, which win over those of the package."""
+        self.secrets = secrets
+        """Values of secret settings by reference."""
         self.package_id = package_id
         self.cell = Cell()
         self.breakpoints = frozenset(breakpoints)

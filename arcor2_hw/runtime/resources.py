@@ -97,7 +97,8 @@ class Resources:
         classes = {name: find_type(name) for name in {o.type for o in data.scene.objects}}
         try:
             here = [] if program.here is None else overlay(program.here, data.scene)
-            program.cell.open(recipes(data.scene, classes, data.models, [*data.project.object_overrides, *here]))
+            overridden = [*data.project.object_overrides, *here]
+            program.cell.open(recipes(data.scene, classes, data.models, overridden, secrets=program.secrets))
             program.check()
             program.cell.take_control()
         except SceneFault as fault:

@@ -1,9 +1,11 @@
 """The ASGI application: websocket, REST routes, editor, and the parts behind them, brought up and ended in order."""
 
+import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from typing import Any, cast
 
+import structlog
 from litestar import Litestar, Request, Response, WebSocket, websocket
 from litestar.exceptions import HTTPException, MethodNotAllowedException, NotFoundException
 from litestar.plugins import PluginProtocol
@@ -24,6 +26,8 @@ from arcor2_server.hub import Hub
 from arcor2_server.locks import Locks
 from arcor2_server.object_types import ObjectTypes
 from arcor2_server.origin import HostNames, own_pages_only
+from arcor2_server.packages import Packages
+from arcor2_server.private_files import tighten
 from arcor2_server.response_headers import add_headers
 from arcor2_server.rest import routes
 from arcor2_server.rest.answers import ROLE, http_refusal
@@ -59,16 +63,21 @@ from arcor2_server.rpc import (  # noqa: F401
     scene_objects,
     temporary,
 )
+from arcor2_server.secrets_out import REDACTION
 from arcor2_server.services import Services
 from arcor2_server.session import Session
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import AssetStore, Storage
+from arcor2_server.storage.hiding import hide_stored
 from arcor2_server.users import Users
+
+log = structlog.get_logger(__name__)
 
 
 @asynccontextmanager
 async def running_services(settings: ServerSettings) -> AsyncIterator[Services]:
     """Bring up all parts, and end them in the opposite order. StorageError when the data cannot be used."""
+    tighten(settings.data_dir)
     async with AsyncExitStack() as stack:
         storage = await Storage.open(settings)
         stack.push_async_callback(storage.close)
@@ -97,6 +106,10 @@ async def running_services(settings: ServerSettings) -> AsyncIterator[Services]:
         services.damage.load()
         if damage := services.access.repair():
             services.damage.report(damage)
+        services.secrets.store.load(services.damage)
+        storage.secrets = services.secrets
+        REDACTION.secrets = lambda: services.secrets.store.values
+        await hide_stored_secrets(services)
         services.markers.load(services.damage)
         services.arm_calibrations.load()
         stack.push_async_callback(services.compute.close)
@@ -116,6 +129,24 @@ async def running_services(settings: ServerSettings) -> AsyncIterator[Services]:
         stack.push_async_callback(services.execution.close)
         await temporary.recover(services)
         yield services
+
+
+async def hide_stored_secrets(services: Services) -> None:
+    """Move secrets that saved documents and packages hold in clear to the store of secrets. StorageError.
+
+    Documents are searched once, and again when object types with further secret settings are known.
+    """
+    secrets, store = services.secrets, services.secrets.store
+    declared = secrets.declared()
+    if store.scanned is not None and declared <= store.scanned:
+        return
+    packages = Packages(services.settings.packages_dir, secrets.hide_in_package)
+    with secrets.migrating():
+        found = await hide_stored(services.storage, secrets) + await asyncio.to_thread(packages.hide_secrets)
+    store.note_scanned(declared | (store.scanned or set()))
+    await store.flush()
+    if found:
+        log.info("secrets moved out of documents", documents=found)
 
 
 def _is_known(services: Services) -> Callable[[str], Awaitable[bool]]:

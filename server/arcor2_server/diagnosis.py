@@ -6,7 +6,7 @@ It is made when somebody asks for it, and goes to him alone. Secrets are left ou
 import io
 import platform
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
 from importlib.metadata import distributions
 from pathlib import Path
 from typing import Any, Final
@@ -86,15 +86,15 @@ def _type(services: Services, name: str) -> dict[str, Any]:
     }
 
 
-def packed(content: dict[str, Any], notes: Any = None) -> bytes:
-    """Give the zip. Takes a moment: for another thread."""
+def packed(content: dict[str, Any], notes: Any = None, stored: Set[str] = frozenset()) -> bytes:
+    """Return the zip without secrets; `stored` are those of settings. Takes a moment: for another thread."""
     plain = msgspec.to_builtins(content, enc_hook=_plain)
     plain["about.json"] |= {
         "python": platform.python_version(),
         "system": platform.platform(),
         "packages": dict(sorted((each.name, each.version) for each in distributions())),
     }
-    secrets = set(secrets_in(plain))
+    secrets = set(secrets_in(plain)) | stored
     target = io.BytesIO()
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("README.txt", _README)

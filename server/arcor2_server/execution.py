@@ -30,6 +30,7 @@ from arcor2_server.cell.opening import shapes_put_in
 from arcor2_server.cell.streams import RobotStreams
 from arcor2_server.cell.told import calibrations_of_package, with_world
 from arcor2_server.kept_packages import KeptPackages
+from arcor2_server.packages import Packages
 from arcor2_server.rpc.registry import RequestRefused, make_event
 from arcor2_server.runs import How
 
@@ -51,7 +52,7 @@ class Execution(KeptPackages):
     """Runs one package at a time, in a cell host of its own. Requests that a state forbids raise RequestRefused."""
 
     def __init__(self, services: "Services") -> None:
-        super().__init__(services.hub, services.settings.packages_dir)
+        super().__init__(services.hub, Packages(services.settings.packages_dir, services.secrets.hide_in_package))
         self.state = S.UNDEFINED
         self.package_id = ""
         self.stop_within = STOP_WITHIN
@@ -192,6 +193,9 @@ class Execution(KeptPackages):
     async def _begin(self, message: m.RunPackage) -> None:
         try:
             host = await self._services.cell.hosts.take(self)
+            values = self._services.secrets.values_for_package
+            secrets = await asyncio.to_thread(values, Path(message.directory))
+            message = msgspec.structs.replace(message, secrets=secrets)
             if self._shared_of:  # at the last moment: a change after this is told to the program
                 shared = await self._services.breakpoints.ids(self._shared_of)
                 message = msgspec.structs.replace(message, shared_breakpoints=sorted(shared))
@@ -318,7 +322,7 @@ class Execution(KeptPackages):
             case "PackageInfo":
                 self._info = message.encoded
                 info = msgspec.json.decode(message.encoded, type=_InfoEvent)
-                _, overlaid = overlay_for(self._services.settings.cell, info.data.scene)
+                _, overlaid = overlay_for(self._services, info.data.scene)
                 self.board.show(info.data.scene.objects, overlaid)
                 asyncio.get_running_loop().call_later(SPARE_AFTER, self._services.cell.hosts.prepare)
             case "ActionStateBefore":

@@ -2,7 +2,6 @@
 
 import abc
 import asyncio
-from pathlib import Path
 from typing import IO
 
 from arcor2_hw.data.events import ChangeType
@@ -15,8 +14,8 @@ from arcor2_server.rpc.registry import make_event
 class KeptPackages(abc.ABC):
     """What may be done with packages on disk; with that which runs, nothing but to give it another name."""
 
-    def __init__(self, hub: Hub, directory: Path) -> None:
-        self.packages = Packages(directory)
+    def __init__(self, hub: Hub, packages: Packages) -> None:
+        self.packages = packages
         self._hub = hub
 
     @abc.abstractmethod

@@ -8,6 +8,7 @@ import msgspec
 import structlog
 
 from arcor2_server.recent_log import RECENT
+from arcor2_server.secrets_out import REDACTION
 
 
 def set_up(level: str = "info") -> None:
@@ -17,13 +18,14 @@ def set_up(level: str = "info") -> None:
         structlog.contextvars.merge_contextvars,
         structlog.processors.add_log_level,
         structlog.processors.TimeStamper(fmt="iso", utc=True),
+        REDACTION,
         RECENT,
     ]
     last: structlog.typing.Processor
     if sys.stderr.isatty():
         last = structlog.dev.ConsoleRenderer(exception_formatter=structlog.dev.plain_traceback)
     else:
-        shared.append(structlog.processors.format_exc_info)
+        shared += [structlog.processors.format_exc_info, REDACTION]
         last = structlog.processors.JSONRenderer(serializer=_to_json)
     structlog.configure(
         processors=[*shared, last],

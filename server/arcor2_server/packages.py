@@ -8,6 +8,7 @@ import shutil
 import stat
 import tempfile
 import zipfile
+from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path, PurePosixPath
 from typing import IO, Any, Final
@@ -40,8 +41,10 @@ _NEVER_BUILT: Final = PackageMeta("N/A", "1970-01-01T00:00:00+00:00")
 class Packages:
     """The directory of packages. Everything here reads or writes files: call it in a thread."""
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, hide_secrets: Callable[[Path], bool] = lambda _: False) -> None:
         self._root = root
+        self._hide_secrets = hide_secrets
+        """Replaces secrets in the documents of a package by references."""
 
     def checked(self, package_id: str) -> Path:
         """Give where a package of that id is, or would be; InvalidPackage for what is no id."""
@@ -147,6 +150,13 @@ class Packages:
             raise StorageError(f"Packages cannot be read: {error.strerror}.") from error
         return projects
 
+    def hide_secrets(self) -> int:
+        """Replace secrets in all packages by references; returns how many packages held one. StorageError."""
+        try:
+            return sum(self._hide_secrets(self.directory(summary.id)) for summary in self.all())
+        except OSError as error:
+            raise StorageError(f"Packages cannot be written: {error.strerror}.") from error
+
     def _mark(self, package_id: str) -> Path:
         return self._root / f"{_TEMPORARY}{package_id}"
 
@@ -192,7 +202,7 @@ class Packages:
             unpack(content, temporary)
             if not (temporary / "script.py").is_file():
                 raise InvalidPackage("The package has no script.py.")
-            temporary.chmod(0o755)
+            self._hide_secrets(temporary)
             if target.exists():
                 self._discard(target)
             temporary.rename(target)

@@ -1,9 +1,14 @@
 """Files that only their owner may read: databases, tokens, secrets."""
 
 import os
+import stat
 import tempfile
 from pathlib import Path
 from typing import Final
+
+import structlog
+
+log = structlog.get_logger(__name__)
 
 FILE_MODE: Final = 0o600
 DIRECTORY_MODE: Final = 0o700
@@ -17,6 +22,17 @@ def ensure_private(path: Path) -> None:
             os.fchmod(descriptor, FILE_MODE)
     finally:
         os.close(descriptor)
+
+
+def tighten(directory: Path) -> None:
+    """Take the rights of group and others away from a directory and what is directly in it, where we own it."""
+    for path in (directory, *directory.iterdir()):
+        try:
+            status = path.lstat()
+            if status.st_mode & 0o077 and not stat.S_ISLNK(status.st_mode):
+                path.chmod(DIRECTORY_MODE if stat.S_ISDIR(status.st_mode) else FILE_MODE)
+        except OSError as error:
+            log.warning("others may read a file of the data directory", path=str(path), reason=error.strerror)
 
 
 def write_private(path: Path, content: bytes) -> None:

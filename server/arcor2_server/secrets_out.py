@@ -1,17 +1,14 @@
 """Takes secrets out of what leaves the workplace for somebody who helps."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, MutableMapping, Set
 from typing import Any, Final
 
-HIDDEN: Final = "***"
+from arcor2_hw.data.secret import HIDDEN, is_secret_name
+
 SHORTEST: Final = 4
 """Characters of a secret that is looked for in other texts: a shorter one stands in too many words."""
 
-_NAMES: Final = re.compile(
-    r"(?i)password|passwd|passphrase|secret|token|credential|api_?key|private_?key|(^|_)(pass|pin)($|_)"
-)
-_FILE: Final = re.compile(r"(?i)_(file|path)$")
 _VALUES: Final = ("value", "default_value")
 _IN_TEXT: Final = (
     (re.compile(r"(?<=://)[^/@\s:\"]*:[^/@\s\"]*(?=@)"), HIDDEN),
@@ -22,18 +19,13 @@ _IN_TEXT: Final = (
 )
 
 
-def is_secret(name: str) -> bool:
-    """Tell whether a setting of this name holds a secret; one that names a file only says where it is."""
-    return _NAMES.search(name) is not None and _FILE.search(name) is None
-
-
 def hide(value: Any) -> Any:
     """Give JSON data with the values of secrets hidden: by the key, or by the `name` that stands beside a `value`."""
     if isinstance(value, list):
         return [hide(item) for item in value]
     if not isinstance(value, dict):
         return value
-    named = is_secret(str(value.get("name", "")))
+    named = is_secret_name(str(value.get("name", "")))
     return {key: HIDDEN if item and _holds(key, item, named=named) else hide(item) for key, item in value.items()}
 
 
@@ -43,7 +35,7 @@ def secrets_in(value: Any) -> Iterator[str]:
         for item in value:
             yield from secrets_in(item)
     elif isinstance(value, dict):
-        named = is_secret(str(value.get("name", "")))
+        named = is_secret_name(str(value.get("name", "")))
         for key, item in value.items():
             if not _holds(key, item, named=named):
                 yield from secrets_in(item)
@@ -61,5 +53,32 @@ def clean(text: str, secrets: set[str]) -> str:
     return text
 
 
+class LogRedaction:
+    """Hides secrets of settings in what is logged (a processor of structlog)."""
+
+    def __init__(self) -> None:
+        self.secrets: Callable[[], Set[str]] = frozenset
+        """Returns the secrets to hide."""
+
+    def __call__(self, _logger: Any, _name: str, event: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
+        """Return an event without secrets."""
+        secrets = [secret for secret in self.secrets() if len(secret) >= SHORTEST]
+        return {key: _without(value, secrets) for key, value in event.items()} if secrets else event
+
+
+REDACTION: Final = LogRedaction()
+
+
+def _without(value: Any, secrets: list[str]) -> Any:
+    if isinstance(value, dict):
+        return {key: _without(item, secrets) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_without(item, secrets) for item in value]
+    if isinstance(value, str):
+        for secret in secrets:
+            value = value.replace(secret, HIDDEN)
+    return value
+
+
 def _holds(key: str, item: Any, *, named: bool) -> bool:
-    return not isinstance(item, dict | list) and ((named and key in _VALUES) or is_secret(key))
+    return not isinstance(item, dict | list) and ((named and key in _VALUES) or is_secret_name(key))

@@ -18,7 +18,9 @@ from arcor2_server.presence import PresenceBoard
 from arcor2_server.previews import Previews
 from arcor2_server.reachability import ReachabilityBoard
 from arcor2_server.runs import Runs
+from arcor2_server.secret_store import SecretStore
 from arcor2_server.session.saved_problems import SavedProblems
+from arcor2_server.setting_secrets import SettingSecrets
 from arcor2_server.storage.calibrations import Calibrations
 from arcor2_server.storage.shared import SharedData
 from arcor2_server.tasks import Tasks
@@ -56,6 +58,7 @@ class Services:
     breakpoints: the shared ones. presence: who looks at what. edit_news: what follows from edits.
     reachability: what robots reach of the open project. prepared: meshes and robots as clients show them.
     arm_calibrations: what controllers told of their very arms. damage: notices about damaged files.
+    secrets: takes secret settings out of documents.
     """
 
     settings: "ServerSettings"
@@ -91,10 +94,12 @@ class Services:
     prepared: PreparedAssets = field(init=False)
     arm_calibrations: ArmCalibrations = field(init=False)
     damage: DataDamage = field(init=False)
+    secrets: SettingSecrets = field(init=False)
 
     def __post_init__(self) -> None:
         """Make what needs no more than these."""
         self.damage = DataDamage(self.settings.data_dir, self.hub)
+        self.secrets = SettingSecrets(self.types, SecretStore(self.settings.secrets_file))
         self.compute = Compute(self.settings.compute_idle)
         self.calibration = CalibrationService(self)
         self.calibration_records = Calibrations(self.storage)

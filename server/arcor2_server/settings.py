@@ -121,6 +121,11 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
         return self.data_dir / "markers.json"
 
     @property
+    def secrets_file(self) -> Path:
+        """Give the file of the secrets of devices."""
+        return self.data_dir / "secrets.json"
+
+    @property
     def assets_dir(self) -> Path:
         """Give the directory of assets."""
         return self.data_dir / "assets"

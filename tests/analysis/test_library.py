@@ -663,6 +663,46 @@ def test_settings_as_dataclasses_order_them() -> None:
     assert lib.analyse("Heir").meta.settings == derived
 
 
+def test_secret_settings() -> None:
+    lib = library(
+        Bank="""
+        from dataclasses import dataclass, field
+        @dataclass
+        class BankSettings(Settings):
+            host: str
+            code: str = field(metadata={"secret": True})
+            password: str = "robotics"
+            password_file: str = ""
+            token: str = field(default="part", metadata={"unit": "x", "secret": False})
+            pin: int = 3
+            empty_secret: str = ""
+        class Bank(Generic):
+            def __init__(self, obj_id: str, name: str, settings: BankSettings) -> None: ...
+        """,
+        Wrong="""
+        from dataclasses import dataclass, field
+        @dataclass
+        class WrongSettings(Settings):
+            pin: int = field(default=1, metadata={"secret": True})
+        class Wrong(Generic):
+            def __init__(self, obj_id: str, name: str, settings: WrongSettings) -> None: ...
+        """,
+    )
+    settings = {each.name: (each.secret, each.default_value) for each in lib.analyse("Bank").meta.settings}
+    assert settings == {
+        "host": (msgspec.UNSET, msgspec.UNSET),
+        "code": (True, msgspec.UNSET),
+        "password": (True, '"***"'),
+        "password_file": (msgspec.UNSET, '""'),
+        "token": (msgspec.UNSET, '"part"'),
+        "pin": (msgspec.UNSET, "3"),
+        "empty_secret": (True, '""'),
+    }
+    problem = lib.analyse("Wrong").problem
+    assert problem is not None
+    assert "a secret setting must be of type str" in str(problem)
+
+
 ROBOT = """
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import Arcor2NotImplemented

@@ -5,10 +5,12 @@ import signal
 import time
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.scene import SceneObjectOverride
+from arcor2_hw.data.secret import new_reference
 from arcor2_hw.runtime import messages as m
 
 from .conftest import HostProcess, open_scene, scene_object, type_code
@@ -218,6 +220,24 @@ def test_overrides_lie_over_parameters(host: HostProcess, tmp_path: Path) -> Non
     host.send(open_scene([type_code("Device", DEVICE)], *objects, overrides=[override]))
     host.expect(m.SceneOpened)
     assert [p.name for p in tmp_path.iterdir()] == ["over"]
+
+
+def test_references_to_secrets(host: HostProcess, tmp_path: Path) -> None:
+    reference = new_reference()
+    objects = [scene_object("a", "Device", file=reference)]
+    message = open_scene([type_code("Device", DEVICE)], *objects)
+    host.send(msgspec.structs.replace(message, secrets={reference: str(tmp_path / "secret")}))
+    host.expect(m.SceneOpened)
+    assert [p.name for p in tmp_path.iterdir()] == ["secret"]
+
+
+def test_a_secret_that_is_not_stored_is_named(host: HostProcess) -> None:
+    host.send(open_scene([type_code("Device", DEVICE)], scene_object("a", "Device", file=new_reference())))
+    error = host.expect(m.SceneFailed).error
+    assert error.object_id == "obj_a"
+    assert error.message == (
+        "a: the secret setting file is not stored on this server. Enter it in the settings of a, or in the cell file."
+    )
 
 
 def test_a_source_that_breaks_is_named(host: HostProcess) -> None:

@@ -69,7 +69,7 @@ class YumiSettings(Settings):
     host: str
     rws_port: int = 80
     user: str = "Default User"
-    password: str = "robotics"  # noqa: S105 - what ABB delivers
+    password: str = dataclasses.field(default="robotics", repr=False, metadata={"secret": True})  # what ABB delivers
     left_port: int = 6101
     right_port: int = 6111
     left_mass: float = -1.0

@@ -1020,6 +1020,7 @@ export interface Parameter {
  * One parameter of an action or setting; `extra` and `default_value` are JSON in strings.
  *
  * former_names: names under which older projects give it (ours, beside the protocol).
+ * secret: the value of this setting is stored by the server and never sent to clients.
  */
 export interface ParameterMeta {
   name: string;
@@ -1030,6 +1031,7 @@ export interface ParameterMeta {
   default_value?: string;
   extra?: string;
   former_names?: string[];
+  secret?: boolean;
 }
 
 /** Values of PivotEnum in UpdateObjectPoseUsingRobot. */

@@ -1,20 +1,25 @@
 """What is known of the devices that a cell host holds: connection, health, alarms, control."""
 
 from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING
 
 import msgspec
 import structlog
 
 from arcor2_hw.data.base import UNSET, Data
-from arcor2_hw.data.cell import Cell, overlay, strangers
+from arcor2_hw.data.cell import overlay, strangers
 from arcor2_hw.data.device import Alarm, Connection, Health
 from arcor2_hw.data.events import ObjectStateData
 from arcor2_hw.data.operation import ObjectHealthData
 from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
+from arcor2_hw.data.secret import HIDDEN
 from arcor2_hw.exceptions import NotFound
 from arcor2_hw.runtime.messages import DeviceChanged, HeldPart
 from arcor2_server.hub import Hub
 from arcor2_server.rpc.registry import RequestRefused, make_event
+
+if TYPE_CHECKING:
+    from arcor2_server.services import Services
 
 log = structlog.get_logger(__name__)
 
@@ -37,18 +42,20 @@ class DeviceStatus(Data, frozen=True):
     overlaid: list[str] = msgspec.field(default_factory=list)
 
 
-def overlay_for(cell: Cell | None, scene: Scene) -> tuple[list[SceneObjectOverride], dict[str, list[str]]]:
-    """Give what the server's cell file lays over a scene, and the names of these settings by object; told in the log.
+def overlay_for(services: "Services", scene: Scene) -> tuple[list[SceneObjectOverride], dict[str, list[str]]]:
+    """Return what the server's cell file lays over a scene, and the names of these settings by object; logged.
 
     Raises InvalidData naming the object whose type is another one.
     """
+    cell = services.settings.cell
     if cell is None:
         return [], {}
     overrides = overlay(cell, scene)
-    names = {scene_object.id: scene_object.name for scene_object in scene.objects}
+    objects = {scene_object.id: scene_object for scene_object in scene.objects}
     for override in overrides:
-        laid = {parameter.name: parameter.value for parameter in override.parameters}
-        log.info("settings from the cell file", object=names[override.id], settings=laid)
+        of, secret = objects[override.id], services.secrets.is_secret
+        laid = {each.name: HIDDEN if secret(of.type, each.name) else each.value for each in override.parameters}
+        log.info("settings from the cell file", object=of.name, settings=laid)
     if unknown := strangers(cell, scene):
         log.warning("the cell file names what is not in the scene", objects=unknown, scene=scene.name)
     return overrides, {override.id: [parameter.name for parameter in override.parameters] for override in overrides}

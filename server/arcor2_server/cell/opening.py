@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING, Final
 
+import msgspec
+
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.scene import Scene
@@ -27,7 +29,7 @@ def opening(services: "Services", scene: Scene, keep_going: bool) -> tuple[m.Ope
 
     Raises NotFound, InvalidData.
     """
-    here, overlaid = overlay_for(services.settings.cell, scene)
+    here, overlaid = overlay_for(services, scene)
     names = {obj.type for obj in scene.objects}
     models: dict[str, ObjectModel] = {}
     for name in names:
@@ -35,13 +37,15 @@ def opening(services: "Services", scene: Scene, keep_going: bool) -> tuple[m.Ope
         if not isinstance(model, Unset):
             models[name] = model
     project = services.session.project
+    overrides = [*([] if project is None else project.object_overrides), *here]
     message = m.OpenScene(
         scene,
         services.types.type_codes(names),
         models,
-        [*([] if project is None else project.object_overrides), *here],
+        overrides,
         services.settings.streaming_period,
         keep_going=keep_going,
         assets=shapes_put_in(services),
+        secrets=services.secrets.values_for(msgspec.json.encode((scene, overrides))),
     )
     return message, overlaid

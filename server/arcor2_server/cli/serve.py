@@ -6,6 +6,7 @@ import errno
 import fcntl
 import gc
 import importlib
+import os
 import signal
 import socket
 import sys
@@ -107,6 +108,8 @@ def serve(
     """
     if openapi:
         return _print_openapi()
+    # Whatever the server and its children create is for their user alone.
+    os.umask(0o077)
     # Start-up makes much that stays and little that goes: collecting would only look at it again and again.
     gc.disable()
     try:

@@ -1,12 +1,13 @@
 """What all requests that edit the open document share."""
 
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Iterable, Sequence
 from contextlib import asynccontextmanager
 from typing import Any
 
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.events import ChangeType, LockData
 from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.parameter import Parameter
 from arcor2_server.rpc.registry import Context, RequestRefused
 from arcor2_server.session.changes import Change, Kind
 
@@ -17,6 +18,20 @@ async def commit(context: Context, changes: Sequence[Change]) -> bool:
         return False
     await context.services.session.commit(context.client.user or "", changes, context.request)
     return True
+
+
+async def hide_secrets(
+    context: Context, type_name: str, given: Iterable[Parameter], before: Iterable[Parameter] = ()
+) -> list[Parameter]:
+    """Store the secrets among the settings of an object; returns the settings with references. See SettingSecrets.hide.
+
+    Others may edit while this waits for the disk.
+    """
+    if context.dry_run:
+        return list(given)
+    hidden = context.services.secrets.hide(type_name, given, before)
+    await context.services.secrets.store.flush()
+    return hidden
 
 
 def unlock(context: Context, *ids: str) -> None:

@@ -17,7 +17,7 @@ from arcor2_hw.data.rpc import (
 from arcor2_hw.data.scene import SceneObjectOverride
 from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_server.locks import PROJECT
-from arcor2_server.rpc.editing import commit, drop_locks, require_free, require_held, tell, unlock
+from arcor2_server.rpc.editing import commit, drop_locks, hide_secrets, require_free, require_held, tell, unlock
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
 from arcor2_server.session.changes import Change, Kind
 from arcor2_server.session.checks import check_project_parameter, check_setting
@@ -101,6 +101,16 @@ async def _set_overrides(
         context.emit("OverrideUpdated", given, how, object_id)
 
 
+async def _without_secret(context: Context, object_id: str, given: Parameter) -> Parameter:
+    """Store the value of an override that is secret; returns it with a reference. InvalidData when it has no value."""
+    document, overrides = _overrides(context, object_id, given)
+    require_held(context, object_id)
+    hidden = await hide_secrets(context, document.scene_object(object_id).type, [given], overrides)
+    if not hidden:
+        raise InvalidData(f"Enter a value for the secret setting {given.name}: none is stored.")
+    return hidden[0]
+
+
 def _index(overrides: list[Parameter], name: str) -> int:
     for index, override in enumerate(overrides):
         if override.name == name:
@@ -111,18 +121,20 @@ def _index(overrides: list[Parameter], name: str) -> int:
 @rpc("AddOverride")
 async def add_override(context: Context, args: AddOverrideArgs) -> None:
     """Let the project replace a setting of an object."""
-    document, overrides = _overrides(context, args.id, args.override)
+    given = await _without_secret(context, args.id, args.override)
+    document, overrides = _overrides(context, args.id, given)
     if any(override.name == args.override.name for override in overrides):
         raise InvalidData(f"The setting {args.override.name} is overridden already: update the override.")
-    await _set_overrides(context, document, args.id, [*overrides, args.override], args.override, ChangeType.ADD)
+    await _set_overrides(context, document, args.id, [*overrides, given], given, ChangeType.ADD)
 
 
 @rpc("UpdateOverride")
 async def update_override(context: Context, args: UpdateOverrideArgs) -> None:
     """Change the value by which the project replaces a setting."""
-    document, overrides = _overrides(context, args.id, args.override)
-    overrides[_index(overrides, args.override.name)] = args.override
-    await _set_overrides(context, document, args.id, overrides, args.override, ChangeType.UPDATE)
+    given = await _without_secret(context, args.id, args.override)
+    document, overrides = _overrides(context, args.id, given)
+    overrides[_index(overrides, given.name)] = given
+    await _set_overrides(context, document, args.id, overrides, given, ChangeType.UPDATE)
 
 
 @rpc("DeleteOverride")

@@ -22,7 +22,16 @@ from arcor2_hw.data.rpc import (
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_server.locks import ADDING_OBJECT, SCENE
-from arcor2_server.rpc.editing import commit, drop_locks, eef_pose, require_free, require_held, tell, unlock
+from arcor2_server.rpc.editing import (
+    commit,
+    drop_locks,
+    eef_pose,
+    hide_secrets,
+    require_free,
+    require_held,
+    tell,
+    unlock,
+)
 from arcor2_server.rpc.object_types import require_mesh
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
 from arcor2_server.session.aftermath import VIRTUAL, uses_object
@@ -37,7 +46,8 @@ async def add_object_to_scene(context: Context, args: AddObjectToSceneArgs) -> N
     async with services.locks.auto(context.user, SCENE):
         services.session.require_scene_alone()
         services.cell.require_offline()
-        await _add(context, SceneObject(args.name, args.type, args.pose, list(args.parameters), new_id("obj")))
+        parameters = await hide_secrets(context, args.type, args.parameters)
+        await _add(context, SceneObject(args.name, args.type, args.pose, parameters, new_id("obj")))
 
 
 async def _add(context: Context, obj: SceneObject) -> None:
@@ -119,7 +129,9 @@ async def update_object_parameters(context: Context, args: UpdateObjectParameter
     if problems := settings_problems(obj.name, args.parameters, services.types.meta(obj.type)):
         raise InvalidData(" ".join(problems))
     require_held(context, args.id)
-    await _update(context, replace(obj, parameters=list(args.parameters)))
+    parameters = await hide_secrets(context, obj.type, args.parameters, obj.parameters)
+    require_held(context, args.id)
+    await _update(context, replace(document.scene_object(args.id), parameters=parameters))
 
 
 async def _update(context: Context, obj: SceneObject) -> None:

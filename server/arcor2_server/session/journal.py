@@ -26,11 +26,17 @@ class Journal:
 
     After a failure all jobs of the same epoch fail, those that come later too: what they build on is not kept.
     `on_failure` is called in the event loop before the waiting callers get their StorageError; it has to take the
-    edits back and to begin a new epoch (`next_epoch`).
+    edits back and to begin a new epoch (`next_epoch`). `convert` changes what is recovered; it is called by the thread.
     """
 
-    def __init__(self, path: Path, on_failure: Callable[[], None] = lambda: None) -> None:
+    def __init__(
+        self,
+        path: Path,
+        on_failure: Callable[[], None] = lambda: None,
+        convert: Callable[[Recovered], Recovered] = lambda found: found,
+    ) -> None:
         self._path = path
+        self._convert = convert
         self._on_failure = on_failure
         self._jobs: queue.SimpleQueue[_Job | None] = queue.SimpleQueue()
         self._thread: threading.Thread | None = None
@@ -86,10 +92,10 @@ class Journal:
     # ------------------------------------------------------------------------------------------ the thread
     def _run(self, started: "asyncio.Future[Recovered | None]") -> None:
         assert self._loop is not None
-        with closing(JournalFile(self._path)) as file:
+        with closing(JournalFile(self._path, self._convert)) as file:
             try:
                 recovered, self.loss = file.open()
-            except (sqlite3.Error, OSError) as error:
+            except (sqlite3.Error, OSError, StorageError) as error:
                 failure = StorageError(f"The journal {self._path} cannot be used: {error}.")
                 self._loop.call_soon_threadsafe(_resolve, started, None, failure)
                 return

@@ -9,7 +9,8 @@ import os
 import shutil
 import sqlite3
 import zlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Final
 
@@ -76,8 +77,9 @@ insert into opening values (1, 0);
 class JournalFile:
     """The SQLite file and the position file. Used by one thread. Methods raise sqlite3.Error and OSError."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, convert: Callable[[Recovered], Recovered] = lambda found: found) -> None:
         self._path = path
+        self._convert = convert
         self._position_path = path.with_suffix(".position")
         self._connection: sqlite3.Connection | None = None
         self._descriptor = -1
@@ -86,7 +88,8 @@ class JournalFile:
     def open(self) -> tuple[Recovered | None, Loss | None]:
         """Open or create the files. Returns what an earlier server left open, and what of it is lost.
 
-        A damaged file is stored under another name, and what is intact goes into a new one.
+        A damaged file is stored under another name, and what is intact goes into a new one. What `convert` changes is
+        written into a new file, so that nothing of the old one is left.
         """
         expected = _read_position(self._position_path)
         exists = self._path.exists() and self._path.stat().st_size > 0
@@ -99,11 +102,19 @@ class JournalFile:
             self._discard(copy)
             raise
         loss = None
-        if reading.damage:
+        found = reading.recovered
+        if found is not None:
+            reading.recovered = self._convert(found)
+        if reading.damage or reading.recovered is not found:
             self.close()
-            stored = self._set_aside(copy) if exists else None
-            log.error("journal damaged", reason=reading.damage, lost=reading.lost, stored_as=str(stored or ""))
-            self._start_anew(reading)
+            fresh = self._written_anew(reading)
+            stored = self._set_aside(copy) if exists and reading.damage else None
+            if reading.damage:
+                log.error("journal damaged", reason=reading.damage, lost=reading.lost, stored_as=str(stored or ""))
+            _beside(self._path, "-wal").unlink(missing_ok=True)
+            fresh.replace(self._path)
+            self._connection = _connect(self._path)
+            _recover(self._connection)
             if reading.lost:
                 loss = Loss(reading.damage, reading.lost, "" if stored is None else str(stored), reading.incomplete)
         self._discard(copy)
@@ -180,19 +191,23 @@ class JournalFile:
             raise
         return Reading(damage=reason, lost="Unsaved changes of the scene or project that was open are lost.")
 
-    def _start_anew(self, reading: Reading) -> None:
-        """Write what is intact into a new file."""
-        ensure_private(self._path)
-        self._connection = connection = _connect(self._path)
-        _recover(connection)
-        with connection:
-            connection.execute("begin immediate")
-            connection.execute("update opening set serial = ?", (reading.serial,))
-            if (found := reading.recovered) is not None:
-                base = Base(found.items, found.number, found.scene, found.project, forget=0)
-                jobs: list[Edit | Base] = [base, *found.edits]
-                for job in jobs:
-                    write(connection, job, reading.serial)
+    def _written_anew(self, reading: Reading) -> Path:
+        """Write what is intact into a new file next to the other one."""
+        path = self._path.with_name(f".{self._path.stem}.new{self._path.suffix}")
+        for ending in ("", "-wal"):
+            _beside(path, ending).unlink(missing_ok=True)
+        ensure_private(path)
+        with closing(_connect(path)) as connection:
+            _recover(connection)
+            with connection:
+                connection.execute("begin immediate")
+                connection.execute("update opening set serial = ?", (reading.serial,))
+                if (found := reading.recovered) is not None:
+                    base = Base(found.items, found.number, found.scene, found.project, forget=0)
+                    jobs: list[Edit | Base] = [base, *found.edits]
+                    for job in jobs:
+                        write(connection, job, reading.serial)
+        return path
 
     # ------------------------------------------------------------------------------------------ other files
     def _write_position(self) -> None:

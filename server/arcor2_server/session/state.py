@@ -53,7 +53,7 @@ class Session(OpenDocument):
         self.on_change: list[Callable[[Edit | None], None]] = []
         """Called with each edit once it is on the disk, and with None when another document is open."""
         self._limit = settings.history_limit
-        self._journal = Journal(settings.journal_database, self._take_back)
+        self._journal = Journal(settings.journal_database, self._take_back, services.secrets.hide_in_journal)
         self._closed = ClosedHistories(settings.history_dir)
         self._number = 0
         self._based_on = 0

@@ -9,6 +9,7 @@ from sqlalchemy import delete, select
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.project import ProjectParameter
 from arcor2_hw.data.scene import SceneObjectOverride
+from arcor2_server.setting_secrets import types_of
 from arcor2_server.storage.models import BreakpointsRow, ExecutionTokenRow, ProjectBesideRow, ProjectRow
 from arcor2_server.storage.store import Storage
 
@@ -41,7 +42,12 @@ class Beside:
         return msgspec.json.decode(await self._read(project_id, "object_parameters"), type=list[SceneObjectOverride])
 
     async def put_object_parameters(self, project_id: str, overrides: list[SceneObjectOverride]) -> None:
-        """Keep overrides of objects beside a project, in place of those before."""
+        """Store overrides of objects beside a project, in place of those before."""
+        if (secrets := self._storage.secrets) is not None and overrides:
+            scene = await self._storage.scene((await self._storage.project(project_id)).scene_id)
+            before = await self.object_parameters(project_id)
+            overrides = secrets.hide_in_overrides(overrides, types_of(scene), before)
+            await secrets.store.flush()
         await self._write(project_id, "object_parameters", overrides)
 
     async def _read(self, project_id: str, what: Literal["parameters", "object_parameters"]) -> bytes:

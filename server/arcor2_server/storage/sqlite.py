@@ -5,18 +5,23 @@ import sqlite3
 from pathlib import Path
 from typing import Any
 
+from sqlalchemy import text
+from sqlalchemy.ext.asyncio import AsyncEngine
+
 from arcor2_hw.exceptions import StorageError
+from arcor2_server.private_files import ensure_private
 
 
 def check_opens(path: Path) -> None:
-    """Raise StorageError where there is no opening the file.
+    """Create the file, readable by its owner alone; StorageError where it cannot be opened.
 
     aiosqlite leaves a thread to itself after an open that failed, which then speaks to a loop that may be closed.
     """
     try:
+        ensure_private(path)
         with contextlib.closing(sqlite3.connect(path)):
             return
-    except sqlite3.Error as error:
+    except (sqlite3.Error, OSError) as error:
         raise StorageError(f"cannot use the database {path}: {error}", detail=str(error)) from error
 
 
@@ -27,3 +32,13 @@ def prepare(connection: Any, _record: Any) -> None:
     for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "busy_timeout=5000"):
         cursor.execute(f"PRAGMA {pragma}")
     cursor.close()
+
+
+async def purge(engine: AsyncEngine) -> None:
+    """Overwrite what was replaced or deleted; other databases do that themselves. Raises SQLAlchemyError."""
+    if engine.dialect.name != "sqlite":
+        return
+    async with engine.connect() as plain:
+        connection = await plain.execution_options(isolation_level="AUTOCOMMIT")
+        for statement in ("VACUUM", "PRAGMA wal_checkpoint(TRUNCATE)"):
+            await connection.execute(text(statement))

@@ -17,10 +17,11 @@ from arcor2_hw.data.object_type import Box, Cylinder, Mesh, Model3dType, Models,
 from arcor2_hw.data.project import BareProject, Project
 from arcor2_hw.data.scene import BareScene, Scene
 from arcor2_hw.exceptions import NotFound, StorageError
+from arcor2_server.setting_secrets import SettingSecrets
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage.models import ModelRow, ObjectTypeRow, ProjectRow, ProjectSourceRow, SceneRow
 from arcor2_server.storage.schema import bring_up_to_date
-from arcor2_server.storage.sqlite import check_opens, prepare
+from arcor2_server.storage.sqlite import check_opens, prepare, purge
 
 _together: ContextVar[AsyncSession | None] = ContextVar("together", default=None)
 """The session of the transaction that the present task is in."""
@@ -50,6 +51,8 @@ class Storage:
         self.types_revision = 0
         self.on_deleted: list[Callable[[str], Awaitable[None]]] = []
         """Called with the id of a scene or project that was deleted."""
+        self.secrets: SettingSecrets | None = None
+        """Takes secrets out of what is saved."""
         self._engine = engine
         self._place = place
         self._sessions = async_sessionmaker(engine, expire_on_commit=False)
@@ -73,6 +76,13 @@ class Storage:
             await engine.dispose()
             raise
         return cls(engine, place)
+
+    async def purge(self) -> None:
+        """Overwrite what was replaced or deleted, in the file of SQLite. StorageError."""
+        try:
+            await purge(self._engine)
+        except SQLAlchemyError as error:
+            raise self._failed("write", error) from error
 
     async def close(self) -> None:
         """Close the database."""
@@ -104,6 +114,9 @@ class Storage:
             saved = msgspec.structs.replace(
                 scene, created=row.created if row else stamp, modified=stamp, int_modified=UNSET
             )
+            if self.secrets is not None:
+                before = None if row is None else self._decoded(_decode_scene, row)
+                saved = await self.secrets.take_from_scene(saved, before)
             await session.merge(
                 SceneRow(
                     id=saved.id,
@@ -153,11 +166,14 @@ class Storage:
         """Save; gives the project as saved (like put_scene). NotFound when its scene is not saved."""
         stamp = now()
         async with self.writing() as session:
-            await self.one(session, SceneRow, project.scene_id, "scene")
+            scene = await self.one(session, SceneRow, project.scene_id, "scene")
             row = await session.get(ProjectRow, project.id)
             saved = msgspec.structs.replace(
                 project, created=row.created if row else stamp, modified=stamp, int_modified=UNSET
             )
+            if self.secrets is not None and saved.object_overrides:
+                before = None if row is None else self._decoded(_decode_project, row)
+                saved = await self.secrets.take_from_project(saved, self._decoded(_decode_scene, scene), before)
             await session.merge(
                 ProjectRow(
                     id=saved.id,

@@ -12,8 +12,9 @@ from arcor2_hw.data.rpc import RPCS
 from tests.protocol import PROTOCOL
 
 ADDED = {
-    "ObjectTypeMeta": {"category", "icon"},
-    "ObjectAction": {"category", "icon"},
+    "ObjectTypeMeta": {"category", "icon", "shadows"},
+    "ParameterMeta": {"former_names", "secret"},
+    "ObjectAction": {"category", "former_names", "icon"},
     "RobotEef.Data": {"time_ms"},
     "RobotFeatures": {"jog", "acknowledge_stop", "kinematic_calibration"},
     "RobotJoints.Data": {"time_ms"},

@@ -17,11 +17,12 @@ from arcor2_hw.client import Client
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.role import Role
+from arcor2_hw.data.secret import HIDDEN, is_secret_name
 from arcor2_server.cli.main import app
 from arcor2_server.cli.status import ExitStatus
 from arcor2_server.diagnosis import LARGEST_PART, packed
 from arcor2_server.recent_log import LONGEST_LINE, RecentLog
-from arcor2_server.secrets_out import HIDDEN, clean, hide, is_secret, secrets_in
+from arcor2_server.secrets_out import clean, hide, secrets_in
 from arcor2_server.tokens import TokenFile
 from tests.server.core.serving import ServerProcess, running
 
@@ -31,7 +32,7 @@ PASSWORD = "opensesame-7"
 # ------------------------------------------------------------------------------------------------ secrets
 @pytest.mark.parametrize("name", ["password", "user_password", "apiKey", "api_key", "token", "client_secret", "pin"])
 def test_a_secret_is_known_by_its_name(name: str) -> None:
-    assert is_secret(name)
+    assert is_secret_name(name)
     assert hide({name: "x", "other": [{"name": name, "value": '"x"'}]}) == {
         name: HIDDEN,
         "other": [{"name": name, "value": HIDDEN}],

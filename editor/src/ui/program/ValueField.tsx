@@ -23,6 +23,8 @@ interface ValueFieldProps {
   /** For what is chosen out of a list. */
   choices?: Choice[];
   hint?: string;
+  /** The value is never shown: the server sends a placeholder, which stands for the stored one. */
+  secret?: boolean;
   /** Why it cannot be changed; empty when it can. */
   why?: string;
   /** Take it over; gives why not. */
@@ -30,8 +32,9 @@ interface ValueFieldProps {
   children?: ReactNode;
 }
 
-export function ValueField({ label, name, type, json, extra = {}, choices, hint, why = "", onSet, children }: ValueFieldProps) {
-  const known = textOf(type, json);
+export function ValueField({ label, name, type, json, extra = {}, choices, hint, secret = false, why = "", onSet, children }: ValueFieldProps) {
+  const stored = secret && (json ?? "").startsWith('"***');
+  const known = stored ? "" : textOf(type, json);
   const [text, setText] = useState(known);
   const [problem, setProblem] = useState("");
   const id = useId();
@@ -85,7 +88,9 @@ export function ValueField({ label, name, type, json, extra = {}, choices, hint,
             {...described}
             value={text}
             inputMode={type === "integer" || type === "double" ? "decimal" : undefined}
-            autoComplete="off"
+            type={secret ? "password" : undefined}
+            placeholder={stored ? "Stored. Type to replace it." : undefined}
+            autoComplete={secret ? "new-password" : "off"}
             onChange={(event) => setText(event.target.value)}
             onBlur={leave}
             onKeyDown={(event) => {

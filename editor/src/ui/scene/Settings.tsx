@@ -30,6 +30,7 @@ export function SettingsFields({ settings, values, why, onChange }: { settings: 
       json={values[each.name] ?? each.default_value}
       extra={extraOf(each)}
       hint={each.description}
+      secret={each.secret}
       why={why}
       onSet={(json) => {
         const next = { ...values, [each.name]: json };

@@ -1,0 +1,96 @@
+"""Values of secret settings, stored apart from the documents that refer to them."""
+
+import asyncio
+import threading
+from pathlib import Path
+
+import msgspec
+
+from arcor2_hw.data.base import Data
+from arcor2_hw.data.secret import new_reference
+from arcor2_hw.exceptions import StorageError
+from arcor2_server.data_damage import DataDamage
+from arcor2_server.private_files import write_private
+
+
+class Secret(Data, frozen=True):
+    """One value, and the setting of which object type it is for."""
+
+    type: str
+    setting: str
+    value: str
+
+
+class _Content(msgspec.Struct):
+    secrets: dict[str, Secret] = msgspec.field(default_factory=dict)
+    scanned: set[tuple[str, str]] | None = None
+    """The secret settings (object type, name) that stored documents were searched for; None: never."""
+
+
+class SecretStore:
+    """A file that only its owner can read. Any thread may use it; what was added is on disk after `flush`."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._content = _Content()
+        self._changed = False
+        self._lock = threading.Lock()
+        self.values: frozenset[str] = frozenset()
+        """All values, to hide them in texts."""
+
+    def load(self, damage: DataDamage) -> None:
+        """Read the file; a damaged one is set aside and reported. StorageError when it cannot be read."""
+        try:
+            self._content = msgspec.json.decode(self._path.read_bytes(), type=_Content)
+            self.values = frozenset(secret.value for secret in self._content.secrets.values())
+        except FileNotFoundError:
+            return
+        except msgspec.DecodeError as error:
+            damage.set_aside(self._path, "The passwords of devices are lost: enter them again.", error)
+        except OSError as error:
+            raise StorageError(f"The secrets in {self._path} cannot be read: {error}") from error
+
+    @property
+    def scanned(self) -> set[tuple[str, str]] | None:
+        """The secret settings that stored documents were searched for, None when they never were."""
+        return self._content.scanned
+
+    def note_scanned(self, settings: set[tuple[str, str]]) -> None:
+        """Note for which secret settings stored documents were searched."""
+        with self._lock:
+            self._content.scanned = settings
+            self._changed = True
+
+    def find(self, reference: str) -> Secret | None:
+        """Return a secret, None when it is not stored."""
+        return self._content.secrets.get(reference)
+
+    def add(self, type_name: str, setting: str, value: str, *, reuse: bool = False) -> str:
+        """Store a value; returns the reference to it. `reuse`: the same one for the same value of a setting."""
+        secret = Secret(type_name, setting, value)
+        with self._lock:
+            if reuse:
+                for reference, stored in self._content.secrets.items():
+                    if stored == secret:
+                        return reference
+            reference = new_reference()
+            self._content.secrets[reference] = secret
+            self.values |= {value}
+            self._changed = True
+        return reference
+
+    def save(self) -> None:
+        """Write what was added. StorageError."""
+        with self._lock:
+            if not self._changed:
+                return
+            try:
+                write_private(self._path, msgspec.json.format(msgspec.json.encode(self._content)))
+            except OSError as error:
+                raise StorageError(f"Secrets cannot be stored in {self._path}: {error.strerror}") from error
+            self._changed = False
+
+    async def flush(self) -> None:
+        """Write what was added, without blocking the event loop. StorageError."""
+        if self._changed:
+            await asyncio.to_thread(self.save)

@@ -1,0 +1,56 @@
+"""Moves secrets that stored documents hold in clear to the store of secrets."""
+
+from typing import TYPE_CHECKING, TypeVar
+
+import msgspec
+from sqlalchemy import select
+
+from arcor2_hw.data.project import Project
+from arcor2_hw.data.scene import Scene, SceneObjectOverride
+from arcor2_server.setting_secrets import SettingSecrets, types_of
+from arcor2_server.storage.models import ProjectBesideRow, ProjectRow, SceneRow
+
+if TYPE_CHECKING:
+    from arcor2_server.storage.store import Storage
+
+T = TypeVar("T")
+
+
+async def hide_stored(storage: "Storage", secrets: SettingSecrets) -> int:
+    """Replace secrets in all saved documents by references; returns how many documents held one. StorageError.
+
+    Documents that cannot be read are left as they are.
+    """
+    changed = 0
+    async with storage.writing() as session:
+        types: dict[str, str] = {}
+        for scene_row in await session.scalars(select(SceneRow)):
+            scene = _decoded(scene_row.document, Scene)
+            if scene is None:
+                continue
+            types |= types_of(scene)
+            if (hidden := secrets.hide_in_scene(scene)) is not scene:
+                scene_row.document, changed = msgspec.json.encode(hidden), changed + 1
+        for project_row in await session.scalars(select(ProjectRow)):
+            project = _decoded(project_row.document, Project)
+            if project is None or not project.object_overrides:
+                continue
+            overrides = secrets.hide_in_overrides(project.object_overrides, types)
+            if overrides != project.object_overrides:
+                fresh = msgspec.structs.replace(project, object_overrides=overrides)
+                project_row.document, changed = msgspec.json.encode(fresh), changed + 1
+        for beside_row in await session.scalars(select(ProjectBesideRow)):
+            given = _decoded(beside_row.object_parameters, list[SceneObjectOverride])
+            if given and (overrides := secrets.hide_in_overrides(given, types)) != given:
+                beside_row.object_parameters, changed = msgspec.json.encode(overrides), changed + 1
+        await secrets.store.flush()  # before the documents lose the values
+    if changed:
+        await storage.purge()
+    return changed
+
+
+def _decoded(content: bytes, kind: type[T]) -> T | None:
+    try:
+        return msgspec.json.decode(content, type=kind)
+    except msgspec.DecodeError:
+        return None

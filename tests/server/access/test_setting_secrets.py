@@ -1,0 +1,289 @@
+"""Secret settings: never sent, never in a document, and yet the device gets them."""
+
+import asyncio
+import contextlib
+import hashlib
+import io
+import stat
+import zipfile
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import msgspec
+import pytest
+from websockets.asyncio.client import connect
+
+from arcor2_hw.client import Client
+from arcor2_hw.data import rpc
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.geometry import Position
+from arcor2_hw.data.object_type import ParameterMeta
+from arcor2_hw.data.package import PackageStateEnum
+from arcor2_hw.data.parameter import Parameter
+from arcor2_hw.data.project import Flow
+from arcor2_hw.data.secret import HIDDEN, is_reference
+from arcor2_hw.exceptions import InvalidData
+from arcor2_server.app import running_services
+from arcor2_server.settings import ServerSettings
+from tests.server.core.serving import ServerProcess, running
+
+CODE, OTHER, UNSAVED = "swordfish-4711", "halibut-0815", "haddock-42"
+CLEAR = ("clear-password-7", "clear-override-8", "clear-unsaved-9")
+"""The passwords in `clear_secrets.zip`: of the saved scene and the package, of overrides, of the open scene."""
+
+VAULT = '''
+"""A device with a secret."""
+import dataclasses
+import hashlib
+
+from arcor2_hw.actions import action
+from arcor2_hw.exceptions import NotConnected
+from arcor2_hw.objects import Generic, Settings
+
+
+@dataclasses.dataclass
+class VaultSettings(Settings):
+    address: str
+    code: str = dataclasses.field(default="", repr=False, metadata={"secret": True})
+
+
+class Vault(Generic):
+    """A vault that opens for the right code."""
+
+    _ABSTRACT = False
+
+    def __init__(self, obj_id: str, name: str, settings: VaultSettings) -> None:
+        super().__init__(obj_id, name, settings)
+        if hashlib.sha256(settings.code.encode()).hexdigest() != settings.address:
+            raise NotConnected("the code is wrong")
+
+    @action
+    def ring(self, *, an: str | None = None) -> None:
+        """Ring."""
+'''
+
+
+def setting(name: str, value: str) -> Parameter:
+    return Parameter(name, "string", msgspec.json.encode(value).decode())
+
+
+def address(code: str) -> Parameter:
+    """The vault's settings say by a digest which code it takes."""
+    return setting("address", hashlib.sha256(code.encode()).hexdigest())
+
+
+def leaks(directory: Path, *secrets: str, besides: str = "secrets.json") -> list[str]:
+    """Return the files that hold one of the secrets."""
+    return [
+        str(path.relative_to(directory))
+        for path in directory.rglob("*")
+        if path.is_file() and path.name != besides and any(each.encode() in path.read_bytes() for each in secrets)
+    ]
+
+
+def open_to_others(directory: Path) -> list[str]:
+    """Return what in the directory others than its owner may read, the directory itself too."""
+    found = [path for path in (directory, *directory.iterdir()) if path.stat().st_mode & 0o077]
+    return [f"{path.name} {stat.S_IMODE(path.stat().st_mode):o}" for path in found]
+
+
+@contextlib.asynccontextmanager
+async def listening(server: ServerProcess) -> AsyncIterator[list[str]]:
+    """Collect whatever another client is sent."""
+    heard: list[str] = []
+    async with connect(server.url) as socket:
+        yield heard
+        with contextlib.suppress(TimeoutError):
+            while True:
+                heard.append(str(await asyncio.wait_for(socket.recv(), 0.2)))
+
+
+async def test_a_secret_reaches_the_device_and_nobody_else(tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    async with (
+        running(data) as server,
+        listening(server) as heard,
+        Client(server.url, "ann") as client,
+        httpx.AsyncClient(base_url=server.url.replace("ws", "http")) as http,
+    ):
+        call = client.call
+        uploaded = await http.put("/object-types", json={"id": "Vault", "name": "Vault", "source": VAULT})
+        assert uploaded.status_code == 200, uploaded.text
+        (vault,) = [meta for meta in await call("GetObjectTypes") if meta.type == "Vault"]
+        assert {each.name: each.secret for each in vault.settings} == {"address": msgspec.UNSET, "code": True}
+
+        await call("NewScene", rpc.NewSceneArgs("bank"))
+        given = [address(OTHER), setting("code", CODE)]
+        await call("AddObjectToScene", rpc.AddObjectToSceneArgs("vault", "Vault", parameters=given))
+        obj = (await client.next_event("SceneObjectChanged")).data
+        reference = msgspec.json.decode(obj.parameters[1].value)
+        assert is_reference(reference)
+        # What a client got, it sends back: the secret stays. So does `***`.
+        await call("WriteLock", rpc.WriteLockArgs(obj.id))
+        for kept in (reference, HIDDEN):
+            again = [address(CODE), setting("code", kept)]
+            await call("UpdateObjectParameters", rpc.UpdateObjectParametersArgs(obj.id, again))
+            updated = (await client.next_event("SceneObjectChanged")).data
+            assert msgspec.json.decode(updated.parameters[1].value) == reference
+        await call("WriteUnlock", rpc.WriteUnlockArgs(obj.id))
+        await call("SaveScene")
+        await call("StartScene")
+        assert await state(client) == "started"
+        await call("StopScene")
+        assert await state(client) == "stopped"
+
+        # Over REST the same holds.
+        scene = (await call("ListScenes"))[0]
+        stored = (await http.get(f"/scenes/{scene.id}")).json()
+        assert stored["objects"][0]["parameters"][1]["value"] == f'"{reference}"'
+        await call("CloseScene")
+        stored["objects"][0]["parameters"][1]["value"] = f'"{HIDDEN}"'
+        assert (await http.put("/scenes", json=stored)).status_code == 200
+        stored = (await http.get(f"/scenes/{scene.id}")).json()
+        assert stored["objects"][0]["parameters"][1]["value"] == f'"{reference}"'
+
+        # An override of a project, and a package, which gets it from the server.
+        await call("NewProject", rpc.NewProjectArgs(scene.id, "ringing"))
+        project = (await client.next_event("OpenProject")).data.project
+        await call("WriteLock", rpc.WriteLockArgs(obj.id))
+        await call("AddOverride", rpc.AddOverrideArgs(obj.id, address(OTHER)))
+        await call("AddOverride", rpc.AddOverrideArgs(obj.id, setting("code", UNSAVED)))
+        await call("UpdateOverride", rpc.UpdateOverrideArgs(obj.id, setting("code", OTHER)))
+        await call("Undo")
+        await call("Redo")
+        await call("WriteUnlock", rpc.WriteUnlockArgs(obj.id))
+        await call("AddActionPoint", rpc.AddActionPointArgs("there", Position()))
+        point = (await client.next_event("ActionPointChanged")).data
+        await call("AddAction", rpc.AddActionArgs(point.id, "ring", f"{obj.id}/ring", [], [Flow()]))
+        ring = (await client.next_event("ActionChanged")).data.id
+        await call("AddLogicItem", rpc.AddLogicItemArgs("START", ring))
+        await call("AddLogicItem", rpc.AddLogicItemArgs(ring, "END"))
+        await call("SaveProject")
+        assert (await http.put(f"/projects/{project.id}/object-parameters", json=overridden(obj.id))).status_code == 200
+        answers = [
+            (await http.get(path)).text
+            for path in (f"/projects/{project.id}", f"/projects/{project.id}/object-parameters", "/api/devices")
+        ]
+        built = await call("BuildProject", rpc.BuildProjectArgs(project.id, "ringing"))
+        await call("CloseProject")
+        package = (await http.get(f"/packages/{built.package_id}")).content
+        await call("RunPackage", rpc.RunPackageArgs(built.package_id))
+        assert (await client.next_event("ActionStateAfter")).data.action_id == ring
+        await call("StopPackage")
+        while (await client.next_event("PackageState")).data.state is not PackageStateEnum.STOPPED:
+            pass
+
+        # A package that comes with a secret in clear loses it.
+        files = {"executionPackage": clear(package)}
+        assert (await http.post(f"/packages/{built.package_id}", files=files)).is_success
+        package = (await http.get(f"/packages/{built.package_id}")).content
+        diagnosis = (await http.get("/api/diagnosis")).content
+    with zipfile.ZipFile(io.BytesIO(package)) as files:
+        assert reference.encode() not in files.read("data/scene.json")
+        assert HIDDEN.encode() in files.read("data/scene.json")
+        answers += [files.read(name).decode(errors="replace") for name in files.namelist()]
+    with zipfile.ZipFile(io.BytesIO(diagnosis)) as files:
+        answers += [files.read(name).decode(errors="replace") for name in files.namelist()]
+    answers += heard
+    assert len(heard) > 20
+    for secret in (CODE, OTHER, UNSAVED):
+        assert [answer for answer in answers if secret in answer] == []
+    assert leaks(tmp_path, CODE, OTHER, UNSAVED) == []
+    assert CODE in (data / "secrets.json").read_text()
+    assert open_to_others(data) == []
+
+
+async def state(client: Client) -> str:
+    while True:
+        found = (await client.next_event("SceneState")).data
+        if found.state in ("started", "stopped"):
+            return str(found.state)
+
+
+def overridden(object_id: str) -> list[dict[str, Any]]:
+    return [{"id": object_id, "parameters": [{"name": "code", "type": "string", "value": f'"{OTHER}"'}]}]
+
+
+def clear(package: bytes) -> bytes:
+    """Put a secret in clear into a package."""
+    target = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(package)) as files, zipfile.ZipFile(target, "w") as changed:
+        for name in files.namelist():
+            content = files.read(name)
+            if name == "data/scene.json":
+                scene = msgspec.json.decode(content)
+                scene["objects"][0]["parameters"][1]["value"] = f'"{CODE}"'
+                content = msgspec.json.encode(scene)
+            changed.writestr(name, content)
+    return target.getvalue()
+
+
+async def test_data_with_secrets_in_clear_is_migrated(tmp_path: Path) -> None:
+    """The directory was made by version 0.1 before it stored secrets apart; its server was killed with a scene open."""
+    with zipfile.ZipFile(Path(__file__).parent / "clear_secrets.zip") as files:
+        files.extractall(tmp_path)
+    for path in tmp_path.iterdir():
+        path.chmod(0o755 if path.is_dir() else 0o644)
+    tmp_path.chmod(0o755)
+    assert leaks(tmp_path, *CLEAR)
+    references = []
+    for _ in range(2):
+        async with running_services(ServerSettings(data_dir=tmp_path)) as services:
+            store = services.secrets.store
+            scene = services.session.require_scene()
+            (opened,) = [each for obj in scene.objects for each in obj.parameters if each.name == "password"]
+            saved = await services.storage.scene(scene.id)
+            (kept,) = [each for obj in saved.objects for each in obj.parameters if each.name == "password"]
+            (project,) = [await services.storage.project(bare.id) for bare in await services.storage.projects()]
+            (override,) = project.object_overrides[0].parameters
+            found = [store.find(msgspec.json.decode(each.value)) for each in (opened, kept, override)]
+            assert [None if each is None else each.value for each in found] == [CLEAR[2], CLEAR[0], CLEAR[1]]
+            (directory,) = (tmp_path / "packages").iterdir()
+            assert set(services.secrets.values_for_package(directory).values()) == {CLEAR[0], CLEAR[1]}
+            references.append((opened, kept, override))
+            assert services.session.has_changes
+            # What undo goes back to is the saved password: it is one secret, not two.
+            await services.session.commit(
+                "ann", [change.inverse() for edit in reversed(services.session.history) for change in edit.changes]
+            )
+            assert not services.session.has_changes
+            await services.session.commit(
+                "ann", [change.inverse() for change in list(services.session.history)[-1].changes]
+            )
+        assert leaks(tmp_path, *CLEAR) == []
+        private = ("documents", "journal", "secrets", "packages", tmp_path.name)
+        assert [each for each in open_to_others(tmp_path) if each.startswith(private)] == []
+    assert references[0] == references[1]
+
+
+async def test_what_a_reference_may_stand_for(tmp_path: Path) -> None:
+    async with running_services(ServerSettings(data_dir=tmp_path)) as services:
+        secrets = services.secrets
+        (first,) = secrets.hide("YuMi", [setting("password", CODE)])
+        (second,) = secrets.hide("YuMi", [setting("password", CODE)])
+        assert first != second  # equal passwords cannot be told by their references
+        assert secrets.hide("YuMi", [setting("password", CODE)], [first]) == [first]
+        assert secrets.hide("YuMi", [first]) == [first]
+        assert secrets.hide("YuMi", [setting("password", HIDDEN)], [first]) == [first]
+        assert secrets.hide("YuMi", [setting("password", HIDDEN)]) == []  # the driver's default
+        assert secrets.hide("YuMi", [setting("password", "")], [first]) == [setting("password", "")]
+        assert secrets.hide("YuMi", [setting("host", CODE)]) == [setting("host", CODE)]
+        (unknown,) = secrets.hide("Unknown", [setting("api_key", CODE)])
+        assert is_reference(msgspec.json.decode(unknown.value))
+        # A secret cannot be sent to another device.
+        with pytest.raises(InvalidData, match="another setting"):
+            secrets.hide("Other", [msgspec.structs.replace(first, name="api_key")])
+        # A reference of another server is kept, and says nothing.
+        away = setting("password", HIDDEN + "0123456789abcdef")
+        assert secrets.hide("YuMi", [away]) == [away]
+        assert secrets.values_for(away.value.encode()) == {}
+
+
+async def test_a_default_that_is_secret_is_not_sent(tmp_path: Path) -> None:
+    async with running_services(ServerSettings(data_dir=tmp_path)) as services:
+        (password,) = [each for each in services.types.meta("YuMi").settings if each.name == "password"]
+        assert isinstance(password, ParameterMeta)
+        assert not isinstance(password.default_value, Unset)
+        assert (password.secret, msgspec.json.decode(password.default_value)) == (True, HIDDEN)
