@@ -134,6 +134,7 @@ class FakeCell:
         self.pose = Pose(Position(0.4, 0.1, 0.3), Orientation(1, 0, 0, 0))
         self.joints = [Joint("j1", 0.1), Joint("j2", -0.2)]
         self.moved: list[tuple[str, Pose]] = []
+        self.board = SimpleNamespace(on_obstacles_changed=[])
 
     @property
     def online(self) -> bool:
