@@ -13,8 +13,9 @@ from litestar.handlers import BaseRouteHandler, WebsocketRouteHandler
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server import audit
 from arcor2_server.connection_limits import CONNECTION
-from arcor2_server.rest.answers import OPEN, PERSON, ROLE
+from arcor2_server.rest.answers import AS_ROLE, OPEN, PERSON, ROLE
 from arcor2_server.settings import ServerSettings
 from arcor2_server.tokens import FILE, Token, TokenFile
 
@@ -168,6 +169,15 @@ def role_needed(connection: ASGIConnection[Any, Any, Any, Any], handler: BaseRou
         raise NotAuthorizedException(
             "A token is needed: Authorization: Bearer ...", headers={"WWW-Authenticate": "Bearer"}
         )
+    connection.state[AS_ROLE] = role
     needed = handler.opt.get(ROLE, Role.PROGRAMMER)
     if role < needed:
+        audit.note(
+            "forbidden",
+            f"{connection.scope.get('method', '')} {connection.url.path}",
+            user=connection.state.get(PERSON, ""),
+            role=role,
+            address=address_of(connection),
+            target="",
+        )
         raise PermissionDeniedException(f"This needs the role {needed.name.lower()} or a higher one.")

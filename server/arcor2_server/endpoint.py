@@ -5,6 +5,7 @@ import logging
 import secrets
 from collections.abc import Callable
 from typing import Any, Final
+from weakref import WeakKeyDictionary
 
 import msgspec
 import structlog
@@ -16,6 +17,7 @@ from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import RPCS, Request, Response, Rpc
 from arcor2_hw.data.texts import SHORTEST, check_texts
 from arcor2_hw.exceptions import Arcor2Error, StorageError, TextTooLong
+from arcor2_server import audit
 from arcor2_server.access import AccessRefused, address_of
 from arcor2_server.client import Client, CloseCode
 from arcor2_server.hub import encode
@@ -122,6 +124,8 @@ class Endpoint:
         self._routes = self._speech.routes
         self._tasks: set[asyncio.Task[None]] = set()
         self._watch: asyncio.Task[None] | None = None
+        self._holds: WeakKeyDictionary[Client, tuple[str, str, int, str]] = WeakKeyDictionary()
+        """The hold of each client that was logged last."""
 
     async def serve(self, socket: WebSocket[Any, Any, Any]) -> None:
         """Serve one connection until it ends."""
@@ -263,6 +267,7 @@ class Endpoint:
         if client.role < rpc.role:
             needed = f"{rpc.name} needs the role {Role(rpc.role).name.lower()} or a higher one."
             self._refuse(client, request, needed, "forbidden")
+            self._note("forbidden", client, rpc, UNSET)
             return
         args = route.default
         if route.decode is not None:
@@ -292,13 +297,28 @@ class Endpoint:
             partly = error.data is not UNSET
             text = _shortened(str(error))
             self._answer(client, request, context if partly else None, False, error.data, text, error.code)
+            self._note("refused", client, rpc, args, dry_run=context.dry_run)
             return
         except Arcor2Error as error:
             if error.detail:
                 log.info("request refused", request=rpc.name, reason=_shortened(str(error)), detail=error.detail)
             self._refuse(client, request, str(error), error.code)
+            self._note("refused", client, rpc, args, dry_run=context.dry_run)
             return
         self._answer(client, request, context, True, UNSET if data is None else data)
+        self._note("done", client, rpc, args, dry_run=context.dry_run)
+
+    def _note(self, outcome: str, client: Client, rpc: Rpc, args: Any, *, dry_run: bool = False) -> None:
+        """Log a command, or what was refused by role; of a hold, which is renewed ten times a second, its start."""
+        if outcome != "forbidden" and (dry_run or not audit.is_command(rpc)):
+            return
+        if (hold := getattr(args, "hold", None)) is not None:
+            press = (rpc.name, args.robot_id, hold, outcome)
+            if self._holds.get(client) == press:
+                return
+            self._holds[client] = press
+        target = audit.target_of(args)
+        audit.note(outcome, rpc.name, user=client.name, role=client.role, address=client.address, target=target)
 
     def _answer(
         self,

@@ -26,6 +26,8 @@ SERVICE: Final = "service"
 """The key of a route's `opt` that names the service it belongs to."""
 PERSON: Final = "person"
 """The key of a request's state under which the name on its token is, where it has one."""
+AS_ROLE: Final = "as_role"
+"""The key of a request's state under which the role of the sender is."""
 
 _encode = msgspec.json.Encoder().encode
 

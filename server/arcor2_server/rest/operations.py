@@ -22,7 +22,8 @@ from litestar.response import Stream
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.texts import check_texts
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
-from arcor2_server.rest.answers import OPEN, PERSON, ROLE, SERVICE, InternalError, Unsupported, refusal
+from arcor2_server import audit
+from arcor2_server.rest.answers import AS_ROLE, OPEN, PERSON, ROLE, SERVICE, InternalError, Unsupported, refusal
 from arcor2_server.rest.encodings import accepted_encodings
 from arcor2_server.rest.naming import camelized, camelized_names, snake, snaked
 from arcor2_server.rest.receiving import receiving
@@ -137,8 +138,10 @@ def route(declared: Operation) -> HTTPRouteHandler:
         try:
             with receiving(request, declared.title, declared.told_from):
                 done = await declared.handler(**await _arguments(declared, request, uploads))
+            _note("done", declared, request)
             return await _response(declared, request, done)
         except Arcor2Error as error:
+            _note("refused", declared, request)
             if error.detail:
                 log.info("request refused", path=declared.path, reason=str(error)[:1000], detail=error.detail[:1000])
             return refusal(declared.service, error)
@@ -164,6 +167,20 @@ def route(declared: Operation) -> HTTPRouteHandler:
         request_max_body_size=declared.limit,
         include_in_schema=False,
     )(handle)
+
+
+def _note(outcome: str, declared: Operation, request: Request[Any, Any, Any]) -> None:
+    """Log what changes something."""
+    if declared.method == "GET":
+        return
+    audit.note(
+        outcome,
+        f"{declared.method} {declared.path}",
+        user=request.state.get(PERSON, ""),
+        role=request.state.get(AS_ROLE),
+        address=request.client.host if request.client else "",
+        target=", ".join(str(request.path_params[name]) for name in declared.path_names)[: audit.LONGEST_TARGET],
+    )
 
 
 async def _arguments(declared: Operation, request: Request[Any, Any, Any], uploads: list[UploadFile]) -> dict[str, Any]:

@@ -1,0 +1,90 @@
+"""One log line for each request that is refused by role, and for each command that moves or changes something."""
+
+from typing import Any, Final
+
+import structlog
+
+from arcor2_hw.data.role import Role
+from arcor2_hw.data.rpc import Rpc
+
+log = structlog.get_logger(__name__)
+
+READING: Final = frozenset(
+    {
+        "ActionParamValues",
+        "Authenticate",
+        "CameraColorImage",
+        "CameraColorParameters",
+        "CheckCalibration",
+        "ForwardKinematics",
+        "History",
+        "InverseKinematics",
+        "MarkersCorners",
+        "ObjectTypeUsage",
+        "ProjectsWithScene",
+        "Reachability",
+        "SceneObjectUsage",
+        "SystemInfo",
+        "Version",
+    }
+)
+"""Requests that change nothing, besides those whose names begin with Get and List."""
+OF_THE_SCREEN: Final = frozenset(
+    {
+        "PreviewMove",
+        "ReadLock",
+        "ReadUnlock",
+        "RegisterForRobotEvent",
+        "RegisterUser",
+        "SetViewState",
+        "StreamRobot",
+        "SubscribeEvents",
+        "UpdateLock",
+        "UpdatePresence",
+        "WriteLock",
+        "WriteUnlock",
+    }
+)
+"""Requests that concern what a client shows, receives or holds, not the cell or a document."""
+_TARGETS: Final = (
+    *("robot_id", "object_id", "object_type_id", "package_id", "action_point_id", "orientation_id", "joints_id"),
+    *(
+        "action_id",
+        "logic_item_id",
+        "project_id",
+        "scene_id",
+        "id",
+        "target_id",
+        "original_id",
+        "start",
+        "name",
+        "type",
+    ),
+)
+"""Fields of arguments that say what a request is about, the most telling first. Their values are no secrets."""
+LONGEST_TARGET: Final = 100
+
+
+def is_command(rpc: Rpc) -> bool:
+    """Tell whether a request moves or changes something."""
+    return not (rpc.name.startswith(("Get", "List")) or rpc.name in READING or rpc.name in OF_THE_SCREEN)
+
+
+def target_of(args: Any) -> str:
+    """Return what the arguments of a request are about; empty where they do not say."""
+    robot = getattr(args, "robot", None)
+    for each in (args, robot):
+        for name in _TARGETS:
+            value = getattr(each, name, None)
+            if isinstance(value, str) and value:
+                return value[:LONGEST_TARGET]
+    if isinstance(args, set | frozenset):
+        return ", ".join(sorted(str(each) for each in args))[:LONGEST_TARGET]
+    return ""
+
+
+def note(outcome: str, request: str, *, user: str, role: Role | None, address: str, target: str) -> None:
+    """Log one request. outcome: done, refused or forbidden."""
+    write = log.warning if outcome == "forbidden" else log.info
+    name = "none" if role is None else role.name.lower()
+    write("command", outcome=outcome, request=request, target=target, user=user, role=name, address=address)
