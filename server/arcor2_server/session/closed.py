@@ -9,13 +9,15 @@ from typing import Final
 
 import msgspec
 import structlog
+from msgspec.structs import replace
 
 from arcor2_hw.data.base import now
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
+from arcor2_server.data_damage import DataDamage
 from arcor2_server.private_files import DIRECTORY_MODE, write_private
 from arcor2_server.session.changes import OF_SCENE, Change, Edit, How, Item, Kind, decode_changes, decode_items
-from arcor2_server.session.document import Document
+from arcor2_server.session.document import UNTIMED, Document
 from arcor2_server.session.history import History
 from arcor2_server.session.unsaved import Unsaved
 
@@ -52,8 +54,9 @@ class _Stored(msgspec.Struct, frozen=True):
 class ClosedHistories:
     """One file per closed document."""
 
-    def __init__(self, directory: Path) -> None:
+    def __init__(self, directory: Path, damage: DataDamage) -> None:
         self._directory = directory
+        self._damage = damage
 
     async def store(self, document: Document, history: History, unsaved: Unsaved) -> None:
         """Store the history of a document that is about to be closed, as far as it leads to what is saved."""
@@ -71,7 +74,17 @@ class ClosedHistories:
 
     async def reopen(self, scene: Scene, project: Project | None) -> tuple[Document, list[Edit]]:
         """Return the document of a scene or project, and its history, which is empty where none leads to it."""
-        closed = await asyncio.to_thread(self._read, scene.id if project is None else project.id)
+        path = self._path(scene.id if project is None else project.id)
+        closed = None
+        try:
+            closed = await asyncio.to_thread(_read, path)
+        except FileNotFoundError:
+            pass
+        except OSError as error:
+            log.error("undo history cannot be read", file=str(path), reason=str(error))
+        except (zlib.error, ValueError) as error:
+            what = f"Edits of {(project or scene).name!r} from before it was opened cannot be undone."
+            self._damage.set_aside(path, what, error)
         continued = None if closed is None else continue_history(closed, scene, project)
         return continued or (Document.of(scene, project), [])
 
@@ -86,24 +99,19 @@ class ClosedHistories:
         for oldest in stored[:-CLOSED_LIMIT]:
             oldest.unlink()
 
-    def _read(self, document: str) -> ClosedHistory | None:
-        path = self._path(document)
-        try:
-            stored = msgspec.json.decode(zlib.decompress(path.read_bytes()), type=_Stored)
-            edits = [
-                Edit(row.number, row.time, row.user, decode_changes(row.changes), row.request, row.how, row.of)
-                for row in stored.edits
-            ]
-            return ClosedHistory(stored.document, decode_items(stored.items), edits)
-        except FileNotFoundError:
-            return None
-        except (OSError, zlib.error, msgspec.DecodeError, ValueError) as error:
-            log.error("undo history cannot be read", document=document, file=str(path), reason=str(error))
-            return None
-
     def _path(self, document: str) -> Path:
         # An id may hold characters that a file name cannot.
         return self._directory / f"{hashlib.sha256(document.encode()).hexdigest()}.history"
+
+
+def _read(path: Path) -> ClosedHistory:
+    """Read a stored history. Raises OSError, and zlib.error or ValueError when the file is damaged."""
+    stored = msgspec.json.decode(zlib.decompress(path.read_bytes()), type=_Stored)
+    edits = [
+        Edit(row.number, row.time, row.user, decode_changes(row.changes), row.request, row.how, row.of)
+        for row in stored.edits
+    ]
+    return ClosedHistory(stored.document, decode_items(stored.items), edits)
 
 
 # ---------------------------------------------------------------------------------------------- closing
@@ -133,16 +141,21 @@ def continue_history(
 
     What was changed outside the editor since the document was closed is an edit without a user at the end.
     """
-    saved = Document.of(scene, project)
+    # Only the items are needed here: a second document with its lookups would double the time.
+    saved = [
+        Item(change.kind, change.id, change.parent, change.rank, change.after)
+        for change in Document().changes_to_fill(scene, project)
+    ]
     of_scene = project is None
     # The scene of a project has a history of its own: it is taken as it is now.
     items = [item for item in closed.items if (item.kind in OF_SCENE) is of_scene]
-    items += [item for item in saved.items() if (item.kind in OF_SCENE) is not of_scene]
+    items += [item for item in saved if (item.kind in OF_SCENE) is not of_scene]
     document = Document(items)
-    changes = differences(document, saved.items())
+    changes = differences(document, saved)
     document.apply(changes)
     # The order and the owner of an item are no part of a change.
-    if document.scene != saved.scene or document.project != saved.project:
+    untimed = replace(scene, **UNTIMED), project and replace(project, **UNTIMED)
+    if (document.scene, document.project) != untimed:
         return None
     edits = closed.edits
     if changes:

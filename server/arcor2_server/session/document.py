@@ -34,7 +34,7 @@ ROOTS: Final = (Kind.OBJECT, Kind.PARAMETER, Kind.SCENE, Kind.PROJECT)
 REFERRING: Final = frozenset({"pose", "position", "joints", *ActionParameterType})
 """Types of action parameter whose value is the id of something in the project."""
 
-_UNTIMED: Final = {"created": UNSET, "modified": UNSET, "int_modified": UNSET}
+UNTIMED: Final = {"created": UNSET, "modified": UNSET, "int_modified": UNSET}
 """When a document was saved is no part of what is edited: undoing an edit must not change it."""
 
 _by_rank = operator.attrgetter("rank")
@@ -88,11 +88,11 @@ class Document:
     def changes_to_fill(self, scene: Scene, project: Project | None = None) -> list[Change]:
         """Give the changes that put a scene and project into an empty document."""
         add = self.add
-        changes = [add(Kind.SCENE, scene.id, replace(scene, objects=[], **_UNTIMED))]
+        changes = [add(Kind.SCENE, scene.id, replace(scene, objects=[], **UNTIMED))]
         changes += [add(Kind.OBJECT, obj.id, obj) for obj in scene.objects]
         if project is None:
             return changes
-        bare = replace(project, action_points=[], parameters=[], logic=[], object_overrides=[], **_UNTIMED)
+        bare = replace(project, action_points=[], parameters=[], logic=[], object_overrides=[], **UNTIMED)
         changes.append(add(Kind.PROJECT, project.id, bare))
         for point in project.action_points:
             changes.append(add(Kind.POINT, point.id, bare_point(point)))

@@ -54,7 +54,7 @@ class Session(OpenDocument):
         """Called with each edit once it is on the disk, and with None when another document is open."""
         self._limit = settings.history_limit
         self._journal = Journal(settings.journal_database, self._take_back, services.secrets.hide_in_journal)
-        self._closed = ClosedHistories(settings.history_dir)
+        self._closed = ClosedHistories(settings.history_dir, services.damage)
         self._number = 0
         self._based_on = 0
         self._pending: deque[_Pending] = deque()
@@ -67,6 +67,8 @@ class Session(OpenDocument):
         """
         recovered = await self._journal.open()
         if recovered is not None:
+            if recovered.number and not recovered.edits and self._journal.loss is None:
+                recovered = await self._with_history(recovered)
             self._restore(recovered)
             await self._find_unsaved()
         if (loss := self._journal.loss) is not None:
@@ -82,6 +84,18 @@ class Session(OpenDocument):
     async def close(self) -> None:
         """Write what waits. What is open stays open for the next start."""
         await self._journal.close()
+
+    async def _with_history(self, recovered: Recovered) -> Recovered:
+        """Add the history that led to a document if the server ended before it was in the journal (see `show`)."""
+        document = Document(recovered.items)
+        if (scene := document.scene) is not None:
+            _, edits = await self._closed.reopen(scene, document.project)
+            if edits and edits[-1].number == recovered.number:
+                recovered = replace(recovered, edits=edits)
+                self._journal_history(
+                    Base(recovered.items, recovered.number, recovered.scene, recovered.project, 0, edits)
+                )
+        return recovered
 
     async def _superseded(self) -> bool:
         """Whether the open document is older than what is saved: it was recovered from a damaged journal."""
@@ -188,6 +202,10 @@ class Session(OpenDocument):
         base = Base(self.document.items(), self._number, self._scene_times, self._project_times, forget)
         return self._journal.rebase(base)
 
+    def _journal_history(self, base: Base) -> None:
+        """Write the edits that led to a document which the journal holds without them."""
+        self._journal.rebase(base).add_done_callback(lambda future: future.exception())
+
     # ------------------------------------------------------------------------------------------ opening, saving
     async def show(self, scene: Scene, project: Project | None = None) -> None:
         """Open a scene, or a project on its scene, in place of what is open; its history is continued."""
@@ -196,8 +214,11 @@ class Session(OpenDocument):
             await self._closed.store(self.document, self.history, self._unsaved)
             scene_times = Times.of(scene)
             project_times = Times() if project is None else Times.of(project)
-            number = edits[-1].number if edits else 0
-            await self._journal.rebase(Base(document.items(), number, scene_times, project_times, ALL, edits))
+            base = Base(document.items(), edits[-1].number if edits else 0, scene_times, project_times, ALL)
+            await self._journal.rebase(base)
+            if edits:
+                # Not waited for: a long history takes longer than the document. Later edits are written after it.
+                self._journal_history(replace(base, forget=0, edits=edits))
         # Before observers are called, which read the times.
         self._scene_times, self._project_times = scene_times, project_times
         self._replace(document, edits)
