@@ -122,6 +122,12 @@ class InvalidData(Arcor2Error):
     code = "invalid_data"
 
 
+class AddressChanged(InvalidData):
+    """A stored secret was entered for another address; the message names the device, the setting and both addresses."""
+
+    code = "address_changed"
+
+
 class TextTooLong(InvalidData):
     """A text is longer than its field allows; the message names the field and the limit."""
 

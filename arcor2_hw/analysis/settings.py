@@ -21,12 +21,13 @@ _KINDS: Final = frozenset({"boolean", "integer", "double", "string", "string_enu
 
 
 class _Field(NamedTuple):
-    """A field of a dataclass. `secret` is None where its metadata does not say."""
+    """A field of a dataclass. `secret` and `address` are None where its metadata does not say."""
 
     default: ast.expr | None
     in_constructor: bool = True
     keyword_only: bool = False
     secret: bool | None = None
+    address: bool | None = None
 
 
 class SettingsReader:
@@ -110,8 +111,8 @@ class SettingsReader:
             if "default_factory" in given:
                 raise info.problem("the default of a setting has to stand in the source", expression)
             in_constructor = not _is(given.get("init"), False)
-            secret = _secret(given.get("metadata"))
-            return _Field(given.get("default"), in_constructor, _is(given.get("kw_only"), True), secret)
+            secret, address = (_declared(given.get("metadata"), key) for key in ("secret", "address"))
+            return _Field(given.get("default"), in_constructor, _is(given.get("kw_only"), True), secret, address)
         return _Field(expression)
 
     def _setting(
@@ -127,8 +128,9 @@ class SettingsReader:
                 members = enum_members(enumeration, self._resolver) or {}
                 extra = encode(Extra(allowed_values=list(dict.fromkeys(members.values()))))
             default = self._actions.default(info, kind, enumeration, field.default)
-            if field.secret and kind.name != "string":
-                raise info.problem(f"a secret setting must be of type str, not {kind.name}", hint)
+            for what, declared in (("a secret setting", field.secret), ("an address", field.address)):
+                if declared and kind.name != "string":
+                    raise info.problem(f"{what} must be of type str, not {kind.name}", hint)
         except Broken as error:
             raise Broken(f"setting {name}: {error}", error.problem.path, error.problem.line) from None
         except InvalidData as error:
@@ -137,7 +139,13 @@ class SettingsReader:
         if secret and default not in (UNSET, '""'):
             default = encode(HIDDEN)
         return ParameterMeta(
-            name, kind.name, description=description, default_value=default, extra=extra, secret=secret or UNSET
+            name,
+            kind.name,
+            description=description,
+            default_value=default,
+            extra=extra,
+            secret=secret or UNSET,
+            address=UNSET if field.address is None else field.address,
         )
 
 
@@ -145,11 +153,11 @@ def _is(expression: ast.expr | None, value: bool) -> bool:
     return isinstance(expression, ast.Constant) and expression.value is value
 
 
-def _secret(metadata: ast.expr | None) -> bool | None:
-    """Return what `field(metadata={"secret": ...})` says, None where it says nothing."""
+def _declared(metadata: ast.expr | None, name: str) -> bool | None:
+    """Return what `field(metadata={name: ...})` says, None where it says nothing."""
     if isinstance(metadata, ast.Dict):
         for key, value in zip(metadata.keys, metadata.values, strict=True):
-            if isinstance(key, ast.Constant) and key.value == "secret" and isinstance(value, ast.Constant):
+            if isinstance(key, ast.Constant) and key.value == name and isinstance(value, ast.Constant):
                 return bool(value.value)
     return None
 

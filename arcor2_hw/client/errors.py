@@ -135,7 +135,10 @@ class EventsMissed(Arcor2Error):
 
 _KINDS: Final[dict[type[RequestFailed], tuple[str, ...]]] = {
     Forbidden: ("forbidden", "token_needed", "not_registered"),
-    BadRequest: ("invalid_arguments", "invalid_data", "invalid_project", "invalid_package", "unsound", "too_long"),
+    BadRequest: (
+        *("invalid_arguments", "invalid_data", "invalid_project", "invalid_package", "unsound", "too_long"),
+        "address_changed",
+    ),
     NothingThere: ("not_found",),
     InTheWay: ("conflict",),
     LockedByOther: ("locked",),

@@ -109,6 +109,7 @@ class ParameterMeta(Data, frozen=True):
 
     former_names: names under which older projects give it (ours, beside the protocol).
     secret: the value of this setting is stored by the server and never sent to clients.
+    address: whether this setting says where the device is; left out where its name decides.
     """
 
     name: str
@@ -120,6 +121,7 @@ class ParameterMeta(Data, frozen=True):
     extra: str | Unset = UNSET
     former_names: list[str] | Unset = UNSET
     secret: bool | Unset = UNSET
+    address: bool | Unset = UNSET
 
 
 class ActionMetadata(Data, frozen=True):

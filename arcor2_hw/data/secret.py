@@ -4,6 +4,10 @@ import re
 import secrets
 from typing import Any, Final
 
+from msgspec import field
+
+from arcor2_hw.data.base import Data
+
 HIDDEN: Final = "***"
 """Shown in place of a secret; as the value of a setting it stands for the stored one."""
 
@@ -24,11 +28,16 @@ def is_reference(value: Any) -> bool:
     return isinstance(value, str) and _REFERENCE.fullmatch(value) is not None
 
 
-def references_in(document: bytes) -> set[str]:
-    """Return the references in an encoded document."""
-    return set(_REFERENCE.findall(document.decode(errors="replace")))
-
-
 def is_secret_name(name: str) -> bool:
     """Tell whether a setting of this name holds a secret; one that names a file only says where it is."""
     return _NAMES.search(name) is not None and _FILE.search(name) is None
+
+
+class ObjectSecrets(Data, frozen=True):
+    """Secrets of one object for the cell host.
+
+    values: values by the name of the setting. problem: why other secrets are withheld; empty when they are not stored.
+    """
+
+    values: dict[str, str] = field(default_factory=dict)
+    problem: str = ""

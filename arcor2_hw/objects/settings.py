@@ -6,17 +6,13 @@ URL or a file therefore goes through the checks in this module; each raises OutO
 
 import dataclasses
 import os
-import re
 import stat
 import urllib.parse
 from pathlib import Path
-from typing import Final
 
+from arcor2_hw.data.address import HOST
 from arcor2_hw.data.device import DEVICE_FILES
 from arcor2_hw.exceptions import OutOfRange
-
-_HOST: Final = re.compile(r"[\w.-]+|\[?[0-9A-Fa-f:.]*:[0-9A-Fa-f:.]*(%[\w.-]+)?\]?")
-"""A host name, an IPv4 address, or an IPv6 address with or without brackets and zone."""
 
 
 @dataclasses.dataclass
@@ -26,12 +22,15 @@ class Settings:
     A secret is declared by its metadata: `password: str = field(default="", repr=False, metadata={"secret": True})`.
     The server stores its value apart and never sends it to clients. A str whose name says that it is secret
     (`password`, `token`, `api_key`, ...) is treated the same unless its metadata has `"secret": False`.
+
+    A stored secret is sent only to the address that it was entered for. A str whose name says so (`host`, `url`,
+    `address`, `port`, ...) is part of that address; metadata `"address": True` or `False` declares it otherwise.
     """
 
 
 def check_host(host: str, port: int = 1) -> None:
     """Check the settings `host`, a name or an address, and `port`."""
-    if not _HOST.fullmatch(host):
+    if not HOST.fullmatch(host):
         raise OutOfRange(f"host must be the name or address of the device, not {host!r}")
     if not 1 <= port <= 65535:
         raise OutOfRange(f"port must be 1 to 65535, not {port!r}")
@@ -42,7 +41,7 @@ def check_url(name: str, url: str, *schemes: str) -> urllib.parse.SplitResult:
     problem = f"{name} must be {' or '.join(f'{scheme}://host:port' for scheme in schemes)}"
     try:
         parts = urllib.parse.urlsplit(url)
-        sound = bool(parts.hostname and _HOST.fullmatch(parts.hostname)) and parts.port != 0
+        sound = bool(parts.hostname and HOST.fullmatch(parts.hostname)) and parts.port != 0
     except ValueError:
         raise OutOfRange(problem) from None
     if "@" in parts.netloc or parts.query or parts.fragment:

@@ -12,6 +12,7 @@ from msgspec.structs import replace
 from arcor2_hw.data.device import Connection
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.scene import Scene, SceneObjectOverride
+from arcor2_hw.data.secret import ObjectSecrets
 from arcor2_hw.exceptions import Arcor2Error, NotConnected, NotFound, ProgramStopped, Refused
 from arcor2_hw.objects import Camera, Generic, Robot
 from arcor2_hw.runtime.creation import Recipe, load_type, recipe
@@ -43,9 +44,9 @@ def recipes(
     models: Mapping[str, ObjectModel],
     overridden: Iterable[SceneObjectOverride] = (),
     failed: Callable[[SceneFault], None] | None = None,
-    secrets: Mapping[str, str] = MappingProxyType({}),
+    secrets: Mapping[str, ObjectSecrets] = MappingProxyType({}),
 ) -> list[Recipe]:
-    """Work out how every object is made; `secrets` has the values of secret settings by reference.
+    """Work out how every object is made; `secrets` are those of the objects, by id.
 
     SceneFault names the first that cannot be; with `failed`, that is told of each instead.
     """
@@ -56,7 +57,8 @@ def recipes(
             cls = classes.get(scene_object.type)
             if cls is None:
                 raise NotFound(f"{scene_object.name}: object type {scene_object.type} is not there")
-            found.append(recipe(scene_object, cls, models.get(scene_object.type), overridden, secrets))
+            own = secrets.get(scene_object.id, ObjectSecrets())
+            found.append(recipe(scene_object, cls, models.get(scene_object.type), overridden, own))
         except Arcor2Error as error:
             fault = SceneFault(scene_object.id, error)
             if failed is None:

@@ -11,7 +11,7 @@ import tempfile
 import typing
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from types import MappingProxyType, ModuleType
+from types import ModuleType
 from typing import Any, Final
 
 import humps
@@ -22,14 +22,16 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.scene import SceneObject, SceneObjectOverride
-from arcor2_hw.data.secret import is_reference
-from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound
+from arcor2_hw.data.secret import ObjectSecrets, is_reference
+from arcor2_hw.exceptions import AddressChanged, Arcor2Error, InvalidData, NotFound
 from arcor2_hw.objects import CollisionObject, Generic, GenericWithPose, Settings
 from arcor2_hw.runtime import older
 from arcor2_hw.runtime.messages import TypeCode
 
 ENTRY_POINTS: Final = "arcor2_hw.object_types"
 """Entry point group under which installed object types are found, by the type's name."""
+
+_NO_SECRETS: Final = ObjectSecrets()
 
 source_hooks: list[Callable[[], None]] = [older.install]
 """Called before a source that is no installed module is imported: the place of what older sources want to import."""
@@ -152,19 +154,20 @@ def _setting(hint: Any, parameter: Parameter) -> Any:
     return msgspec.convert(value, hint)
 
 
-def with_secrets(name: str, parameters: Mapping[str, Parameter], secrets: Mapping[str, str]) -> dict[str, Parameter]:
-    """Replace references to secrets by their values; InvalidData for one that is not stored."""
+def with_secrets(name: str, parameters: Mapping[str, Parameter], secrets: ObjectSecrets) -> dict[str, Parameter]:
+    """Replace references to secrets by their values; InvalidData for one that is not stored or is withheld."""
     found = dict(parameters)
     for key, parameter in parameters.items():
-        reference = parameter.value.strip('"')
-        if not is_reference(reference):
+        if not is_reference(parameter.value.strip('"')):
             continue
-        if reference not in secrets:
+        if key not in secrets.values:
+            if secrets.problem:
+                raise AddressChanged(secrets.problem)
             raise InvalidData(
                 f"{name}: the secret setting {key} is not stored on this server. Enter it in the settings of {name}, "
                 "or in the cell file."
             )
-        found[key] = Parameter(key, parameter.type, msgspec.json.encode(secrets[reference]).decode())
+        found[key] = Parameter(key, parameter.type, msgspec.json.encode(secrets.values[key]).decode())
     return found
 
 
@@ -240,11 +243,11 @@ def recipe(
     cls: type[Generic],
     model: ObjectModel | None,
     overrides: Iterable[SceneObjectOverride] = (),
-    secrets: Mapping[str, str] = MappingProxyType({}),
+    secrets: ObjectSecrets = _NO_SECRETS,
 ) -> Recipe:
     """Work out the constructor's arguments (protocol, section 9.2); InvalidData names object and parameter.
 
-    secrets: values of secret settings by reference.
+    secrets: values of the object's secret settings.
     """
     name = scene_object.name
     if cls.abstract():

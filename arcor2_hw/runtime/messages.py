@@ -16,6 +16,7 @@ from arcor2_hw.data.operation import HoldKind
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.robot import Joint, KinematicCalibration
 from arcor2_hw.data.scene import Scene, SceneObjectOverride
+from arcor2_hw.data.secret import ObjectSecrets
 from arcor2_hw.framing import PREFIX_SIZE as PREFIX_SIZE
 from arcor2_hw.runtime.message_parts import DeviceStop as DeviceStop
 from arcor2_hw.runtime.message_parts import HeldPart as HeldPart
@@ -58,7 +59,7 @@ class OpenScene(ToHost, frozen=True):
     keep_going: an object that cannot be made or connected is told as failed by DeviceChanged, and the others come up.
     assets: files of the meshes and of robots' models that were uploaded, by id. bodies: what stands in the way besides.
     calibrations: kinematics of robots as their controllers told them, by id. secrets: values of secret settings by
-    reference.
+    the id of the object.
     """
 
     scene: Scene
@@ -71,7 +72,7 @@ class OpenScene(ToHost, frozen=True):
     assets: dict[str, str] = field(default_factory=dict)
     bodies: list[PutIn] = field(default_factory=list)
     calibrations: dict[str, KinematicCalibration] = field(default_factory=dict)
-    secrets: dict[str, str] = field(default_factory=dict)
+    secrets: dict[str, ObjectSecrets] = field(default_factory=dict)
 
 
 class RetryObject(ToHost, frozen=True):
@@ -99,7 +100,7 @@ class RunPackage(ToHost, frozen=True):
     assets: dict[str, str] = field(default_factory=dict)
     bodies: list[PutIn] = field(default_factory=list)
     calibrations: dict[str, KinematicCalibration] = field(default_factory=dict)
-    secrets: dict[str, str] = field(default_factory=dict)
+    secrets: dict[str, ObjectSecrets] = field(default_factory=dict)
 
 
 class PutBody(ToHost, frozen=True):

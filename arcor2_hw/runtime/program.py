@@ -20,6 +20,7 @@ from arcor2_hw.data.events import (
 )
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.project import Project, ProjectRobotJoints
+from arcor2_hw.data.secret import ObjectSecrets
 from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, InvalidData, NotFound, ProgramStopped
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.device import STOP_DEADLINE, Device, describe
@@ -71,13 +72,13 @@ class Program:
         breakpoints: Set[str] = frozenset(),
         shared_breakpoints: Set[str] = frozenset(),
         here: CellFile | None = None,
-        secrets: Mapping[str, str] = MappingProxyType({}),
+        secrets: Mapping[str, ObjectSecrets] = MappingProxyType({}),
     ) -> None:
         self.channel = channel
         self.here = here
         """The settings of devices at this place, which win over those of the package."""
         self.secrets = secrets
-        """Values of secret settings by reference."""
+        """Values of secret settings by the id of the object."""
         self.package_id = package_id
         self.cell = Cell()
         self.breakpoints = frozenset(breakpoints)

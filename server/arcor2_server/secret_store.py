@@ -14,11 +14,15 @@ from arcor2_server.private_files import write_private
 
 
 class Secret(Data, frozen=True):
-    """One value, and the setting of which object type it is for."""
+    """One value, and the setting of which object type it is for.
+
+    address: hosts that the value may be sent to; None in files of older versions, until the value is used.
+    """
 
     type: str
     setting: str
     value: str
+    address: str | None = None
 
 
 class _Content(msgspec.Struct):
@@ -65,9 +69,17 @@ class SecretStore:
         """Return a secret, None when it is not stored."""
         return self._content.secrets.get(reference)
 
-    def add(self, type_name: str, setting: str, value: str, *, reuse: bool = False) -> str:
-        """Store a value; returns the reference to it. `reuse`: the same one for the same value of a setting."""
-        secret = Secret(type_name, setting, value)
+    def bind(self, reference: str, address: str) -> Secret | None:
+        """Note the address of a secret that has none yet; returns the secret, None when it is not stored."""
+        with self._lock:
+            secret = self._content.secrets.get(reference)
+            if secret is not None and secret.address is None:
+                secret = self._content.secrets[reference] = msgspec.structs.replace(secret, address=address)
+                self._changed = True
+            return secret
+
+    def add(self, secret: Secret, *, reuse: bool = False) -> str:
+        """Store a secret; returns the reference to it. `reuse`: the same one for an equal secret."""
         with self._lock:
             if reuse:
                 for reference, stored in self._content.secrets.items():
@@ -75,7 +87,7 @@ class SecretStore:
                         return reference
             reference = new_reference()
             self._content.secrets[reference] = secret
-            self.values |= {value}
+            self.values |= {secret.value}
             self._changed = True
         return reference
 

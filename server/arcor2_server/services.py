@@ -99,7 +99,7 @@ class Services:
     def __post_init__(self) -> None:
         """Make what needs no more than these."""
         self.damage = DataDamage(self.settings.data_dir, self.hub)
-        self.secrets = SettingSecrets(self.types, SecretStore(self.settings.secrets_file))
+        self.secrets = SettingSecrets(self.types, SecretStore(self.settings.secrets_file), self.settings.cell)
         self.compute = Compute(self.settings.compute_idle)
         self.calibration = CalibrationService(self)
         self.calibration_records = Calibrations(self.storage)

@@ -1,10 +1,12 @@
 """Takes secret settings out of documents that enter the server, and puts them back for the cell host.
 
 Scenes, projects, packages and the journal hold a reference in place of each secret. They can be shown, logged and
-exported as they are.
+exported as they are. A reference is valid only together with the address that its value was entered for: a user who
+changes the host in the settings of a device cannot have the password sent to another machine.
 """
 
 import contextlib
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final, Protocol
@@ -12,18 +14,23 @@ from typing import Any, Final, Protocol
 import msgspec
 from msgspec.structs import replace
 
-from arcor2_hw.data.object_type import ObjectTypeMeta
+from arcor2_hw.data.address import host_of, is_address_name
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.cell import Cell, parameters_of
+from arcor2_hw.data.object_type import ObjectTypeMeta, ParameterMeta
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
-from arcor2_hw.data.secret import HIDDEN, is_reference, is_secret_name, references_in
-from arcor2_hw.exceptions import InvalidData, NotFound
-from arcor2_server.secret_store import SecretStore
+from arcor2_hw.data.secret import HIDDEN, ObjectSecrets, is_reference, is_secret_name
+from arcor2_hw.exceptions import AddressChanged, InvalidData, InvalidPackage, NotFound
+from arcor2_hw.runtime.documents import read_document
+from arcor2_server.secret_store import Secret, SecretStore
 from arcor2_server.session.changes import Change, Kind
 from arcor2_server.session.journal_records import Recovered
 
 PACKAGED: Final = ("scene.json", "project.json")
 """Documents in the folder `data` of a package that may hold settings."""
+_UNKNOWN: Final = SceneObject("", "")
 _WITH_SETTINGS: Final = frozenset({Kind.OBJECT, Kind.OVERRIDE})
 
 
@@ -40,8 +47,9 @@ class Types(Protocol):
 class SettingSecrets:
     """Replaces values by references, and finds values by reference."""
 
-    def __init__(self, types: Types, store: SecretStore) -> None:
+    def __init__(self, types: Types, store: SecretStore, cell: Cell | None = None) -> None:
         self._types = types
+        self._cell = cell
         self.store = store
         self._reuse = False
 
@@ -65,68 +73,119 @@ class SettingSecrets:
 
     def is_secret(self, type_name: str, setting: str) -> bool:
         """Tell whether a setting is secret; of an unknown type, or an unknown setting, its name decides."""
-        try:
-            found = next((each for each in self._types.meta(type_name).settings if each.name == setting), None)
-        except NotFound:
-            found = None
+        found = next((each for each in self._settings(type_name) if each.name == setting), None)
         return is_secret_name(setting) if found is None else found.secret is True
 
+    def _settings(self, type_name: str) -> list[ParameterMeta]:
+        try:
+            return self._types.meta(type_name).settings
+        except NotFound:
+            return []
+
+    def address(self, name: str, type_name: str, parameters: Iterable[Parameter]) -> str:
+        """Return the hosts that an object connects to with these settings, those of the cell file included."""
+        settings = self._settings(type_name)
+        texts = {each.name: _text(each.default_value) for each in settings if not isinstance(each.default_value, Unset)}
+        texts |= {each.name: _text(each.value) for each in parameters}
+        device = None if self._cell is None else self._cell.device(name)
+        if device is not None and device.type == type_name:
+            texts |= {each.name: _text(each.value) for each in parameters_of(device)}
+        declared = {each.name: each.address for each in settings if not isinstance(each.address, Unset)}
+        return ", ".join(
+            host_of(text) for key, text in sorted(texts.items()) if text and declared.get(key, is_address_name(key))
+        )
+
     # ------------------------------------------------------------------------------------------ values to references
-    def hide(self, type_name: str, given: Iterable[Parameter], before: Iterable[Parameter] = ()) -> list[Parameter]:
+    def hide(
+        self,
+        type_name: str,
+        given: Iterable[Parameter],
+        before: Iterable[Parameter] = (),
+        *,
+        name: str = "",
+        below: Iterable[Parameter] = (),
+        check: bool = False,
+    ) -> list[Parameter]:
         """Return settings of an object with references in place of secrets; the values are stored by `flush`.
 
-        before: the settings as they are. `***` keeps what is stored, else the driver's default counts. Raises
-        InvalidData for a reference to the secret of another setting.
+        Args:
+            type_name: the object's type.
+            given: all its settings, or all its overrides.
+            before: the same as they are stored. `***` keeps what is stored, else the driver's default counts.
+            name: the object's name.
+            below: for overrides, the settings of the object in the scene.
+            check: refuse a reference to a secret that was entered for another address.
+
+        Raises:
+            InvalidData: a reference is to the secret of another setting.
+            AddressChanged: a reference is to a secret for another address.
         """
-        stored = {parameter.name: _text(parameter) for parameter in before}
+        given, before, below = list(given), list(before), list(below)
+        stored = {parameter.name: _text(parameter.value) for parameter in before}
+        address = self.address(name, type_name, [*below, *given])
+        if before or below:
+            previous = self.address(name, type_name, [*below, *before])
+            for reference in (*map(_text, (each.value for each in below)), *stored.values()):
+                self.store.bind(reference, previous)
         found = []
         for parameter in given:
-            value = _text(parameter)
+            value = _text(parameter.value)
             if not value or not self.is_secret(type_name, parameter.name):
                 found.append(parameter)
                 continue
             known = stored.get(parameter.name) or ""
             known = known if is_reference(known) else ""
             if value == HIDDEN:
-                if known:
-                    found.append(_with(parameter, known))
-                continue
+                if not known:
+                    continue
+                value = known
             if is_reference(value):
-                secret = self.store.find(value)
+                secret = self.store.bind(value, address)
                 if secret is not None and (secret.type, secret.setting) != (type_name, parameter.name):
                     raise InvalidData(f"The setting {parameter.name} refers to a secret of another setting. Enter it.")
-                found.append(parameter)
+                if check and secret is not None and secret.address != address:
+                    raise AddressChanged(_enter_again(name or type_name, secret, address))
+                found.append(_with(parameter, value))
                 continue
-            secret = self.store.find(known)
-            if secret is None or secret.value != value:
-                known = self.store.add(type_name, parameter.name, value, reuse=self._reuse)
+            entered = Secret(type_name, parameter.name, value, address)
+            if self.store.find(known) != entered:
+                known = self.store.add(entered, reuse=self._reuse)
             found.append(_with(parameter, known))
         return found
 
     def hide_in_object(self, obj: SceneObject, before: SceneObject | None = None) -> SceneObject:
-        """Return an object of a scene without secrets; the same one when it has none."""
+        """Return an object of a scene without secrets; the same one when it has none.
+
+        Raises AddressChanged when it has another address than `before`, and a secret for that one.
+        """
         given = list(obj.parameters)
-        hidden = self.hide(obj.type, given, [] if before is None else before.parameters)
+        stored = [] if before is None else before.parameters
+        moved = before is not None and self.address(obj.name, obj.type, given) != self.address(
+            obj.name, obj.type, stored
+        )
+        hidden = self.hide(obj.type, given, stored, name=obj.name, check=moved)
         return obj if hidden == given else replace(obj, parameters=hidden)
 
     def hide_in_scene(self, scene: Scene, before: Scene | None = None) -> Scene:
-        """Return a scene without secrets; `before` is how it is stored."""
-        stored = {} if before is None else {obj.id: obj for obj in before.objects}
+        """Return a scene without secrets; `before` is how it is stored. Raises AddressChanged."""
+        stored = {} if before is None else objects_of(before)
         objects = [self.hide_in_object(obj, stored.get(obj.id)) for obj in scene.objects]
         return scene if objects == scene.objects else replace(scene, objects=objects)
 
     def hide_in_overrides(
         self,
         overrides: list[SceneObjectOverride],
-        types: Mapping[str, str],
+        objects: Mapping[str, SceneObject],
         before: Iterable[SceneObjectOverride] = (),
     ) -> list[SceneObjectOverride]:
-        """Return overrides without secrets; `types` are the types of objects by id."""
+        """Return overrides without secrets; `objects` are those of the scene by id."""
         stored = {override.id: override.parameters for override in before}
-        return [
-            replace(each, parameters=self.hide(types.get(each.id, ""), each.parameters, stored.get(each.id, ())))
-            for each in overrides
-        ]
+        found = []
+        for each in overrides:
+            obj = objects.get(each.id, _UNKNOWN)
+            hidden = self.hide(obj.type, each.parameters, stored.get(each.id, ()), name=obj.name, below=obj.parameters)
+            found.append(replace(each, parameters=hidden))
+        return found
 
     async def take_from_scene(self, scene: Scene, before: Scene | None) -> Scene:
         """Return a scene without secrets, which are on disk then; `before` is how it is stored. StorageError."""
@@ -137,7 +196,7 @@ class SettingSecrets:
     async def take_from_project(self, project: Project, scene: Scene, before: Project | None) -> Project:
         """Return a project on a scene without secrets, which are on disk then. StorageError."""
         stored = [] if before is None else before.object_overrides
-        hidden = self.hide_in_overrides(project.object_overrides, types_of(scene), stored)
+        hidden = self.hide_in_overrides(project.object_overrides, objects_of(scene), stored)
         await self.store.flush()
         return replace(project, object_overrides=hidden)
 
@@ -148,12 +207,12 @@ class SettingSecrets:
             for change in edit.changes:
                 if change.kind in _WITH_SETTINGS:
                     values += [(change.kind, change.before), (change.kind, change.after)]
-        types = {value.id: value.type for kind, value in values if kind is Kind.OBJECT and value is not None}
+        objects = {value.id: value for kind, value in values if kind is Kind.OBJECT and value is not None}
 
         def hidden(kind: Kind, value: Any) -> Any:
             if value is None or kind not in _WITH_SETTINGS:
                 return value
-            return self.hide_in_object(value) if kind is Kind.OBJECT else self.hide_in_overrides([value], types)[0]
+            return self.hide_in_object(value) if kind is Kind.OBJECT else self.hide_in_overrides([value], objects)[0]
 
         with self.migrating():
             if all(hidden(kind, value) == value for kind, value in values):
@@ -175,11 +234,11 @@ class SettingSecrets:
             except (OSError, msgspec.DecodeError):
                 documents[name] = None
         scene, project = documents.values()
-        objects = _entries(scene, "objects")
-        types = {each.get("id"): str(each.get("type", "")) for each in objects}
-        changed = [self._hide_plain(types.get(each.get("id"), ""), each) for each in objects]
-        overrides = [*_entries(project, "object_overrides"), *_entries(project, "objectOverrides")]
-        changed += [self._hide_plain(types.get(each.get("id"), ""), each) for each in overrides]
+        objects = {each.get("id"): each for each in _entries(scene, "objects")}
+        changed = [self._hide_plain(each, each, []) for each in objects.values()]
+        for override in [*_entries(project, "object_overrides"), *_entries(project, "objectOverrides")]:
+            obj = objects.get(override.get("id"), {})
+            changed.append(self._hide_plain(override, obj, _parameters(obj)))
         if not any(changed):
             return False
         self.store.save()
@@ -191,43 +250,83 @@ class SettingSecrets:
                 fresh.replace(path)
         return True
 
-    def _hide_plain(self, type_name: str, entry: dict[str, Any]) -> bool:
-        try:
-            given = msgspec.convert(entry.get("parameters", []), list[Parameter])
-        except msgspec.ValidationError:
-            return False
-        hidden = self.hide(type_name, given)
-        entry["parameters"] = msgspec.to_builtins(hidden)
+    def _hide_plain(self, entry: dict[str, Any], obj: dict[str, Any], below: list[Parameter]) -> bool:
+        given = _parameters(entry)
+        hidden = self.hide(str(obj.get("type", "")), given, name=str(obj.get("name", "")), below=below)
+        if hidden != given:
+            entry["parameters"] = msgspec.to_builtins(hidden)
         return hidden != given
 
     # ------------------------------------------------------------------------------------------ references to values
-    def values_for(self, *documents: bytes) -> dict[str, str]:
-        """Return the values of the references in encoded documents, as far as they are stored."""
-        references = {reference for document in documents for reference in references_in(document)}
-        secrets = {reference: self.store.find(reference) for reference in references}
-        return {reference: secret.value for reference, secret in secrets.items() if secret is not None}
+    def values_for(self, scene: Scene, overrides: Iterable[SceneObjectOverride] = ()) -> dict[str, ObjectSecrets]:
+        """Return the secrets of objects by id, as far as they are stored and were entered for the object's address.
 
-    def values_for_package(self, directory: Path) -> dict[str, str]:
-        """Return the values of the references in a package. Reads files: call it in a thread."""
-        paths = [directory / "data" / name for name in PACKAGED]
-        return self.values_for(*(path.read_bytes() for path in paths if path.is_file()))
+        Objects that share an id get none: the cell host could not tell their secrets apart.
+        Call `flush` of the store afterwards: this may note the address of a secret.
+        """
+        overrides = list(overrides)
+        count = Counter(obj.id for obj in scene.objects)
+        found = {obj.id: self._values_for(obj, overrides) for obj in scene.objects if count[obj.id] == 1}
+        return {key: secrets for key, secrets in found.items() if secrets is not None}
+
+    def _values_for(self, obj: SceneObject, overrides: list[SceneObjectOverride]) -> ObjectSecrets | None:
+        layers = [obj.parameters, *(each.parameters for each in overrides if each.id == obj.id)]
+        parameters = {each.name: each for layer in layers for each in layer}
+        address = self.address(obj.name, obj.type, parameters.values())
+        values: dict[str, str] = {}
+        problem = ""
+        for key, parameter in parameters.items():
+            secret = self.store.find(_text(parameter.value))
+            if secret is None or (secret.type, secret.setting) != (obj.type, key):
+                continue
+            secret = self.store.bind(_text(parameter.value), address) or secret
+            if secret.address == address:
+                values[key] = secret.value
+            else:
+                problem = _enter_again(obj.name, secret, address)
+        return ObjectSecrets(values, problem) if values or problem else None
+
+    def values_for_package(self, directory: Path) -> dict[str, ObjectSecrets]:
+        """Return the secrets of a package, none when it is damaged. Reads and writes files: call it in a thread."""
+        try:
+            scene = read_document(directory / "data" / PACKAGED[0], Scene)
+            project = read_document(directory / "data" / PACKAGED[1], Project)
+        except InvalidPackage:
+            return {}
+        found = self.values_for(scene, project.object_overrides)
+        self.store.save()
+        return found
+
+
+def _enter_again(name: str, secret: Secret, address: str) -> str:
+    return (
+        f"Enter the {secret.setting} of {name!r} again: its host changed from {secret.address or 'none'} "
+        f"to {address or 'none'}."
+    )
 
 
 def _hidden(change: Change, hidden: Callable[[Kind, Any], Any]) -> Change:
     return replace(change, before=hidden(change.kind, change.before), after=hidden(change.kind, change.after))
 
 
-def types_of(scene: Scene) -> dict[str, str]:
-    """Return the types of the objects of a scene by id."""
-    return {obj.id: obj.type for obj in scene.objects}
+def objects_of(scene: Scene) -> dict[str, SceneObject]:
+    """Return the objects of a scene by id."""
+    return {obj.id: obj for obj in scene.objects}
 
 
-def _text(parameter: Parameter) -> str:
-    """Return the value of a setting that is a text, else an empty one."""
+def _text(value: str) -> str:
+    """Return the encoded value of a setting that is a text, else an empty one."""
     try:
-        return msgspec.json.decode(parameter.value, type=str)
+        return msgspec.json.decode(value, type=str)
     except msgspec.DecodeError:
         return ""
+
+
+def _parameters(entry: dict[str, Any]) -> list[Parameter]:
+    try:
+        return msgspec.convert(entry.get("parameters", []), list[Parameter])
+    except msgspec.ValidationError:
+        return []
 
 
 def _with(parameter: Parameter, value: str) -> Parameter:

@@ -670,6 +670,8 @@ def test_secret_settings() -> None:
         @dataclass
         class BankSettings(Settings):
             host: str
+            branch: str = field(metadata={"address": True})
+            report_url: str = field(metadata={"address": False})
             code: str = field(metadata={"secret": True})
             password: str = "robotics"
             password_file: str = ""
@@ -691,6 +693,8 @@ def test_secret_settings() -> None:
     settings = {each.name: (each.secret, each.default_value) for each in lib.analyse("Bank").meta.settings}
     assert settings == {
         "host": (msgspec.UNSET, msgspec.UNSET),
+        "branch": (msgspec.UNSET, msgspec.UNSET),
+        "report_url": (msgspec.UNSET, msgspec.UNSET),
         "code": (True, msgspec.UNSET),
         "password": (True, '"***"'),
         "password_file": (msgspec.UNSET, '""'),
@@ -698,6 +702,10 @@ def test_secret_settings() -> None:
         "pin": (msgspec.UNSET, "3"),
         "empty_secret": (True, '""'),
     }
+    declared = {
+        each.name: each.address for each in lib.analyse("Bank").meta.settings if each.address is not msgspec.UNSET
+    }
+    assert declared == {"branch": True, "report_url": False}
     problem = lib.analyse("Wrong").problem
     assert problem is not None
     assert "a secret setting must be of type str" in str(problem)

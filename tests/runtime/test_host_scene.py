@@ -10,7 +10,7 @@ import pytest
 
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.scene import SceneObjectOverride
-from arcor2_hw.data.secret import new_reference
+from arcor2_hw.data.secret import ObjectSecrets, new_reference
 from arcor2_hw.runtime import messages as m
 
 from .conftest import HostProcess, open_scene, scene_object, type_code
@@ -226,7 +226,7 @@ def test_references_to_secrets(host: HostProcess, tmp_path: Path) -> None:
     reference = new_reference()
     objects = [scene_object("a", "Device", file=reference)]
     message = open_scene([type_code("Device", DEVICE)], *objects)
-    host.send(msgspec.structs.replace(message, secrets={reference: str(tmp_path / "secret")}))
+    host.send(msgspec.structs.replace(message, secrets={"obj_a": ObjectSecrets({"file": str(tmp_path / "secret")})}))
     host.expect(m.SceneOpened)
     assert [p.name for p in tmp_path.iterdir()] == ["secret"]
 
@@ -238,6 +238,13 @@ def test_a_secret_that_is_not_stored_is_named(host: HostProcess) -> None:
     assert error.message == (
         "a: the secret setting file is not stored on this server. Enter it in the settings of a, or in the cell file."
     )
+
+
+def test_a_secret_for_another_address_is_withheld(host: HostProcess) -> None:
+    message = open_scene([type_code("Device", DEVICE)], scene_object("a", "Device", file=new_reference()))
+    host.send(msgspec.structs.replace(message, secrets={"obj_a": ObjectSecrets(problem="Enter the file again.")}))
+    error = host.expect(m.SceneFailed).error
+    assert (error.object_id, error.code, error.message) == ("obj_a", "address_changed", "Enter the file again.")
 
 
 def test_a_source_that_breaks_is_named(host: HostProcess) -> None:

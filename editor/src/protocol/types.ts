@@ -1021,6 +1021,7 @@ export interface Parameter {
  *
  * former_names: names under which older projects give it (ours, beside the protocol).
  * secret: the value of this setting is stored by the server and never sent to clients.
+ * address: whether this setting says where the device is; left out where its name decides.
  */
 export interface ParameterMeta {
   name: string;
@@ -1032,6 +1033,7 @@ export interface ParameterMeta {
   extra?: string;
   former_names?: string[];
   secret?: boolean;
+  address?: boolean;
 }
 
 /** Values of PivotEnum in UpdateObjectPoseUsingRobot. */

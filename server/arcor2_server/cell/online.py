@@ -151,6 +151,7 @@ class OnlineCell:
         """Give why the scene did not come up, None when it did."""
         self.board.show(scene.objects, {})
         message, overlaid = opening(self._services, scene, keep_going)
+        await self._services.secrets.store.flush()
         self.board.show(scene.objects, overlaid)
         self._answer = asyncio.get_running_loop().create_future()
         host = self._host = await self.hosts.take(self)

@@ -2,8 +2,6 @@
 
 from typing import TYPE_CHECKING, Final
 
-import msgspec
-
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.scene import Scene
@@ -46,6 +44,6 @@ def opening(services: "Services", scene: Scene, keep_going: bool) -> tuple[m.Ope
         services.settings.streaming_period,
         keep_going=keep_going,
         assets=shapes_put_in(services),
-        secrets=services.secrets.values_for(msgspec.json.encode((scene, overrides))),
+        secrets=services.secrets.values_for(scene, overrides),
     )
     return message, overlaid

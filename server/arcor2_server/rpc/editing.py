@@ -8,6 +8,7 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.events import ChangeType, LockData
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.parameter import Parameter
+from arcor2_hw.data.scene import SceneObject
 from arcor2_server.rpc.registry import Context, RequestRefused
 from arcor2_server.session.changes import Change, Kind
 
@@ -21,16 +22,31 @@ async def commit(context: Context, changes: Sequence[Change]) -> bool:
 
 
 async def hide_secrets(
-    context: Context, type_name: str, given: Iterable[Parameter], before: Iterable[Parameter] = ()
+    context: Context,
+    obj: SceneObject,
+    given: Iterable[Parameter],
+    before: Iterable[Parameter] = (),
+    *,
+    of_project: bool = False,
 ) -> list[Parameter]:
     """Store the secrets among the settings of an object; returns the settings with references. See SettingSecrets.hide.
 
     Others may edit while this waits for the disk.
+
+    Args:
+        context: the request.
+        obj: the object as it is in the scene.
+        given: its settings, or with `of_project` its overrides.
+        before: the same as they are.
+        of_project: the settings are overrides. They are changed one by one, so their addresses are checked when the
+            scene or the package is started.
     """
     if context.dry_run:
         return list(given)
-    hidden = context.services.secrets.hide(type_name, given, before)
-    await context.services.secrets.store.flush()
+    secrets = context.services.secrets
+    below = obj.parameters if of_project else ()
+    hidden = secrets.hide(obj.type, given, before, name=obj.name, below=below, check=not of_project)
+    await secrets.store.flush()
     return hidden
 
 

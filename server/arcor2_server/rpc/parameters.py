@@ -105,10 +105,12 @@ async def _without_secret(context: Context, object_id: str, given: Parameter) ->
     """Store the value of an override that is secret; returns it with a reference. InvalidData when it has no value."""
     document, overrides = _overrides(context, object_id, given)
     require_held(context, object_id)
-    hidden = await hide_secrets(context, document.scene_object(object_id).type, [given], overrides)
-    if not hidden:
+    others = [override for override in overrides if override.name != given.name]
+    obj = document.scene_object(object_id)
+    hidden = await hide_secrets(context, obj, [*others, given], overrides, of_project=True)
+    if not hidden or hidden[-1].name != given.name:
         raise InvalidData(f"Enter a value for the secret setting {given.name}: none is stored.")
-    return hidden[0]
+    return hidden[-1]
 
 
 def _index(overrides: list[Parameter], name: str) -> int:

@@ -46,8 +46,8 @@ async def add_object_to_scene(context: Context, args: AddObjectToSceneArgs) -> N
     async with services.locks.auto(context.user, SCENE):
         services.session.require_scene_alone()
         services.cell.require_offline()
-        parameters = await hide_secrets(context, args.type, args.parameters)
-        await _add(context, SceneObject(args.name, args.type, args.pose, parameters, new_id("obj")))
+        obj = SceneObject(args.name, args.type, args.pose, id=new_id("obj"))
+        await _add(context, replace(obj, parameters=await hide_secrets(context, obj, args.parameters)))
 
 
 async def _add(context: Context, obj: SceneObject) -> None:
@@ -129,7 +129,7 @@ async def update_object_parameters(context: Context, args: UpdateObjectParameter
     if problems := settings_problems(obj.name, args.parameters, services.types.meta(obj.type)):
         raise InvalidData(" ".join(problems))
     require_held(context, args.id)
-    parameters = await hide_secrets(context, obj.type, args.parameters, obj.parameters)
+    parameters = await hide_secrets(context, obj, args.parameters, obj.parameters)
     require_held(context, args.id)
     await _update(context, replace(document.scene_object(args.id), parameters=parameters))
 

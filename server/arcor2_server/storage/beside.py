@@ -9,7 +9,7 @@ from sqlalchemy import delete, select
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.project import ProjectParameter
 from arcor2_hw.data.scene import SceneObjectOverride
-from arcor2_server.setting_secrets import types_of
+from arcor2_server.setting_secrets import objects_of
 from arcor2_server.storage.models import BreakpointsRow, ExecutionTokenRow, ProjectBesideRow, ProjectRow
 from arcor2_server.storage.store import Storage
 
@@ -46,7 +46,7 @@ class Beside:
         if (secrets := self._storage.secrets) is not None and overrides:
             scene = await self._storage.scene((await self._storage.project(project_id)).scene_id)
             before = await self.object_parameters(project_id)
-            overrides = secrets.hide_in_overrides(overrides, types_of(scene), before)
+            overrides = secrets.hide_in_overrides(overrides, objects_of(scene), before)
             await secrets.store.flush()
         await self._write(project_id, "object_parameters", overrides)
 

@@ -6,8 +6,8 @@ import msgspec
 from sqlalchemy import select
 
 from arcor2_hw.data.project import Project
-from arcor2_hw.data.scene import Scene, SceneObjectOverride
-from arcor2_server.setting_secrets import SettingSecrets, types_of
+from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
+from arcor2_server.setting_secrets import SettingSecrets, objects_of
 from arcor2_server.storage.models import ProjectBesideRow, ProjectRow, SceneRow
 
 if TYPE_CHECKING:
@@ -23,25 +23,25 @@ async def hide_stored(storage: "Storage", secrets: SettingSecrets) -> int:
     """
     changed = 0
     async with storage.writing() as session:
-        types: dict[str, str] = {}
+        objects: dict[str, SceneObject] = {}
         for scene_row in await session.scalars(select(SceneRow)):
             scene = _decoded(scene_row.document, Scene)
             if scene is None:
                 continue
-            types |= types_of(scene)
+            objects |= objects_of(scene)
             if (hidden := secrets.hide_in_scene(scene)) is not scene:
                 scene_row.document, changed = msgspec.json.encode(hidden), changed + 1
         for project_row in await session.scalars(select(ProjectRow)):
             project = _decoded(project_row.document, Project)
             if project is None or not project.object_overrides:
                 continue
-            overrides = secrets.hide_in_overrides(project.object_overrides, types)
+            overrides = secrets.hide_in_overrides(project.object_overrides, objects)
             if overrides != project.object_overrides:
                 fresh = msgspec.structs.replace(project, object_overrides=overrides)
                 project_row.document, changed = msgspec.json.encode(fresh), changed + 1
         for beside_row in await session.scalars(select(ProjectBesideRow)):
             given = _decoded(beside_row.object_parameters, list[SceneObjectOverride])
-            if given and (overrides := secrets.hide_in_overrides(given, types)) != given:
+            if given and (overrides := secrets.hide_in_overrides(given, objects)) != given:
                 beside_row.object_parameters, changed = msgspec.json.encode(overrides), changed + 1
         await secrets.store.flush()  # before the documents lose the values
     if changed:

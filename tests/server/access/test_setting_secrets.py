@@ -16,16 +16,21 @@ import pytest
 from websockets.asyncio.client import connect
 
 from arcor2_hw.client import Client
+from arcor2_hw.client.errors import BadRequest
 from arcor2_hw.data import rpc
 from arcor2_hw.data.base import Unset
-from arcor2_hw.data.geometry import Position
+from arcor2_hw.data.cell import Cell, CellDevice, overlay
+from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import ParameterMeta
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.data.parameter import Parameter
-from arcor2_hw.data.project import Flow
-from arcor2_hw.data.secret import HIDDEN, is_reference
-from arcor2_hw.exceptions import InvalidData
+from arcor2_hw.data.project import Flow, Project
+from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
+from arcor2_hw.data.secret import HIDDEN, ObjectSecrets, is_reference
+from arcor2_hw.exceptions import AddressChanged, InvalidData
 from arcor2_server.app import running_services
+from arcor2_server.secret_store import Secret
+from arcor2_server.setting_secrets import SettingSecrets
 from arcor2_server.settings import ServerSettings
 from tests.server.core.serving import ServerProcess, running
 
@@ -45,7 +50,8 @@ from arcor2_hw.objects import Generic, Settings
 
 @dataclasses.dataclass
 class VaultSettings(Settings):
-    address: str
+    digest: str
+    host: str = "plc1"
     code: str = dataclasses.field(default="", repr=False, metadata={"secret": True})
 
 
@@ -56,7 +62,7 @@ class Vault(Generic):
 
     def __init__(self, obj_id: str, name: str, settings: VaultSettings) -> None:
         super().__init__(obj_id, name, settings)
-        if hashlib.sha256(settings.code.encode()).hexdigest() != settings.address:
+        if hashlib.sha256(settings.code.encode()).hexdigest() != settings.digest:
             raise NotConnected("the code is wrong")
 
     @action
@@ -69,9 +75,9 @@ def setting(name: str, value: str) -> Parameter:
     return Parameter(name, "string", msgspec.json.encode(value).decode())
 
 
-def address(code: str) -> Parameter:
+def digest(code: str) -> Parameter:
     """The vault's settings say by a digest which code it takes."""
-    return setting("address", hashlib.sha256(code.encode()).hexdigest())
+    return setting("digest", hashlib.sha256(code.encode()).hexdigest())
 
 
 def leaks(directory: Path, *secrets: str, besides: str = "secrets.json") -> list[str]:
@@ -112,10 +118,14 @@ async def test_a_secret_reaches_the_device_and_nobody_else(tmp_path: Path) -> No
         uploaded = await http.put("/object-types", json={"id": "Vault", "name": "Vault", "source": VAULT})
         assert uploaded.status_code == 200, uploaded.text
         (vault,) = [meta for meta in await call("GetObjectTypes") if meta.type == "Vault"]
-        assert {each.name: each.secret for each in vault.settings} == {"address": msgspec.UNSET, "code": True}
+        assert {each.name: each.secret for each in vault.settings} == {
+            "digest": msgspec.UNSET,
+            "host": msgspec.UNSET,
+            "code": True,
+        }
 
         await call("NewScene", rpc.NewSceneArgs("bank"))
-        given = [address(OTHER), setting("code", CODE)]
+        given = [digest(OTHER), setting("code", CODE)]
         await call("AddObjectToScene", rpc.AddObjectToSceneArgs("vault", "Vault", parameters=given))
         obj = (await client.next_event("SceneObjectChanged")).data
         reference = msgspec.json.decode(obj.parameters[1].value)
@@ -123,7 +133,7 @@ async def test_a_secret_reaches_the_device_and_nobody_else(tmp_path: Path) -> No
         # What a client got, it sends back: the secret stays. So does `***`.
         await call("WriteLock", rpc.WriteLockArgs(obj.id))
         for kept in (reference, HIDDEN):
-            again = [address(CODE), setting("code", kept)]
+            again = [digest(CODE), setting("code", kept)]
             await call("UpdateObjectParameters", rpc.UpdateObjectParametersArgs(obj.id, again))
             updated = (await client.next_event("SceneObjectChanged")).data
             assert msgspec.json.decode(updated.parameters[1].value) == reference
@@ -148,7 +158,7 @@ async def test_a_secret_reaches_the_device_and_nobody_else(tmp_path: Path) -> No
         await call("NewProject", rpc.NewProjectArgs(scene.id, "ringing"))
         project = (await client.next_event("OpenProject")).data.project
         await call("WriteLock", rpc.WriteLockArgs(obj.id))
-        await call("AddOverride", rpc.AddOverrideArgs(obj.id, address(OTHER)))
+        await call("AddOverride", rpc.AddOverrideArgs(obj.id, digest(OTHER)))
         await call("AddOverride", rpc.AddOverrideArgs(obj.id, setting("code", UNSAVED)))
         await call("UpdateOverride", rpc.UpdateOverrideArgs(obj.id, setting("code", OTHER)))
         await call("Undo")
@@ -241,7 +251,8 @@ async def test_data_with_secrets_in_clear_is_migrated(tmp_path: Path) -> None:
             found = [store.find(msgspec.json.decode(each.value)) for each in (opened, kept, override)]
             assert [None if each is None else each.value for each in found] == [CLEAR[2], CLEAR[0], CLEAR[1]]
             (directory,) = (tmp_path / "packages").iterdir()
-            assert set(services.secrets.values_for_package(directory).values()) == {CLEAR[0], CLEAR[1]}
+            (packaged,) = services.secrets.values_for_package(directory).values()
+            assert packaged == ObjectSecrets({"password": CLEAR[1]})
             references.append((opened, kept, override))
             assert services.session.has_changes
             # What undo goes back to is the saved password: it is one secret, not two.
@@ -278,7 +289,111 @@ async def test_what_a_reference_may_stand_for(tmp_path: Path) -> None:
         # A reference of another server is kept, and says nothing.
         away = setting("password", HIDDEN + "0123456789abcdef")
         assert secrets.hide("YuMi", [away]) == [away]
-        assert secrets.values_for(away.value.encode()) == {}
+        assert secrets.values_for(scene_with(setting("host", "yumi1"), away)) == {}
+
+
+def scene_with(*parameters: Parameter) -> Scene:
+    return Scene("bank", id="scn_1", objects=[SceneObject("yumi", "YuMi", Pose(), list(parameters), "obj_1")])
+
+
+AGAIN = "Enter the code of 'vault' again: its host changed from plc1 to evil."
+
+
+async def test_a_secret_is_not_sent_to_another_host(tmp_path: Path) -> None:
+    async with (
+        running(tmp_path / "data") as server,
+        Client(server.url, "ann") as client,
+        httpx.AsyncClient(base_url=server.url.replace("ws", "http")) as http,
+    ):
+        call = client.call
+        await http.put("/object-types", json={"id": "Vault", "name": "Vault", "source": VAULT})
+        await call("NewScene", rpc.NewSceneArgs("bank"))
+        given = [digest(CODE), setting("code", CODE)]  # for the host that is the default
+        await call("AddObjectToScene", rpc.AddObjectToSceneArgs("vault", "Vault", parameters=given))
+        obj = (await client.next_event("SceneObjectChanged")).data
+        code = obj.parameters[1]
+        await call("WriteLock", rpc.WriteLockArgs(obj.id))
+        for kept in (code, setting("code", HIDDEN)):
+            moved = [digest(CODE), setting("host", "evil"), kept]
+            with pytest.raises(BadRequest, match=AGAIN) as refused:
+                await call("UpdateObjectParameters", rpc.UpdateObjectParametersArgs(obj.id, moved))
+            assert refused.value.reason == AddressChanged.code
+        with pytest.raises(BadRequest, match=AGAIN.replace("vault", "thief")):
+            await call("AddObjectToScene", rpc.AddObjectToSceneArgs("thief", "Vault", parameters=[*moved[:2], code]))
+        # With the code entered again, the host may change; undo returns to host and code before.
+        moved = [digest(CODE), setting("host", "plc2"), setting("code", CODE)]
+        await call("UpdateObjectParameters", rpc.UpdateObjectParametersArgs(obj.id, moved))
+        entered = (await client.next_event("SceneObjectChanged")).data.parameters
+        assert is_reference(msgspec.json.decode(entered[2].value))
+        assert entered[2] != code
+        await call("Undo")
+        await call("WriteUnlock", rpc.WriteUnlockArgs(obj.id))
+        await call("SaveScene")
+        scene = (await call("ListScenes"))[0]
+        stored = (await http.get(f"/scenes/{scene.id}")).json()
+        assert stored["objects"][0]["parameters"] == msgspec.to_builtins(obj.parameters)
+        await call("CloseScene")
+        stored["objects"][0]["parameters"].append(msgspec.to_builtins(setting("host", "evil")))
+        answer = await http.put("/scenes", json=stored)
+        assert answer.is_client_error
+        assert AGAIN in answer.text
+
+        # Overrides are entered one by one: the device is refused when the scene starts.
+        await call("NewProject", rpc.NewProjectArgs(scene.id, "ringing"))
+        await call("WriteLock", rpc.WriteLockArgs(obj.id))
+        await call("AddOverride", rpc.AddOverrideArgs(obj.id, setting("host", "evil")))
+        await call("WriteUnlock", rpc.WriteUnlockArgs(obj.id))
+        await call("StartScene")
+        while not (found := (await client.next_event("SceneState")).data).message:
+            assert found.state != "started"
+        assert AGAIN in found.message
+        if found.state != "stopped":
+            assert await state(client) == "stopped"
+        await call("WriteLock", rpc.WriteLockArgs(obj.id))
+        await call("AddOverride", rpc.AddOverrideArgs(obj.id, setting("code", CODE)))
+        await call("WriteUnlock", rpc.WriteUnlockArgs(obj.id))
+        await call("StartScene")
+        assert await state(client) == "started"
+        await call("StopScene")
+
+
+async def test_which_secrets_the_cell_host_gets(tmp_path: Path) -> None:
+    settings = ServerSettings(data_dir=tmp_path)
+    async with running_services(settings) as services:
+        secrets = services.secrets
+        host = setting("host", "yumi1")
+        (_, password) = secrets.hide("YuMi", [host, setting("password", CODE)])
+        found = {"obj_1": ObjectSecrets({"password": CODE})}
+        moved = "Enter the password of 'yumi' again: its host changed from yumi1 to {}."
+        assert secrets.values_for(scene_with(host, password)) == found
+        assert secrets.values_for(scene_with(setting("host", "YuMi1"), password)) == found
+        withheld = {"obj_1": ObjectSecrets(problem=moved.format("evil"))}
+        assert secrets.values_for(scene_with(setting("host", "evil"), password)) == withheld
+        over = [SceneObjectOverride("obj_1", [setting("host", "evil")])]
+        assert secrets.values_for(scene_with(host, password), over) == withheld
+        package = tmp_path / "package"
+        (package / "data").mkdir(parents=True)
+        (package / "data" / "scene.json").write_bytes(msgspec.json.encode(scene_with(host, password)))
+        for overrides, expected in (([], found), (over, withheld)):
+            project = Project("ringing", "scn_1", id="pro_1", object_overrides=overrides)
+            (package / "data" / "project.json").write_bytes(msgspec.json.encode(project))
+            assert secrets.values_for_package(package) == expected
+        # The cell file moves the device; a password that is entered then is for the new address.
+        cell = Cell([CellDevice("yumi", "YuMi", {"host": "yumi2"})])
+        here = SettingSecrets(services.types, secrets.store, cell)
+        laid = overlay(cell, scene_with(host, password))
+        assert here.values_for(scene_with(host, password), laid)["obj_1"].problem == moved.format("yumi2")
+        (_, again) = here.hide("YuMi", [host, setting("password", CODE)], [host, password], name="yumi")
+        assert here.values_for(scene_with(host, again), laid) == found
+        # Only the setting that it was entered for gets it, and only an object with an id of its own.
+        assert secrets.values_for(scene_with(host, msgspec.structs.replace(password, name="user"))) == {}
+        twin = scene_with(setting("host", "evil")).objects + scene_with(host, password).objects
+        assert secrets.values_for(Scene("bank", id="scn_1", objects=twin)) == {}
+        # A secret without an address is for the one that it is used with first.
+        (unbound,) = [setting("password", secrets.store.add(Secret("YuMi", "password", OTHER)))]
+        with pytest.raises(AddressChanged, match=moved.format("evil")):
+            secrets.hide("YuMi", [setting("host", "evil"), unbound], [host, unbound], name="yumi", check=True)
+        assert secrets.values_for(scene_with(host, unbound)) == {"obj_1": ObjectSecrets({"password": OTHER})}
 
 
 async def test_a_default_that_is_secret_is_not_sent(tmp_path: Path) -> None:

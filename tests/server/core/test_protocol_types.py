@@ -13,7 +13,7 @@ from tests.protocol import PROTOCOL
 
 ADDED = {
     "ObjectTypeMeta": {"category", "icon", "shadows"},
-    "ParameterMeta": {"former_names", "secret"},
+    "ParameterMeta": {"address", "former_names", "secret"},
     "ObjectAction": {"category", "former_names", "icon"},
     "RobotEef.Data": {"time_ms"},
     "RobotFeatures": {"jog", "acknowledge_stop", "kinematic_calibration"},

@@ -1,0 +1,38 @@
+"""Which settings say where a device is, and at which host that is."""
+
+import pytest
+
+from arcor2_hw.data.address import host_of, is_address_name
+
+
+@pytest.mark.parametrize(
+    ("address", "host"),
+    [
+        ("PLC1", "plc1"),
+        ("plc1:502", "plc1"),
+        ("10.0.0.1", "10.0.0.1"),
+        ("::1", "::1"),
+        ("opc.tcp://plc1:4840/path", "plc1"),
+        ("https://[::1]:80", "::1"),
+        ("socket://plc1:4001", "plc1"),
+        ("http://plc1.evil?x=1", "plc1.evil"),
+        # Not a host alone: any other text is another address.
+        ("/dev/ttyUSB0", "/dev/ttyUSB0"),
+        ("http://plc1@evil/", "http://plc1@evil/"),
+        ("http://plc1:80@evil/", "http://plc1:80@evil/"),
+        ("http://evil\\@plc1/", "http://evil\\@plc1/"),
+        ("http://plc1\n.evil/", "http://plc1\n.evil/"),
+    ],
+)
+def test_the_host_of_an_address(address: str, host: str) -> None:
+    assert host_of(address) == host
+
+
+@pytest.mark.parametrize("name", ["host", "url", "address", "port", "serial_port", "robot_ip", "baseUrl", "host2"])
+def test_a_setting_with_an_address(name: str) -> None:
+    assert is_address_name(name)
+
+
+@pytest.mark.parametrize("name", ["name", "report", "ghost", "password", "port_count", "user"])
+def test_a_setting_without_an_address(name: str) -> None:
+    assert not is_address_name(name)
