@@ -57,6 +57,8 @@ class ClosedHistories:
     def __init__(self, directory: Path, damage: DataDamage) -> None:
         self._directory = directory
         self._damage = damage
+        self._latest: ClosedHistory | None = None
+        """The document that was closed last: often the one that is opened next, as by "Save and run"."""
 
     async def store(self, document: Document, history: History, unsaved: Unsaved) -> None:
         """Store the history of a document that is about to be closed, as far as it leads to what is saved."""
@@ -68,28 +70,37 @@ class ClosedHistories:
             if closed is None:
                 await self.forget(item.id)
             else:
+                self._latest = None
                 await asyncio.to_thread(self._write, closed)
+                self._latest = closed
         except OSError as error:
             log.warning("undo history is not stored", document=item.id, reason=str(error))
 
     async def reopen(self, scene: Scene, project: Project | None) -> tuple[Document, list[Edit]]:
         """Return the document of a scene or project, and its history, which is empty where none leads to it."""
-        path = self._path(scene.id if project is None else project.id)
-        closed = None
+        opened = project or scene
+        closed = self._latest
+        if closed is None or closed.document != opened.id:
+            closed = await self._load(opened)
+        continued = None if closed is None else continue_history(closed, scene, project)
+        return continued or (Document.of(scene, project), [])
+
+    async def _load(self, opened: Scene | Project) -> ClosedHistory | None:
+        path = self._path(opened.id)
         try:
-            closed = await asyncio.to_thread(_read, path)
+            return await asyncio.to_thread(_read, path)
         except FileNotFoundError:
             pass
         except OSError as error:
             log.error("undo history cannot be read", file=str(path), reason=str(error))
         except (zlib.error, ValueError) as error:
-            what = f"Edits of {(project or scene).name!r} from before it was opened cannot be undone."
+            what = f"Edits of {opened.name!r} from before it was opened cannot be undone."
             self._damage.set_aside(path, what, error)
-        continued = None if closed is None else continue_history(closed, scene, project)
-        return continued or (Document.of(scene, project), [])
+        return None
 
     async def forget(self, document: str) -> None:
         """Delete the history of a document. Raises OSError."""
+        self._latest = None
         await asyncio.to_thread(self._path(document).unlink, missing_ok=True)
 
     def _write(self, history: ClosedHistory) -> None:
