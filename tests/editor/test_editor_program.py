@@ -289,7 +289,7 @@ async def test_an_action_goes_with_its_steps_and_comes_back_by_one_undo(work: Wo
     now = await work.saved()
     assert {(each.start, each.end) for each in now.logic if each.end == test} == {(work.action("insert").id, test)}
     assert not [each for each in now.logic if close in (each.start, each.end)]
-    await page.get_by_role("button", name="Undo removing the action close and 2 more").click()
+    await page.get_by_role("button", name="Undo removing the action close").click()
     await work.told("ActionChanged", lambda event: event.change_type is ChangeType.ADD)
 
     async def back() -> bool:
