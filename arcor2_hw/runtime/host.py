@@ -145,6 +145,8 @@ class Host:
             self._cell.close()
             self.link.post(m.SceneFailed(error_data(fault.error, fault.object_id)))
             return False
+        for device in self._cell:  # clients know how each device is when they learn that the scene is online
+            self._watch.glance(device)
         self.link.post(m.SceneOpened())
         self.clock.every(message.streaming_period if message.streaming_period > 0 else 0.1, self._stream_subscribed)
         return True

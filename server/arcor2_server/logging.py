@@ -1,5 +1,6 @@
 """Logging: one line per event on standard error, for people on a terminal and as JSON elsewhere."""
 
+import contextlib
 import logging
 import sys
 from typing import Any
@@ -9,6 +10,20 @@ import structlog
 
 from arcor2_server.recent_log import RECENT
 from arcor2_server.secrets_out import REDACTION
+
+
+class _StandardError:
+    """Standard error as it is when something is logged: loggers are cached, and the stream may be replaced."""
+
+    def write(self, text: str) -> None:
+        """Write; a stream that is closed or broken must not end what was to be logged."""
+        with contextlib.suppress(OSError, ValueError):
+            sys.stderr.write(text)
+
+    def flush(self) -> None:
+        """Flush, as `write` does."""
+        with contextlib.suppress(OSError, ValueError):
+            sys.stderr.flush()
 
 
 def set_up(level: str = "info") -> None:
@@ -30,7 +45,7 @@ def set_up(level: str = "info") -> None:
     structlog.configure(
         processors=[*shared, last],
         wrapper_class=structlog.make_filtering_bound_logger(number),
-        logger_factory=structlog.PrintLoggerFactory(sys.stderr),
+        logger_factory=structlog.PrintLoggerFactory(_StandardError()),  # type: ignore[arg-type]
         cache_logger_on_first_use=True,
     )
     formatter = structlog.stdlib.ProcessorFormatter(

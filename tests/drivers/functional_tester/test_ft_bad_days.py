@@ -202,7 +202,7 @@ def test_state_gets_stale_before_it_is_called_lost(
 ) -> None:
     assert observed.machine_state() is MachineState.STOPPED
     fake.control.do("silence")
-    with pytest.raises(Stale, match=f"tester at {fake.ready['modbus']}: the newest state is 0.5. s old"):
+    with pytest.raises(Stale, match=rf"tester at {fake.ready['modbus']}: the newest state is \d\.\d+ s old"):
         wait_for(observed.machine_state, lambda state: state is not MachineState.STOPPED)
     wait_for(lambda: observed.connection, lambda state: state is Connection.LOST)
     with pytest.raises(ConnectionLost, match=fake.ready["modbus"]):

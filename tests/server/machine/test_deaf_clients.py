@@ -10,8 +10,8 @@ import psutil
 from tests.server.core.serving import Talker, running, talking, until
 
 READERS, DEAF = 40, 10
-EVENTS = 120
-TEXT = "x" * 50_000
+EVENTS = 700
+TEXT = "x" * 9_900
 BOUND = 500_000
 """Bytes that may wait for a client; what the system's own buffers take beside it is less than the rest."""
 COST_MIB = 50
