@@ -51,6 +51,7 @@ def recipes(
     SceneFault names the first that cannot be; with `failed`, that is told of each instead.
     """
     overridden = list(overridden)
+    _import_numpy(classes.values())
     found = []
     for scene_object in scene.objects:
         try:
@@ -86,7 +87,6 @@ def scene_recipes(
             if failed is None and not only:
                 raise
             broken[name] = error
-    _before_threads(classes.values())
     for one in objects:
         if (problem := broken.get(one.type)) is not None:
             fault = SceneFault(one.id, NotConnected(f"{one.name}: {problem}", problem.detail))
@@ -97,10 +97,11 @@ def scene_recipes(
     return recipes(rest, classes, message.models, message.overrides, failed, message.secrets)
 
 
-def _before_threads(classes: Iterable[type[Generic]]) -> None:
-    """Import what devices import when they connect, all at once: several threads in numpy's import lock each other out.
+def _import_numpy(classes: Iterable[type[Generic]]) -> None:
+    """Import numpy before the devices connect, each on a thread of its own.
 
-    It takes 0.1 s, which scenes without robots and cameras do without.
+    A vendor's library that is loaded while another thread is importing numpy fails. The import takes 0.1 s, which
+    scenes without robots and cameras do without.
     """
     if any(issubclass(each, Robot | Camera) for each in classes):
         importlib.import_module("numpy")

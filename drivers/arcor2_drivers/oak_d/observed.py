@@ -161,11 +161,13 @@ class Observed:
             from .device_feed import DeviceFeed
 
             return DeviceFeed(self.who, self._name, self._settings, timeout)
-        except ImportError as e:
+        except ModuleNotFoundError as e:
             raise NotConnected(
                 f"{self.who}: depthai is not installed here; it comes with the extra `depthai` (arcor2-hw[depthai])",
                 str(e),
             ) from e
+        except ImportError as e:
+            raise NotConnected(f"{self.who}: depthai is installed and cannot be loaded: {e}") from e
 
     def _watch(self, stopping: threading.Event) -> None:
         feed = self._feed
