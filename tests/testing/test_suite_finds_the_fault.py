@@ -88,7 +88,7 @@ def test_there_is_a_broken_driver_for_each_case() -> None:
 
 @pytest.mark.timeout(180)
 def test_each_broken_rule_fails_in_its_case_and_in_no_other(tmp_path: Path) -> None:
-    options = ("-pxdist", "-n4", "--dist=load", "--phases=1")
+    options = ("-pxdist", "-n3", "--dist=load", "--phases=1")
     output = run(tmp_path, "test_toy.py::TestBroken", *options, selected="not test_level", cases=True)
     found: dict[str, set[str]] = {}
     for case, bench in re.findall(r"^(?:FAILED|ERROR) test_toy.py::TestBroken::test_(\w+)\[(\w+)\]", output, re.M):
