@@ -1,9 +1,12 @@
 """The main job as a newcomer runs it: four readings must agree, each sabotage must tell, and the cell starts again."""
 
 import asyncio
+import io
+import json
 import random
 import re
 import signal
+import zipfile
 from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
 from typing import Any
@@ -24,6 +27,7 @@ SEED = random.SystemRandom().randrange(1_000_000)
 BOARDS = 2
 GOOD = 3
 """A seed whose first board is good."""
+FIRST_VERSION = Path(__file__).parents[1] / "compatibility" / "recorded" / "demo-package.zip"
 
 
 class Cell:
@@ -42,10 +46,16 @@ class Cell:
         """What an operator does before a new start: everything is taken away, new boards are laid in."""
         await self.run.tell("world", "renew", boards=boards, seed=GOOD)
 
-    async def program(self, client: Client, at: dict[str, Callable[[], Awaitable[Any]]] | None = None) -> str:
-        """Run the program; gives what it ended with, empty for nothing. `at` is done when an action begins."""
-        packages = await client.call("ListPackages")
-        await client.call("RunPackage", rpc.RunPackageArgs(packages[-1].id))
+    async def program(
+        self, client: Client, at: dict[str, Callable[[], Awaitable[Any]]] | None = None, package_id: str = ""
+    ) -> str:
+        """Run a package, by default the newest; return its error, empty for none.
+
+        at: what to do when the action of that name starts.
+        """
+        if not package_id:
+            package_id = (await client.call("ListPackages"))[-1].id
+        await client.call("RunPackage", rpc.RunPackageArgs(package_id))
         names: dict[str, str] = {}
         problem = ""
         while True:
@@ -206,6 +216,40 @@ async def test_each_sabotage_is_told_and_the_cell_starts_again(cell: Cell) -> No
     (board,) = world["boards"]
     told = [(result["serial"], result["passed"]) for result in erp["results"] if result["order"] == "AGAIN"]
     assert told == [(board["code"], True)]
+
+
+async def test_a_package_of_the_first_version_runs_with_its_own_drivers(cell: Cell, tmp_path: Path) -> None:
+    async with Client(cell.url, "tests") as client:
+        newest = tmp_path / "newest.zip"
+        await client.rest.download_package((await client.call("ListPackages"))[-1].id, newest)
+        await client.rest.upload_package("first-version", with_the_settings_of(FIRST_VERSION, newest))
+        await cell.renew()
+        await cell.run.tell("erp", "add_order", order="FIRST", product="Controller board", quantity=1)
+        assert await cell.program(client, package_id="first-version") == ""
+        await client.call("DeletePackage", rpc.IdArgs("first-version"))
+    world, erp = await cell.run.tell("world", "truth"), await cell.run.tell("erp", "truth")
+    (board,) = world["boards"]
+    assert (board["place"], board["label"]) == ("good", {"code": board["code"], "pressed": True})
+    reported = [(result["serial"], result["passed"]) for result in erp["results"] if result["order"] == "FIRST"]
+    assert reported == [(board["code"], True)]
+
+
+def with_the_settings_of(package: Path, other: Path) -> bytes:
+    """Return a package whose objects have the settings, thus the addresses, that those of another package have."""
+    with zipfile.ZipFile(other) as archive:
+        scene = json.loads(archive.read("data/scene.json"))
+    settings = {each["name"]: each["parameters"] for each in scene["objects"]}
+    packed = io.BytesIO()
+    with zipfile.ZipFile(package) as archive, zipfile.ZipFile(packed, "w") as target:
+        for name in archive.namelist():
+            content = archive.read(name)
+            if name == "data/scene.json":
+                scene = json.loads(content)
+                for each in scene["objects"]:
+                    each["parameters"] = settings[each["name"]]
+                content = json.dumps(scene).encode()
+            target.writestr(name, content)
+    return packed.getvalue()
 
 
 async def _state(run: Run, wanted: str) -> bool:
