@@ -1,5 +1,5 @@
 # Two commands: `make run` and `make test`. Both do all the set-up; the second time they start at once.
-.PHONY: run test bench bench-long bench-editor lint types layers check lock clean
+.PHONY: run test bench bench-compare bench-long bench-editor lint types layers check lock clean
 .DEFAULT_GOAL := run
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
@@ -25,6 +25,10 @@ test: .make/dev .make/editor .make/browser
 
 bench: .make/dev
 	$(BIN)/python -m benchmarks $(ARGS)
+
+# This checkout and another revision, measured in turns: make bench-compare ARGS="v0.1 requests documents"
+bench-compare: .make/dev
+	$(BIN)/python -m benchmarks.compare $(ARGS)
 
 # Every transport lost and back 300 times instead of 18, which takes half an hour.
 bench-long: .make/dev
