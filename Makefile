@@ -1,5 +1,5 @@
 # Two commands: `make run` and `make test`. Both do all the set-up; the second time they start at once.
-.PHONY: run test bench bench-compare bench-long bench-editor lint types layers check lock clean
+.PHONY: run test bench bench-compare bench-long bench-editor lint types layers check-editor check lock clean
 .DEFAULT_GOAL := run
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
@@ -38,7 +38,7 @@ bench-long: .make/dev
 bench-editor: .make/dev .make/editor .make/browser
 	$(BIN)/python -m benchmarks.editor $(ARGS)
 
-check: lint types layers
+check: lint types layers check-editor
 
 lint: .make/dev
 	$(BIN)/ruff check .
@@ -49,6 +49,9 @@ types: .make/dev
 
 layers: .make/dev
 	$(BIN)/lint-imports
+
+check-editor: .make/node
+	$(BIN)/python editor/build.py check
 
 # ---------------------------------------------------------------------------------------------------- set-up
 # A stamp per set of wheels: a set is installed once, and again only when its lock or the project's own metadata changes.
@@ -78,10 +81,15 @@ LIBRARIES := libEGL.so.1:libegl1 libGL.so.1:libgl1 libusb-1.0.so.0:libusb-1.0-0 
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@touch $@
 
-# The editor, with the machine's Node.js or, where there is none, the one from PyPI. Built again when its sources changed.
-EDITOR := $(shell find editor -name node_modules -prune -o -name __pycache__ -prune -o -type f -print)
-.make/editor: $(EDITOR) | .make/venv
+# Node.js: the machine's, or the one from PyPI where it is missing or too old.
+.make/node: editor/node.txt editor/build.py | .make/venv
+	@mkdir -p .make
 	@$(BIN)/python editor/build.py --find-node 2>/dev/null || $(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r editor/node.txt
+	@touch $@
+
+# The editor, built again when its sources changed.
+EDITOR := $(shell find editor -name node_modules -prune -o -name __pycache__ -prune -o -type f -print)
+.make/editor: $(EDITOR) | .make/node
 	$(BIN)/python editor/build.py
 	@touch $@
 

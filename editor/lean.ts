@@ -16,10 +16,10 @@ const PARTS: Readonly<Record<string, string>> = {
     addEventListener() {} removeEventListener() {} setAnimationLoop() {} dispose() {} hasDepthSensing() { return false; }
     getEnvironmentBlendMode() { return "opaque"; }
   }`,
-  "renderers/webgl/WebGLUniformsGroups.js":
-    "export class WebGLUniformsGroups { bind() {} update() {} dispose() {} }",
+  "renderers/webgl/WebGLUniformsGroups.js": "export class WebGLUniformsGroups { bind() {} update() {} dispose() {} }",
   "renderers/webgl/WebGLOutput.js": "export class WebGLOutput {}",
-  "renderers/webgl/WebGLEnvironments.js": "export class WebGLEnvironments { get(texture) { return texture ?? null; } dispose() {} }",
+  "renderers/webgl/WebGLEnvironments.js":
+    "export class WebGLEnvironments { get(texture) { return texture ?? null; } dispose() {} }",
   "renderers/webgl/WebGLMorphtargets.js": "export class WebGLMorphtargets { update() {} }",
   "renderers/WebGLCubeRenderTarget.js": "export class WebGLCubeRenderTarget {}",
   // Lines of the logic are of this kind; the others would be read from files.
@@ -39,7 +39,10 @@ const NONE = /^NUM_(CLIPPING_PLANES|SUN_LIGHT\w*|SPOT_LIGHT\w*|POINT_LIGHT\w*|RE
 
 /** Whether a term of a condition is false for certain. */
 function isFalse(term: string): boolean {
-  const bare = term.trim().replace(/^\(\s*(?!.*\).*\()(.*?)\s*\)$/, "$1").trim();
+  const bare = term
+    .trim()
+    .replace(/^\(\s*(?!.*\).*\()(.*?)\s*\)$/, "$1")
+    .trim();
   const asked = /^defined\s*\(?\s*(\w+)\s*\)?$/.exec(bare);
   return asked?.[1] ? NEVER.test(asked[1]) : NONE.test(bare);
 }

@@ -8,7 +8,7 @@ import { defineConfig, type Plugin } from "vitest/config";
 import { lean } from "./lean.ts";
 
 const OUT = join(import.meta.dirname, "../server/arcor2_server/editor_files");
-const SERVER = process.env["ARCOR2_HW_URL"] ?? "http://127.0.0.1:6789";
+const SERVER = process.env.ARCOR2_HW_URL ?? "http://127.0.0.1:6789";
 
 /** Compressing at build time costs the server nothing and is denser than it could afford per request. */
 function compressed(): Plugin {

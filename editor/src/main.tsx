@@ -27,7 +27,12 @@ if (root) {
 
 // What a first tap opens is there when it comes, without having delayed the first picture.
 setTimeout(() => {
-  for (const load of [() => import("./ui/kit/menu"), () => import("./ui/kit/dialogs"), () => import("./ui/workplace/Panel"), () => import("./ui/things/ThingsPanel")]) {
+  for (const load of [
+    () => import("./ui/kit/menu"),
+    () => import("./ui/kit/dialogs"),
+    () => import("./ui/workplace/Panel"),
+    () => import("./ui/things/ThingsPanel"),
+  ]) {
     load().catch(() => {}); // the server is away: it is loaded when it is needed
   }
 }, 1500);

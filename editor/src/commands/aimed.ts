@@ -1,8 +1,8 @@
 /** The place in the middle of the view, where the cross is. */
 
+import type { Orientation, Position } from "../protocol/types";
 import { theEngine } from "../session/engine";
 import { DOWN } from "./program";
-import type { Orientation, Position } from "../protocol/types";
 
 /** Give where the cross points, and how a tool would stand on that surface; null when it points at nothing. */
 export function aimedPlace(): { position: Position; orientation: Orientation } | null {

@@ -1,8 +1,8 @@
 /** How commands ask: a refusal becomes a notice with the server's sentence, and the caller learns that it failed. */
 
+import type { CallOptions } from "../protocol/client";
 import { ConnectionLost, Refused } from "../protocol/errors";
 import { LEAST_ROLE, type Requests } from "../protocol/types";
-import type { CallOptions } from "../protocol/client";
 import { call } from "../session/session";
 import type { State } from "../store/state";
 import { tell } from "../store/store";

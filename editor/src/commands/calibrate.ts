@@ -12,7 +12,8 @@ import { held, refusal } from "./asking";
 import { type Chosen, robotArg } from "./robot";
 
 /** Put an object where the robot's tool points; `pivot` is which of its places is touched. */
-export const placeByRobot = (id: string, chosen: Chosen, pivot: Pivot) => refusal(() => call("UpdateObjectPoseUsingRobot", { id, robot: robotArg(chosen), pivot }));
+export const placeByRobot = (id: string, chosen: Chosen, pivot: Pivot) =>
+  refusal(() => call("UpdateObjectPoseUsingRobot", { id, robot: robotArg(chosen), pivot }));
 
 /** Show an object where `placeByRobot` would put it, with the tool at a pose in the world; gives why it cannot be. */
 export function showAtTool(id: string, tool: Pose, pivot: Pivot): string {
@@ -76,11 +77,16 @@ export function beginAiming(id: string, chosen: Chosen, onLost: () => void): Pro
 }
 
 // ------------------------------------------------------------------------------------------------ cameras
-export const calibrateCamera = (id: string) => refusal(() => held(id, () => remembering(id, () => call("CalibrateCamera", { id }, { deadline: 30 }))));
+export const calibrateCamera = (id: string) =>
+  refusal(() => held(id, () => remembering(id, () => call("CalibrateCamera", { id }, { deadline: 30 }))));
 
 export const calibrateRobot = (robot_id: string, camera_id: string, move_to_calibration_pose: boolean) =>
   refusal(() =>
-    held(robot_id, () => remembering(robot_id, () => call("CalibrateRobot", { robot_id, camera_id, move_to_calibration_pose }, { deadline: 30 }))),
+    held(robot_id, () =>
+      remembering(robot_id, () =>
+        call("CalibrateRobot", { robot_id, camera_id, move_to_calibration_pose }, { deadline: 30 }),
+      ),
+    ),
   );
 
 /** Where the thing that was calibrated last stood before, until somebody has said that its new place is right. */
@@ -111,14 +117,18 @@ export interface CalibrationRecord {
 
 async function rest<T>(path: string, options: RequestInit = {}): Promise<T> {
   const token = remembered("token");
-  const headers: Record<string, string> = { "Content-Type": "application/json", ...(token ? { Authorization: `Bearer ${token}` } : {}) };
+  const headers: Record<string, string> = {
+    "Content-Type": "application/json",
+    ...(token ? { Authorization: `Bearer ${token}` } : {}),
+  };
   const response = await fetch(path, { ...options, headers });
   if (!response.ok) throw new Error(await refusedWith(response, "The server refuses it"));
   return (await response.json()) as T;
 }
 
 /** The newest records of an object. */
-export const recordsOf = (object: string) => rest<CalibrationRecord[]>(`/api/calibrations?object_id=${encodeURIComponent(object)}&limit=3`);
+export const recordsOf = (object: string) =>
+  rest<CalibrationRecord[]>(`/api/calibrations?object_id=${encodeURIComponent(object)}&limit=3`);
 
 export interface TouchedFrame {
   pose: Pose;
@@ -133,10 +143,22 @@ export interface TouchedFrame {
 
 /** The frame of points that are known in it, and were touched, in the same order; nothing is kept of it. */
 export const frameByPoints = (known: Position[], touched: Position[]) =>
-  rest<TouchedFrame>("/api/calibration/touch/frame-by-points", { method: "PUT", body: JSON.stringify({ known, touched }) });
+  rest<TouchedFrame>("/api/calibration/touch/frame-by-points", {
+    method: "PUT",
+    body: JSON.stringify({ known, touched }),
+  });
 
 /** The frame of three touched points: its origin, one on its x axis, one in its xy plane. */
-export const frameByAxes = (origin: Position, on_x: Position, in_plane: Position[], record: { object_id: string; object_name: string }) =>
-  rest<TouchedFrame>("/api/calibration/touch/frame-by-axes", { method: "PUT", body: JSON.stringify({ origin, on_x, in_plane, record }) });
+export const frameByAxes = (
+  origin: Position,
+  on_x: Position,
+  in_plane: Position[],
+  record: { object_id: string; object_name: string },
+) =>
+  rest<TouchedFrame>("/api/calibration/touch/frame-by-axes", {
+    method: "PUT",
+    body: JSON.stringify({ origin, on_x, in_plane, record }),
+  });
 
-export const placeAt = (object_id: string, pose: Pose) => refusal(() => held(object_id, () => call("UpdateObjectPose", { object_id, pose })));
+export const placeAt = (object_id: string, pose: Pose) =>
+  refusal(() => held(object_id, () => call("UpdateObjectPose", { object_id, pose })));

@@ -13,7 +13,11 @@ export function saveDiagnosis(): Promise<string> {
   return refusal(async () => {
     const token = remembered("token");
     const headers = { "Content-Type": "application/json", ...(token ? { Authorization: `Bearer ${token}` } : {}) };
-    const response = await fetch("/api/diagnosis", { method: "POST", headers, body: JSON.stringify({ client: seen() }) });
+    const response = await fetch("/api/diagnosis", {
+      method: "POST",
+      headers,
+      body: JSON.stringify({ client: seen() }),
+    });
     if (!response.ok) throw new Error(await refusedWith(response, "The server gives no diagnosis"));
     saveAs(await response.blob(), `diagnosis-${new Date().toISOString().slice(0, 19).replaceAll(":", "-")}.zip`);
   });

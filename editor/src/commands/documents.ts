@@ -25,7 +25,8 @@ export async function fromTemplate(kind: "scene" | "project", source: string, na
 const LISTED = 10_000;
 
 function listed(kind: "scene" | "project", name: string): Promise<string> {
-  const find = () => (kind === "scene" ? now().lists.scenes : now().lists.projects)?.find((each) => each.name === name)?.id ?? "";
+  const find = () =>
+    (kind === "scene" ? now().lists.scenes : now().lists.projects)?.find((each) => each.name === name)?.id ?? "";
   return new Promise((resolve) => {
     const end = (id: string) => {
       clearTimeout(late);
@@ -55,12 +56,20 @@ export const duplicateProject = (source_id: string, target_name: string) =>
 
 /** For fields on the tiles: they tell by themselves why it was refused. */
 export const describe = (kind: "scene" | "project", id: string, new_description: string): Promise<string> =>
-  refusal(() => (kind === "scene" ? call("UpdateSceneDescription", { scene_id: id, new_description }) : call("UpdateProjectDescription", { project_id: id, new_description })));
+  refusal(() =>
+    kind === "scene"
+      ? call("UpdateSceneDescription", { scene_id: id, new_description })
+      : call("UpdateProjectDescription", { project_id: id, new_description }),
+  );
 export const rename = (kind: "scene" | "project" | "package", id: string, new_name: string): Promise<string> =>
   refusal(() =>
     kind === "package"
       ? call("RenamePackage", { package_id: id, new_name })
-      : held(id, () => (kind === "scene" ? call("RenameScene", { id, new_name }) : call("RenameProject", { project_id: id, new_name }))),
+      : held(id, () =>
+          kind === "scene"
+            ? call("RenameScene", { id, new_name })
+            : call("RenameProject", { project_id: id, new_name }),
+        ),
   );
 
 export const deleteScene = (id: string) => ask("DeleteScene", { id });

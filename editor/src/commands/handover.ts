@@ -17,7 +17,8 @@ export function noLongerAsk(id: string): void {
 export function followWishes(): () => void {
   return store.subscribe((state, before) => {
     const { wanted, free } = handOver(state, before);
-    for (const { id, by } of wanted) tell("warn", `${by} asks for ${nameOf(state, id)}, which you hold: it is free as soon as you are done with it.`);
+    for (const { id, by } of wanted)
+      tell("warn", `${by} asks for ${nameOf(state, id)}, which you hold: it is free as soon as you are done with it.`);
     for (const id of free) {
       tell("info", `${nameOf(state, id)} is free now.`);
       noLongerAsk(id);

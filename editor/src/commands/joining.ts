@@ -26,4 +26,8 @@ export async function howToJoin(): Promise<Joining> {
 
 /** Whether a host is this machine to itself, so that nobody else gets anywhere by it. A name may begin with digits, too. */
 export const isHere = (host: string) =>
-  host === "localhost" || host.endsWith(".localhost") || host === "[::1]" || host === "0.0.0.0" || /^127(\.\d{1,3}){3}$/.test(host);
+  host === "localhost" ||
+  host.endsWith(".localhost") ||
+  host === "[::1]" ||
+  host === "0.0.0.0" ||
+  /^127(\.\d{1,3}){3}$/.test(host);

@@ -26,7 +26,10 @@ const read = async (id: string) => (await stored(`/scenes/${encodeURIComponent(i
 
 /** The names of the objects of a scene that something is wrong with; rejects with why nobody knows. */
 export async function faultyObjects(id: string, problems: readonly string[]): Promise<string[]> {
-  return atFault(problems, (await read(id)).objects.map((each) => each.name));
+  return atFault(
+    problems,
+    (await read(id)).objects.map((each) => each.name),
+  );
 }
 
 /** Take objects out of a saved scene; the scene as it was stays as a copy. Gives why not. */

@@ -111,7 +111,8 @@ export class Moving {
     const { target, stored, model } = this;
     if (model && target.type) {
       const { type } = target;
-      if (!(await holding(type, () => ask("UpdateObjectModel", { object_type_id: type, object_model: model })))) return false;
+      if (!(await holding(type, () => ask("UpdateObjectModel", { object_type_id: type, object_model: model }))))
+        return false;
     }
     if (!stored || same(stored, relativeTo(target.frame, target.pose))) {
       this.forget();

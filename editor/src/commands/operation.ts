@@ -1,9 +1,9 @@
 /** The scene in operation: online, offline, and stop. */
 
-import { ask, sentence } from "./asking";
-import { endHolds } from "./holds";
 import { call, serves } from "../session/session";
 import { tell } from "../store/store";
+import { ask, sentence } from "./asking";
+import { endHolds } from "./holds";
 
 /** Go online; devices that fail are left out where the server can do without them. */
 export const goOnline = () => ask(serves("StartSceneKeepGoing") ? "StartSceneKeepGoing" : "StartScene");
@@ -26,5 +26,6 @@ export async function stopMotion(): Promise<void> {
   } catch (error) {
     reasons = [sentence(error)];
   }
-  if (reasons.length > 0) tell("error", `Not stopped: ${reasons.map((each) => each.replace(/\.$/, "")).join("; ")}. Use the emergency stop.`);
+  if (reasons.length > 0)
+    tell("error", `Not stopped: ${reasons.map((each) => each.replace(/\.$/, "")).join("; ")}. Use the emergency stop.`);
 }

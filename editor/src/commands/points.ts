@@ -49,7 +49,8 @@ function seen<T>(look: (state: State) => T | undefined): Promise<T | undefined> 
   });
 }
 
-const pointNamed = (name: string) => seen((state) => Object.values(state.doc?.points ?? {}).find((each) => each.name === name));
+const pointNamed = (name: string) =>
+  seen((state) => Object.values(state.doc?.points ?? {}).find((each) => each.name === name));
 
 // ------------------------------------------------------------------------------------------------ points
 /** Add a point where something is in the world, on a parent if one is given, and select it. */
@@ -66,7 +67,9 @@ export function addPoint(world: Position, parent = "", orientation?: Orientation
     select({ kind: "point", id: point.id });
     if (orientation) {
       const turned = relativeTo(frame, { position: world, orientation }).orientation;
-      await held(point.id, () => call("AddActionPointOrientation", { action_point_id: point.id, orientation: turned, name: "default" }));
+      await held(point.id, () =>
+        call("AddActionPointOrientation", { action_point_id: point.id, orientation: turned, name: "default" }),
+      );
     }
   });
 }
@@ -75,26 +78,38 @@ export function addPoint(world: Position, parent = "", orientation?: Orientation
 export function addPointFromRobot({ robotId, armId, effector }: Chosen): Promise<string> {
   return refusal(async () => {
     const name = freeName("point", names(now().doc?.points));
-    await call("AddApUsingRobot", { robot_id: robotId, end_effector_id: effector, name, ...(armId ? { arm_id: armId } : {}) });
+    await call("AddApUsingRobot", {
+      robot_id: robotId,
+      end_effector_id: effector,
+      name,
+      ...(armId ? { arm_id: armId } : {}),
+    });
     const point = await pointNamed(name);
     if (point) select({ kind: "point", id: point.id });
   });
 }
 
 /** Move a point, in its parent's frame, with all that hangs on it. */
-export const movePoint = (id: string, position: Position) => refusal(() => held(id, () => call("UpdateActionPointPosition", { action_point_id: id, new_position: position }), true));
+export const movePoint = (id: string, position: Position) =>
+  refusal(() =>
+    held(id, () => call("UpdateActionPointPosition", { action_point_id: id, new_position: position }), true),
+  );
 
 export const movePointToRobot = (id: string, chosen: Chosen) =>
-  refusal(() => held(id, () => call("UpdateActionPointUsingRobot", { action_point_id: id, robot: robotArg(chosen) }), true));
+  refusal(() =>
+    held(id, () => call("UpdateActionPointUsingRobot", { action_point_id: id, robot: robotArg(chosen) }), true),
+  );
 
 /** Hang a point on another thing, or in the world; it stays where it is. */
-export const setParent = (id: string, parent: string) => refusal(() => held(id, () => call("UpdateActionPointParent", { action_point_id: id, new_parent_id: parent })));
+export const setParent = (id: string, parent: string) =>
+  refusal(() => held(id, () => call("UpdateActionPointParent", { action_point_id: id, new_parent_id: parent })));
 
 /** What a point may hang on: what has a place, but not what hangs on it. */
 export function possibleParents(state: State, id: string): string[] {
   const { doc } = state;
   if (!doc) return [];
-  const below = (each: string | undefined): boolean => each !== undefined && (each === id || below(doc.points[each]?.parent));
+  const below = (each: string | undefined): boolean =>
+    each !== undefined && (each === id || below(doc.points[each]?.parent));
   const objects = Object.values(doc.objects).filter((each) => each.pose);
   const points = Object.values(doc.points).filter((each) => !below(each.id));
   return [...objects, ...points].map((each) => each.id);
@@ -113,24 +128,36 @@ export function copyPoint(id: string, count: number, step: Position): Promise<st
 }
 
 export const removePoint = (id: string) => refusal(() => call("RemoveActionPoint", { id }));
-export const renamePoint = (id: string, new_name: string) => refusal(() => held(id, () => call("RenameActionPoint", { action_point_id: id, new_name })));
+export const renamePoint = (id: string, new_name: string) =>
+  refusal(() => held(id, () => call("RenameActionPoint", { action_point_id: id, new_name })));
 
 // ------------------------------------------------------------------------------------------------ orientations
 export function addOrientation(point: string, orientation: Orientation, stem = "orientation"): Promise<string> {
   const name = freeName(stem, namesAt(now().doc?.orientations, point));
-  return refusal(() => held(point, () => call("AddActionPointOrientation", { action_point_id: point, orientation, name })));
+  return refusal(() =>
+    held(point, () => call("AddActionPointOrientation", { action_point_id: point, orientation, name })),
+  );
 }
 
 export function addOrientationFromRobot(point: string, chosen: Chosen): Promise<string> {
   const name = freeName("orientation", namesAt(now().doc?.orientations, point));
-  return refusal(() => held(point, () => call("AddActionPointOrientationUsingRobot", { action_point_id: point, robot: robotArg(chosen), name })));
+  return refusal(() =>
+    held(point, () =>
+      call("AddActionPointOrientationUsingRobot", { action_point_id: point, robot: robotArg(chosen), name }),
+    ),
+  );
 }
 
-export const turnOrientation = (id: string, orientation: Orientation) => refusal(() => held(id, () => call("UpdateActionPointOrientation", { orientation_id: id, orientation })));
+export const turnOrientation = (id: string, orientation: Orientation) =>
+  refusal(() => held(id, () => call("UpdateActionPointOrientation", { orientation_id: id, orientation })));
 export const turnOrientationToRobot = (id: string, chosen: Chosen) =>
-  refusal(() => held(id, () => call("UpdateActionPointOrientationUsingRobot", { orientation_id: id, robot: robotArg(chosen) })));
-export const renameOrientation = (id: string, new_name: string) => refusal(() => held(id, () => call("RenameActionPointOrientation", { orientation_id: id, new_name })));
-export const removeOrientation = (id: string) => refusal(() => call("RemoveActionPointOrientation", { orientation_id: id }));
+  refusal(() =>
+    held(id, () => call("UpdateActionPointOrientationUsingRobot", { orientation_id: id, robot: robotArg(chosen) })),
+  );
+export const renameOrientation = (id: string, new_name: string) =>
+  refusal(() => held(id, () => call("RenameActionPointOrientation", { orientation_id: id, new_name })));
+export const removeOrientation = (id: string) =>
+  refusal(() => call("RemoveActionPointOrientation", { orientation_id: id }));
 
 // ------------------------------------------------------------------------------------------------ joints
 /** The point at which joints are kept: its lock is theirs. */
@@ -138,14 +165,24 @@ const pointOf = (joints: string): string => now().doc?.joints[joints]?.pointId ?
 
 export function addJointsFromRobot(point: string, { robotId, armId, effector }: Chosen): Promise<string> {
   const name = freeName("joints", namesAt(now().doc?.joints, point));
-  const args = { action_point_id: point, robot_id: robotId, name, end_effector_id: effector, ...(armId ? { arm_id: armId } : {}) };
+  const args = {
+    action_point_id: point,
+    robot_id: robotId,
+    name,
+    end_effector_id: effector,
+    ...(armId ? { arm_id: armId } : {}),
+  };
   return refusal(() => held(point, () => call("AddActionPointJointsUsingRobot", args)));
 }
 
-export const setJoints = (id: string, joints: Joint[]) => refusal(() => held(pointOf(id), () => call("UpdateActionPointJoints", { joints_id: id, joints })));
-export const setJointsToRobot = (id: string) => refusal(() => held(pointOf(id), () => call("UpdateActionPointJointsUsingRobot", { joints_id: id })));
-export const renameJoints = (id: string, new_name: string) => refusal(() => held(pointOf(id), () => call("RenameActionPointJoints", { joints_id: id, new_name })));
-export const removeJoints = (id: string) => refusal(() => held(pointOf(id), () => call("RemoveActionPointJoints", { joints_id: id })));
+export const setJoints = (id: string, joints: Joint[]) =>
+  refusal(() => held(pointOf(id), () => call("UpdateActionPointJoints", { joints_id: id, joints })));
+export const setJointsToRobot = (id: string) =>
+  refusal(() => held(pointOf(id), () => call("UpdateActionPointJointsUsingRobot", { joints_id: id })));
+export const renameJoints = (id: string, new_name: string) =>
+  refusal(() => held(pointOf(id), () => call("RenameActionPointJoints", { joints_id: id, new_name })));
+export const removeJoints = (id: string) =>
+  refusal(() => held(pointOf(id), () => call("RemoveActionPointJoints", { joints_id: id })));
 
 /** Compute the joints anew, for an orientation of their point: near to what they were, so that the arm bends the same way. */
 export function solveJoints(id: string, orientationId: string): Promise<string> {
@@ -153,7 +190,8 @@ export function solveJoints(id: string, orientationId: string): Promise<string> 
     const { doc, live } = now();
     const kept = doc?.joints[id];
     if (!doc || !kept) return;
-    const effector = kept.end_effector_id ?? live.arms[kept.robot_id]?.find((each) => each.id === (kept.arm_id ?? ""))?.effectors[0];
+    const effector =
+      kept.end_effector_id ?? live.arms[kept.robot_id]?.find((each) => each.id === (kept.arm_id ?? ""))?.effectors[0];
     if (effector === undefined) throw new Error("Go online first: which end effector is meant is not known.");
     const joints = await call("InverseKinematics", {
       robot_id: kept.robot_id,

@@ -1,13 +1,22 @@
 /** The program: actions, their parameters, the steps between them, project parameters and overrides. */
 
+import { cannotLead, freeStep, incoming, outgoing } from "../program/logic";
+import { actionNames, freeName, newOutputs } from "../program/naming";
+import { initial } from "../program/values";
+import type {
+  Action,
+  ActionParameter,
+  ObjectAction,
+  Orientation,
+  Parameter,
+  Position,
+  ProjectLogicIf,
+  Requests,
+} from "../protocol/types";
 import { call } from "../session/session";
 import { isRunning } from "../store/selectors";
 import type { State } from "../store/state";
 import { now, select, setUi, store, tell } from "../store/store";
-import type { Action, ActionParameter, ObjectAction, Orientation, Parameter, Position, ProjectLogicIf, Requests } from "../protocol/types";
-import { cannotLead, freeStep, incoming, outgoing } from "../program/logic";
-import { actionNames, freeName, newOutputs } from "../program/naming";
-import { initial } from "../program/values";
 import { ask, barred, held, refusal, sentence } from "./asking";
 
 /** s within which an event that tells of what was just added has come. */
@@ -76,26 +85,39 @@ export const DOWN: Orientation = { x: 1, y: 0, z: 0, w: 0 };
 
 async function orientationOf(pointId: string, where: Where): Promise<string> {
   if ("pointId" in where && where.orientationId) return where.orientationId;
-  const on = (state: State) => Object.values(state.doc?.orientations ?? {}).find((each) => each.pointId === pointId)?.id;
+  const on = (state: State) =>
+    Object.values(state.doc?.orientations ?? {}).find((each) => each.pointId === pointId)?.id;
   const there = on(now());
   if (there) return there;
   const orientation = "orientation" in where ? where.orientation : DOWN;
-  await held(pointId, () => call("AddActionPointOrientation", { action_point_id: pointId, orientation, name: "default" }));
+  await held(pointId, () =>
+    call("AddActionPointOrientation", { action_point_id: pointId, orientation, name: "default" }),
+  );
   return awaited(on);
 }
 
 /** Joints of a robot on a point; taken from where it stands when there are none. */
 async function jointsOf(pointId: string, robotId: string): Promise<string> {
-  const on = (state: State) => Object.values(state.doc?.joints ?? {}).find((each) => each.pointId === pointId && each.robot_id === robotId)?.id;
+  const on = (state: State) =>
+    Object.values(state.doc?.joints ?? {}).find((each) => each.pointId === pointId && each.robot_id === robotId)?.id;
   const there = on(now());
   if (there) return there;
-  const taken = Object.values(now().doc?.joints ?? {}).filter((each) => each.pointId === pointId).map((each) => each.name);
+  const taken = Object.values(now().doc?.joints ?? {})
+    .filter((each) => each.pointId === pointId)
+    .map((each) => each.name);
   const name = freeName("default", taken);
-  await held(pointId, () => call("AddActionPointJointsUsingRobot", { action_point_id: pointId, robot_id: robotId, name }));
+  await held(pointId, () =>
+    call("AddActionPointJointsUsingRobot", { action_point_id: pointId, robot_id: robotId, name }),
+  );
   return awaited(on);
 }
 
-async function startingParameters(objectId: string, meta: ObjectAction, pointId: string, where: Where): Promise<ActionParameter[]> {
+async function startingParameters(
+  objectId: string,
+  meta: ObjectAction,
+  pointId: string,
+  where: Where,
+): Promise<ActionParameter[]> {
   const parameters: ActionParameter[] = [];
   for (const wanted of meta.parameters) {
     const { name, type } = wanted;
@@ -116,7 +138,10 @@ async function startingParameters(objectId: string, meta: ObjectAction, pointId:
   return parameters;
 }
 
-async function startingValue(objectId: string, wanted: ObjectAction["parameters"][number]): Promise<string | undefined> {
+async function startingValue(
+  objectId: string,
+  wanted: ObjectAction["parameters"][number],
+): Promise<string | undefined> {
   if (wanted.dynamic_value && wanted.default_value === undefined && wanted.type === "string") {
     const values = await dynamicValues(objectId, wanted.name, []).catch(() => null);
     if (values?.[0] !== undefined) return JSON.stringify(values[0]);
@@ -129,7 +154,8 @@ function imageFor(type: string): string | undefined {
   const { doc, types } = now();
   for (const action of Object.values(doc?.actions ?? {})) {
     const [objectId = "", method] = action.type.split("/");
-    const returns = types.actions[doc?.objects[objectId]?.type ?? ""]?.find((each) => each.name === method)?.returns ?? [];
+    const returns =
+      types.actions[doc?.objects[objectId]?.type ?? ""]?.find((each) => each.name === method)?.returns ?? [];
     const index = returns.indexOf(type);
     if (index >= 0 && action.flows[0]?.outputs[index]) return `${action.id}/default/${index}`;
   }
@@ -138,14 +164,23 @@ function imageFor(type: string): string | undefined {
 
 /** The last known values of dynamic parameters, so that they can be chosen offline too. */
 const dynamicKnown = new Map<string, string[]>();
-const dynamicKey = (objectId: string, name: string, parents: { id: string; value: string }[]) => JSON.stringify([objectId, name, parents]);
+const dynamicKey = (objectId: string, name: string, parents: { id: string; value: string }[]) =>
+  JSON.stringify([objectId, name, parents]);
 
-export function lastDynamicValues(objectId: string, name: string, parents: { id: string; value: string }[]): string[] | undefined {
+export function lastDynamicValues(
+  objectId: string,
+  name: string,
+  parents: { id: string; value: string }[],
+): string[] | undefined {
   return dynamicKnown.get(dynamicKey(objectId, name, parents));
 }
 
 /** The values that a parameter may take now, as the live device knows them: a set, given in order. Rejects when it cannot be asked. */
-export async function dynamicValues(objectId: string, name: string, parents: { id: string; value: string }[]): Promise<string[]> {
+export async function dynamicValues(
+  objectId: string,
+  name: string,
+  parents: { id: string; value: string }[],
+): Promise<string[]> {
   const found = await call("ActionParamValues", { id: objectId, param_id: name, parent_params: parents });
   const values = [...found].sort((a, b) => a.localeCompare(b, undefined, { numeric: true }));
   dynamicKnown.set(dynamicKey(objectId, name, parents), values);
@@ -167,7 +202,9 @@ export const setParameter = (actionId: string, parameter: ActionParameter): Prom
 
 /** Name the results of an action; gives why not. */
 export const nameResults = (actionId: string, outputs: string[]): Promise<string> =>
-  refusal(() => held(actionId, () => call("UpdateAction", { action_id: actionId, flows: [{ type: "default", outputs }] })));
+  refusal(() =>
+    held(actionId, () => call("UpdateAction", { action_id: actionId, flows: [{ type: "default", outputs }] })),
+  );
 
 export const renameAction = (action_id: string, new_name: string): Promise<string> =>
   refusal(() => held(action_id, () => call("RenameAction", { action_id, new_name })));
@@ -178,9 +215,22 @@ export async function duplicateAction(action: Action & { pointId: string }): Pro
   if (!doc) return;
   const name = freeName(action.name, actionNames(doc));
   const count = action.flows[0]?.outputs.length ?? 0;
-  const flows = [{ type: "default" as const, outputs: newOutputs(doc, action.type.split("/")[1] ?? action.name, count) }];
-  if (!(await ask("AddAction", { action_point_id: action.pointId, name, type: action.type, parameters: action.parameters, flows }))) return;
-  const added = await awaited((state) => Object.values(state.doc?.actions ?? {}).find((each) => each.name === name)).catch(() => null);
+  const flows = [
+    { type: "default" as const, outputs: newOutputs(doc, action.type.split("/")[1] ?? action.name, count) },
+  ];
+  if (
+    !(await ask("AddAction", {
+      action_point_id: action.pointId,
+      name,
+      type: action.type,
+      parameters: action.parameters,
+      flows,
+    }))
+  )
+    return;
+  const added = await awaited((state) =>
+    Object.values(state.doc?.actions ?? {}).find((each) => each.name === name),
+  ).catch(() => null);
   if (added) select({ kind: "action", id: added.id });
 }
 
@@ -190,7 +240,11 @@ export async function removeAction(id: string): Promise<void> {
   const name = doc?.actions[id]?.name;
   if (!doc || name === undefined) return;
   const steps = outgoing(doc, id).length + incoming(doc, id).length;
-  if (await ask("RemoveAction", { id, with_steps: true })) tell("info", `Removed ${name}${steps > 0 ? " with its steps" : ""}. Undo brings ${steps > 0 ? "all of it" : "it"} back.`);
+  if (await ask("RemoveAction", { id, with_steps: true }))
+    tell(
+      "info",
+      `Removed ${name}${steps > 0 ? " with its steps" : ""}. Undo brings ${steps > 0 ? "all of it" : "it"} back.`,
+    );
 }
 
 // ------------------------------------------------------------------------------------------------ steps
@@ -225,10 +279,16 @@ export async function connect(from: string, to: string, condition?: ProjectLogic
     const free = freeStep(doc, types, from);
     if (typeof free === "string") return tell("info", free);
     given = free.condition;
-    if (free.first && !(await updateStep(free.first.item.id, free.first.item.start, free.first.item.end, free.first.condition))) return;
+    if (
+      free.first &&
+      !(await updateStep(free.first.item.id, free.first.item.start, free.first.item.end, free.first.condition))
+    )
+      return;
   }
   if (!(await ask("AddLogicItem", { start: from, end: to, condition: given }))) return;
-  const added = await awaited((state) => Object.values(state.doc?.logic ?? {}).find((each) => each.start === from && each.end === to)).catch(() => null);
+  const added = await awaited((state) =>
+    Object.values(state.doc?.logic ?? {}).find((each) => each.start === from && each.end === to),
+  ).catch(() => null);
   if (added) select({ kind: "logic", id: added.id });
 }
 
@@ -260,18 +320,24 @@ export async function placePuck(id: string, position: Position | null): Promise<
   const before = now().view.shared[`place/${id}`];
   // Of a change of the view state everybody is told but who makes it.
   showPuck(id, position);
-  if (!(await ask("SetViewState", { scope: "shared", document, values: { [`place/${id}`]: position } }))) showPuck(id, before);
+  if (!(await ask("SetViewState", { scope: "shared", document, values: { [`place/${id}`]: position } })))
+    showPuck(id, before);
 }
 
 // ------------------------------------------------------------------------------------------------ parameters
 
-export const addParameter = (name: string, type: string, value: string): Promise<string> => refusal(() => call("AddProjectParameter", { name, type, value }));
+export const addParameter = (name: string, type: string, value: string): Promise<string> =>
+  refusal(() => call("AddProjectParameter", { name, type, value }));
 export const updateParameter = (id: string, change: { name?: string; value?: string }): Promise<string> =>
   refusal(() => held(id, () => call("UpdateProjectParameter", { id, ...change })));
 export const removeParameter = (id: string) => ask("RemoveProjectParameter", { id });
 
 /** Let the project replace a setting of a device, or no longer (`value` undefined). */
-export const override = (objectId: string, setting: Omit<Parameter, "value">, value: string | undefined): Promise<string> =>
+export const override = (
+  objectId: string,
+  setting: Omit<Parameter, "value">,
+  value: string | undefined,
+): Promise<string> =>
   refusal(() =>
     held(objectId, async () => {
       const known = now().doc?.overrides[objectId]?.[setting.name];

@@ -28,14 +28,15 @@ let known: Chosen | null = null;
 /** The robot that the user works with: as he chose last, else the first that there is. The same object while it is the same. */
 export function chosenRobot(state: State): Chosen | null {
   const next = found(state);
-  if (known && next && known.robotId === next.robotId && known.armId === next.armId && known.effector === next.effector) return known;
+  if (known && next && known.robotId === next.robotId && known.armId === next.armId && known.effector === next.effector)
+    return known;
   known = next;
   return known;
 }
 
 function found(state: State): Chosen | null {
   const robots = robotsOf(state);
-  const last = (state.view.user["last_robot"] ?? {}) as Partial<Record<keyof Chosen, unknown>>;
+  const last = (state.view.user.last_robot ?? {}) as Partial<Record<keyof Chosen, unknown>>;
   const robotId = robots.find((each) => each === last.robotId) ?? robots[0];
   if (robotId === undefined) return null;
   const arms = state.live.arms[robotId] ?? [];
@@ -66,16 +67,23 @@ const ofArm = (armId: string) => (armId ? { arm_id: armId } : {});
 
 /** Where the end effector is, as last reported; undefined when it is not known, or no longer. */
 export function effectorPose({ robotId, armId, effector }: Chosen): Pose | undefined {
-  return telemetry.endEffectors(robotId).find((each) => each.end_effector_id === effector && (each.arm_id ?? "") === armId)?.pose;
+  return telemetry
+    .endEffectors(robotId)
+    .find((each) => each.end_effector_id === effector && (each.arm_id ?? "") === armId)?.pose;
 }
 
 /** Why the robot cannot be asked to do something now; empty when it can. */
-export function notReady(state: State, chosen: Chosen | null, request: Parameters<typeof barred>[1] = "MoveToPose"): string {
+export function notReady(
+  state: State,
+  chosen: Chosen | null,
+  request: Parameters<typeof barred>[1] = "MoveToPose",
+): string {
   if (!chosen) return "There is no robot in this scene.";
   const name = state.doc?.objects[chosen.robotId]?.name ?? "The robot";
   if (state.live.state !== "started") return "Go online first.";
   const connection = state.live.objects[chosen.robotId];
-  if (connection && connection.state !== "online" && connection.state !== "back") return `${name} is not there: ${connection.reason || connection.state}.`;
+  if (connection && connection.state !== "online" && connection.state !== "back")
+    return `${name} is not there: ${connection.reason || connection.state}.`;
   const hold = state.live.holds[chosen.robotId];
   if (hold && hold.user !== state.connection.user) return `${hold.user} holds ${name}.`;
   const owner = state.locks[chosen.robotId];
@@ -95,8 +103,19 @@ export interface Step {
 }
 
 /** Gives why it was refused, empty when the robot moves. */
-export function stepEffector({ robotId, armId, effector }: Chosen, { pose, ...step }: Step, manner: Manner): Promise<string> {
-  const args = { robot_id: robotId, end_effector_id: effector, ...step, ...(pose ? { pose } : {}), ...manner, ...ofArm(armId) };
+export function stepEffector(
+  { robotId, armId, effector }: Chosen,
+  { pose, ...step }: Step,
+  manner: Manner,
+): Promise<string> {
+  const args = {
+    robot_id: robotId,
+    end_effector_id: effector,
+    ...step,
+    ...(pose ? { pose } : {}),
+    ...manner,
+    ...ofArm(armId),
+  };
   return refusal(() => held(robotId, () => call("StepRobotEef", args, { deadline: 30 })));
 }
 
@@ -107,17 +126,31 @@ export function alignDown({ robotId, armId, effector }: Chosen, manner: Manner):
 
 /** Move to a pose in the world; what is left out of it stays. */
 export function moveToPose({ robotId, armId, effector }: Chosen, pose: Partial<Pose>, manner: Manner): Promise<string> {
-  return refusal(() => call("MoveToPose", { robot_id: robotId, end_effector_id: effector, ...pose, ...manner, ...ofArm(armId) }, { deadline: 30 }));
+  return refusal(() =>
+    call(
+      "MoveToPose",
+      { robot_id: robotId, end_effector_id: effector, ...pose, ...manner, ...ofArm(armId) },
+      { deadline: 30 },
+    ),
+  );
 }
 
 export function moveToJoints({ robotId, armId }: Chosen, joints: Joint[], { speed, safe }: Manner): Promise<string> {
-  return refusal(() => call("MoveToJoints", { robot_id: robotId, joints, speed, safe, ...ofArm(armId) }, { deadline: 30 }));
+  return refusal(() =>
+    call("MoveToJoints", { robot_id: robotId, joints, speed, safe, ...ofArm(armId) }, { deadline: 30 }),
+  );
 }
 
 /** Move to an orientation of a point, or to joints kept there. */
-export function moveToTaught({ robotId, armId, effector }: Chosen, goal: { orientation_id: string } | { joints_id: string }, manner: Manner): Promise<string> {
+export function moveToTaught(
+  { robotId, armId, effector }: Chosen,
+  goal: { orientation_id: string } | { joints_id: string },
+  manner: Manner,
+): Promise<string> {
   const to = "orientation_id" in goal ? { ...goal, end_effector_id: effector } : goal;
-  return refusal(() => call("MoveToActionPoint", { robot_id: robotId, ...to, ...manner, ...ofArm(armId) }, { deadline: 30 }));
+  return refusal(() =>
+    call("MoveToActionPoint", { robot_id: robotId, ...to, ...manner, ...ofArm(armId) }, { deadline: 30 }),
+  );
 }
 
 /** Unlock what a protective stop has left, by the person who has looked. */
@@ -137,9 +170,19 @@ export interface Showing {
  * Show the robot where it would be at a pose in the world. Gives what stands against it as a sentence, empty when
  * nothing does; what would collide is shown all the same, as far as there are joints for it.
  */
-export async function showAt(chosen: Chosen, pose: Pose, { current = () => true, keep = false }: Showing = {}): Promise<string> {
+export async function showAt(
+  chosen: Chosen,
+  pose: Pose,
+  { current = () => true, keep = false }: Showing = {},
+): Promise<string> {
   const ask = (avoid_collisions: boolean) =>
-    call("InverseKinematics", { robot_id: chosen.robotId, end_effector_id: chosen.effector, pose, avoid_collisions, ...ofArm(chosen.armId) });
+    call("InverseKinematics", {
+      robot_id: chosen.robotId,
+      end_effector_id: chosen.effector,
+      pose,
+      avoid_collisions,
+      ...ofArm(chosen.armId),
+    });
   const show = (ghost: Ghost | null) => current() && setUi({ ghost });
   try {
     show({ robotId: chosen.robotId, joints: await ask(true), problem: "" });

@@ -13,7 +13,8 @@ const BUILT_WITHIN = 120;
 export function notRunnable(state: State): string {
   if (!state.doc?.project) return "Open a project: a scene alone cannot be run.";
   if (isRunning(state)) return "It runs already.";
-  if (state.live.state === "starting" || state.live.state === "stopping") return "Wait until the devices are online or offline.";
+  if (state.live.state === "starting" || state.live.state === "stopping")
+    return "Wait until the devices are online or offline.";
   if (state.live.executing) return "An action is being tried. Wait for it, or press Stop motion.";
   return barred(state, "TemporaryPackage");
 }
@@ -22,7 +23,9 @@ export function notRunnable(state: State): string {
 export async function run({ paused = false } = {}): Promise<boolean> {
   try {
     if (now().doc?.unsaved) await call("SaveProject");
-    const shared = serves("SetBreakpoints") ? { shared_breakpoints: true } : { breakpoints: Object.keys(now().breakpoints) };
+    const shared = serves("SetBreakpoints")
+      ? { shared_breakpoints: true }
+      : { breakpoints: Object.keys(now().breakpoints) };
     await call("TemporaryPackage", { start_paused: paused, ...shared }, { deadline: BUILT_WITHIN });
     return true;
   } catch (error) {
@@ -32,7 +35,11 @@ export async function run({ paused = false } = {}): Promise<boolean> {
 }
 
 export const runPackage = (id: string, paused = false) =>
-  ask("RunPackage", { id, start_paused: paused, ...(serves("SetBreakpoints") ? { shared_breakpoints: true } : {}) }, { deadline: BUILT_WITHIN });
+  ask(
+    "RunPackage",
+    { id, start_paused: paused, ...(serves("SetBreakpoints") ? { shared_breakpoints: true } : {}) },
+    { deadline: BUILT_WITHIN },
+  );
 export const pause = () => ask("PausePackage");
 export const resume = () => ask("ResumePackage");
 export const step = () => ask("StepAction");
@@ -44,7 +51,11 @@ export async function build(name: string): Promise<boolean> {
   const { doc } = now();
   if (!doc?.project) return false;
   if (doc.unsaved && !(await ask("SaveProject"))) return false;
-  const built = await ask("BuildProject", { project_id: doc.project.id, package_name: name }, { deadline: BUILT_WITHIN });
+  const built = await ask(
+    "BuildProject",
+    { project_id: doc.project.id, package_name: name },
+    { deadline: BUILT_WITHIN },
+  );
   if (built) tell("info", `The package ${name} is built.`);
   return built !== undefined;
 }

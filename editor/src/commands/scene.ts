@@ -1,9 +1,9 @@
 /** The objects of the open scene: add, name, copy, remove, their settings and shapes. Forms are given why something was refused. */
 
-import type { ObjectModel, ObjectTypeMeta, Parameter, Pose, SceneObject } from "../protocol/types";
 import { freeName } from "../program/naming";
-import { call } from "../session/session";
+import type { ObjectModel, ObjectTypeMeta, Parameter, Pose, SceneObject } from "../protocol/types";
 import { uploadAsset } from "../session/assets";
+import { call } from "../session/session";
 import { isRunning } from "../store/selectors";
 import type { State } from "../store/state";
 import { now, select, setUi, tell } from "../store/store";
@@ -99,7 +99,11 @@ export async function duplicateObject({ name, type, pose, parameters }: SceneObj
   const beside = pose && { ...pose, position: plus(pose.position, { x: 0.1, y: 0.1, z: 0 }) };
   const own = meta?.base === "VirtualCollisionObject" && meta.object_model && beside;
   const done = own
-    ? await ask("AddVirtualCollisionObjectToScene", { name: copy, pose: beside, model: named(meta.object_model as ObjectModel, copy) })
+    ? await ask("AddVirtualCollisionObjectToScene", {
+        name: copy,
+        pose: beside,
+        model: named(meta.object_model as ObjectModel, copy),
+      })
     : await ask("AddObjectToScene", { name: copy, type, parameters, ...(beside ? { pose: beside } : {}) });
   if (done) await taken(copy).catch(() => {}); // somebody took it away again
 }

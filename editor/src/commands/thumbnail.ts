@@ -48,7 +48,9 @@ export async function readThumbnail(document: string): Promise<void> {
   if (!serves("GetViewState")) return;
   const { values } = await call("GetViewState", { scope: "shared", document });
   const { thumbnail, picture } = values as { thumbnail?: unknown; picture?: unknown };
-  const [own, taken] = [picture, thumbnail].map((each) => (typeof each === "string" && each.startsWith("data:image/") ? each : ""));
+  const [own, taken] = [picture, thumbnail].map((each) =>
+    typeof each === "string" && each.startsWith("data:image/") ? each : "",
+  );
   useOwn.setState({ [document]: !!own });
   useThumbnails.setState({ [document]: own || taken || "" });
 }
@@ -63,7 +65,9 @@ async function smaller(blob: Blob, closer = CLOSER): Promise<string> {
   canvas.height = HEIGHT;
   const scale = Math.max(WIDTH / picture.width, HEIGHT / picture.height) * closer;
   const [w, h] = [WIDTH / scale, HEIGHT / scale];
-  canvas.getContext("2d")?.drawImage(picture, (picture.width - w) / 2, (picture.height - h) / 2, w, h, 0, 0, WIDTH, HEIGHT);
+  canvas
+    .getContext("2d")
+    ?.drawImage(picture, (picture.width - w) / 2, (picture.height - h) / 2, w, h, 0, 0, WIDTH, HEIGHT);
   picture.close();
   return QUALITIES.map((each) => canvas.toDataURL("image/webp", each)).find((each) => each.length <= MOST) ?? "";
 }

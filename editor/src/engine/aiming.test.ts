@@ -11,7 +11,11 @@ const CONE = 0.06;
 const ball = (id: string, x: number, z = 0, radius = 0.015): Target => ({ id, centre: new Vector3(x, 0, z), radius });
 const box = (id: string, size: [number, number, number], place: [number, number, number], turned = 0): Target => {
   const half = new Vector3(...size).multiplyScalar(0.5);
-  return { id, box: new Box3(half.clone().negate(), half), frame: new Matrix4().makeRotationZ(turned).setPosition(...place) };
+  return {
+    id,
+    box: new Box3(half.clone().negate(), half),
+    frame: new Matrix4().makeRotationZ(turned).setPosition(...place),
+  };
 };
 const ids = (targets: Target[], before = "") => aimed(targets, RAY, CONE, before).map((each) => each.id);
 

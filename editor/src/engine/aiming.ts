@@ -53,7 +53,11 @@ export function aimed(targets: Iterable<Target>, ray: Ray, cone: number, before 
       id,
       off,
       distance,
-      score: off / cone + LARGE * Math.min(1, size / (2 * cone)) + FAR * (1 - nearest / distance) - (id === before ? 0.05 : 0),
+      score:
+        off / cone +
+        LARGE * Math.min(1, size / (2 * cone)) +
+        FAR * (1 - nearest / distance) -
+        (id === before ? 0.05 : 0),
     }))
     .sort((a, b) => a.score - b.score || a.distance - b.distance)
     .slice(0, MOST_CANDIDATES);
@@ -108,7 +112,7 @@ export function* targetsOf(things: Iterable<Thing>): Generator<Target> {
 /** The meshes of a thing; not those of what hangs on it. */
 function meshesOf(root: Object3D, id: string, found: Mesh[] = []): Mesh[] {
   for (const child of root.children) {
-    const owner = child.userData["item"] as string | undefined;
+    const owner = child.userData.item as string | undefined;
     if (!child.visible || (owner !== undefined && owner !== id)) continue;
     if (owner === id && (child as Mesh).isMesh) found.push(child as Mesh);
     meshesOf(child, id, found);

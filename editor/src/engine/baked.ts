@@ -3,7 +3,16 @@
  * hundred triangles. Nothing is done per frame; all is written anew when something changed its place or its colour.
  */
 
-import { BufferAttribute, BufferGeometry, DynamicDrawUsage, Matrix4, Mesh, MeshLambertMaterial, type Scene, Vector3 } from "three";
+import {
+  BufferAttribute,
+  BufferGeometry,
+  DynamicDrawUsage,
+  Matrix4,
+  Mesh,
+  MeshLambertMaterial,
+  type Scene,
+  Vector3,
+} from "three";
 import type { Instance } from "./batches";
 import { cheapen } from "./surface";
 
@@ -36,7 +45,9 @@ export class Baked {
     this.mesh.visible = instances.length > 0;
     if (instances.length === 0) return;
     const { geometry } = this.mesh;
-    const [places, normals, colors] = ["position", "normal", "color"].map((name) => geometry.getAttribute(name) as BufferAttribute) as [BufferAttribute, BufferAttribute, BufferAttribute];
+    const [places, normals, colors] = ["position", "normal", "color"].map(
+      (name) => geometry.getAttribute(name) as BufferAttribute,
+    ) as [BufferAttribute, BufferAttribute, BufferAttribute];
     let at = 0;
     for (const { frame, offset, color } of instances) {
       matrix.multiplyMatrices(frame.matrixWorld, offset);
@@ -49,7 +60,10 @@ export class Baked {
           normals.setXYZ(at, CORNERS[n] as number, CORNERS[n + 1] as number, size);
         }
       } else {
-        const { position: its, normal: facing } = this.shape.attributes as { position: BufferAttribute; normal: BufferAttribute };
+        const { position: its, normal: facing } = this.shape.attributes as {
+          position: BufferAttribute;
+          normal: BufferAttribute;
+        };
         for (let n = 0; n < its.count; n++, at++) {
           place.fromBufferAttribute(its, n).applyMatrix4(matrix);
           normal.fromBufferAttribute(facing, n).transformDirection(matrix);
@@ -76,12 +90,20 @@ export class Baked {
 
   private makeRoom(instances: number): void {
     this.room = instances;
-    const index = this.ball > 0 ? [0, 1, 2, 0, 2, 3] : this.shape.index ? [...this.shape.index.array] : [...Array(this.corners).keys()];
+    const index =
+      this.ball > 0
+        ? [0, 1, 2, 0, 2, 3]
+        : this.shape.index
+          ? [...this.shape.index.array]
+          : [...Array(this.corners).keys()];
     const vertices = this.ball > 0 ? 4 : this.shape.getAttribute("position").count;
     this.mesh.geometry.dispose();
     this.mesh.geometry = new BufferGeometry();
     for (const name of ["position", "normal", "color"]) {
-      this.mesh.geometry.setAttribute(name, new BufferAttribute(new Float32Array(instances * vertices * 3), 3).setUsage(DynamicDrawUsage));
+      this.mesh.geometry.setAttribute(
+        name,
+        new BufferAttribute(new Float32Array(instances * vertices * 3), 3).setUsage(DynamicDrawUsage),
+      );
     }
     const all = new Uint32Array(instances * index.length);
     for (let n = 0; n < instances; n++) index.forEach((each, m) => (all[n * index.length + m] = n * vertices + each));

@@ -1,6 +1,16 @@
 /** Many small things in one mesh: where they are drawn, and that they are met although the instances are not drawn. */
 
-import { Color, Matrix4, Mesh, MeshLambertMaterial, Object3D, Raycaster, Scene, SphereGeometry, Vector3 } from "three";
+import {
+  Color,
+  Matrix4,
+  type Mesh,
+  MeshLambertMaterial,
+  Object3D,
+  Raycaster,
+  Scene,
+  SphereGeometry,
+  Vector3,
+} from "three";
 import { expect, test } from "vitest";
 import { Batches, type Instance } from "./batches";
 
@@ -20,7 +30,7 @@ function meshOf(scene: Scene): Mesh {
 function hit(scene: Scene, x: number): string | undefined {
   const caster = new Raycaster(new Vector3(x, 0, 5), new Vector3(0, 0, -1));
   const [first] = caster.intersectObjects(scene.children, true);
-  return first && (first.object.userData["batch"] as (index: number) => string)(first.instanceId as number);
+  return first && (first.object.userData.batch as (index: number) => string)(first.instanceId as number);
 }
 
 test("balls that are painted are squares at their places, as large as they are, and met as balls", () => {

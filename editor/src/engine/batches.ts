@@ -1,6 +1,15 @@
 /** Many equal small things drawn in one go: points, pucks, arrows. Each keeps its frame in the scene graph. */
 
-import { type BufferGeometry, Color, DynamicDrawUsage, InstancedMesh, type Material, Matrix4, type Object3D, type Scene } from "three";
+import {
+  type BufferGeometry,
+  Color,
+  DynamicDrawUsage,
+  InstancedMesh,
+  type Material,
+  Matrix4,
+  type Object3D,
+  type Scene,
+} from "three";
 import { Baked } from "./baked";
 
 export interface Instance {
@@ -72,7 +81,7 @@ export class Batch {
     mesh.instanceMatrix.setUsage(DynamicDrawUsage);
     mesh.setColorAt(0, new Color(1, 1, 1)); // makes the attribute, so that the shader is compiled once
     mesh.count = 0;
-    mesh.userData["batch"] = (index: number) => this.instances[index]?.id;
+    mesh.userData.batch = (index: number) => this.instances[index]?.id;
     this.scene.add(mesh);
     return mesh;
   }

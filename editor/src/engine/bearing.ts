@@ -27,7 +27,10 @@ export function lookAt(engine: Engine, id: string): void {
   if (engine.view.mode === "fly") return engine.focus(id);
   const { position, target } = engine.view.viewpoint;
   const to = thing.anchor(new Vector3());
-  const moved = to.clone().sub(new Vector3(...target)).add(new Vector3(...position));
+  const moved = to
+    .clone()
+    .sub(new Vector3(...target))
+    .add(new Vector3(...position));
   engine.view.set(moved.toArray(), to.toArray());
 }
 

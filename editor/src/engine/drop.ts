@@ -1,6 +1,16 @@
 /** How high something is, to be seen from any side: a dashed line down to the floor, and a ring where it stands above. */
 
-import { BufferGeometry, Group, LineDashedMaterial, LineSegments, Mesh, MeshBasicMaterial, RingGeometry, type Scene, Vector3 } from "three";
+import {
+  BufferGeometry,
+  Group,
+  LineDashedMaterial,
+  LineSegments,
+  Mesh,
+  MeshBasicMaterial,
+  RingGeometry,
+  type Scene,
+  Vector3,
+} from "three";
 import type { Palette } from "./palette";
 
 /** m: what is lower stands on the floor. */
@@ -12,10 +22,13 @@ export class DropLine {
     new BufferGeometry().setFromPoints([new Vector3(), new Vector3(0, 0, -1)]),
     new LineDashedMaterial({ dashSize: 0.02, gapSize: 0.015, transparent: true, opacity: 0.9 }),
   );
-  private readonly ring = new Mesh(new RingGeometry(0.03, 0.036, 32), new MeshBasicMaterial({ transparent: true, opacity: 0.8 }));
+  private readonly ring = new Mesh(
+    new RingGeometry(0.03, 0.036, 32),
+    new MeshBasicMaterial({ transparent: true, opacity: 0.8 }),
+  );
 
   constructor(scene: Scene) {
-    this.root.userData["ground"] = true; // not to be picked
+    this.root.userData.ground = true; // not to be picked
     this.root.add(this.line, this.ring);
     this.root.visible = false;
     scene.add(this.root);

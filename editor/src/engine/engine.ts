@@ -3,16 +3,7 @@
  * something changed.
  */
 
-import {
-  Box3,
-  Fog,
-  GridHelper,
-  PCFShadowMap,
-  Scene,
-  SRGBColorSpace,
-  Vector3,
-  WebGLRenderer,
-} from "three";
+import { Box3, Fog, GridHelper, PCFShadowMap, Scene, SRGBColorSpace, Vector3, WebGLRenderer } from "three";
 import type { Pose } from "../protocol/types";
 import type { Telemetry } from "../store/telemetry";
 import { Batches } from "./batches";
@@ -27,10 +18,10 @@ import { DARK, LIGHT, type Palette } from "./palette";
 import { type Hit, onFloor, pick } from "./picking";
 import { worldPose } from "./poses";
 import { type Context, type Quality, type Thing, trianglesOf } from "./thing";
-import { Ties } from "./ties";
 import { make } from "./things/make";
-import { type Way, WayLine } from "./way";
 import { type JointLimit, RobotThing } from "./things/robot";
+import { Ties } from "./ties";
+import { type Way, WayLine } from "./way";
 
 export type { Quality };
 
@@ -113,7 +104,11 @@ export class Engine {
   constructor(private readonly options: EngineOptions) {
     const { canvas, quality } = options;
     // Nothing is seen through the view: what draws pages need not look for what is behind it.
-    const context = canvas.getContext("webgl2", { alpha: false, antialias: quality !== "low", powerPreference: "low-power" });
+    const context = canvas.getContext("webgl2", {
+      alpha: false,
+      antialias: quality !== "low",
+      powerPreference: "low-power",
+    });
     this.renderer = new WebGLRenderer({ canvas, ...(context && { context }) });
     this.renderer.outputColorSpace = SRGBColorSpace;
     this.renderer.setPixelRatio(quality === "low" ? 1 : Math.min(2, window.devicePixelRatio));
@@ -132,7 +127,8 @@ export class Engine {
       asset: options.asset,
       trouble: options.trouble,
       thing: (id) => this.things.get(id),
-      metresPerPixel: (at) => (2 * this.view.camera.position.distanceTo(at) * Math.tan((this.view.camera.fov * Math.PI) / 360)) / this.height,
+      metresPerPixel: (at) =>
+        (2 * this.view.camera.position.distanceTo(at) * Math.tan((this.view.camera.fov * Math.PI) / 360)) / this.height,
       invalidate: () => this.invalidate(),
       loaded: () => this.loaded(),
     };
@@ -227,7 +223,7 @@ export class Engine {
   /** What lies under a place of the view, in pixels, the best first. */
   pick(x: number, y: number, slack = 12): Hit[] {
     this.place();
-    const roots = this.scene.children.filter((each) => each !== this.grid && !each.userData["ground"]);
+    const roots = this.scene.children.filter((each) => each !== this.grid && !each.userData.ground);
     return pick(x, y, { width: this.width, height: this.height }, this.view.camera, roots, slack, (id) => {
       const kind = this.things.get(id)?.item.kind;
       return kind !== undefined && SMALL.has(kind);
@@ -423,7 +419,12 @@ export class Engine {
     this.tellHeight();
     this.renderer.render(this.scene, this.view.camera);
     this.frames++;
-    this.labels.show(labelsOf(this.things, this.hovered, this.notes, this.view.camera.position), this.view.camera, this.width, this.height);
+    this.labels.show(
+      labelsOf(this.things, this.hovered, this.notes, this.view.camera.position),
+      this.view.camera,
+      this.width,
+      this.height,
+    );
     for (const watcher of this.watchers) watcher();
     if (this.stirred.size > 0) this.draw();
   }

@@ -82,7 +82,7 @@ export class Labels {
     badge.hidden = !label.badge;
     if (note.textContent !== label.note) note.textContent = label.note;
     note.hidden = !label.note;
-    element.dataset["selected"] = String(label.selected);
+    element.dataset.selected = String(label.selected);
     return element;
   }
 }

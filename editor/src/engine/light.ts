@@ -19,7 +19,7 @@ export function light(scene: Scene, shadows: boolean): () => void {
   if (shadows) {
     const ground = new Mesh(new PlaneGeometry(20, 20), new ShadowMaterial({ opacity: 0.22 }));
     ground.receiveShadow = true;
-    ground.userData["ground"] = true;
+    ground.userData.ground = true;
     ground.position.z = -0.0005;
     scene.add(ground);
   }

@@ -5,14 +5,26 @@ import type { Item } from "./items";
 import type { Label } from "./labels";
 import type { Thing } from "./thing";
 
-const WEIGHTS: Record<Item["kind"], number> = { robot: 40, object: 10, point: 20, action: 30, orientation: 5, logic: 0 };
+const WEIGHTS: Record<Item["kind"], number> = {
+  robot: 40,
+  object: 10,
+  point: 20,
+  action: 30,
+  orientation: 5,
+  logic: 0,
+};
 
 /** m from the eye within which points and actions have their names, too. */
 const NEAR = 0.9;
 const place = new Vector3();
 
 /** What is selected comes first, then what the pointer or the cross is on, what has something to tell, and what is near. */
-export function labelsOf(things: Map<string, Thing>, hovered: string, notes: ReadonlyMap<string, string>, eye: Vector3): Label[] {
+export function labelsOf(
+  things: Map<string, Thing>,
+  hovered: string,
+  notes: ReadonlyMap<string, string>,
+  eye: Vector3,
+): Label[] {
   const found: Label[] = [];
   for (const [id, thing] of things) {
     const { item } = thing;
@@ -20,15 +32,32 @@ export function labelsOf(things: Map<string, Thing>, hovered: string, notes: Rea
     const note = notes.get(id) ?? "";
     const under = id === hovered;
     if (item.faint >= 1) continue;
-    const always = item.kind === "robot" || item.kind === "object" || (item.kind === "action" && (item.running || item.role !== "action"));
+    const always =
+      item.kind === "robot" ||
+      item.kind === "object" ||
+      (item.kind === "action" && (item.running || item.role !== "action"));
     const small = item.kind === "point" || item.kind === "action";
     const told = item.selected || under || badge !== "";
     if (!always && !small && !told) continue;
     const distance = thing.anchor(place).distanceTo(eye);
     if (!always && !told && distance > NEAR) continue;
     const faded = item.faint > 0.5 ? -30 : 0;
-    const weight = (item.selected ? 1000 : 0) + (under ? 500 : 0) + (badge ? 100 : 0) + WEIGHTS[item.kind] + faded + 20 / (1 + distance);
-    found.push({ id, text: item.name, badge, note, selected: item.selected, weight, anchor: (target) => thing.anchor(target) });
+    const weight =
+      (item.selected ? 1000 : 0) +
+      (under ? 500 : 0) +
+      (badge ? 100 : 0) +
+      WEIGHTS[item.kind] +
+      faded +
+      20 / (1 + distance);
+    found.push({
+      id,
+      text: item.name,
+      badge,
+      note,
+      selected: item.selected,
+      weight,
+      anchor: (target) => thing.anchor(target),
+    });
   }
   return found;
 }

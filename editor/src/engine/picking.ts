@@ -1,6 +1,6 @@
 /** What is under the pointer or the crosshair: all candidates, the best first. */
 
-import { type Camera, type Intersection, type Object3D, Raycaster, Vector2, Vector3 } from "three";
+import { type Camera, type Intersection, type Object3D, Raycaster, Vector2, type Vector3 } from "three";
 
 export interface Hit {
   id: string;
@@ -13,7 +13,10 @@ export interface Hit {
 }
 
 /** Fingers are wide, and points small: further rays around the pointer, at so many pixels. */
-const AROUND: [number, number][] = [0, 1, 2, 3, 4, 5, 6, 7].map((n) => [Math.cos((n * Math.PI) / 4), Math.sin((n * Math.PI) / 4)]);
+const AROUND: [number, number][] = [0, 1, 2, 3, 4, 5, 6, 7].map((n) => [
+  Math.cos((n * Math.PI) / 4),
+  Math.sin((n * Math.PI) / 4),
+]);
 
 const caster = new Raycaster();
 caster.params.Line.threshold = 0.002; // m; outlines and axes would be hit a metre beside them
@@ -58,11 +61,11 @@ export function pick(
 }
 
 function idOf(hit: Intersection): string | undefined {
-  const batch = hit.object.userData["batch"] as ((index: number) => string | undefined) | undefined;
+  const batch = hit.object.userData.batch as ((index: number) => string | undefined) | undefined;
   if (batch) return hit.instanceId === undefined ? undefined : batch(hit.instanceId);
   for (let each: Object3D | null = hit.object; each; each = each.parent) {
     if (!each.visible) return undefined;
-    const id = each.userData["item"] as string | undefined;
+    const id = each.userData.item as string | undefined;
     if (id !== undefined) return id;
   }
   return undefined;

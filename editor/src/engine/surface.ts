@@ -90,7 +90,10 @@ export function cheapen(material: MeshLambertMaterial, discs = false): void {
 }
 
 /** A dull material, of a colour that can be set. */
-export function surface({ quality }: Pick<Context, "quality">, parameters: MeshLambertMaterialParameters = {}): MeshLambertMaterial {
+export function surface(
+  { quality }: Pick<Context, "quality">,
+  parameters: MeshLambertMaterialParameters = {},
+): MeshLambertMaterial {
   const material = new MeshLambertMaterial(parameters);
   if (quality === "low") cheapen(material);
   return material;

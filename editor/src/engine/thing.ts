@@ -1,6 +1,6 @@
 /** The picture of one item, and what it is given by the engine. */
 
-import { type Material, type Mesh, type Object3D, Vector3 } from "three";
+import type { Material, Mesh, Object3D, Vector3 } from "three";
 import type { Telemetry } from "../store/telemetry";
 import type { Batches } from "./batches";
 import type { Item } from "./items";
@@ -77,7 +77,7 @@ export abstract class Thing<I extends Item = Item> {
 /** Mark an object and what is below it as the picture of an item, for picking. */
 export function ownedBy(root: Object3D, id: string): void {
   root.traverse((each) => {
-    each.userData["item"] = id;
+    each.userData.item = id;
   });
 }
 
@@ -86,7 +86,7 @@ export function trianglesOf(root: Object3D, id: string): number {
   let count = 0;
   root.traverse((each) => {
     const mesh = each as Mesh;
-    if (!mesh.isMesh || each.userData["item"] !== id) return;
+    if (!mesh.isMesh || each.userData.item !== id) return;
     count += (mesh.geometry.index?.count ?? mesh.geometry.getAttribute("position").count) / 3;
   });
   return count;
@@ -103,7 +103,7 @@ export function seenThrough(material: Material, on: boolean): void {
 export function disposeTree(root: Object3D): void {
   root.traverse((each) => {
     const mesh = each as { geometry?: { dispose(): void; userData?: object }; material?: Material | Material[] };
-    if (each.userData["shared"]) return;
+    if (each.userData.shared) return;
     mesh.geometry?.dispose();
     for (const material of [mesh.material ?? []].flat()) material.dispose();
   });

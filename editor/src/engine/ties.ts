@@ -1,19 +1,30 @@
 /** Lines from points to what they hang on, all drawn in one go. */
 
-import { BufferAttribute, BufferGeometry, DynamicDrawUsage, LineBasicMaterial, LineSegments, type Scene, Vector3 } from "three";
+import {
+  BufferAttribute,
+  BufferGeometry,
+  DynamicDrawUsage,
+  LineBasicMaterial,
+  LineSegments,
+  type Scene,
+  Vector3,
+} from "three";
 import type { Palette } from "./palette";
 import type { Thing } from "./thing";
 
 const place = new Vector3();
 
 export class Ties {
-  private readonly lines = new LineSegments(new BufferGeometry(), new LineBasicMaterial({ transparent: true, opacity: 0.75 }));
+  private readonly lines = new LineSegments(
+    new BufferGeometry(),
+    new LineBasicMaterial({ transparent: true, opacity: 0.75 }),
+  );
   private room = 0;
   /** How many are drawn. */
   count = 0;
 
   constructor(scene: Scene) {
-    this.lines.userData["ground"] = true; // not to be picked
+    this.lines.userData.ground = true; // not to be picked
     this.lines.frustumCulled = false;
     this.lines.visible = false;
     scene.add(this.lines);

@@ -1,6 +1,14 @@
 /** The straight way from one place to another, before somebody goes it: unbroken where it is free, else dashed. */
 
-import { type BufferGeometry, CylinderGeometry, Mesh, MeshBasicMaterial, type Scene, SphereGeometry, Vector3 } from "three";
+import {
+  type BufferGeometry,
+  CylinderGeometry,
+  Mesh,
+  MeshBasicMaterial,
+  type Scene,
+  SphereGeometry,
+  Vector3,
+} from "three";
 import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 import type { Position } from "../protocol/types";
 import type { Palette } from "./palette";
@@ -17,7 +25,11 @@ export interface Way {
 /** m: half of its thickness, what is shorter is not drawn, lengths of a dash and of what is between. */
 const RADIUS = 0.003;
 const SHORTEST = 0.005;
-const DASHES: Record<WayState, readonly [number, number] | null> = { free: null, unknown: [0.02, 0.012], blocked: [0.008, 0.012] };
+const DASHES: Record<WayState, readonly [number, number] | null> = {
+  free: null,
+  unknown: [0.02, 0.012],
+  blocked: [0.008, 0.012],
+};
 const MOST_DASHES = 60;
 const up = new Vector3(0, 1, 0);
 
@@ -28,7 +40,7 @@ export class WayLine {
   private readonly mesh = new Mesh<BufferGeometry, MeshBasicMaterial>(undefined, this.material);
 
   constructor(scene: Scene) {
-    this.mesh.userData["ground"] = true; // not to be picked
+    this.mesh.userData.ground = true; // not to be picked
     this.mesh.visible = false;
     scene.add(this.mesh);
   }
@@ -44,7 +56,9 @@ export class WayLine {
     this.mesh.visible = this.shown !== null;
     if (!this.shown || !from || !to) return true;
     const { state } = this.shown;
-    this.material.color.copy(state === "free" ? palette.reach.reachable : state === "blocked" ? palette.trouble : palette.locked);
+    this.material.color.copy(
+      state === "free" ? palette.reach.reachable : state === "blocked" ? palette.trouble : palette.locked,
+    );
     this.mesh.geometry.dispose();
     this.mesh.geometry = pieces(length, DASHES[state]);
     this.mesh.position.copy(from);

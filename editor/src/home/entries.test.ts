@@ -2,14 +2,26 @@ import { describe, expect, it } from "vitest";
 import type { Lists } from "../store/state";
 import { chosen, entriesOf } from "./entries";
 
-const scene = (id: string, name: string, modified: string) => ({ id, name, created: "2026-01-01T00:00:00Z", modified, description: "" });
+const scene = (id: string, name: string, modified: string) => ({
+  id,
+  name,
+  created: "2026-01-01T00:00:00Z",
+  modified,
+  description: "",
+});
 const LISTS: Lists = {
   scenes: [scene("s1", "cell 10", "2026-03-01T00:00:00Z"), scene("s2", "cell 2", "2026-04-01T00:00:00Z")],
   projects: [
     { id: "p1", name: "sort", scene_id: "s1", description: "boards", has_logic: true, problems: ["no end"] },
     { id: "p2", name: "lost", scene_id: "gone", description: "", has_logic: true },
   ],
-  packages: [{ id: "k1", package_meta: { name: "sort 1", built: "2026-04-02T00:00:00Z" }, project_meta: { id: "p9", name: "old", description: "", modified: "2026-04-01T00:00:00Z" } }],
+  packages: [
+    {
+      id: "k1",
+      package_meta: { name: "sort 1", built: "2026-04-02T00:00:00Z" },
+      project_meta: { id: "p9", name: "old", description: "", modified: "2026-04-01T00:00:00Z" },
+    },
+  ],
   shown: "ProjectsList",
   highlight: "",
 };

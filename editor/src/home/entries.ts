@@ -69,7 +69,9 @@ export function entriesOf(lists: Lists, kind: Entry["kind"]): Entry[] | null {
           created: meta.built,
           problems: [],
           executed: meta.executed ?? "",
-          ...(project ? { from: { id: project.id, name: project.name, gone: !projects?.some((each) => each.id === project.id) } } : {}),
+          ...(project
+            ? { from: { id: project.id, name: project.name, gone: !projects?.some((each) => each.id === project.id) } }
+            : {}),
         })) ?? null
       );
   }
@@ -81,10 +83,18 @@ function from(id: string, of: { id: string; name: string }[] | null): Entry["fro
 }
 
 /** Those that are looked for, sorted; starred ones are not before others unless asked for alone. */
-export function chosen(entries: Entry[], search: string, sort: Sort, stars: ReadonlySet<string> | null, recent: readonly string[] = []): Entry[] {
+export function chosen(
+  entries: Entry[],
+  search: string,
+  sort: Sort,
+  stars: ReadonlySet<string> | null,
+  recent: readonly string[] = [],
+): Entry[] {
   const wanted = search.trim().toLowerCase();
   const found = entries.filter(
-    (each) => (!stars || stars.has(each.id)) && `${each.name} ${each.description} ${each.from?.name ?? ""}`.toLowerCase().includes(wanted),
+    (each) =>
+      (!stars || stars.has(each.id)) &&
+      `${each.name} ${each.description} ${each.from?.name ?? ""}`.toLowerCase().includes(wanted),
   );
   const opened = new Map(recent.map((id, n) => [id, n]));
   const last = ({ id }: Entry) => opened.get(id) ?? recent.length;

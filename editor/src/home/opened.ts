@@ -9,7 +9,9 @@ const PREFIX = "opened/";
 /** Ids from the values that are kept of a user, `opened/<id>` with the time in ms; the last opened first. */
 export function openedOf(values: Record<string, unknown>): Opened {
   return Object.entries(values)
-    .flatMap(([key, time]) => (key.startsWith(PREFIX) && typeof time === "number" ? [{ id: key.slice(PREFIX.length), time }] : []))
+    .flatMap(([key, time]) =>
+      key.startsWith(PREFIX) && typeof time === "number" ? [{ id: key.slice(PREFIX.length), time }] : [],
+    )
     .sort((a, b) => b.time - a.time)
     .map(({ id }) => id);
 }

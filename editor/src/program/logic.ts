@@ -10,11 +10,17 @@ const BRANCHABLE = new Set(["boolean", "integer", "integer_enum", "string_enum"]
 /** The action, START or END at one side of a step: ends may name a flow behind a slash. */
 export const placeOf = (end: string): string => end.split("/")[0] ?? end;
 
-export const outgoing = (doc: OpenDocument, id: string): LogicItem[] => Object.values(doc.logic).filter((item) => placeOf(item.start) === id);
-export const incoming = (doc: OpenDocument, id: string): LogicItem[] => Object.values(doc.logic).filter((item) => placeOf(item.end) === id);
+export const outgoing = (doc: OpenDocument, id: string): LogicItem[] =>
+  Object.values(doc.logic).filter((item) => placeOf(item.start) === id);
+export const incoming = (doc: OpenDocument, id: string): LogicItem[] =>
+  Object.values(doc.logic).filter((item) => placeOf(item.end) === id);
 
 /** What an action's type says of it; undefined when it is not known (yet, or any more). */
-export function metaOf(types: State["types"], doc: OpenDocument, action: Pick<Action, "type">): ObjectAction | undefined {
+export function metaOf(
+  types: State["types"],
+  doc: OpenDocument,
+  action: Pick<Action, "type">,
+): ObjectAction | undefined {
   const [objectId = "", method] = action.type.split("/");
   const type = doc.objects[objectId]?.type;
   return type === undefined ? undefined : types.actions[type]?.find((each) => each.name === method);
@@ -32,9 +38,11 @@ function reached(doc: OpenDocument, from: string, next: (doc: OpenDocument, id: 
 }
 
 /** Everything that comes after an action. */
-export const after = (doc: OpenDocument, id: string): Set<string> => reached(doc, id, (of, each) => outgoing(of, each).map((item) => placeOf(item.end)));
+export const after = (doc: OpenDocument, id: string): Set<string> =>
+  reached(doc, id, (of, each) => outgoing(of, each).map((item) => placeOf(item.end)));
 /** Everything that comes before an action. */
-export const before = (doc: OpenDocument, id: string): Set<string> => reached(doc, id, (of, each) => incoming(of, each).map((item) => placeOf(item.start)));
+export const before = (doc: OpenDocument, id: string): Set<string> =>
+  reached(doc, id, (of, each) => incoming(of, each).map((item) => placeOf(item.start)));
 
 export interface Result {
   action: Of<Action>;
@@ -136,6 +144,7 @@ export function conditionWords(doc: OpenDocument, types: State["types"], item: L
   if (!condition) return outgoing(doc, placeOf(item.start)).length > 1 ? "else" : "";
   const result = resultAt(doc, types, condition.what);
   const own = result?.action.id === placeOf(item.start);
-  const value = condition.value === "true" ? "yes" : condition.value === "false" ? "no" : condition.value.replace(/^"(.*)"$/, "$1");
+  const value =
+    condition.value === "true" ? "yes" : condition.value === "false" ? "no" : condition.value.replace(/^"(.*)"$/, "$1");
   return own && result?.type === "boolean" ? value : `${result?.name ?? "result"} = ${value}`;
 }

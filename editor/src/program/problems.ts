@@ -1,9 +1,9 @@
 /** What is wrong with a program before it is run: each fault in words, and where it is. */
 
 import type { OpenDocument, State } from "../store/state";
+import { after, END, incoming, linkTo, metaOf, outgoing, placeOf, resultAt, resultsOf, START } from "./logic";
 import { reachOfAction } from "./reach";
 import { decoded } from "./values";
-import { after, END, incoming, linkTo, metaOf, outgoing, placeOf, resultAt, resultsOf, START } from "./logic";
 
 export interface Problem {
   /** Of the thing that has it; what a tap leads to. */
@@ -26,7 +26,10 @@ export function problemsOf(doc: OpenDocument, types: State["types"], reach: Stat
   for (const action of Object.values(doc.actions)) {
     const there = reachOfAction(action, reach);
     if (there?.reach !== "out_of_reach" && there?.reach !== "in_collision") continue;
-    warn(action.id, `${action.name}: ${there.reason || (there.reach === "in_collision" ? "the robot would touch something there." : "the robot does not reach there.")}`);
+    warn(
+      action.id,
+      `${action.name}: ${there.reason || (there.reach === "in_collision" ? "the robot would touch something there." : "the robot does not reach there.")}`,
+    );
   }
   return found;
 }
@@ -40,7 +43,12 @@ function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Te
     const ways = outgoing(doc, action.id);
     if (!used.has(action.id)) {
       const loose = incoming(doc, action.id).length === 0;
-      warn(action.id, loose ? `${action.name} is never run: nothing leads to it.` : `${action.name} is never run: no way from Start leads there.`);
+      warn(
+        action.id,
+        loose
+          ? `${action.name} is never run: nothing leads to it.`
+          : `${action.name} is never run: no way from Start leads there.`,
+      );
       continue;
     }
     if (ways.length === 0) {
@@ -55,16 +63,25 @@ function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Te
     const both = conditions.some((each) => each.value === "true") && conditions.some((each) => each.value === "false");
     if (!both) {
       const bool = first.value === "true" || first.value === "false";
-      const missing = bool ? `${result?.name ?? "its result"} is ${first.value === "true" ? "no" : "yes"}` : "no condition holds";
+      const missing = bool
+        ? `${result?.name ?? "its result"} is ${first.value === "true" ? "no" : "yes"}`
+        : "no condition holds";
       error(action.id, `Nothing follows ${action.name} when ${missing}.`);
     }
   }
   for (const item of Object.values(doc.logic)) {
     if (item.condition && !resultAt(doc, types, item.condition.what) && typesKnown(doc, types)) {
-      error(item.id, `A step from ${doc.actions[placeOf(item.start)]?.name ?? "an action"} asks for a result that does not exist any more.`);
+      error(
+        item.id,
+        `A step from ${doc.actions[placeOf(item.start)]?.name ?? "an action"} asks for a result that does not exist any more.`,
+      );
     }
   }
-  if (!Object.values(doc.logic).some((item) => placeOf(item.end) === END) && Object.keys(doc.actions).length > 0 && outgoing(doc, START).length > 0) {
+  if (
+    !Object.values(doc.logic).some((item) => placeOf(item.end) === END) &&
+    Object.keys(doc.actions).length > 0 &&
+    outgoing(doc, START).length > 0
+  ) {
     error(END, "No way leads to End.");
   }
 }
@@ -73,7 +90,13 @@ function typesKnown(doc: OpenDocument, types: State["types"]): boolean {
   return Object.values(doc.objects).every((object) => object.type in types.actions);
 }
 
-function ofAction(doc: OpenDocument, types: State["types"], action: OpenDocument["actions"][string], error: Tell, warn: Tell): void {
+function ofAction(
+  doc: OpenDocument,
+  types: State["types"],
+  action: OpenDocument["actions"][string],
+  error: Tell,
+  warn: Tell,
+): void {
   const [objectId = ""] = action.type.split("/");
   const object = doc.objects[objectId];
   if (!object) return error(action.id, `${action.name}: its device is not in the scene any more.`);
@@ -87,23 +110,40 @@ function ofAction(doc: OpenDocument, types: State["types"], action: OpenDocument
     if (!parameter) {
       if (wanted.default_value === undefined) error(action.id, `${action.name}: ${wanted.name} is missing.`);
     } else if (parameter.type === "project_parameter") {
-      if (!(String(value) in doc.parameters)) error(action.id, `${action.name}: the parameter for ${wanted.name} is gone.`);
+      if (!(String(value) in doc.parameters))
+        error(action.id, `${action.name}: the parameter for ${wanted.name} is gone.`);
     } else if (parameter.type === "link") {
       const result = resultAt(doc, types, String(value));
       if (!result) error(action.id, `${action.name}: the result for ${wanted.name} is gone.`);
       else if (doc.project?.has_logic && !after(doc, result.action.id).has(action.id)) {
-        warn(action.id, `${action.name}: ${wanted.name} uses a result of ${result.action.name}, which does not come before it.`);
+        warn(
+          action.id,
+          `${action.name}: ${wanted.name} uses a result of ${result.action.name}, which does not come before it.`,
+        );
       }
     } else if (wanted.type === "joints" && doc.joints[String(value)]?.is_valid === false) {
-      warn(action.id, `${action.name}: the joints ${doc.joints[String(value)]?.name} were taken before their point was moved.`);
+      warn(
+        action.id,
+        `${action.name}: the joints ${doc.joints[String(value)]?.name} were taken before their point was moved.`,
+      );
     }
   }
 }
 
 /** Names of what uses a project parameter or a result of an action. */
-export function usersOf(doc: OpenDocument, types: State["types"], of: { parameter: string } | { action: string }): string[] {
+export function usersOf(
+  doc: OpenDocument,
+  types: State["types"],
+  of: { parameter: string } | { action: string },
+): string[] {
   const users: string[] = [];
-  const links = new Set("action" in of ? (doc.actions[of.action] ? resultsOf(doc, types, doc.actions[of.action] as never).map(linkTo) : []) : []);
+  const links = new Set(
+    "action" in of
+      ? doc.actions[of.action]
+        ? resultsOf(doc, types, doc.actions[of.action] as never).map(linkTo)
+        : []
+      : [],
+  );
   for (const action of Object.values(doc.actions)) {
     const uses = action.parameters.some(({ type, value }) => {
       const id = String(decoded(value));

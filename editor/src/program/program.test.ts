@@ -2,6 +2,7 @@
 
 import { deflateRawSync } from "node:zlib";
 import { describe, expect, test } from "vitest";
+import { against } from "../commands/aimed";
 import type { LogicItem, ObjectAction, Project, Reach, Scene } from "../protocol/types";
 import { opened } from "../store/document";
 import type { OpenDocument, State } from "../store/state";
@@ -9,7 +10,6 @@ import { initialState } from "../store/state";
 import { textOfZip } from "../ui/code/package";
 import { pieces } from "../ui/code/python";
 import { firstIn, graphOf, lastIn } from "../ui/flow/graph";
-import { against } from "../commands/aimed";
 import { cannotLead, conditionWords, freeStep, usable } from "./logic";
 import { freeName, newOutputs } from "./naming";
 import { problemsOf, usersOf } from "./problems";
@@ -31,15 +31,31 @@ const TYPES: State["types"] = {
 };
 
 /** Actions a, b, ... by their kinds, on one point; steps as [from, to, value of from's result]. */
-function program(kinds: Record<string, string>, steps: [string, string, string?][] = [], parameters: Record<string, object> = {}): OpenDocument {
+function program(
+  kinds: Record<string, string>,
+  steps: [string, string, string?][] = [],
+  parameters: Record<string, object> = {},
+): OpenDocument {
   const at = { x: 0, y: 0, z: 0 };
   const actions = Object.entries(kinds).map(([id, kind]) => {
     const outputs = kind === "act" ? [] : [`${id}_result`];
     const given = kind === "count" ? [{ name: "by", type: "integer", value: "1", ...parameters[id] }] : [];
     return { id, name: id, type: `device/${kind}`, parameters: given, flows: [{ type: "default" as const, outputs }] };
   });
-  const logic = steps.map(([start, end, value], index): LogicItem => ({ id: `s${index}`, start, end, ...(value === undefined ? {} : { condition: { what: `${start}/default/0`, value } }) }));
-  const scene: Scene = { id: "scene", name: "scene", description: "", objects: [{ id: "device", name: "device", type: "Device", parameters: [] }] };
+  const logic = steps.map(
+    ([start, end, value], index): LogicItem => ({
+      id: `s${index}`,
+      start,
+      end,
+      ...(value === undefined ? {} : { condition: { what: `${start}/default/0`, value } }),
+    }),
+  );
+  const scene: Scene = {
+    id: "scene",
+    name: "scene",
+    description: "",
+    objects: [{ id: "device", name: "device", type: "Device", parameters: [] }],
+  };
   const project: Project = {
     id: "project",
     name: "project",
@@ -57,26 +73,41 @@ function program(kinds: Record<string, string>, steps: [string, string, string?]
 
 describe("steps", () => {
   test("the first way on asks for nothing, the second makes a branch of both", () => {
-    const doc = program({ a: "ask", b: "act", c: "act" }, [["START", "a"], ["a", "b"]]);
+    const doc = program({ a: "ask", b: "act", c: "act" }, [
+      ["START", "a"],
+      ["a", "b"],
+    ]);
     expect(freeStep(doc, TYPES, "b")).toEqual({});
     const what = "a/default/0";
-    expect(freeStep(doc, TYPES, "a")).toEqual({ condition: { what, value: "false" }, first: { item: doc.logic["s1"], condition: { what, value: "true" } } });
-    const both = program({ a: "ask", b: "act", c: "act" }, [["a", "b", "true"], ["a", "c", "false"]]);
+    expect(freeStep(doc, TYPES, "a")).toEqual({
+      condition: { what, value: "false" },
+      first: { item: doc.logic.s1, condition: { what, value: "true" } },
+    });
+    const both = program({ a: "ask", b: "act", c: "act" }, [
+      ["a", "b", "true"],
+      ["a", "c", "false"],
+    ]);
     expect(freeStep(both, TYPES, "a")).toBe("All ways on from a are taken.");
     expect(freeStep(doc, TYPES, "START")).toMatch("begin in one place");
   });
 
   test("numbers that are not asked for yet are offered, and the way without a condition stays the rest", () => {
-    const doc = program({ a: "count", b: "act", c: "act", d: "act" }, [["a", "b"], ["a", "c", "0"]]);
+    const doc = program({ a: "count", b: "act", c: "act", d: "act" }, [
+      ["a", "b"],
+      ["a", "c", "0"],
+    ]);
     expect(freeStep(doc, TYPES, "a")).toEqual({ condition: { what: "a/default/0", value: "1" } });
-    expect(conditionWords(doc, TYPES, doc.logic["s0"] as LogicItem)).toBe("else");
-    expect(conditionWords(doc, TYPES, doc.logic["s1"] as LogicItem)).toBe("a_result = 0");
+    expect(conditionWords(doc, TYPES, doc.logic.s0 as LogicItem)).toBe("else");
+    expect(conditionWords(doc, TYPES, doc.logic.s1 as LogicItem)).toBe("a_result = 0");
     const plain = program({ a: "act", b: "act", c: "act" }, [["a", "b"]]);
     expect(freeStep(plain, TYPES, "a")).toMatch("no result that could decide");
   });
 
   test("what would be refused is told before", () => {
-    const doc = program({ a: "act", b: "act", c: "act" }, [["a", "b"], ["b", "c"]]);
+    const doc = program({ a: "act", b: "act", c: "act" }, [
+      ["a", "b"],
+      ["b", "c"],
+    ]);
     expect(cannotLead(doc, "c", "a")).toBe("It would close a loop.");
     expect(cannotLead(doc, "a", "b")).toBe("It leads there already.");
     expect(cannotLead(doc, "a", "b", "s0")).toBe("");
@@ -86,7 +117,10 @@ describe("steps", () => {
   });
 
   test("only results that can be there are offered", () => {
-    const doc = program({ a: "count", b: "count", c: "count", d: "count" }, [["a", "b"], ["b", "c"]]);
+    const doc = program({ a: "count", b: "count", c: "count", d: "count" }, [
+      ["a", "b"],
+      ["b", "c"],
+    ]);
     expect(usable(doc, TYPES, "b", "integer").map((each) => each.name)).toEqual(["a_result"]);
     expect(usable(doc, TYPES, "c", "integer").map((each) => each.name)).toEqual(["a_result", "b_result"]);
     expect(usable(doc, TYPES, "c", "boolean")).toEqual([]);
@@ -99,21 +133,75 @@ describe("faults", () => {
   const texts = (doc: OpenDocument) => problemsOf(doc, TYPES).map((each) => `${each.level} ${each.id}: ${each.text}`);
 
   test("a sound program has none", () => {
-    expect(texts(program({ a: "ask", b: "act" }, [["START", "a"], ["a", "b", "true"], ["a", "END", "false"], ["b", "END"]]))).toEqual([]);
-    expect(texts(program({ a: "count" }, [["START", "a"], ["a", "END"]], { a: { type: "project_parameter", value: '"par"' } }))).toEqual([]);
+    expect(
+      texts(
+        program({ a: "ask", b: "act" }, [
+          ["START", "a"],
+          ["a", "b", "true"],
+          ["a", "END", "false"],
+          ["b", "END"],
+        ]),
+      ),
+    ).toEqual([]);
+    expect(
+      texts(
+        program(
+          { a: "count" },
+          [
+            ["START", "a"],
+            ["a", "END"],
+          ],
+          { a: { type: "project_parameter", value: '"par"' } },
+        ),
+      ),
+    ).toEqual([]);
   });
 
   test("dead ends, halves of branches and what is never run are named where they are", () => {
-    expect(texts(program({ a: "act" }))).toEqual(["error START: Nothing follows Start: connect it to the first action.", "warn a: a is never run: nothing leads to it."]);
-    expect(texts(program({ a: "act" }, [["START", "a"]]))).toContain("error a: Nothing follows a: connect it to the next action, or to End.");
-    expect(texts(program({ a: "ask" }, [["START", "a"], ["a", "END", "true"]]))).toEqual(["error a: Nothing follows a when a_result is no."]);
-    expect(texts(program({ a: "count" }, [["START", "a"], ["a", "END", "3"]]))).toEqual(["error a: Nothing follows a when no condition holds."]);
+    expect(texts(program({ a: "act" }))).toEqual([
+      "error START: Nothing follows Start: connect it to the first action.",
+      "warn a: a is never run: nothing leads to it.",
+    ]);
+    expect(texts(program({ a: "act" }, [["START", "a"]]))).toContain(
+      "error a: Nothing follows a: connect it to the next action, or to End.",
+    );
+    expect(
+      texts(
+        program({ a: "ask" }, [
+          ["START", "a"],
+          ["a", "END", "true"],
+        ]),
+      ),
+    ).toEqual(["error a: Nothing follows a when a_result is no."]);
+    expect(
+      texts(
+        program({ a: "count" }, [
+          ["START", "a"],
+          ["a", "END", "3"],
+        ]),
+      ),
+    ).toEqual(["error a: Nothing follows a when no condition holds."]);
   });
 
   test("values that are gone, and results of what comes later", () => {
-    const gone = program({ a: "count" }, [["START", "a"], ["a", "END"]], { a: { type: "project_parameter", value: '"away"' } });
+    const gone = program(
+      { a: "count" },
+      [
+        ["START", "a"],
+        ["a", "END"],
+      ],
+      { a: { type: "project_parameter", value: '"away"' } },
+    );
     expect(texts(gone)).toEqual(["error a: a: the parameter for by is gone."]);
-    const later = program({ a: "count", b: "count" }, [["START", "a"], ["a", "b"], ["b", "END"]], { a: { type: "link", value: '"b/default/0"' } });
+    const later = program(
+      { a: "count", b: "count" },
+      [
+        ["START", "a"],
+        ["a", "b"],
+        ["b", "END"],
+      ],
+      { a: { type: "link", value: '"b/default/0"' } },
+    );
     expect(texts(later)).toEqual(["warn a: a: by uses a result of b, which does not come before it."]);
     expect(usersOf(later, TYPES, { action: "b" })).toEqual(["a"]);
     expect(usersOf(gone, TYPES, { parameter: "away" })).toEqual(["a"]);
@@ -121,7 +209,11 @@ describe("faults", () => {
 });
 
 test("the graph goes from top to bottom, and offers the ways that are free", () => {
-  const doc = program({ a: "ask", b: "act", c: "act" }, [["START", "a"], ["a", "b", "true"], ["b", "END"]]);
+  const doc = program({ a: "ask", b: "act", c: "act" }, [
+    ["START", "a"],
+    ["a", "b", "true"],
+    ["b", "END"],
+  ]);
   const { boxes, lines } = graphOf(doc, TYPES);
   const of = (id: string) => boxes.find((each) => each.id === id);
   const heights = ["START", "a", "b", "END"].map((id) => of(id)?.y ?? 0);
@@ -130,16 +222,37 @@ test("the graph goes from top to bottom, and offers the ways that are free", () 
   expect(of("a")?.ways.map((each) => each.id)).toEqual(["false"]);
   expect(of("START")?.ways).toEqual([]);
   expect(of("c")?.ways.map((each) => each.id)).toEqual(["next"]);
-  expect(lines.map((each) => [each.words, each.branch])).toEqual([["", "always"], ["yes", "true"], ["", "always"]]);
+  expect(lines.map((each) => [each.words, each.branch])).toEqual([
+    ["", "always"],
+    ["yes", "true"],
+    ["", "always"],
+  ]);
 });
 
 describe("straight runs", () => {
-  const doc = program({ a: "ask", b: "act", c: "act", d: "act", e: "act", f: "act" }, [["START", "a"], ["a", "b", "true"], ["b", "c"], ["c", "d"], ["d", "e"], ["a", "f", "false"], ["f", "e"], ["e", "END"]]);
+  const doc = program({ a: "ask", b: "act", c: "act", d: "act", e: "act", f: "act" }, [
+    ["START", "a"],
+    ["a", "b", "true"],
+    ["b", "c"],
+    ["c", "d"],
+    ["d", "e"],
+    ["a", "f", "false"],
+    ["f", "e"],
+    ["e", "END"],
+  ]);
 
   test("end where ways part or meet, and are of three actions at least", () => {
     expect(runsOf(doc)).toEqual([["b", "c", "d"]]);
     // A condition, or a second way in, ends one.
-    expect(runsOf(program({ a: "act", b: "ask", c: "act", d: "act" }, [["a", "b"], ["b", "c", "true"], ["c", "d"]]))).toEqual([]);
+    expect(
+      runsOf(
+        program({ a: "act", b: "ask", c: "act", d: "act" }, [
+          ["a", "b"],
+          ["b", "c", "true"],
+          ["c", "d"],
+        ]),
+      ),
+    ).toEqual([]);
     expect(runsOf(program({ a: "act", b: "act" }, [["a", "b"]]))).toEqual([]);
   });
 
@@ -149,7 +262,14 @@ describe("straight runs", () => {
     const one = boxes.find((each) => each.kind === "fold");
     expect([one?.name, one?.detail]).toEqual(["3 actions", "b, c, d"]);
     expect(boxes.map((each) => each.id)).toEqual(["START", "a", "e", "f", "fold/b", "END"]);
-    expect(lines.map((each) => [each.from, each.to])).toEqual([["START", "a"], ["a", "fold/b"], ["fold/b", "e"], ["a", "f"], ["f", "e"], ["e", "END"]]);
+    expect(lines.map((each) => [each.from, each.to])).toEqual([
+      ["START", "a"],
+      ["a", "fold/b"],
+      ["fold/b", "e"],
+      ["a", "f"],
+      ["f", "e"],
+      ["e", "END"],
+    ]);
     expect(one && [firstIn(one), lastIn(one)]).toEqual(["b", "d"]);
   });
 
@@ -174,8 +294,14 @@ describe("values", () => {
   });
 
   test("what nobody has said is the least that is allowed", () => {
-    const of = (type: string, extra?: object) => initial({ name: "x", type, dynamic_value: false, ...(extra ? { extra: JSON.stringify(extra) } : {}) });
-    expect([of("integer", { minimum: 3 }), of("double", { maximum: -2 }), of("boolean"), of("string")]).toEqual(["3", "-2.0", "false", '""']);
+    const of = (type: string, extra?: object) =>
+      initial({ name: "x", type, dynamic_value: false, ...(extra ? { extra: JSON.stringify(extra) } : {}) });
+    expect([of("integer", { minimum: 3 }), of("double", { maximum: -2 }), of("boolean"), of("string")]).toEqual([
+      "3",
+      "-2.0",
+      "false",
+      '""',
+    ]);
     expect(of("string_enum", { allowed_values: ["firm", "soft"] })).toBe('"firm"');
     expect(of("pose")).toBeUndefined();
   });
@@ -188,7 +314,12 @@ describe("values", () => {
 });
 
 test("a tool that stands on a surface looks against its normal", () => {
-  for (const normal of [{ x: 0, y: 0, z: 1 }, { x: 1, y: 0, z: 0 }, { x: 0, y: -0.6, z: 0.8 }, { x: 0, y: 0, z: -1 }]) {
+  for (const normal of [
+    { x: 0, y: 0, z: 1 },
+    { x: 1, y: 0, z: 0 },
+    { x: 0, y: -0.6, z: 0.8 },
+    { x: 0, y: 0, z: -1 },
+  ]) {
     const { x, y, z, w } = against(normal);
     // The third column of the rotation's matrix.
     const axis = [2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)];
@@ -197,7 +328,10 @@ test("a tool that stands on a surface looks against its normal", () => {
 });
 
 test("a file is read out of a zip, packed or not", async () => {
-  const files: [string, string, boolean][] = [["a.txt", "first", false], ["script.py", "print('hello')\n".repeat(50), true]];
+  const files: [string, string, boolean][] = [
+    ["a.txt", "first", false],
+    ["script.py", "print('hello')\n".repeat(50), true],
+  ];
   const parts: Buffer[] = [];
   const directory: Buffer[] = [];
   let at = 0;
@@ -239,15 +373,30 @@ test("Python in pieces keeps every character, and texts over lines stay texts", 
 });
 
 describe("whether a robot gets there", () => {
-  const action = (...parameters: [string, string][]) => ({ type: "ur/move", parameters: parameters.map(([type, id], n) => ({ name: `p${n}`, type, value: JSON.stringify(id) })) });
+  const action = (...parameters: [string, string][]) => ({
+    type: "ur/move",
+    parameters: parameters.map(([type, id], n) => ({ name: `p${n}`, type, value: JSON.stringify(id) })),
+  });
   const told = (robot_id: string, end_effector_id: string, ...items: [string, Reach, string?][]) => ({
-    [`${robot_id}//${end_effector_id}`]: { robot_id, end_effector_id, revision: 1, items: items.map(([id, reach, reason]) => ({ id, reach, ...(reason ? { reason } : {}) })) },
+    [`${robot_id}//${end_effector_id}`]: {
+      robot_id,
+      end_effector_id,
+      revision: 1,
+      items: items.map(([id, reach, reason]) => ({ id, reach, ...(reason ? { reason } : {}) })),
+    },
   });
 
   test("of each goal the end effector counts that gets there best, of all goals the worst", () => {
-    const reach = { ...told("ur", "grip", ["a", "out_of_reach", "too far"], ["b", "in_collision", "table"]), ...told("ur", "cup", ["a", "reachable"], ["b", "out_of_reach", "too far"]) };
+    const reach = {
+      ...told("ur", "grip", ["a", "out_of_reach", "too far"], ["b", "in_collision", "table"]),
+      ...told("ur", "cup", ["a", "reachable"], ["b", "out_of_reach", "too far"]),
+    };
     expect(reachOfAction(action(["pose", "a"]), reach)?.reach).toBe("reachable");
-    expect(reachOfAction(action(["pose", "a"], ["joints", "b"]), reach)).toEqual({ reach: "in_collision", reason: "table", goal: "b" });
+    expect(reachOfAction(action(["pose", "a"], ["joints", "b"]), reach)).toEqual({
+      reach: "in_collision",
+      reason: "table",
+      goal: "b",
+    });
   });
 
   test("another robot does not count, nor what is no goal or not known", () => {

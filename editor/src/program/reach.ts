@@ -18,14 +18,19 @@ export interface ActionReach {
 
 /** Orientations and joints that an action is told to go to. */
 export function goalsOf({ parameters }: Pick<Action, "parameters">): string[] {
-  return parameters.flatMap(({ type, value }) => (type === "pose" || type === "joints" ? [String(decoded(value))] : []));
+  return parameters.flatMap(({ type, value }) =>
+    type === "pose" || type === "joints" ? [String(decoded(value))] : [],
+  );
 }
 
 /**
  * How the robot of an action gets to all that the action is told to go to: of each goal the answer of the end effector
  * that gets there best, of all goals the worst. Null where nothing is known, or it goes nowhere.
  */
-export function reachOfAction(action: Pick<Action, "parameters" | "type">, reach: Record<string, ReachabilityData>): ActionReach | null {
+export function reachOfAction(
+  action: Pick<Action, "parameters" | "type">,
+  reach: Record<string, ReachabilityData>,
+): ActionReach | null {
   const robot = action.type.split("/")[0];
   const answers = Object.values(reach).filter((each) => each.robot_id === robot);
   let worst: ActionReach | null = null;
@@ -33,7 +38,8 @@ export function reachOfAction(action: Pick<Action, "parameters" | "type">, reach
     let best: ActionReach | null = null;
     for (const { items } of answers) {
       const item = items.find((each) => each.id === goal);
-      if (item && (!best || worse(best.reach, item.reach))) best = { reach: item.reach, reason: item.reason ?? "", goal };
+      if (item && (!best || worse(best.reach, item.reach)))
+        best = { reach: item.reach, reason: item.reason ?? "", goal };
     }
     if (best && (!worst || worse(best.reach, worst.reach))) worst = best;
   }

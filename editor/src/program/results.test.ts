@@ -4,17 +4,40 @@ import { reduce } from "../store/reduce";
 import { initialState, type State } from "../store/state";
 import { dismissal, lastRun, resultOf, undismissedRun } from "./results";
 
-const RUN: Run = { number: 7, package_id: "pkg", package_name: "sorting 1", started: "2026-04-01T00:00:00Z", end: "running", actions: 3, temporary: false, start_paused: false, project_id: "pro" };
-const FAILED: Run = { ...RUN, end: "failed", ended: "2026-04-01T00:00:09Z", last_action: { id: "act", name: "scan" }, error: "no code was read" };
+const RUN: Run = {
+  number: 7,
+  package_id: "pkg",
+  package_name: "sorting 1",
+  started: "2026-04-01T00:00:00Z",
+  end: "running",
+  actions: 3,
+  temporary: false,
+  start_paused: false,
+  project_id: "pro",
+};
+const FAILED: Run = {
+  ...RUN,
+  end: "failed",
+  ended: "2026-04-01T00:00:09Z",
+  last_action: { id: "act", name: "scan" },
+  error: "no code was read",
+};
 
 function told(state: State, ...runs: Run[]): State {
-  return runs.reduce((before, data) => ({ ...before, ...reduce(before, { event: "RunChanged", data } as never) }), state);
+  for (const data of runs) state = { ...state, ...reduce(state, { event: "RunChanged", data } as never) };
+  return state;
 }
 
 describe("the result of a run", () => {
   it("names the action and the error, and the project of a temporary package", () => {
     expect(resultOf(RUN)).toBeNull();
-    expect(resultOf(FAILED)).toEqual({ tone: "bad", title: "Run failed in scan", name: "sorting 1", detail: "no code was read", actionId: "act" });
+    expect(resultOf(FAILED)).toEqual({
+      tone: "bad",
+      title: "Run failed in scan",
+      name: "sorting 1",
+      detail: "no code was read",
+      actionId: "act",
+    });
     expect(resultOf({ ...FAILED, temporary: true, project_name: "sorting" })?.name).toBe("sorting");
     expect(resultOf({ ...RUN, end: "stopped", stopped_by: "Eva" })?.title).toBe("Run stopped by Eva");
   });

@@ -12,7 +12,9 @@ export function runsOf(doc: OpenDocument): string[][] {
   const onlyNext = (id: string): string | undefined => {
     const ways = outgoing(doc, id);
     const next = placeOf(ways[0]?.end ?? END);
-    return ways.length === 1 && !ways[0]?.condition && next in doc.actions && incoming(doc, next).length === 1 ? next : undefined;
+    return ways.length === 1 && !ways[0]?.condition && next in doc.actions && incoming(doc, next).length === 1
+      ? next
+      : undefined;
   };
   const found: string[][] = [];
   for (const id of Object.keys(doc.actions)) {

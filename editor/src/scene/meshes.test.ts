@@ -21,5 +21,6 @@ describe("a mesh that is to be uploaded", () => {
     await expect(readMesh(new File(["no mesh at all"], "letter.stl"))).rejects.toThrow("letter.stl");
   });
 
-  it("larger than a room is in mm", () => expect([likelyUnit([0.4, 2, 0.1]), likelyUnit([400, 20, 1])]).toEqual(["m", "mm"]));
+  it("larger than a room is in mm", () =>
+    expect([likelyUnit([0.4, 2, 0.1]), likelyUnit([400, 20, 1])]).toEqual(["m", "mm"]));
 });

@@ -22,8 +22,11 @@ export async function readMesh(file: File): Promise<MeshFile> {
   geometry.computeBoundingBox();
   const box = geometry.boundingBox;
   const count = (geometry.index?.count ?? geometry.getAttribute("position").count) / 3;
-  const size: [number, number, number] = box ? [box.max.x - box.min.x, box.max.y - box.min.y, box.max.z - box.min.z] : [0, 0, 0];
-  if (count < 1 || !size.every(Number.isFinite) || Math.max(...size) <= 0) throw new Error(`There is no surface in ${file.name}.`);
+  const size: [number, number, number] = box
+    ? [box.max.x - box.min.x, box.max.y - box.min.y, box.max.z - box.min.z]
+    : [0, 0, 0];
+  if (count < 1 || !size.every(Number.isFinite) || Math.max(...size) <= 0)
+    throw new Error(`There is no surface in ${file.name}.`);
   return { file, geometry, triangles: Math.floor(count), size };
 }
 
@@ -49,5 +52,5 @@ export function inMetres({ file, geometry }: Pick<MeshFile, "file" | "geometry">
       });
     }
   }
-  return new File([view.buffer], file.name.replace(/\.\w+$/, "") + ".stl", { type: "model/stl" });
+  return new File([view.buffer], `${file.name.replace(/\.\w+$/, "")}.stl`, { type: "model/stl" });
 }

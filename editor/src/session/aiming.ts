@@ -19,7 +19,7 @@ const NOTHING = { candidates: [], chosen: "" };
 export const useAiming = create<Aiming>(() => ({ listed: false, ...NOTHING }));
 
 /** Whether the user picks by the cross: kept by the server, for all his tablets. */
-export const aimsAlways = (state: State): boolean => state.view.general["aiming"] === true;
+export const aimsAlways = (state: State): boolean => state.view.general.aiming === true;
 
 /** Say that a list of it is open, until what this gives is called. */
 export function listAimed(): () => void {
@@ -49,10 +49,13 @@ export function followCross(engine: Engine, drawn: () => void): () => void {
     const stays = chosen !== best && ids.includes(chosen);
     best = ids[0] ?? "";
     const next = stays ? chosen : best;
-    if (next !== chosen || ids.length !== candidates.length || ids.some((each, n) => each !== candidates[n])) useAiming.setState({ candidates: ids, chosen: next });
+    if (next !== chosen || ids.length !== candidates.length || ids.some((each, n) => each !== candidates[n]))
+      useAiming.setState({ candidates: ids, chosen: next });
     engine.hover(next);
     drawn();
-    if (next !== told) setUi({ aimed: (told = next) || undefined });
+    if (next === told) return;
+    told = next;
+    setUi({ aimed: next || undefined });
   };
   const end = engine.watch(look);
   look();

@@ -28,7 +28,10 @@ export function followArms(state: State): void {
       const several = state.types.robots[state.doc?.objects[id]?.type ?? ""]?.multi_arm ?? false;
       // Refused by a robot that is just being lost: it is asked again when it is back.
       askArms(id, several).then(
-        (arms) => store.setState((now) => (now.live.state === "started" ? { live: { ...now.live, arms: put(now.live.arms, id, arms) } } : {})),
+        (arms) =>
+          store.setState((now) =>
+            now.live.state === "started" ? { live: { ...now.live, arms: put(now.live.arms, id, arms) } } : {},
+          ),
         () => {},
       );
     }

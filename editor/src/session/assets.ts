@@ -16,7 +16,11 @@ export async function uploadAsset(file: File): Promise<string> {
   const token = remembered("token");
   const body = new FormData();
   body.append("assetData", file);
-  const response = await fetch("/assets", { method: "POST", body, headers: token ? { Authorization: `Bearer ${token}` } : {} });
+  const response = await fetch("/assets", {
+    method: "POST",
+    body,
+    headers: token ? { Authorization: `Bearer ${token}` } : {},
+  });
   if (!response.ok) throw new Error(await refusedWith(response, `The server does not take ${file.name}`));
   return ((await response.json()) as { id: string }).id;
 }

@@ -21,6 +21,10 @@ export function note(what: Entry["what"], text: string): void {
 export const diary = (): readonly Entry[] => entries;
 
 if (typeof window !== "undefined") {
-  window.addEventListener("error", ({ message, filename, lineno }) => note("fault", `${message} (${filename}:${lineno})`));
-  window.addEventListener("unhandledrejection", ({ reason }) => note("fault", reason instanceof Error ? `${reason.message}\n${reason.stack ?? ""}` : String(reason)));
+  window.addEventListener("error", ({ message, filename, lineno }) =>
+    note("fault", `${message} (${filename}:${lineno})`),
+  );
+  window.addEventListener("unhandledrejection", ({ reason }) =>
+    note("fault", reason instanceof Error ? `${reason.message}\n${reason.stack ?? ""}` : String(reason)),
+  );
 }

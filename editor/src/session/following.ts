@@ -23,7 +23,11 @@ export function followDocument(state: State): void {
 
 async function general(still: () => boolean): Promise<void> {
   if (!serves("GetViewState")) return;
-  const read = (scope: "user" | "shared") => call("GetViewState", { scope }).then(({ values }) => values, () => ({}));
+  const read = (scope: "user" | "shared") =>
+    call("GetViewState", { scope }).then(
+      ({ values }) => values,
+      () => ({}),
+    );
   const [shared, own] = await Promise.all([read("shared"), read("user")]);
   if (still()) store.setState((state) => ({ view: { ...state.view, general: { ...shared, ...own } } }));
 }
@@ -35,20 +39,26 @@ async function ofDocument(document: string, project: boolean, still: () => boole
   };
   if (serves("GetViewState")) {
     for (const scope of ["user", "shared"] as const) {
-      void ask(call("GetViewState", { scope, document }).then(({ values }) => ({ view: { ...now().view, [scope]: values } })));
+      void ask(
+        call("GetViewState", { scope, document }).then(({ values }) => ({ view: { ...now().view, [scope]: values } })),
+      );
     }
   }
   if (!project) return;
   if (serves("GetBreakpoints")) {
     void ask(
       // By its id: while its program runs it is not open.
-      call("GetBreakpoints", { project_id: document }).then(({ ids }) => ({ breakpoints: Object.fromEntries(ids.map((id) => [id, true as const])) })),
+      call("GetBreakpoints", { project_id: document }).then(({ ids }) => ({
+        breakpoints: Object.fromEntries(ids.map((id) => [id, true as const])),
+      })),
     );
   }
   if (serves("Reachability")) {
     void ask(
       call("Reachability").then((all) => ({
-        reach: Object.fromEntries(all.map((one) => [[one.robot_id, one.arm_id ?? "", one.end_effector_id].join("/"), one])),
+        reach: Object.fromEntries(
+          all.map((one) => [[one.robot_id, one.arm_id ?? "", one.end_effector_id].join("/"), one]),
+        ),
       })),
     );
   }

@@ -7,8 +7,15 @@ import { remembered } from "./memory";
 /** Give the id of what a straight line meets first of all that stands in the way, null where it is free. Rejects with a sentence. */
 export async function metBy(from: Position, to: Position): Promise<string | null> {
   const token = remembered("token");
-  const headers: HeadersInit = { "Content-Type": "application/json", ...(token ? { Authorization: `Bearer ${token}` } : {}) };
-  const response = await fetch("/utils/line-safe", { method: "PUT", headers, body: JSON.stringify({ pt1: from, pt2: to }) });
+  const headers: HeadersInit = {
+    "Content-Type": "application/json",
+    ...(token ? { Authorization: `Bearer ${token}` } : {}),
+  };
+  const response = await fetch("/utils/line-safe", {
+    method: "PUT",
+    headers,
+    body: JSON.stringify({ pt1: from, pt2: to }),
+  });
   if (!response.ok) throw new Error(await refusedWith(response, "The server does not look at the way"));
   const { safe, object_id } = (await response.json()) as { safe: boolean; object_id?: string };
   return safe ? null : (object_id ?? "");

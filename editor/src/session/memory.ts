@@ -1,6 +1,12 @@
 /** What this browser remembers: who uses it, the token, and how it likes the screen. The rest is kept by the server. */
 
-const KEYS = { name: "arcor2-hw.name", token: "arcor2-hw.token", names: "arcor2-hw.names", theme: "arcor2-hw.theme", hand: "arcor2-hw.left-handed" };
+const KEYS = {
+  name: "arcor2-hw.name",
+  token: "arcor2-hw.token",
+  names: "arcor2-hw.names",
+  theme: "arcor2-hw.theme",
+  hand: "arcor2-hw.left-handed",
+};
 
 export function remembered(key: keyof typeof KEYS): string {
   try {

@@ -37,7 +37,10 @@ function followRuns(state: State): void {
     if (runsAsked.has(project_id)) continue;
     runsAsked.add(project_id);
     const wanted = project_id ? { limit: 20, project_id } : { limit: 100 };
-    void call("ListRuns", wanted).then(({ runs }) => store.setState(({ program }) => ({ program: withRuns(program, runs) })), () => {});
+    void call("ListRuns", wanted).then(
+      ({ runs }) => store.setState(({ program }) => ({ program: withRuns(program, runs) })),
+      () => {},
+    );
   }
 }
 
@@ -45,7 +48,8 @@ function followActions(state: State): void {
   if (!state.doc?.project) return;
   for (const { type } of Object.values(state.doc.objects)) {
     if (!(type in state.types.byName)) continue;
-    if (type in state.types.actions) asked.delete(type); // it is asked for again when the type was changed
+    if (type in state.types.actions)
+      asked.delete(type); // it is asked for again when the type was changed
     else if (!asked.has(type)) {
       asked.add(type);
       actionsOf(type).catch(() => {});

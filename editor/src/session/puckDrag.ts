@@ -1,7 +1,7 @@
 /** Drags a puck that is selected over the level on which it stands; where it is let go, all see it. */
 
-import type { Engine } from "../engine/engine";
 import { notEditable, placePuck, showPuck } from "../commands/program";
+import type { Engine } from "../engine/engine";
 import { now } from "../store/store";
 
 /** Pixels that a finger moves before it drags: less is a tap. */
@@ -9,7 +9,15 @@ const BEGINS = 6;
 
 /** Listen on the canvas of the view; gives what ends that. */
 export function dragPucks(engine: Engine, canvas: HTMLCanvasElement): () => void {
-  let held: { id: string; level: number; x: number; y: number; moved: boolean; pointer: number; before: unknown } | null = null;
+  let held: {
+    id: string;
+    level: number;
+    x: number;
+    y: number;
+    moved: boolean;
+    pointer: number;
+    before: unknown;
+  } | null = null;
   const place = (event: PointerEvent) => {
     const box = canvas.getBoundingClientRect();
     return [event.clientX - box.left, event.clientY - box.top] as const;
@@ -19,9 +27,21 @@ export function dragPucks(engine: Engine, canvas: HTMLCanvasElement): () => void
     if (held || !event.isPrimary || event.button !== 0 || !selection || now().ui.connecting) return;
     if (selection.kind !== "action" && selection.kind !== "terminal") return;
     const [x, y] = place(event);
-    if (engine.pick(x, y, event.pointerType === "mouse" ? 4 : 14)[0]?.id !== selection.id || notEditable(now(), "PreviewMove")) return;
+    if (
+      engine.pick(x, y, event.pointerType === "mouse" ? 4 : 14)[0]?.id !== selection.id ||
+      notEditable(now(), "PreviewMove")
+    )
+      return;
     const level = engine.item(selection.id)?.pose.position.z ?? 0;
-    held = { id: selection.id, level, x, y, moved: false, pointer: event.pointerId, before: now().view.shared[`place/${selection.id}`] };
+    held = {
+      id: selection.id,
+      level,
+      x,
+      y,
+      moved: false,
+      pointer: event.pointerId,
+      before: now().view.shared[`place/${selection.id}`],
+    };
     engine.view.enable(false);
     canvas.setPointerCapture(event.pointerId);
   };

@@ -3,9 +3,9 @@
  * whenever the connection comes back. Motion is never asked for here.
  */
 
-import { ProtocolClient, type CallOptions } from "../protocol/client";
+import { type CallOptions, ProtocolClient } from "../protocol/client";
 import { Refused } from "../protocol/errors";
-import { ADDITIONAL_EVENTS, ROLES, type Requests, type ServerEvent } from "../protocol/types";
+import { ADDITIONAL_EVENTS, type Requests, ROLES, type ServerEvent } from "../protocol/types";
 import { OFFLINE } from "../store/state";
 import { applyEvent, now, setConnection, store, tell } from "../store/store";
 import { telemetry } from "../store/telemetry";
@@ -24,8 +24,14 @@ export function call<N extends keyof Requests>(
   args?: Requests[N]["args"],
   options?: CallOptions,
 ): Promise<Requests[N]["data"]> {
-  const answer = (client.call as (...given: unknown[]) => Promise<Requests[N]["data"]>).call(client, request, args, options);
-  if (!options?.dryRun) answer.catch((error) => note("refused", `${request}: ${error instanceof Error ? error.message : error}`));
+  const answer = (client.call as (...given: unknown[]) => Promise<Requests[N]["data"]>).call(
+    client,
+    request,
+    args,
+    options,
+  );
+  if (!options?.dryRun)
+    answer.catch((error) => note("refused", `${request}: ${error instanceof Error ? error.message : error}`));
   return answer;
 }
 
@@ -60,7 +66,8 @@ client.onEvent = (event: ServerEvent) => {
   else if (event.event === "RobotEef") telemetry.takeEef(event.data);
   else {
     // Of a stream nobody wants to read each.
-    if (event.event !== "MovePreview" && event.event !== "UserPresence") note("event", `${event.event} ${event.change_type ?? ""}`);
+    if (event.event !== "MovePreview" && event.event !== "UserPresence")
+      note("event", `${event.event} ${event.change_type ?? ""}`);
     applyEvent(event);
   }
 };
@@ -184,7 +191,8 @@ store.subscribe((state, before) => {
   tellPresence(state, now);
   followPrograms(state);
   // Problems, which no event tells, may have come or gone with what was edited, or with a kind of object.
-  const mended = before.doc !== null || (before.connection.status === "ready" && before.types.byName !== state.types.byName);
+  const mended =
+    before.doc !== null || (before.connection.status === "ready" && before.types.byName !== state.types.byName);
   if (mended && !state.doc && state.connection.status === "ready") loadLists().catch(() => {});
 });
 

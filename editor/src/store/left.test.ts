@@ -8,7 +8,12 @@ function state(users: State["users"], locks: Record<string, string> = {}): State
   return { ...start, connection: { ...start.connection, user: "Olga", status: "ready" }, users, locks, doc };
 }
 const user = (name: string, role: string, document?: string) => ({
-  [name]: { user: name, online: true, role, ...(document === undefined ? {} : { presence: { document, selected: [], view: "" } }) },
+  [name]: {
+    user: name,
+    online: true,
+    role,
+    ...(document === undefined ? {} : { presence: { document, selected: [], view: "" } }),
+  },
 });
 
 test("a user who is not connected and holds locks is gone", () => {

@@ -46,9 +46,9 @@ const OPEN: ServerEvent = { event: "OpenProject", data: { scene: SCENE, project:
 describe("the open document", () => {
   test("is taken apart by ids", () => {
     const { doc } = after(OPEN);
-    expect(doc?.points["acp"]).toMatchObject({ name: "pick", parent: "obj" });
-    expect(doc?.orientations["ori"]?.pointId).toBe("acp");
-    expect(doc?.actions["act"]?.pointId).toBe("acp");
+    expect(doc?.points.acp).toMatchObject({ name: "pick", parent: "obj" });
+    expect(doc?.orientations.ori?.pointId).toBe("acp");
+    expect(doc?.actions.act?.pointId).toBe("acp");
     expect(doc?.unsaved).toBe(false);
   });
 
@@ -65,21 +65,33 @@ describe("the open document", () => {
       parent_id: "acp",
       data: { id: "act2", name: "grip", type: "obj/grip", parameters: [], flows: [] } as never,
     });
-    expect(added.doc?.actions["act2"]).toMatchObject({ pointId: "acp", type: "obj/grip" });
+    expect(added.doc?.actions.act2).toMatchObject({ pointId: "acp", type: "obj/grip" });
     expect(added.doc?.unsaved).toBe(true);
     // Other events than "add" do not say on which point it is.
-    const renamed = after(OPEN, { event: "ActionChanged", change_type: "update_base", data: { id: "act", name: "go", type: "obj/move" } });
-    expect(renamed.doc?.actions["act"]).toMatchObject({ pointId: "acp", name: "go", parameters: [] });
-    const gone = after(OPEN, { event: "ActionPointChanged", change_type: "remove", data: { id: "acp", name: "pick", position: POSE.position } });
+    const renamed = after(OPEN, {
+      event: "ActionChanged",
+      change_type: "update_base",
+      data: { id: "act", name: "go", type: "obj/move" },
+    });
+    expect(renamed.doc?.actions.act).toMatchObject({ pointId: "acp", name: "go", parameters: [] });
+    const gone = after(OPEN, {
+      event: "ActionPointChanged",
+      change_type: "remove",
+      data: { id: "acp", name: "pick", position: POSE.position },
+    });
     expect(gone.doc?.points).toEqual({});
     expect(gone.doc?.orientations).toEqual({});
     expect(gone.doc?.actions).toEqual({});
   });
 
   test("a change of a point alone keeps what is on it, and its new parent is taken over", () => {
-    const moved = after(OPEN, { event: "ActionPointChanged", change_type: "update_base", data: { id: "acp", name: "pick", position: { x: 2, y: 0, z: 0 } } });
-    expect(moved.doc?.points["acp"]).toMatchObject({ position: { x: 2 } });
-    expect(moved.doc?.points["acp"]?.parent).toBeUndefined();
+    const moved = after(OPEN, {
+      event: "ActionPointChanged",
+      change_type: "update_base",
+      data: { id: "acp", name: "pick", position: { x: 2, y: 0, z: 0 } },
+    });
+    expect(moved.doc?.points.acp).toMatchObject({ position: { x: 2 } });
+    expect(moved.doc?.points.acp?.parent).toBeUndefined();
     expect(Object.keys(moved.doc?.orientations ?? {})).toEqual(["ori"]);
   });
 
@@ -93,32 +105,48 @@ describe("the open document", () => {
   });
 
   test("opened again, after the connection was lost, keeps the selection unless it is gone", () => {
-    const selected = (id: string): State => ({ ...after(OPEN), ui: { ...initialState().ui, selection: { kind: "action", id } } });
+    const selected = (id: string): State => ({
+      ...after(OPEN),
+      ui: { ...initialState().ui, selection: { kind: "action", id } },
+    });
     expect(reduce(selected("act"), OPEN).ui?.selection?.id).toBe("act");
     expect(reduce(selected("other"), OPEN).ui?.selection).toBeNull();
-    const removed = reduce(selected("act"), { event: "ActionChanged", change_type: "remove", data: { id: "act", name: "move", type: "obj/move" } });
+    const removed = reduce(selected("act"), {
+      event: "ActionChanged",
+      change_type: "remove",
+      data: { id: "act", name: "move", type: "obj/move" },
+    });
     expect(removed.ui?.selection).toBeNull();
   });
 });
 
 describe("what others do", () => {
   test("locks are known by what they hold", () => {
-    const held = after({ event: "ObjectsLocked", data: { object_ids: ["a", "b"], owner: "Eva" } }, { event: "ObjectsUnlocked", data: { object_ids: ["a"], owner: "Eva" } });
+    const held = after(
+      { event: "ObjectsLocked", data: { object_ids: ["a", "b"], owner: "Eva" } },
+      { event: "ObjectsUnlocked", data: { object_ids: ["a"], owner: "Eva" } },
+    );
     expect(held.locks).toEqual({ b: "Eva" });
     expect(Object.keys(held.lockedAt)).toEqual(["b"]);
   });
 
   test("who left is gone, and a preview that is over, too", () => {
-    const presence = (online: boolean): ServerEvent => ({ event: "UserPresence", data: { user: "Eva", online, role: "operator" } });
+    const presence = (online: boolean): ServerEvent => ({
+      event: "UserPresence",
+      data: { user: "Eva", online, role: "operator" },
+    });
     expect(Object.keys(after(presence(true)).users)).toEqual(["Eva"]);
     expect(after(presence(true), presence(false)).users).toEqual({});
     const drag: ServerEvent = { event: "MovePreview", data: { id: "acp", user: "Eva", position: POSE.position } };
-    expect(after(drag).previews["acp"]?.position).toEqual(POSE.position);
+    expect(after(drag).previews.acp?.position).toEqual(POSE.position);
     expect(after(drag, { event: "MovePreview", data: { id: "acp", user: "Eva" } }).previews).toEqual({});
   });
 
   test("view state of others' documents and users is not ours", () => {
-    const change = (document: string, user: string): ServerEvent => ({ event: "ViewStateChanged", data: { scope: "user", document, user, values: { stars: [1], gone: null }, revision: 2 } });
+    const change = (document: string, user: string): ServerEvent => ({
+      event: "ViewStateChanged",
+      data: { scope: "user", document, user, values: { stars: [1], gone: null }, revision: 2 },
+    });
     expect(after(OPEN, change("pro", "me")).view.user).toEqual({ stars: [1] });
     expect(after(OPEN, change("pro", "Eva")).view.user).toEqual({});
     expect(after(OPEN, change("elsewhere", "me")).view.user).toEqual({});
@@ -131,23 +159,43 @@ describe("operation", () => {
   const lost: ServerEvent = { event: "ObjectState", data: { object_id: "obj", state: "lost", reason: "cable" } };
 
   test("going offline forgets how devices were, and keeps why", () => {
-    expect(after(OPEN, online, lost).live.objects["obj"]?.reason).toBe("cable");
-    const off = after(OPEN, online, lost, { event: "SceneState", data: { state: "stopping", message: "no robot" } }, { event: "SceneState", data: { state: "stopped" } });
+    expect(after(OPEN, online, lost).live.objects.obj?.reason).toBe("cable");
+    const off = after(
+      OPEN,
+      online,
+      lost,
+      { event: "SceneState", data: { state: "stopping", message: "no robot" } },
+      { event: "SceneState", data: { state: "stopped" } },
+    );
     expect(off.live).toMatchObject({ state: "stopped", message: "no robot", objects: {} });
   });
 
   test("devices whose process is frozen are told of once, and again when they answer", () => {
-    const object = (object_id: string, answering?: boolean): ServerEvent => ({ event: "ObjectState", data: { object_id, state: "online", ...(answering === undefined ? {} : { answering }) } });
+    const object = (object_id: string, answering?: boolean): ServerEvent => ({
+      event: "ObjectState",
+      data: { object_id, state: "online", ...(answering === undefined ? {} : { answering }) },
+    });
     const frozen = [online, object("a"), object("b"), object("a", false), object("b", false)];
     expect(after(OPEN, ...frozen).notices.map((each) => each.level)).toEqual(["error"]);
     expect(after(OPEN, ...frozen).notices[0]?.text).toContain("do not answer");
-    expect(after(OPEN, ...frozen, object("a"), object("b")).notices.map((each) => each.level)).toEqual(["error", "info"]);
+    expect(after(OPEN, ...frozen, object("a"), object("b")).notices.map((each) => each.level)).toEqual([
+      "error",
+      "info",
+    ]);
   });
 
   test("a motion that failed is told", () => {
     const state = after({
       event: "RobotMoveToPose",
-      data: { move_event_type: "failed", robot_id: "obj", end_effector_id: "e", target_pose: POSE, safe: true, linear: false, message: "too far" },
+      data: {
+        move_event_type: "failed",
+        robot_id: "obj",
+        end_effector_id: "e",
+        target_pose: POSE,
+        safe: true,
+        linear: false,
+        message: "too far",
+      },
     });
     expect(state.live.moving).toEqual({});
     expect(state.notices.map((each) => [each.level, each.text])).toEqual([["error", "too far"]]);
@@ -156,9 +204,14 @@ describe("operation", () => {
 
   test("a program's actions run until they are told to have ended, and none after it stopped", () => {
     const before = (id: string): ServerEvent => ({ event: "ActionStateBefore", data: { action_id: id } });
-    const state = after({ event: "PackageState", data: { state: "running" } }, before("a"), before("b"), { event: "ActionStateAfter", data: { action_id: "a" } });
+    const state = after({ event: "PackageState", data: { state: "running" } }, before("a"), before("b"), {
+      event: "ActionStateAfter",
+      data: { action_id: "a" },
+    });
     expect(state.program.running).toEqual(["b"]);
-    expect({ ...state, ...reduce(state, { event: "PackageState", data: { state: "stopped" } }) }.program.running).toEqual([]);
+    expect(
+      { ...state, ...reduce(state, { event: "PackageState", data: { state: "stopped" } }) }.program.running,
+    ).toEqual([]);
   });
 });
 

@@ -3,7 +3,7 @@
 import type { Run, ServerEvent, TaskStateData } from "../protocol/types";
 import { changed, opened } from "./document";
 import { put, without } from "./records";
-import { NO_PROGRAM, OFFLINE, type Notice, type State } from "./state";
+import { NO_PROGRAM, type Notice, OFFLINE, type State } from "./state";
 
 /** How many are kept. */
 const NOTICES = 200;
@@ -56,10 +56,18 @@ export function reduce(state: State, event: ServerEvent): Partial<State> {
       return {
         locks: { ...state.locks, ...Object.fromEntries(event.data.object_ids.map((id) => [id, event.data.owner])) },
         // Who is told again of the same owner does not hold it anew.
-        lockedAt: { ...state.lockedAt, ...Object.fromEntries(event.data.object_ids.filter((id) => state.locks[id] !== event.data.owner).map((id) => [id, Date.now()])) },
+        lockedAt: {
+          ...state.lockedAt,
+          ...Object.fromEntries(
+            event.data.object_ids.filter((id) => state.locks[id] !== event.data.owner).map((id) => [id, Date.now()]),
+          ),
+        },
       };
     case "ObjectsUnlocked":
-      return { locks: without(state.locks, ...event.data.object_ids), lockedAt: without(state.lockedAt, ...event.data.object_ids) };
+      return {
+        locks: without(state.locks, ...event.data.object_ids),
+        lockedAt: without(state.lockedAt, ...event.data.object_ids),
+      };
     case "UserPresence":
       return {
         users: event.data.online
@@ -75,9 +83,7 @@ export function reduce(state: State, event: ServerEvent): Partial<State> {
       const names = event.data.map((type) => type.type);
       const given = Object.fromEntries(event.data.map((type) => [type.type, type]));
       const byName =
-        event.change_type === "remove"
-          ? without(state.types.byName, ...names)
-          : { ...state.types.byName, ...given };
+        event.change_type === "remove" ? without(state.types.byName, ...names) : { ...state.types.byName, ...given };
       return { types: { ...state.types, byName, actions: without(state.types.actions, ...names) } };
     }
     case "HistoryChanged":
@@ -107,7 +113,11 @@ export function reduce(state: State, event: ServerEvent): Partial<State> {
 /** Work that is over is remembered among what was told. */
 function over(state: State, { title, state: how, message }: TaskStateData): Pick<State, "said"> | object {
   if (how === "running") return {};
-  const { said } = notice(state, how === "failed" ? "error" : "info", `${title}: ${how}.${message ? ` ${message}` : ""}`);
+  const { said } = notice(
+    state,
+    how === "failed" ? "error" : "info",
+    `${title}: ${how}.${message ? ` ${message}` : ""}`,
+  );
   return { said };
 }
 
@@ -169,7 +179,8 @@ function viewState(state: State, data: import("../protocol/types").ViewState): P
 }
 
 /** The scene in operation; null when the event is about something else. */
-const SILENT = "The devices do not answer: the process that controls them is frozen or overloaded. If something moves, use the emergency stop.";
+const SILENT =
+  "The devices do not answer: the process that controls them is frozen or overloaded. If something moves, use the emergency stop.";
 
 function isAnswering(objects: State["live"]["objects"]): boolean {
   return Object.values(objects).every((each) => each.answering !== false);
@@ -190,7 +201,10 @@ function live(state: State, event: ServerEvent): Partial<State> | null {
       const was = isAnswering(now.objects);
       if (was === isAnswering(objects)) return become({ objects });
       if (was) return { ...become({ objects }), ...notice(state, "error", SILENT) };
-      return { ...become({ objects }), ...(event.data.state === "offline" ? {} : notice(state, "info", "The devices answer again.")) };
+      return {
+        ...become({ objects }),
+        ...(event.data.state === "offline" ? {} : notice(state, "info", "The devices answer again.")),
+      };
     }
     case "ObjectHealth":
       return become({ health: put(now.health, event.data.object_id, event.data) });
@@ -206,7 +220,12 @@ function live(state: State, event: ServerEvent): Partial<State> | null {
     case "RobotMoveToActionPointJoints": {
       const { move_event_type: phase, robot_id, message } = event.data;
       const moving = phase === "start" ? put(now.moving, robot_id, event.event) : without(now.moving, robot_id);
-      const goal = "orientation_id" in event.data ? event.data.orientation_id : "joints_id" in event.data ? event.data.joints_id : "";
+      const goal =
+        "orientation_id" in event.data
+          ? event.data.orientation_id
+          : "joints_id" in event.data
+            ? event.data.joints_id
+            : "";
       const motions = put(now.motions, robot_id, { phase, goal, message: message ?? "" });
       const told = phase === "failed" ? notice(state, "error", message || "The robot did not reach its goal.") : {};
       return { ...become({ moving, motions }), ...told };
@@ -233,7 +252,9 @@ function live(state: State, event: ServerEvent): Partial<State> | null {
 
 /** Return the program with runs added to its history. */
 export function withRuns(program: State["program"], added: Run[]): State["program"] {
-  const runs = [...new Map([...program.runs, ...added].map((run) => [run.number, run])).values()].sort((a, b) => b.number - a.number);
+  const runs = [...new Map([...program.runs, ...added].map((run) => [run.number, run])).values()].sort(
+    (a, b) => b.number - a.number,
+  );
   const watched = Math.max(program.watched, ...added.filter((run) => run.end === "running").map((run) => run.number));
   return { ...program, runs, watched };
 }
@@ -245,7 +266,8 @@ function program(state: State, event: ServerEvent): Partial<State> | null {
   switch (event.event) {
     case "PackageState": {
       const { state: next, package_id = "" } = event.data;
-      if (next === "started") return { program: { ...NO_PROGRAM, runs: now.runs, watched: now.watched, state: next, packageId: package_id } };
+      if (next === "started")
+        return { program: { ...NO_PROGRAM, runs: now.runs, watched: now.watched, state: next, packageId: package_id } };
       return become({
         state: next,
         packageId: package_id || now.packageId,

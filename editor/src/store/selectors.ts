@@ -4,11 +4,19 @@ import type { PackageStateEnum } from "../protocol/types";
 import type { State } from "./state";
 
 /** States in which a program has the devices. */
-export const RUNNING: ReadonlySet<PackageStateEnum> = new Set(["started", "running", "stopping", "pausing", "paused", "resuming"]);
+export const RUNNING: ReadonlySet<PackageStateEnum> = new Set([
+  "started",
+  "running",
+  "stopping",
+  "pausing",
+  "paused",
+  "resuming",
+]);
 
 export const isRunning = (state: State): boolean => RUNNING.has(state.program.state);
 /** Whether something may move at the program's or a user's command: the scene is online, or a program runs. */
-export const isLive = (state: State): boolean => state.live.state === "started" || state.live.state === "stopping" || isRunning(state);
+export const isLive = (state: State): boolean =>
+  state.live.state === "started" || state.live.state === "stopping" || isRunning(state);
 export const isConnected = (state: State): boolean => state.connection.status === "ready";
 export const isOnline = (state: State): boolean => state.live.state === "started";
 

@@ -283,6 +283,17 @@ export function initialState(): State {
     tasks: {},
     notices: [],
     said: [],
-    ui: { selection: null, mode: "3d", connecting: null, follow: false, ghost: null, tool: "", theme: "system", systemDark: false, leftHanded: false, quality: "auto" },
+    ui: {
+      selection: null,
+      mode: "3d",
+      connecting: null,
+      follow: false,
+      ghost: null,
+      tool: "",
+      theme: "system",
+      systemDark: false,
+      leftHanded: false,
+      quality: "auto",
+    },
   };
 }

@@ -4,7 +4,7 @@ import { useStore } from "zustand";
 import { createStore } from "zustand/vanilla";
 import type { ServerEvent } from "../protocol/types";
 import { notice, reduce } from "./reduce";
-import { initialState, type Connection, type Notice, type Selection, type State, type Ui } from "./state";
+import { type Connection, initialState, type Notice, type Selection, type State, type Ui } from "./state";
 
 export const store = createStore<State>(initialState);
 

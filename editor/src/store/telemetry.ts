@@ -68,7 +68,8 @@ export class Telemetry {
     // After a pause there is nothing to interpolate from; between samples a tenth of a second at most.
     // By when they were read, not by when they came: the network bunches them.
     const span = before ? last.read - before.read : 0;
-    if (!before || span <= period * 1.5 || span <= 0 || span > 0.25 || alike(before, last)) return { joints: last.joints, settled: true };
+    if (!before || span <= period * 1.5 || span <= 0 || span > 0.25 || alike(before, last))
+      return { joints: last.joints, settled: true };
     const part = (this.clock() - last.at) / span;
     if (part >= 1) return { joints: last.joints, settled: true };
     const between = new Map<string, number>();

@@ -51,6 +51,10 @@ describe("an amount", () => {
     expect(show(0.1, "m")).toBe("0.1");
     expect(show(100, "mm")).toBe("100000");
     expect(show(Math.PI / 2, "°")).toBe("90");
-    expect([stepWords(0.01, "length"), stepWords(0.0025, "length"), stepWords(DEGREE / 60, "angle")]).toEqual(["1 cm", "2.5 mm", "1′"]);
+    expect([stepWords(0.01, "length"), stepWords(0.0025, "length"), stepWords(DEGREE / 60, "angle")]).toEqual([
+      "1 cm",
+      "2.5 mm",
+      "1′",
+    ]);
   });
 });

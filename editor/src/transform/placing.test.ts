@@ -1,6 +1,19 @@
 import { describe, expect, it } from "vitest";
 import { composed, ORIGIN, relativeTo, turn } from "../viewmodel/frames";
-import { angles, fromAngles, moved, onGrid, placedAt, poseFrom, poseText, same, squared, turned, turnedTo, unit } from "./placing";
+import {
+  angles,
+  fromAngles,
+  moved,
+  onGrid,
+  placedAt,
+  poseFrom,
+  poseText,
+  same,
+  squared,
+  turned,
+  turnedTo,
+  unit,
+} from "./placing";
 
 const POSE = { position: { x: 0.3, y: -0.2, z: 0.15 }, orientation: fromAngles({ x: 0.2, y: -0.4, z: 1.1 }) };
 const FRAME = { position: { x: 1, y: 2, z: 0.5 }, orientation: fromAngles({ x: 0, y: 0, z: Math.PI / 2 }) };
@@ -33,7 +46,12 @@ describe("turning", () => {
   it("is about the frame's axis, around the thing itself", () => {
     const to = turned(POSE, FRAME, "y", 0.3);
     expect(to.position).toEqual(POSE.position);
-    expect(same(composed({ ...ORIGIN, orientation: turn({ x: -1, y: 0, z: 0 }, 0.3) }, { ...POSE, position: ORIGIN.position }), { ...to, position: ORIGIN.position })).toBe(true);
+    expect(
+      same(
+        composed({ ...ORIGIN, orientation: turn({ x: -1, y: 0, z: 0 }, 0.3) }, { ...POSE, position: ORIGIN.position }),
+        { ...to, position: ORIGIN.position },
+      ),
+    ).toBe(true);
   });
 
   it("to an angle leaves the two others", () => {
@@ -58,7 +76,8 @@ describe("a pose as text", () => {
   it("comes back as it was", () => {
     const read = poseFrom(poseText(POSE), ORIGIN);
     expect(read?.position).toEqual(POSE.position);
-    for (const part of ["x", "y", "z", "w"] as const) expect(read?.orientation[part]).toBeCloseTo(POSE.orientation[part], 5);
+    for (const part of ["x", "y", "z", "w"] as const)
+      expect(read?.orientation[part]).toBeCloseTo(POSE.orientation[part], 5);
   });
 
   it("may be a part of one", () => {

@@ -9,7 +9,11 @@ export const AXES: readonly Axis[] = ["x", "y", "z"];
 /** Whose axes are meant. `own`: the thing's, as it is turned; `view`: right, up, and towards the viewer. */
 export type FrameName = "world" | "parent" | "robot" | "own" | "view";
 
-export const unit = (axis: Axis): Position => ({ x: axis === "x" ? 1 : 0, y: axis === "y" ? 1 : 0, z: axis === "z" ? 1 : 0 });
+export const unit = (axis: Axis): Position => ({
+  x: axis === "x" ? 1 : 0,
+  y: axis === "y" ? 1 : 0,
+  z: axis === "z" ? 1 : 0,
+});
 export const scaled = ({ x, y, z }: Position, by: number): Position => ({ x: x * by, y: y * by, z: z * by });
 export const minus = (a: Position, b: Position): Position => plus(a, scaled(b, -1));
 export const dot = (a: Position, b: Position): number => a.x * b.x + a.y * b.y + a.z * b.z;

@@ -23,13 +23,20 @@ describe("pulling a face", () => {
   });
 
   it("of round things grows about the axis", () => {
-    expect(pulled(CYLINDER, "x", 0.01)).toMatchObject({ model: { cylinder: { radius: 0.060000000000000005, height: 0.3 } }, shift: 0 });
+    expect(pulled(CYLINDER, "x", 0.01)).toMatchObject({
+      model: { cylinder: { radius: 0.060000000000000005, height: 0.3 } },
+      shift: 0,
+    });
     expect(pulled(CYLINDER, "z", 0.1).shift).toBeCloseTo(0.05, 12);
   });
 });
 
 it("measures are what can be typed, and each changes one", () => {
-  expect(measures(BOX).map((each) => [each.label, each.value])).toEqual([["X", 0.2], ["Y", 0.4], ["Z", 0.1]]);
+  expect(measures(BOX).map((each) => [each.label, each.value])).toEqual([
+    ["X", 0.2],
+    ["Y", 0.4],
+    ["Z", 0.1],
+  ]);
   expect(measures(CYLINDER)[1]?.put(0.5).cylinder).toEqual({ id: "c", radius: 0.05, height: 0.5 });
   expect(halfOf(CYLINDER)).toEqual({ x: 0.05, y: 0.05, z: 0.15 });
 });

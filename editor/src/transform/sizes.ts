@@ -2,7 +2,7 @@
 
 import type { ObjectModel, Pose, Position } from "../protocol/types";
 import { inverted, rotated } from "../viewmodel/frames";
-import { dot, plusOf, type Axis } from "./placing";
+import { type Axis, dot, plusOf } from "./placing";
 
 /** Thinner would not be seen, and could not be taken hold of. */
 export const THINNEST = 0.001;
@@ -33,7 +33,8 @@ export function pulled(model: ObjectModel, axis: Axis, by: number): { model: Obj
     const height = within(cylinder.height + by);
     return { model: { ...model, cylinder: { ...cylinder, height } }, shift: (height - cylinder.height) / 2 };
   }
-  if (cylinder) return { model: { ...model, cylinder: { ...cylinder, radius: within(cylinder.radius + by) } }, shift: 0 };
+  if (cylinder)
+    return { model: { ...model, cylinder: { ...cylinder, radius: within(cylinder.radius + by) } }, shift: 0 };
   if (sphere) return { model: { ...model, sphere: { ...sphere, radius: within(sphere.radius + by) } }, shift: 0 };
   return { model, shift: 0 };
 }
@@ -50,21 +51,43 @@ export function measures(model: ObjectModel): Measure[] {
   if (box) {
     return (["x", "y", "z"] as const).map((axis) => {
       const side = `size_${axis}` as const;
-      return { label: axis.toUpperCase(), value: box[side], put: (value) => ({ ...model, box: { ...box, [side]: within(value) } }) };
+      return {
+        label: axis.toUpperCase(),
+        value: box[side],
+        put: (value) => ({ ...model, box: { ...box, [side]: within(value) } }),
+      };
     });
   }
   if (cylinder) {
     return [
-      { label: "Radius", value: cylinder.radius, put: (value) => ({ ...model, cylinder: { ...cylinder, radius: within(value) } }) },
-      { label: "Height", value: cylinder.height, put: (value) => ({ ...model, cylinder: { ...cylinder, height: within(value) } }) },
+      {
+        label: "Radius",
+        value: cylinder.radius,
+        put: (value) => ({ ...model, cylinder: { ...cylinder, radius: within(value) } }),
+      },
+      {
+        label: "Height",
+        value: cylinder.height,
+        put: (value) => ({ ...model, cylinder: { ...cylinder, height: within(value) } }),
+      },
     ];
   }
   if (!sphere) return [];
-  return [{ label: "Radius", value: sphere.radius, put: (value) => ({ ...model, sphere: { ...sphere, radius: within(value) } }) }];
+  return [
+    {
+      label: "Radius",
+      value: sphere.radius,
+      put: (value) => ({ ...model, sphere: { ...sphere, radius: within(value) } }),
+    },
+  ];
 }
 
 /** Where something stands that is put onto a surface: as far before it as it reaches behind its own middle. */
-export function lifted(point: Position, normal: Position, { pose, model }: { pose: Pose; model?: ObjectModel }): Position {
+export function lifted(
+  point: Position,
+  normal: Position,
+  { pose, model }: { pose: Pose; model?: ObjectModel },
+): Position {
   if (!model) return { x: point.x, y: point.y, z: point.z };
   const { x, y, z } = rotated(normal, inverted(pose.orientation));
   const half = halfOf(model);

@@ -29,13 +29,23 @@ export function targetOf(state: State, selection: Selection | null): Target | nu
   const { id } = selection;
   const object = doc.objects[id];
   const draft = state.ui.draft;
-  const at = (frame: Pose, known: unknown, stored: Pose) => composed(frame, draft && draft.of === known ? draft.pose : stored);
+  const at = (frame: Pose, known: unknown, stored: Pose) =>
+    composed(frame, draft && draft.of === known ? draft.pose : stored);
   if (object) {
     if (!object.pose) return null;
     const type = state.types.byName[object.type];
     const model = type && draft?.type === type && draft.model ? draft.model : type?.object_model;
     const sized = model && !model.mesh && type && isShapeAlone(state, object.type) ? { model, type: object.type } : {};
-    return { kind: "object", id, of: object, frame: ORIGIN, pose: at(ORIGIN, object, object.pose), moves: true, turns: true, ...sized };
+    return {
+      kind: "object",
+      id,
+      of: object,
+      frame: ORIGIN,
+      pose: at(ORIGIN, object, object.pose),
+      moves: true,
+      turns: true,
+      ...sized,
+    };
   }
   const point = doc.points[id];
   if (point) {
@@ -59,15 +69,21 @@ export function isShapeAlone(state: State, type: string): boolean {
   return false;
 }
 
-const REQUESTS = { object: "UpdateObjectPose", point: "UpdateActionPointPosition", orientation: "UpdateActionPointOrientation" } as const;
+const REQUESTS = {
+  object: "UpdateObjectPose",
+  point: "UpdateActionPointPosition",
+  orientation: "UpdateActionPointOrientation",
+} as const;
 
 /** Why it cannot be moved now, as a sentence; empty when it can. */
 export function notMovable(state: State, { kind, id }: Pick<Target, "kind" | "id">): string {
   const { doc } = state;
   if (isRunning(state)) return "A program runs: stop it first.";
-  if (kind === "object" && doc?.project) return "Objects are moved in the scene: close the project, and open the scene.";
+  if (kind === "object" && doc?.project)
+    return "Objects are moved in the scene: close the project, and open the scene.";
   const type = doc?.objects[id]?.type ?? "";
-  if (kind === "object" && type in state.types.robots && isOnline(state)) return "A robot cannot be moved in the scene while it is online.";
+  if (kind === "object" && type in state.types.robots && isOnline(state))
+    return "A robot cannot be moved in the scene while it is online.";
   const holder = heldBy(state, id);
   if (holder) return `${holder} works on it.`;
   return barred(state, REQUESTS[kind]);
@@ -75,11 +91,21 @@ export function notMovable(state: State, { kind, id }: Pick<Target, "kind" | "id
 
 /** Why its size cannot be changed now. */
 export function notSizable(state: State, target: Pick<Target, "kind" | "id">): string {
-  return notMovable(state, target) || (state.live.state !== "stopped" ? "Go offline to change its size." : "") || barred(state, "UpdateObjectModel");
+  return (
+    notMovable(state, target) ||
+    (state.live.state !== "stopped" ? "Go offline to change its size." : "") ||
+    barred(state, "UpdateObjectModel")
+  );
 }
 
 /** A frame by its name, in the world; for `view` what the viewer sees. */
-export function frameOf(state: State, name: FrameName, target: Pick<Target, "frame" | "pose">, robot: string, view: Pose): Pose {
+export function frameOf(
+  state: State,
+  name: FrameName,
+  target: Pick<Target, "frame" | "pose">,
+  robot: string,
+  view: Pose,
+): Pose {
   switch (name) {
     case "world":
       return ORIGIN;

@@ -1,7 +1,7 @@
 /** How the transform tool is set: units, steps, whose axes, what it snaps to. The user finds it again on every tablet. */
 
 import type { State } from "../store/state";
-import { ANGLE_UNITS, LENGTH_UNITS, type AngleUnit, type LengthUnit } from "./amounts";
+import { ANGLE_UNITS, type AngleUnit, LENGTH_UNITS, type LengthUnit } from "./amounts";
 import type { FrameName } from "./placing";
 
 /** `grid`: the steps' raster; `surface`: on what is below the pointer; `point`: where another thing stands. */
@@ -22,7 +22,15 @@ export interface ToolSettings {
 /** Key of the user's general view state. */
 export const TOOL = "transform";
 
-export const DEFAULTS: ToolSettings = { length: "mm", angle: "°", lengthStep: 0.01, angleStep: Math.PI / 18, frame: "world", snap: "none", by: false };
+export const DEFAULTS: ToolSettings = {
+  length: "mm",
+  angle: "°",
+  lengthStep: 0.01,
+  angleStep: Math.PI / 18,
+  frame: "world",
+  snap: "none",
+  by: false,
+};
 
 const FRAMES: readonly FrameName[] = ["world", "parent", "robot", "own", "view"];
 const SNAPS: readonly Snap[] = ["none", "grid", "surface", "point"];

@@ -1,16 +1,16 @@
 /** Choose the screen (join, home, workplace or operator) and frame it: connection and result above, Stop dock below. */
 
 import { Suspense, useEffect, useState, useSyncExternalStore } from "react";
-import { isLive, isRunning, openId } from "../store/selectors";
 import { rememberPerson } from "../session/memory";
+import { isLive, isRunning, openId } from "../store/selectors";
 import { now, useEditor } from "../store/store";
+import { LostConnection } from "./connection/LostConnection";
+import { Dock } from "./dock/Dock";
+import { keepRecent } from "./home/kept";
 import { Join } from "./join/Join";
 import { Waiting } from "./kit/kit";
 import { lazily } from "./kit/lazily";
-import { LostConnection } from "./connection/LostConnection";
-import { Dock } from "./dock/Dock";
 import { Overlays } from "./search/Overlays";
-import { keepRecent } from "./home/kept";
 import { useScreenSettings } from "./settings/Settings";
 import { Workplace } from "./workplace/Workplace";
 
@@ -36,7 +36,9 @@ export function App() {
   const status = useEditor((state) => state.connection.status);
   const open = useEditor((state) => state.doc !== null);
   const live = useEditor(isLive);
-  const document = useEditor((state) => (state.connection.status === "ready" && !isRunning(state) ? openId(state) : ""));
+  const document = useEditor((state) =>
+    state.connection.status === "ready" && !isRunning(state) ? openId(state) : "",
+  );
   useEffect(() => {
     if (document) keepRecent(document);
   }, [document]);

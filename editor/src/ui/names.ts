@@ -33,7 +33,14 @@ export function selectionOf(state: State, id: string): Selection | null {
   const { doc } = state;
   if (!doc) return null;
   if (id === "START" || id === "END") return { kind: "terminal", id };
-  const kinds = { object: doc.objects, point: doc.points, orientation: doc.orientations, joints: doc.joints, action: doc.actions, logic: doc.logic };
+  const kinds = {
+    object: doc.objects,
+    point: doc.points,
+    orientation: doc.orientations,
+    joints: doc.joints,
+    action: doc.actions,
+    logic: doc.logic,
+  };
   for (const [kind, record] of Object.entries(kinds)) if (id in record) return { kind: kind as Kind, id };
   return null;
 }

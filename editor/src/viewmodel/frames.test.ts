@@ -7,7 +7,8 @@ const frame = { position: { x: 1, y: -2, z: 0.5 }, orientation: fromRollPitchYaw
 const pose = { position: { x: 0.1, y: 0.2, z: 0.3 }, orientation: fromRollPitchYaw([-5, 40, 77]) };
 
 function close(a: object, b: object): void {
-  for (const [key, value] of Object.entries(b)) expect((a as Record<string, number>)[key]).toBeCloseTo(value as number, 9);
+  for (const [key, value] of Object.entries(b))
+    expect((a as Record<string, number>)[key]).toBeCloseTo(value as number, 9);
 }
 
 test("what was composed is seen from the frame as it was", () => {
@@ -22,7 +23,11 @@ test("roll, pitch and yaw there and back", () => {
 });
 
 test("z points where it is told, also the other way round", () => {
-  for (const direction of [{ x: 0, y: 0, z: -1 }, { x: 0.6, y: 0, z: 0.8 }, { x: 0, y: 1, z: 0 }]) {
+  for (const direction of [
+    { x: 0, y: 0, z: -1 },
+    { x: 0.6, y: 0, z: 0.8 },
+    { x: 0, y: 1, z: 0 },
+  ]) {
     close(rotated({ x: 0, y: 0, z: 1 }, alongZ(direction, frame.orientation)), direction);
   }
 });

@@ -48,7 +48,10 @@ export function relativeTo(frame: Pose, pose: Pose): Pose {
 /** How far two poses in one frame are from each other, m and degrees. */
 export function apart(a: Pose, b: Pose): { distance: number; degrees: number } {
   const { position: p, orientation: q } = relativeTo(a, b);
-  return { distance: Math.hypot(p.x, p.y, p.z), degrees: (2 * Math.atan2(Math.hypot(q.x, q.y, q.z), Math.abs(q.w)) * 180) / Math.PI };
+  return {
+    distance: Math.hypot(p.x, p.y, p.z),
+    degrees: (2 * Math.atan2(Math.hypot(q.x, q.y, q.z), Math.abs(q.w)) * 180) / Math.PI,
+  };
 }
 
 /** The rotation by an angle in rad about an axis of length 1. */
@@ -90,5 +93,8 @@ export function worldOf(doc: OpenDocument, id: string | undefined): Pose {
   if (point) return composed(worldOf(doc, point.parent), { position: point.position, orientation: ORIGIN.orientation });
   const orientation = doc.orientations[id];
   if (!orientation) return ORIGIN;
-  return composed(worldOf(doc, orientation.pointId), { position: ORIGIN.position, orientation: orientation.orientation });
+  return composed(worldOf(doc, orientation.pointId), {
+    position: ORIGIN.position,
+    orientation: orientation.orientation,
+  });
 }

@@ -10,7 +10,9 @@ const POSE = { position: { x: 0.5, y: 0, z: 0 }, orientation: UPRIGHT };
 function workplace(): State {
   const state = initialState();
   state.connection.user = "me";
-  state.types.byName = { Box: { type: "Box", object_model: { type: "Box", box: { id: "Box", size_x: 1, size_y: 2, size_z: 3 } } } as never };
+  state.types.byName = {
+    Box: { type: "Box", object_model: { type: "Box", box: { id: "Box", size_x: 1, size_y: 2, size_z: 3 } } } as never,
+  };
   state.types.robots = { UR5e: { type: "UR5e", urdf_package_filename: "ur5e.zip" } as never };
   state.doc = opened(
     {
@@ -60,27 +62,31 @@ const items = (state: State) => Object.fromEntries(new ItemMaker().items(state).
 test("each thing with a place has an item, and what has none is left to the lists", () => {
   const made = items(workplace());
   expect(Object.keys(made).sort()).toEqual(["END", "START", "a1", "a2", "acp", "box", "l1", "l2", "l3", "ori", "ur"]);
-  expect(made["box"]).toMatchObject({ kind: "object", shape: { kind: "box", size: [1, 2, 3] } });
-  expect(made["ur"]).toMatchObject({ kind: "robot", urdf: "ur5e.zip", online: false, axes: true });
+  expect(made.box).toMatchObject({ kind: "object", shape: { kind: "box", size: [1, 2, 3] } });
+  expect(made.ur).toMatchObject({ kind: "robot", urdf: "ur5e.zip", online: false, axes: true });
   const plain = workplace();
   plain.view.user = { hide_axes: true };
-  expect(items(plain)["ur"]).toMatchObject({ axes: false });
-  expect(made["acp"]).toMatchObject({ kind: "point", parent: "box" });
-  expect(made["a2"]).toMatchObject({ level: 1, parent: "acp" });
+  expect(items(plain).ur).toMatchObject({ axes: false });
+  expect(made.acp).toMatchObject({ kind: "point", parent: "box" });
+  expect(made.a2).toMatchObject({ level: 1, parent: "acp" });
 });
 
 test("branches are told by kind and word", () => {
   const made = items(workplace());
-  expect(made["l1"]).toMatchObject({ branch: "always", condition: "" });
-  expect(made["l2"]).toMatchObject({ branch: "false", condition: "no" });
-  expect(made["l3"]).toMatchObject({ branch: "value", condition: "firm" });
+  expect(made.l1).toMatchObject({ branch: "always", condition: "" });
+  expect(made.l2).toMatchObject({ branch: "false", condition: "no" });
+  expect(made.l3).toMatchObject({ branch: "value", condition: "firm" });
 });
 
 test("what did not change is the same item", () => {
   const maker = new ItemMaker();
   const state = workplace();
   const first = new Map(maker.items(state).map((item) => [item.id, item]));
-  const next = { ...state, ui: { ...state.ui, selection: { kind: "point", id: "acp" } as const }, locks: { a1: "Eva" } };
+  const next = {
+    ...state,
+    ui: { ...state.ui, selection: { kind: "point", id: "acp" } as const },
+    locks: { a1: "Eva" },
+  };
   const differing = maker.items(next).filter((item) => first.get(item.id) !== item);
   expect(differing.map((item) => [item.id, item.selected, item.lockedBy])).toEqual([
     ["acp", true, ""],
@@ -98,11 +104,11 @@ test("previews of others, places, what is hidden and how well it is reached", ()
     "r2//e": { items: [{ id: "ori", reach: "near_limit" }] } as never,
   };
   const made = items(state);
-  expect(made["acp"]).toMatchObject({ position: { x: 9 } });
-  expect(made["START"]).toMatchObject({ position: { x: 1, y: 2, z: 3 } });
-  expect(made["END"]).toMatchObject({ position: { x: -0.3 } });
-  expect([made["box"]?.faint, made["ur"]?.faint]).toEqual([1, 0.75]);
-  expect(made["ori"]).toMatchObject({ reach: "near_limit" }); // by the robot that reaches it best
+  expect(made.acp).toMatchObject({ position: { x: 9 } });
+  expect(made.START).toMatchObject({ position: { x: 1, y: 2, z: 3 } });
+  expect(made.END).toMatchObject({ position: { x: -0.3 } });
+  expect([made.box?.faint, made.ur?.faint]).toEqual([1, 0.75]);
+  expect(made.ori).toMatchObject({ reach: "near_limit" }); // by the robot that reaches it best
 });
 
 test("a type without a model has a marker, values are shown as people write them", () => {
@@ -113,11 +119,26 @@ test("a type without a model has a marker, values are shown as people write them
 test("rotations are read as roll, pitch and yaw", () => {
   const half = Math.SQRT1_2;
   const cases: [[number, number, number, number], [number, number, number]][] = [
-    [[0, 0, 0, 1], [0, 0, 0]],
-    [[half, 0, 0, half], [90, 0, 0]],
-    [[0, 0, half, half], [0, 0, 90]],
-    [[0, half, 0, half], [0, 90, 0]],
-    [[1, 0, 0, 0], [180, 0, 0]],
+    [
+      [0, 0, 0, 1],
+      [0, 0, 0],
+    ],
+    [
+      [half, 0, 0, half],
+      [90, 0, 0],
+    ],
+    [
+      [0, 0, half, half],
+      [0, 0, 90],
+    ],
+    [
+      [0, half, 0, half],
+      [0, 90, 0],
+    ],
+    [
+      [1, 0, 0, 0],
+      [180, 0, 0],
+    ],
   ];
   for (const [[x, y, z, w], expected] of cases) {
     rollPitchYaw({ x, y, z, w }).forEach((each, n) => expect(each).toBeCloseTo(expected[n] ?? NaN));

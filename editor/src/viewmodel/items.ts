@@ -30,7 +30,8 @@ export class ItemMaker {
     const found: Item[] = [];
     const add = (id: string, inputs: unknown[], make: () => Item) => {
       const known = before.get(id);
-      const same = known && known.inputs.length === inputs.length && known.inputs.every((each, n) => each === inputs[n]);
+      const same =
+        known && known.inputs.length === inputs.length && known.inputs.every((each, n) => each === inputs[n]);
       const kept = same ? known : { inputs, item: make() };
       this.known.set(id, kept);
       found.push(kept.item);
@@ -47,7 +48,7 @@ export class ItemMaker {
     });
     const tell = (id: string) => [selection?.id === id, lockedBy(state, id, me), faint(id)];
 
-    const axes = state.view.user["hide_axes"] !== true;
+    const axes = state.view.user.hide_axes !== true;
     for (const object of Object.values(doc.objects)) {
       const type = state.types.byName[object.type];
       const robot = state.types.robots[object.type];
@@ -57,15 +58,27 @@ export class ItemMaker {
       const preview = drafted(draft, object) ?? state.previews[object.id];
       const model = type && draft?.type === type ? draft.model : undefined;
       const ghost = state.ui.ghost?.robotId === object.id ? state.ui.ghost : null;
-      add(object.id, [object, type, robot, trouble, robot && online, preview, model, ghost, robot && axes, ...tell(object.id)], () => {
-        const pose = {
-          position: preview?.position ?? object.pose?.position ?? NO_PLACE,
-          orientation: preview?.orientation ?? object.pose?.orientation ?? UPRIGHT.orientation,
-        };
-        const base = { ...common(object.id, object.name), pose, trouble };
-        if (robot) return { ...base, kind: "robot", urdf: robot.urdf_package_filename ?? "", online, axes, ghost: ghost ? ghostOf(ghost) : undefined };
-        return { ...base, kind: "object", shape: shapeOf(type && model ? { ...type, object_model: model } : type) };
-      });
+      add(
+        object.id,
+        [object, type, robot, trouble, robot && online, preview, model, ghost, robot && axes, ...tell(object.id)],
+        () => {
+          const pose = {
+            position: preview?.position ?? object.pose?.position ?? NO_PLACE,
+            orientation: preview?.orientation ?? object.pose?.orientation ?? UPRIGHT.orientation,
+          };
+          const base = { ...common(object.id, object.name), pose, trouble };
+          if (robot)
+            return {
+              ...base,
+              kind: "robot",
+              urdf: robot.urdf_package_filename ?? "",
+              online,
+              axes,
+              ghost: ghost ? ghostOf(ghost) : undefined,
+            };
+          return { ...base, kind: "object", shape: shapeOf(type && model ? { ...type, object_model: model } : type) };
+        },
+      );
     }
     const size = pointSize(state);
     const lines = parentLines(state);
@@ -95,7 +108,7 @@ export class ItemMaker {
       }));
     }
     this.pucks(state, doc, add, common, tell);
-    if (state.view.user["hide_steps"] === true && state.ui.connecting === null) return found;
+    if (state.view.user.hide_steps === true && state.ui.connecting === null) return found;
     for (const item of Object.values(doc.logic)) {
       add(item.id, [item, ...tell(item.id)], () => link(item, common(item.id, "")));
     }
@@ -106,7 +119,10 @@ export class ItemMaker {
     state: State,
     doc: OpenDocument,
     add: (id: string, inputs: unknown[], make: () => Item) => void,
-    common: (id: string, name: string) => Omit<Item, "kind"> & { id: string; name: string; selected: boolean; lockedBy: string; faint: number },
+    common: (
+      id: string,
+      name: string,
+    ) => Omit<Item, "kind"> & { id: string; name: string; selected: boolean; lockedBy: string; faint: number },
     tell: (id: string) => unknown[],
   ): void {
     const levels = new Map<string, number>();
@@ -159,12 +175,12 @@ export class ItemMaker {
 
 /** How large points are drawn, of what they are by themselves: as the user wants it on all his tablets. */
 export function pointSize(state: State): number {
-  const kept = state.view.general["point_size"];
+  const kept = state.view.general.point_size;
   return typeof kept === "number" ? Math.min(4, Math.max(0.5, kept)) : 1;
 }
 
 /** Whether lines lead from all points to what they hang on; else from the selected one alone. */
-export const parentLines = (state: State): boolean => state.view.general["parent_lines"] === true;
+export const parentLines = (state: State): boolean => state.view.general.parent_lines === true;
 
 function ghostOf({ joints, problem, at }: Ghost): RobotItem["ghost"] {
   return { joints: Object.fromEntries(joints.map((each) => [each.name, each.value])), possible: problem === "", at };
@@ -214,7 +230,13 @@ function bestReach(state: State): Record<string, Reach> {
 
 function link(item: LogicItem, base: Omit<LinkItem, "kind" | "from" | "to" | "condition" | "branch">): LinkItem {
   const { condition } = item;
-  const branch = !condition ? "always" : condition.value === "true" ? "true" : condition.value === "false" ? "false" : "value";
+  const branch = !condition
+    ? "always"
+    : condition.value === "true"
+      ? "true"
+      : condition.value === "false"
+        ? "false"
+        : "value";
   const words = branch === "true" ? "yes" : branch === "false" ? "no" : condition ? plain(condition.value) : "";
   return { ...base, kind: "logic", from: item.start, to: item.end, condition: words, branch };
 }

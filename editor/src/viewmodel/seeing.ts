@@ -11,16 +11,16 @@ const FADED = 0.85;
 
 /** Kinds to which the list of things is narrowed; empty: all. */
 export function groupsOf(state: State): Group[] {
-  const kept = state.view.user["filters"];
+  const kept = state.view.user.filters;
   return Array.isArray(kept) ? GROUPS.filter((each) => kept.includes(each)) : [];
 }
 
 /** Whether what is not of these kinds fades in the view. */
-export const fadesOthers = (state: State): boolean => state.view.user["fade_others"] === true;
+export const fadesOthers = (state: State): boolean => state.view.user.fade_others === true;
 
 /** Opaqueness of all objects but robots: 1 as they are, 0 not there. */
 export function opacityOfAll(state: State): number {
-  const kept = state.view.user["opacity_all"];
+  const kept = state.view.user.opacity_all;
   return typeof kept === "number" ? Math.min(1, Math.max(0, kept)) : 1;
 }
 
@@ -32,14 +32,22 @@ export function faintness(state: State): (id: string) => number {
   const own = (opacity ?? {}) as Record<string, unknown>;
   const all = 1 - opacityOfAll(state);
   const groups = new Set<Group>(fadesOthers(state) ? groupsOf(state) : []);
-  const arrows = state.view.user["hide_orientations"] !== true;
+  const arrows = state.view.user.hide_orientations !== true;
   return (id) => {
     if (hidden.has(id) || (!arrows && doc && id in doc.orientations && ui.selection?.id !== id)) return 1;
     const object = doc?.objects[id];
     const robot = object !== undefined && object.type in state.types.robots;
     const given = own[id];
-    const faint = Math.max(typeof given === "number" ? 1 - Math.min(1, Math.max(0, given)) : 0, object && !robot ? all : 0);
-    if (groups.size === 0 || ui.selection?.id === id || groups.has(object ? (robot ? "robots" : "objects") : groupOf(doc, id))) return faint;
+    const faint = Math.max(
+      typeof given === "number" ? 1 - Math.min(1, Math.max(0, given)) : 0,
+      object && !robot ? all : 0,
+    );
+    if (
+      groups.size === 0 ||
+      ui.selection?.id === id ||
+      groups.has(object ? (robot ? "robots" : "objects") : groupOf(doc, id))
+    )
+      return faint;
     return object ? Math.max(faint, FADED) : 1;
   };
 }

@@ -6,7 +6,16 @@ import { allOf, counts, fitting, flat, narrowed, neighbour, thingsOf } from "./t
 
 const UPRIGHT = { x: 0, y: 0, z: 0, w: 1 };
 const POSE = { position: { x: 0, y: 0, z: 0 }, orientation: UPRIGHT };
-const point = (id: string, name: string, parent?: string, more: object = {}) => ({ id, name, parent, position: POSE.position, orientations: [], robot_joints: [], actions: [], ...more });
+const point = (id: string, name: string, parent?: string, more: object = {}) => ({
+  id,
+  name,
+  parent,
+  position: POSE.position,
+  orientations: [],
+  robot_joints: [],
+  actions: [],
+  ...more,
+});
 
 function workplace(): State {
   const state = initialState();
@@ -30,7 +39,10 @@ function workplace(): State {
       has_logic: true,
       action_points: [
         point("grid", "grid", "table"),
-        point("pick", "pick", "grid", { orientations: [{ id: "down", name: "down", orientation: UPRIGHT }], actions: [{ id: "grip", name: "grip", type: "arm/grip", parameters: [], flows: [] }] }),
+        point("pick", "pick", "grid", {
+          orientations: [{ id: "down", name: "down", orientation: UPRIGHT }],
+          actions: [{ id: "grip", name: "grip", type: "arm/grip", parameters: [], flows: [] }],
+        }),
         point("home", "home"),
       ],
       parameters: [],
@@ -88,7 +100,9 @@ test("what is hidden, seen through by itself or with all others, and what fades 
   expect(seen({ filters: ["points", "no such"], fade_others: true }, all)).toEqual([0.85, 0.85, 0, 1, 1]);
   expect(seen({ filters: ["points"] }, all)).toEqual([0, 0, 0, 0, 0]);
   expect(seen({ hide_orientations: true }, ["down", "pick"])).toEqual([1, 0]);
-  expect(seen({ filters: "points", opacity_all: "half", opacity: { arm: "much" }, blocklist: 3, fade_others: true }, all)).toEqual([0, 0, 0, 0, 0]);
+  expect(
+    seen({ filters: "points", opacity_all: "half", opacity: { arm: "much" }, blocklist: 3, fade_others: true }, all),
+  ).toEqual([0, 0, 0, 0, 0]);
   state.ui.selection = { kind: "action", id: "grip" };
   expect(seen({ filters: ["points"], fade_others: true }, all)[3]).toBe(0); // what is selected stays
 });

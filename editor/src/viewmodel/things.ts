@@ -1,8 +1,7 @@
 /** All that is in the workplace, as the list of things shows it: what hangs on what, by kinds, found by words. */
 
 import type { Kind, State } from "../store/state";
-import { type Group, GROUPS } from "./seeing";
-
+import { GROUPS, type Group } from "./seeing";
 
 export interface Row {
   id: string;
@@ -22,26 +21,53 @@ export interface Things {
   program: Row[];
 }
 
-const WORDS = { point: "Action point", orientation: "Orientation", joints: "Joints", action: "Action", logic: "Step", terminal: "Program" } as const;
+const WORDS = {
+  point: "Action point",
+  orientation: "Orientation",
+  joints: "Joints",
+  action: "Action",
+  logic: "Step",
+  terminal: "Program",
+} as const;
 
 export function thingsOf({ doc, types }: Pick<State, "doc" | "types">): Things {
   if (!doc) return { placed: [], unplaced: [], program: [] };
   const points = Object.values(doc.points);
-  const row = (id: string, kind: Exclude<Kind, "object">, group: Group, name: string, below: Row[] = []): Row => ({ id, kind, group, name, detail: WORDS[kind], below });
+  const row = (id: string, kind: Exclude<Kind, "object">, group: Group, name: string, below: Row[] = []): Row => ({
+    id,
+    kind,
+    group,
+    name,
+    detail: WORDS[kind],
+    below,
+  });
   const on = (parent: string | undefined): Row[] =>
     points
       .filter((each) => each.parent === parent)
       .map(({ id, name }) => {
         const mine = (each: { pointId: string }) => each.pointId === id;
         return row(id, "point", "points", name, [
-          ...Object.values(doc.actions).filter(mine).map((each) => row(each.id, "action", "actions", each.name)),
-          ...Object.values(doc.orientations).filter(mine).map((each) => row(each.id, "orientation", "others", each.name)),
-          ...Object.values(doc.joints).filter(mine).map((each) => row(each.id, "joints", "others", each.name)),
+          ...Object.values(doc.actions)
+            .filter(mine)
+            .map((each) => row(each.id, "action", "actions", each.name)),
+          ...Object.values(doc.orientations)
+            .filter(mine)
+            .map((each) => row(each.id, "orientation", "others", each.name)),
+          ...Object.values(doc.joints)
+            .filter(mine)
+            .map((each) => row(each.id, "joints", "others", each.name)),
           ...on(id),
         ]);
       });
   const objects = Object.values(doc.objects).sort((a, b) => a.name.localeCompare(b.name));
-  const object = ({ id, name, type }: (typeof objects)[number]): Row => ({ id, kind: "object", group: type in types.robots ? "robots" : "objects", name, detail: type, below: on(id) });
+  const object = ({ id, name, type }: (typeof objects)[number]): Row => ({
+    id,
+    kind: "object",
+    group: type in types.robots ? "robots" : "objects",
+    name,
+    detail: type,
+    below: on(id),
+  });
   const hasPlace = (each: (typeof objects)[number]) => each.pose !== undefined || each.type in types.robots;
   const called = (id: string) => (id === "START" ? "Start" : id === "END" ? "End" : (doc.actions[id]?.name ?? ""));
   return {
@@ -51,7 +77,9 @@ export function thingsOf({ doc, types }: Pick<State, "doc" | "types">): Things {
       ? [
           row("START", "terminal", "program", "Start"),
           row("END", "terminal", "program", "End"),
-          ...Object.values(doc.logic).map((each) => row(each.id, "logic", "program", `${called(each.start)} → ${called(each.end)}`)),
+          ...Object.values(doc.logic).map((each) =>
+            row(each.id, "logic", "program", `${called(each.start)} → ${called(each.end)}`),
+          ),
         ]
       : [],
   };

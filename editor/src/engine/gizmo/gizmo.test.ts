@@ -52,7 +52,11 @@ describe("handles", () => {
   it("are hit by the distance to their line; a ring rather in front than behind", () => {
     expect(toSegment(5, 3, { x: 0, y: 0 }, { x: 10, y: 0 })).toBe(3);
     expect(toSegment(13, 4, { x: 0, y: 0 }, { x: 10, y: 0 })).toBe(5);
-    const ring = outline({ do: "ring", axis: "z" }, HALF).map(({ x, y }) => ({ x: x * 100, y: y * 20, depth: y > 0 ? 0.9 : 0.1 }));
+    const ring = outline({ do: "ring", axis: "z" }, HALF).map(({ x, y }) => ({
+      x: x * 100,
+      y: y * 20,
+      depth: y > 0 ? 0.9 : 0.1,
+    }));
     const centre = { x: 0, y: 0, depth: 0.5 };
     expect(apart(0, -17, ring, centre)).toBeLessThan(1);
     expect(apart(0, 17, ring, centre)).toBeGreaterThan(7);

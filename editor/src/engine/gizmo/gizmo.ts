@@ -6,7 +6,18 @@
 import { type Camera, Quaternion, Raycaster, type Scene, Vector2, Vector3 } from "three";
 import type { Orientation, Position } from "../../protocol/types";
 import { alongAxis, angleBetween, onPlane, unwound } from "./drags";
-import { apart, AXES, type Axis, type GizmoMode, type Handle, handlesOf, keyOf, onScreen, outline, UNIT } from "./handles";
+import {
+  AXES,
+  type Axis,
+  apart,
+  type GizmoMode,
+  type Handle,
+  handlesOf,
+  keyOf,
+  onScreen,
+  outline,
+  UNIT,
+} from "./handles";
 import { Picture } from "./picture";
 
 export interface GizmoSetup {
@@ -61,7 +72,14 @@ export class Gizmo {
   private readonly caster = new Raycaster();
   private readonly forget = new AbortController();
   private lit = "";
-  private dragging: { handle: Handle; pointer: number; from: Vector3; origin: Vector3; axis: Vector3; last: Drag } | null = null;
+  private dragging: {
+    handle: Handle;
+    pointer: number;
+    from: Vector3;
+    origin: Vector3;
+    axis: Vector3;
+    last: Drag;
+  } | null = null;
 
   constructor(private readonly around: Surroundings) {
     this.picture = new Picture(around.scene);
@@ -239,7 +257,16 @@ export class Gizmo {
     const translation = new Vector3().subVectors(to, from);
     const ring = handle.do === "ring";
     const angle = ring ? unwound(angleBetween(from.clone().sub(origin), to.clone().sub(origin), axis), last.angle) : 0;
-    dragging.last = { phase: "move", handle, translation: ring ? new Vector3() : translation, length: translation.dot(axis), angle, axis, x, y };
+    dragging.last = {
+      phase: "move",
+      handle,
+      translation: ring ? new Vector3() : translation,
+      length: translation.dot(axis),
+      angle,
+      axis,
+      x,
+      y,
+    };
     this.onDrag(dragging.last);
     this.around.draw();
   }

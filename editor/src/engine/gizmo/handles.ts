@@ -19,14 +19,22 @@ export type Handle =
 export type GizmoMode = "move" | "turn" | "size";
 
 export const keyOf = (handle: Handle): string =>
-  handle.do === "free" ? "free" : handle.do === "face" ? `face ${handle.sign > 0 ? "+" : "-"}${handle.axis}` : `${handle.do} ${handle.axis}`;
+  handle.do === "free"
+    ? "free"
+    : handle.do === "face"
+      ? `face ${handle.sign > 0 ? "+" : "-"}${handle.axis}`
+      : `${handle.do} ${handle.axis}`;
 
 /** In lengths of the gizmo: where a shaft begins and ends, where a plane's square is, how large a ring is. */
 export const SHAFT = [0.3, 1.05] as const;
 export const SQUARE = [0.34, 0.56] as const;
 export const RING = 0.85;
 
-export const UNIT: Record<Axis, Vector3> = { x: new Vector3(1, 0, 0), y: new Vector3(0, 1, 0), z: new Vector3(0, 0, 1) };
+export const UNIT: Record<Axis, Vector3> = {
+  x: new Vector3(1, 0, 0),
+  y: new Vector3(0, 1, 0),
+  z: new Vector3(0, 0, 1),
+};
 
 export function handlesOf(mode: GizmoMode, allowed: readonly Axis[]): Handle[] {
   if (mode === "turn") return allowed.map((axis) => ({ do: "ring", axis }));
@@ -64,7 +72,10 @@ export function outline(handle: Handle, half: Record<Axis, number>): Vector3[] {
       const [a, b] = square(handle.axis);
       return Array.from({ length: 49 }, (_, n) => {
         const angle = (n / 48) * 2 * Math.PI;
-        return a.clone().multiplyScalar(Math.cos(angle) * RING).addScaledVector(b, Math.sin(angle) * RING);
+        return a
+          .clone()
+          .multiplyScalar(Math.cos(angle) * RING)
+          .addScaledVector(b, Math.sin(angle) * RING);
       });
     }
   }

@@ -17,8 +17,8 @@ import {
   type Scene,
   SphereGeometry,
   Sprite,
-  SRGBColorSpace,
   SpriteMaterial,
+  SRGBColorSpace,
   TorusGeometry,
   type Vector3,
 } from "three";
@@ -32,11 +32,14 @@ const ABOVE_ALL = 900;
 
 export class Picture {
   private readonly root = new Group();
-  private readonly parts = new Map<string, { handle: Handle; group: Group; material: MeshBasicMaterial; color: Color }>();
+  private readonly parts = new Map<
+    string,
+    { handle: Handle; group: Group; material: MeshBasicMaterial; color: Color }
+  >();
 
   constructor(scene: Scene) {
     // Not to be picked: the gizmo looks for its handles itself.
-    this.root.userData["ground"] = true;
+    this.root.userData.ground = true;
     scene.add(this.root);
   }
 
@@ -53,7 +56,13 @@ export class Picture {
       const key = keyOf(handle);
       if (this.parts.has(key)) continue;
       const color = handle.do === "free" ? PLAIN : COLOURS[handle.axis];
-      const material = new MeshBasicMaterial({ color, depthTest: false, transparent: true, opacity: 0.95, side: DoubleSide });
+      const material = new MeshBasicMaterial({
+        color,
+        depthTest: false,
+        transparent: true,
+        opacity: 0.95,
+        side: DoubleSide,
+      });
       if (handle.do === "plane") material.opacity = 0.55;
       const group = shape(handle, material);
       group.traverse((each) => {
@@ -69,7 +78,13 @@ export class Picture {
     for (const [each, { material, color }] of this.parts) material.color.copy(each === key ? LIT : color);
   }
 
-  place(at: Vector3, turned: Quaternion, scale: number, half: Record<Axis, number>, short: (handle: Handle) => boolean): void {
+  place(
+    at: Vector3,
+    turned: Quaternion,
+    scale: number,
+    half: Record<Axis, number>,
+    short: (handle: Handle) => boolean,
+  ): void {
     this.root.position.copy(at);
     this.root.quaternion.copy(turned);
     this.root.scale.setScalar(scale);
@@ -97,7 +112,11 @@ function shape(handle: Handle, material: MeshBasicMaterial): Group {
     case "axis": {
       const [from, to] = SHAFT;
       const upright = towards(handle.axis);
-      add(new CylinderGeometry(0.02, 0.02, to - from - 0.16, 8).translate(0, (from + to - 0.16) / 2, 0).applyMatrix4(upright));
+      add(
+        new CylinderGeometry(0.02, 0.02, to - from - 0.16, 8)
+          .translate(0, (from + to - 0.16) / 2, 0)
+          .applyMatrix4(upright),
+      );
       add(new ConeGeometry(0.075, 0.2, 16).translate(0, to - 0.08, 0).applyMatrix4(upright));
       const letter = new Sprite(new SpriteMaterial({ map: letterOf(handle.axis), depthTest: false }));
       letter.scale.setScalar(0.2);

@@ -19,12 +19,20 @@ function file(names: string[], extras: object, coloured: string[] = []): ArrayBu
   const bytes = (array: ArrayBufferView) => new Uint8Array(array.buffer as ArrayBuffer);
   const meshes = names.map((name) => {
     const attributes: Record<string, number> = {
-      POSITION: add(bytes(new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 2])), { componentType: 5126, count: 3, type: "VEC3" }),
-      NORMAL: add(bytes(new Int8Array([0, 0, 127, 0, 127, 0, 0, 0, 0, 0, -127, 0])), { componentType: 5120, count: 3, type: "VEC3", normalized: true }, 4),
+      POSITION: add(bytes(new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 2])), {
+        componentType: 5126,
+        count: 3,
+        type: "VEC3",
+      }),
+      NORMAL: add(
+        bytes(new Int8Array([0, 0, 127, 0, 127, 0, 0, 0, 0, 0, -127, 0])),
+        { componentType: 5120, count: 3, type: "VEC3", normalized: true },
+        4,
+      ),
     };
     if (coloured.includes(name)) {
       const red = new Uint16Array([65535, 0, 0, 65535, 65535, 0, 0, 65535, 65535, 0, 0, 65535]);
-      attributes["COLOR_0"] = add(bytes(red), { componentType: 5123, count: 3, type: "VEC4", normalized: true });
+      attributes.COLOR_0 = add(bytes(red), { componentType: 5123, count: 3, type: "VEC4", normalized: true });
     }
     const indices = add(bytes(new Uint16Array([0, 1, 2])), { componentType: 5123, count: 3, type: "SCALAR" });
     return { name, primitives: [{ attributes, indices }] };

@@ -37,13 +37,16 @@ const NAMES = { POSITION: "position", NORMAL: "normal", COLOR_0: "color" } as co
 /** Read a file; throws for what is none. The geometries hold the file's own memory. */
 export function readGlb(content: ArrayBuffer): Shown {
   const head = new DataView(content);
-  if (content.byteLength < 20 || head.getUint32(0, true) !== 0x46546c67) throw new Error("what the server gave is no binary glTF");
+  if (content.byteLength < 20 || head.getUint32(0, true) !== 0x46546c67)
+    throw new Error("what the server gave is no binary glTF");
   const length = head.getUint32(12, true);
   const told = JSON.parse(new TextDecoder().decode(new Uint8Array(content, 20, length))) as Told;
   const start = 20 + length + 8;
 
   const attribute = (number: number): BufferAttribute => {
+    // biome-ignore lint/correctness/noUnsafeOptionalChaining: a damaged file throws, and is reported.
     const { bufferView, componentType, count, type, normalized } = told.accessors?.[number] as Accessor;
+    // biome-ignore lint/correctness/noUnsafeOptionalChaining: a damaged file throws, and is reported.
     const { byteOffset, byteStride } = told.bufferViews?.[bufferView] as { byteOffset: number; byteStride?: number };
     const kind = ARRAYS[componentType];
     // What is padded is taken with its padding: shaders pass over what they do not ask for.

@@ -22,7 +22,9 @@ export function loadRobot(content: ArrayBuffer, { plain, coloured }: RobotMateri
   const { meshes, extras } = readGlb(content);
   if (extras.urdf === undefined) throw new Error("it is no robot");
   // The loader takes the scheme away before it asks.
-  const named = new Map(Object.entries(extras.meshes ?? {}).map(([reference, name]) => [reference.replace(/^package:\/\//, ""), name]));
+  const named = new Map(
+    Object.entries(extras.meshes ?? {}).map(([reference, name]) => [reference.replace(/^package:\/\//, ""), name]),
+  );
   const loader = new URDFLoader(new LoadingManager());
   loader.packages = (packageName: string) => packageName;
   loader.loadMeshCb = (path, _manager, _material, done) => {
@@ -45,7 +47,8 @@ function joinShapes(link: URDFLink): void {
   link.updateWorldMatrix(true, true);
   const base = link.matrixWorld.clone().invert();
   const pieces: Mesh[] = [];
-  for (const each of link.children) if ((each as Partial<URDFVisual>).isURDFVisual) each.traverse((one) => void (isShape(one) && pieces.push(one)));
+  for (const each of link.children)
+    if ((each as Partial<URDFVisual>).isURDFVisual) each.traverse((one) => void (isShape(one) && pieces.push(one)));
   if (pieces.length === 0) return;
   const shapes = pieces.map(({ geometry, matrixWorld }) => {
     // The loader's balls have as many triangles as a whole robot needs.

@@ -1,8 +1,8 @@
 import { Group, Object3D, Vector3 } from "three";
 import type { URDFRobot } from "urdf-loader";
 import { expect, it } from "vitest";
-import { setPose } from "../poses";
 import { LIGHT } from "../palette";
+import { setPose } from "../poses";
 import { GhostRobot } from "./ghost";
 
 const model = () => Object.assign(new Object3D(), { joints: {} }) as unknown as URDFRobot;

@@ -45,7 +45,10 @@ export class GhostRobot {
 
   /** What it shows, for tests. */
   get joints(): Record<string, number> | null {
-    return this.robot && Object.fromEntries(Object.entries(this.robot.joints).map(([name, joint]) => [name, Number(joint.angle)]));
+    return (
+      this.robot &&
+      Object.fromEntries(Object.entries(this.robot.joints).map(([name, joint]) => [name, Number(joint.angle)]))
+    );
   }
 
   dispose(): void {
@@ -62,7 +65,11 @@ export class GhostRobot {
     setPose(frame, at);
     frame.updateMatrix();
     host.updateWorldMatrix(true, false);
-    inverse.copy(host.matrixWorld).invert().multiply(frame.matrix).decompose(frame.position, frame.quaternion, frame.scale);
+    inverse
+      .copy(host.matrixWorld)
+      .invert()
+      .multiply(frame.matrix)
+      .decompose(frame.position, frame.quaternion, frame.scale);
   }
 
   private remove(): void {

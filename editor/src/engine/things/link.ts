@@ -18,7 +18,7 @@ import {
 } from "three";
 import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 import type { LinkItem } from "../items";
-import { ownedBy, Thing, type Context } from "../thing";
+import { type Context, ownedBy, Thing } from "../thing";
 
 /** m. */
 const RADIUS = 0.0028;
@@ -65,9 +65,11 @@ export class LinkThing extends Thing<LinkItem> {
       this.label?.material.map?.dispose();
       this.label?.material.dispose();
       this.label?.removeFromParent();
-      this.label = item.condition ? text(item.condition, `#${color.getHexString()}`, `#${palette.background.getHexString()}`) : null;
+      this.label = item.condition
+        ? text(item.condition, `#${color.getHexString()}`, `#${palette.background.getHexString()}`)
+        : null;
       if (this.label) {
-        this.label.userData["item"] = item.id;
+        this.label.userData.item = item.id;
         this.root.add(this.label);
         this.drawn = "";
       }

@@ -12,13 +12,13 @@ import {
   Mesh,
   OctahedronGeometry,
   SphereGeometry,
-  Vector3,
+  type Vector3,
 } from "three";
 import type { ObjectItem, Shape } from "../items";
 import { readMesh } from "../loaders/glb";
 import { setPose } from "../poses";
 import { surface } from "../surface";
-import { disposeTree, ownedBy, seenThrough, Thing, type Context } from "../thing";
+import { type Context, disposeTree, ownedBy, seenThrough, Thing } from "../thing";
 
 export class ObjectThing extends Thing<ObjectItem> {
   readonly root = new Group();
@@ -46,7 +46,13 @@ export class ObjectThing extends Thing<ObjectItem> {
       this.build(item.shape);
     }
     const { palette } = this.context;
-    const color = item.selected ? palette.selected : item.trouble || this.reason ? palette.trouble : item.lockedBy ? palette.locked : null;
+    const color = item.selected
+      ? palette.selected
+      : item.trouble || this.reason
+        ? palette.trouble
+        : item.lockedBy
+          ? palette.locked
+          : null;
     // A mesh with colours of its own has these, until there is something to tell.
     if (color || !this.coloured) this.material.color.copy(color ?? palette.object);
     else this.material.color.setRGB(1, 1, 1);
@@ -82,7 +88,7 @@ export class ObjectThing extends Thing<ObjectItem> {
     this.reason = "";
     for (const child of [...this.root.children]) {
       // Items that hang on this one stay.
-      if (child.userData["item"] !== this.item.id) continue;
+      if (child.userData.item !== this.item.id) continue;
       child.removeFromParent();
       disposeTree(child);
     }

@@ -1,11 +1,21 @@
 /** An orientation of a point: an arrow the way the tool points; where reachability is known, its colour and shape tell. */
 
-import { type BufferGeometry, ConeGeometry, CylinderGeometry, Matrix4, MeshLambertMaterial, Object3D, OctahedronGeometry, TorusGeometry, Vector3 } from "three";
+import {
+  type BufferGeometry,
+  ConeGeometry,
+  CylinderGeometry,
+  Matrix4,
+  MeshLambertMaterial,
+  Object3D,
+  OctahedronGeometry,
+  TorusGeometry,
+  type Vector3,
+} from "three";
 import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 import type { Batch, Instance } from "../batches";
 import type { OrientationItem } from "../items";
 import { setOrientation } from "../poses";
-import { Thing, type Context } from "../thing";
+import { type Context, Thing } from "../thing";
 
 /** m: an arrow along z, which is where tools point. */
 const LENGTH = 0.05;
@@ -29,7 +39,11 @@ const HEADS: Record<string, () => BufferGeometry> = {
     ),
   in_collision: () => merged(shaft(), new OctahedronGeometry(0.009).translate(0, 0, LENGTH)),
   out_of_reach: () =>
-    merged(shaft(), new CylinderGeometry(0.002, 0.002, 0.028, 6).translate(0, 0, LENGTH), new CylinderGeometry(0.002, 0.002, 0.028, 6).rotateZ(Math.PI / 2).translate(0, 0, LENGTH)),
+    merged(
+      shaft(),
+      new CylinderGeometry(0.002, 0.002, 0.028, 6).translate(0, 0, LENGTH),
+      new CylinderGeometry(0.002, 0.002, 0.028, 6).rotateZ(Math.PI / 2).translate(0, 0, LENGTH),
+    ),
 };
 
 export class OrientationThing extends Thing<OrientationItem> {

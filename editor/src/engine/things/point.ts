@@ -4,7 +4,7 @@ import { Matrix4, MeshLambertMaterial, Object3D, SphereGeometry, Vector3 } from 
 import type { Batch, Instance } from "../batches";
 import type { PointItem } from "../items";
 import { setPosition } from "../poses";
-import { Thing, type Context } from "../thing";
+import { type Context, Thing } from "../thing";
 
 const RADIUS = 0.012;
 /** Pixels: the least radius on the screen; it grows by steps, and so many times at most. */
@@ -22,7 +22,11 @@ export class PointThing extends Thing<PointItem> {
   constructor(item: PointItem, context: Context) {
     super(context);
     this.item = item;
-    this.batch = context.batches.of("point", () => [new SphereGeometry(RADIUS, 14, 10), new MeshLambertMaterial()], RADIUS);
+    this.batch = context.batches.of(
+      "point",
+      () => [new SphereGeometry(RADIUS, 14, 10), new MeshLambertMaterial()],
+      RADIUS,
+    );
     this.instance = { id: item.id, frame: this.root, offset: new Matrix4(), color: context.palette.point };
     this.batch.add(this.instance);
   }

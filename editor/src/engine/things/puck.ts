@@ -3,11 +3,21 @@
  * them. From afar they grow, so that they stay as large as fingers need.
  */
 
-import { type BufferGeometry, CylinderGeometry, Matrix4, MeshLambertMaterial, Object3D, OctahedronGeometry, SphereGeometry, TorusGeometry, Vector3 } from "three";
+import {
+  type BufferGeometry,
+  CylinderGeometry,
+  Matrix4,
+  MeshLambertMaterial,
+  Object3D,
+  OctahedronGeometry,
+  SphereGeometry,
+  TorusGeometry,
+  Vector3,
+} from "three";
 import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 import type { Batch, Instance } from "../batches";
 import type { PuckItem, ReachShown } from "../items";
-import { Thing, type Context } from "../thing";
+import { type Context, Thing } from "../thing";
 
 /** m: radius of a puck, of START and END, height of the first one above its point, and from one to the next. */
 const RADIUS = 0.018;
@@ -37,7 +47,11 @@ const SIGNS: Partial<Record<ReachShown, () => BufferGeometry>> = {
   out_of_reach: cross,
 };
 
-const REASONS: Partial<Record<ReachShown, string>> = { near_limit: "near a limit", in_collision: "in collision", out_of_reach: "out of reach" };
+const REASONS: Partial<Record<ReachShown, string>> = {
+  near_limit: "near a limit",
+  in_collision: "in collision",
+  out_of_reach: "out of reach",
+};
 
 export class PuckThing extends Thing<PuckItem> {
   readonly root = new Object3D();
@@ -53,7 +67,9 @@ export class PuckThing extends Thing<PuckItem> {
     this.item = item;
     const edge = item.role === "action";
     this.batch = context.batches.of(edge ? "puck" : "start and end", () => [
-      (edge ? new CylinderGeometry(RADIUS, RADIUS, 0.01, 24) : new CylinderGeometry(BORDER, BORDER, 0.014, 6)).rotateX(Math.PI / 2),
+      (edge ? new CylinderGeometry(RADIUS, RADIUS, 0.01, 24) : new CylinderGeometry(BORDER, BORDER, 0.014, 6)).rotateX(
+        Math.PI / 2,
+      ),
       new MeshLambertMaterial(),
     ]);
     this.instance = { id: item.id, frame: this.root, offset: new Matrix4(), color: context.palette.point };
@@ -105,7 +121,8 @@ export class PuckThing extends Thing<PuckItem> {
   }
 
   override resized(): boolean {
-    const wanted = (LEAST * this.context.metresPerPixel(this.anchor(up))) / (this.item.role === "action" ? RADIUS : BORDER);
+    const wanted =
+      (LEAST * this.context.metresPerPixel(this.anchor(up))) / (this.item.role === "action" ? RADIUS : BORDER);
     const grown = Math.min(MOST, Math.max(1, 2 ** (Math.ceil(Math.log2(wanted) * 2) / 2)));
     if (grown === this.grown) return false;
     this.grown = grown;

@@ -1,21 +1,12 @@
 /** A robot: its URDF moved by live joints, or a stand-in; a frame at each end effector; greyed when nothing is heard. */
 
-import {
-  AxesHelper,
-  CylinderGeometry,
-  Group,
-  Matrix4,
-  Mesh,
-  type Object3D,
-  SphereGeometry,
-  Vector3,
-} from "three";
+import { AxesHelper, CylinderGeometry, Group, Matrix4, Mesh, type Object3D, SphereGeometry, Vector3 } from "three";
 import type { URDFRobot } from "urdf-loader";
 import { STALE, STILL } from "../../store/telemetry";
 import type { RobotItem } from "../items";
 import { setPose } from "../poses";
 import { surface } from "../surface";
-import { disposeTree, ownedBy, seenThrough, Thing, type Context } from "../thing";
+import { type Context, disposeTree, ownedBy, seenThrough, Thing } from "../thing";
 import { GhostRobot } from "./ghost";
 
 /** How far a joint goes, rad, m where prismatic. */
@@ -77,7 +68,12 @@ export class RobotThing extends Thing<RobotItem> {
       .map(([name, joint]) => {
         const endless = joint.jointType === "continuous";
         const lower = endless ? -2 * Math.PI : Number(joint.limit.lower);
-        return { name, lower, upper: endless ? 2 * Math.PI : Number(joint.limit.upper), prismatic: joint.jointType === "prismatic" };
+        return {
+          name,
+          lower,
+          upper: endless ? 2 * Math.PI : Number(joint.limit.upper),
+          prismatic: joint.jointType === "prismatic",
+        };
       });
   }
 
@@ -175,7 +171,11 @@ export class RobotThing extends Thing<RobotItem> {
       // Reported in the world; the robot's own frame may be another.
       setPose(frame, pose);
       frame.updateMatrix();
-      inverse.copy(this.root.matrixWorld).invert().multiply(frame.matrix).decompose(frame.position, frame.quaternion, frame.scale);
+      inverse
+        .copy(this.root.matrixWorld)
+        .invert()
+        .multiply(frame.matrix)
+        .decompose(frame.position, frame.quaternion, frame.scale);
     }
     for (const [key, frame] of this.tips) {
       if (seen.has(key)) continue;
@@ -201,7 +201,8 @@ export class RobotThing extends Thing<RobotItem> {
     }
     if (!current()) return;
     this.reason = reason;
-    if (reason) this.context.trouble(`${this.item.name} is shown ${robot ? "in part" : "without its shape"}. ${reason}`);
+    if (reason)
+      this.context.trouble(`${this.item.name} is shown ${robot ? "in part" : "without its shape"}. ${reason}`);
     for (const child of [...this.body.children]) {
       child.removeFromParent();
       disposeTree(child);
@@ -217,8 +218,14 @@ export class RobotThing extends Thing<RobotItem> {
 
   /** A foot and a column: a robot stands here, and its type has no model. */
   private standIn(): Object3D {
-    const foot = new Mesh(new CylinderGeometry(0.09, 0.1, 0.05, 32).rotateX(Math.PI / 2).translate(0, 0, 0.025), this.material);
-    const column = new Mesh(new CylinderGeometry(0.055, 0.065, 0.14, 32).rotateX(Math.PI / 2).translate(0, 0, 0.12), this.material);
+    const foot = new Mesh(
+      new CylinderGeometry(0.09, 0.1, 0.05, 32).rotateX(Math.PI / 2).translate(0, 0, 0.025),
+      this.material,
+    );
+    const column = new Mesh(
+      new CylinderGeometry(0.055, 0.065, 0.14, 32).rotateX(Math.PI / 2).translate(0, 0, 0.12),
+      this.material,
+    );
     const head = new Mesh(new SphereGeometry(0.07, 24, 16).translate(0, 0, 0.2), this.material);
     return new Group().add(foot, column, head);
   }

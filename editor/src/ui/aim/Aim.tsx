@@ -1,9 +1,9 @@
 /** The cross in the middle of the view, what it means, and the next that it may mean. */
 
 import { useEffect, useRef } from "react";
+import { keepGeneral } from "../../commands/viewstate";
 import { bearingOf } from "../../engine/bearing";
 import type { Engine } from "../../engine/engine";
-import { keepGeneral } from "../../commands/viewstate";
 import { followCross, nextCandidate, useAiming } from "../../session/aiming";
 import { now, useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
@@ -29,7 +29,8 @@ export function Aim({ engine }: { engine: Engine }) {
         const place = at ? bearingOf(engine, at) : null;
         if (!mark.current) return;
         mark.current.style.visibility = place?.inView ? "visible" : "hidden";
-        if (place) mark.current.style.transform = `translate(${place.x.toFixed(1)}px, ${place.y.toFixed(1)}px) translate(-50%, -50%)`;
+        if (place)
+          mark.current.style.transform = `translate(${place.x.toFixed(1)}px, ${place.y.toFixed(1)}px) translate(-50%, -50%)`;
       }),
     [engine],
   );
@@ -37,10 +38,12 @@ export function Aim({ engine }: { engine: Engine }) {
   useEffect(() => engine.invalidate(), [engine, chosen]);
   useEffect(() => {
     const key = (event: KeyboardEvent) => {
-      if (event.ctrlKey || event.metaKey || event.altKey || writing(event.target) || document.querySelector(".overlay")) return;
+      if (event.ctrlKey || event.metaKey || event.altKey || writing(event.target) || document.querySelector(".overlay"))
+        return;
       if (event.key.toLowerCase() === "n") nextCandidate(event.shiftKey ? -1 : 1);
       // Enter is that of what has the focus, but of the view.
-      else if (event.key === "Enter" && event.target instanceof Element && event.target.matches("body, .view canvas")) takeCandidate();
+      else if (event.key === "Enter" && event.target instanceof Element && event.target.matches("body, .view canvas"))
+        takeCandidate();
       else return;
       event.preventDefault();
     };
@@ -63,16 +66,33 @@ export function Aim({ engine }: { engine: Engine }) {
             <small className="quiet">Nothing near</small>
           )}
         </span>
-        <Button look="primary" aria-label={name ? `Select ${name}` : "Select"} why={chosen ? "" : NOTHING} onPress={takeCandidate}>
+        <Button
+          look="primary"
+          aria-label={name ? `Select ${name}` : "Select"}
+          why={chosen ? "" : NOTHING}
+          onPress={takeCandidate}
+        >
           Select
         </Button>
-        <Button aria-label={`Next ${at}/${candidates.length}, of what is at the cross`} aria-keyshortcuts="N" why={candidates.length > 1 ? "" : chosen ? "Nothing else is near the cross." : NOTHING} onPress={() => nextCandidate()}>
+        <Button
+          aria-label={`Next ${at}/${candidates.length}, of what is at the cross`}
+          aria-keyshortcuts="N"
+          why={candidates.length > 1 ? "" : chosen ? "Nothing else is near the cross." : NOTHING}
+          onPress={() => nextCandidate()}
+        >
           Next{" "}
           <small>
             {at}/{candidates.length}
           </small>
         </Button>
-        {!listed && <Button look="plain" icon="close" aria-label="No more picking by the cross" onPress={() => keepGeneral({ aiming: null })} />}
+        {!listed && (
+          <Button
+            look="plain"
+            icon="close"
+            aria-label="No more picking by the cross"
+            onPress={() => keepGeneral({ aiming: null })}
+          />
+        )}
       </div>
     </>
   );

@@ -31,8 +31,25 @@ export function OffScreen({ engine }: { engine: Engine }) {
   }, [engine, id, away]);
   if (!away) return null;
   return (
-    <button ref={button} type="button" className="off-screen" aria-label={`Look at ${name || "what is selected"}, which is out of the view`} title={name} onClick={() => lookAt(engine, id)}>
-      <svg width="26" height="26" viewBox="0 0 24 24" fill="none" stroke="currentColor" strokeWidth="2.500" strokeLinecap="round" strokeLinejoin="round" aria-hidden="true">
+    <button
+      ref={button}
+      type="button"
+      className="off-screen"
+      aria-label={`Look at ${name || "what is selected"}, which is out of the view`}
+      title={name}
+      onClick={() => lookAt(engine, id)}
+    >
+      <svg
+        width="26"
+        height="26"
+        viewBox="0 0 24 24"
+        fill="none"
+        stroke="currentColor"
+        strokeWidth="2.500"
+        strokeLinecap="round"
+        strokeLinejoin="round"
+        aria-hidden="true"
+      >
         <path d="M3 12h17M13 5l7 7-7 7" />
       </svg>
     </button>
@@ -44,5 +61,10 @@ function taken(view: DOMRect): Rect[] {
   return [...document.querySelectorAll(OTHERS)]
     .map((each) => each.getBoundingClientRect())
     .filter((box) => box.width > 0)
-    .map((box) => ({ left: box.left - view.left, top: box.top - view.top, right: box.right - view.left, bottom: box.bottom - view.top }));
+    .map((box) => ({
+      left: box.left - view.left,
+      top: box.top - view.top,
+      right: box.right - view.left,
+      bottom: box.bottom - view.top,
+    }));
 }

@@ -16,11 +16,18 @@ const INSETS = [34, 104, 174];
  * Give the middle of an arrow towards a place outside of a view, where it covers nothing of what is at its edge, and
  * its angle in degrees, to the right 0, downwards 90. It is moved along its edge as little as that needs, or inwards.
  */
-export function atEdge(to: { x: number; y: number }, width: number, height: number, taken: readonly Rect[]): { x: number; y: number; angle: number } {
+export function atEdge(
+  to: { x: number; y: number },
+  width: number,
+  height: number,
+  taken: readonly Rect[],
+): { x: number; y: number; angle: number } {
   const [dx, dy] = [to.x - width / 2, to.y - height / 2];
   const angle = (Math.atan2(dy, dx) * 180) / Math.PI;
   const free = ({ x, y }: { x: number; y: number }) =>
-    !taken.some((each) => x + HALF > each.left && x - HALF < each.right && y + HALF > each.top && y - HALF < each.bottom);
+    !taken.some(
+      (each) => x + HALF > each.left && x - HALF < each.right && y + HALF > each.top && y - HALF < each.bottom,
+    );
   let first: { x: number; y: number } | null = null;
   for (const inset of INSETS) {
     const [wide, tall] = [Math.max(1, width / 2 - inset), Math.max(1, height / 2 - inset)];

@@ -53,7 +53,9 @@ async function fit(known: readonly Position[]): Promise<void> {
 
 const AimWizard: Section["Body"] = ({ selection: { id } }) => {
   const chosen = useEditor(chosenRobot);
-  const known = useEditor((state) => state.types.byName[state.doc?.objects[id]?.type ?? ""]?.object_model?.mesh?.focus_points);
+  const known = useEditor(
+    (state) => state.types.byName[state.doc?.objects[id]?.type ?? ""]?.object_model?.mesh?.focus_points,
+  );
   const points = known?.length ?? 0;
   const why = useWhyNot(id, "ObjectAimingStart");
   const noRobot = useEditor((state) => notReady(state, chosen, "ObjectAimingStart"));
@@ -110,11 +112,17 @@ const AimWizard: Section["Body"] = ({ selection: { id } }) => {
   };
   return (
     <>
-      <p role="status">{next < 0 ? "All points are taken." : `Point ${next + 1} of ${points}: put the tool's tip on it.`}</p>
+      <p role="status">
+        {next < 0 ? "All points are taken." : `Point ${next + 1} of ${points}: put the tool's tip on it.`}
+      </p>
       <ol className="focus-points">
         {Array.from({ length: points }, (_, n) => (
           <li key={n}>
-            <Button look={n === next ? "primary" : ""} icon={done.includes(n) ? "check" : "point"} onPress={() => void trying(() => take(n))}>
+            <Button
+              look={n === next ? "primary" : ""}
+              icon={done.includes(n) ? "check" : "point"}
+              onPress={() => void trying(() => take(n))}
+            >
               {done.includes(n) ? `Take point ${n + 1} again` : `The tool is on point ${n + 1}`}
             </Button>
           </li>
@@ -122,7 +130,13 @@ const AimWizard: Section["Body"] = ({ selection: { id } }) => {
       </ol>
       {fitted && <FitSoFar {...fitted} />}
       <div className="actions start">
-        <Button look="primary" why={next < 0 ? "" : `Point ${next + 1} is missing.`} onPress={() => void trying(async () => aiming.done().then(() => end("It stands where its points were found.")))}>
+        <Button
+          look="primary"
+          why={next < 0 ? "" : `Point ${next + 1} is missing.`}
+          onPress={() =>
+            void trying(async () => aiming.done().then(() => end("It stands where its points were found.")))
+          }
+        >
           Put it there
         </Button>
         <Button onPress={() => void aiming.cancel().then(() => end(""))}>Give up</Button>

@@ -39,7 +39,11 @@ export function BeforeAfter({ id }: { id: string }) {
         <Button look="primary" onPress={keepPlace}>
           Keep the new place
         </Button>
-        <Button why={why} isDisabled={busy} onPress={() => void ask(placeAt(id, was)).then((done) => done && keepPlace())}>
+        <Button
+          why={why}
+          isDisabled={busy}
+          onPress={() => void ask(placeAt(id, was)).then((done) => done && keepPlace())}
+        >
           Put it back
         </Button>
       </div>

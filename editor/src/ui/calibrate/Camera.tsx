@@ -66,7 +66,13 @@ const Camera: Section["Body"] = ({ selection: { id } }) => {
         </OnOff>
       </div>
       <RefusedText>{failed}</RefusedText>
-      <Button icon="point" className="wraps" why={why || offline} isDisabled={busy} onPress={() => void ask(calibrateCamera(id))}>
+      <Button
+        icon="point"
+        className="wraps"
+        why={why || offline}
+        isDisabled={busy}
+        onPress={() => void ask(calibrateCamera(id))}
+      >
         Find where it stands by markers
       </Button>
       <RefusedText>{refused}</RefusedText>

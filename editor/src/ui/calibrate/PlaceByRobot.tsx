@@ -1,8 +1,8 @@
 /** Where an object stands, shown by the robot: one touch with a straight tool, or three points of its frame. */
 
 import { useEffect, useState } from "react";
-import { frameByAxes, hideAtTool, placeAt, placeByRobot, showAtTool } from "../../commands/calibrate";
 import { refusal } from "../../commands/asking";
+import { frameByAxes, hideAtTool, placeAt, placeByRobot, showAtTool } from "../../commands/calibrate";
 import { chosenRobot, effectorPose, notReady } from "../../commands/robot";
 import type { Pivot, Position } from "../../protocol/types";
 import { now, useEditor } from "../../store/store";
@@ -35,7 +35,12 @@ const PlaceByRobot: Section["Body"] = ({ selection: { id } }) => {
       <RobotChooser />
       <OneOf label="The tool touches" value={pivot} choices={PIVOTS} onChange={setPivot} />
       <Preview key={id} id={id} pivot={pivot} why={why || noRobot} />
-      <Button icon="robot" why={why || noRobot} isDisabled={busy} onPress={() => chosen && void ask(placeByRobot(id, chosen, pivot))}>
+      <Button
+        icon="robot"
+        why={why || noRobot}
+        isDisabled={busy}
+        onPress={() => chosen && void ask(placeByRobot(id, chosen, pivot))}
+      >
         It stands where the tool is
       </Button>
       <RefusedText>{refused}</RefusedText>
@@ -100,7 +105,12 @@ function ThreePoints({ id, why }: { id: string; why: string }) {
           </Button>
         ))}
       </div>
-      <Button look="primary" why={why || (origin && onX && inPlane ? "" : "Touch all three points first.")} isDisabled={busy} onPress={() => void ask(place())}>
+      <Button
+        look="primary"
+        why={why || (origin && onX && inPlane ? "" : "Touch all three points first.")}
+        isDisabled={busy}
+        onPress={() => void ask(place())}
+      >
         Put it there
       </Button>
       {verdict && (

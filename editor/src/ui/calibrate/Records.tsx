@@ -9,7 +9,9 @@ import "./calibrate.css";
 
 export function Records({ id }: { id: string }) {
   const name = useEditor((state) => nameOf(state, id));
-  const task = useEditor((state) => Object.values(state.tasks).findLast((each) => each.kind === "calibration" && each.title.includes(name)));
+  const task = useEditor((state) =>
+    Object.values(state.tasks).findLast((each) => each.kind === "calibration" && each.title.includes(name)),
+  );
   const [records, setRecords] = useState<CalibrationRecord[]>([]);
   const state = task?.state ?? "";
   useEffect(() => {

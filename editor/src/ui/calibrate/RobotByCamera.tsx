@@ -14,8 +14,18 @@ import type { Section } from "../workplace/sections";
 import { Records } from "./Records";
 
 const RobotByCamera: Section["Body"] = ({ selection: { id } }) => {
-  const cameras = useEditor((state) => Object.values(state.doc?.objects ?? {}).filter((each) => derivesFrom(state, each.type, "Camera")).map((each) => each.id).join("\n"));
-  const names = useEditor((state) => cameras.split("\n").map((each) => nameOf(state, each)).join("\n")).split("\n");
+  const cameras = useEditor((state) =>
+    Object.values(state.doc?.objects ?? {})
+      .filter((each) => derivesFrom(state, each.type, "Camera"))
+      .map((each) => each.id)
+      .join("\n"),
+  );
+  const names = useEditor((state) =>
+    cameras
+      .split("\n")
+      .map((each) => nameOf(state, each))
+      .join("\n"),
+  ).split("\n");
   const why = useWhyNot(id, "CalibrateRobot");
   const offline = useEditor((state) => notReady(state, { robotId: id, armId: "", effector: "" }, "CalibrateRobot"));
   const ids = cameras ? cameras.split("\n") : [];
@@ -25,11 +35,24 @@ const RobotByCamera: Section["Body"] = ({ selection: { id } }) => {
   const camera = ids.includes(wanted) ? wanted : (ids[0] ?? "");
   return (
     <>
-      {ids.length > 1 && <Pick label="Camera" value={camera} choices={ids.map((each, n) => [each, names[n] ?? ""] as const)} onChange={setWanted} />}
+      {ids.length > 1 && (
+        <Pick
+          label="Camera"
+          value={camera}
+          choices={ids.map((each, n) => [each, names[n] ?? ""] as const)}
+          onChange={setWanted}
+        />
+      )}
       <OnOff isSelected={moves} onChange={setMoves}>
         Let it move to where it is seen well
       </OnOff>
-      <Button icon="robot" className="wraps" why={why || offline || (camera ? "" : "There is no camera in this scene.")} isDisabled={busy} onPress={() => void ask(calibrateRobot(id, camera, moves))}>
+      <Button
+        icon="robot"
+        className="wraps"
+        why={why || offline || (camera ? "" : "There is no camera in this scene.")}
+        isDisabled={busy}
+        onPress={() => void ask(calibrateRobot(id, camera, moves))}
+      >
         {camera ? `Find where it stands by ${names[ids.indexOf(camera)] ?? "the camera"}` : "Find where it stands"}
       </Button>
       <RefusedText>{refused}</RefusedText>

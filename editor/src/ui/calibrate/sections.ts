@@ -26,11 +26,21 @@ export const calibrateSections: readonly Section[] = [
     },
     Body: lazily(() => import("./Camera")),
   },
-  { id: "robot-by-camera", title: "Calibration", applies: inScene(isRobot), Body: lazily(() => import("./RobotByCamera")) },
+  {
+    id: "robot-by-camera",
+    title: "Calibration",
+    applies: inScene(isRobot),
+    Body: lazily(() => import("./RobotByCamera")),
+  },
   {
     id: "aim",
     title: "Aim at it",
-    applies: inScene((state, { type, pose }) => pose !== undefined && hasRobots(state) && (state.types.byName[type]?.object_model?.mesh?.focus_points?.length ?? 0) > 0),
+    applies: inScene(
+      (state, { type, pose }) =>
+        pose !== undefined &&
+        hasRobots(state) &&
+        (state.types.byName[type]?.object_model?.mesh?.focus_points?.length ?? 0) > 0,
+    ),
     Body: lazily(() => import("./AimWizard")),
   },
   {

@@ -1,8 +1,8 @@
 /** The program as the Python that runs, made by the server from what is saved. It is read, not edited. */
 
 import { useCallback, useEffect, useMemo, useState } from "react";
-import * as documents from "../../commands/documents";
 import { barred } from "../../commands/asking";
+import * as documents from "../../commands/documents";
 import { remembered } from "../../session/memory";
 import { isRunning } from "../../store/selectors";
 import { select, tell, useEditor } from "../../store/store";
@@ -31,8 +31,12 @@ export default function CodeView() {
   const actions = useEditor((state) => state.doc?.actions);
   const selected = useEditor((state) => state.doc?.actions[state.ui.selection?.id ?? ""]?.name ?? "");
   const running = useEditor(isRunning);
-  const runningNames = useEditor((state) => state.program.running.map((each) => state.doc?.actions[each]?.name ?? "").join("\n"));
-  const cannotSave = useEditor((state) => barred(state, "SaveProject") || (isRunning(state) ? "The program runs." : ""));
+  const runningNames = useEditor((state) =>
+    state.program.running.map((each) => state.doc?.actions[each]?.name ?? "").join("\n"),
+  );
+  const cannotSave = useEditor(
+    (state) => barred(state, "SaveProject") || (isRunning(state) ? "The program runs." : ""),
+  );
   const [code, setCode] = useState<Code | null>(null);
   const load = useCallback(() => {
     let ended = false;
@@ -85,7 +89,13 @@ export default function CodeView() {
               {lines.map((line, index) => {
                 const called = line.map((each) => actionIn(each.text, byName)).find(Boolean) ?? "";
                 return (
-                  <li key={index} data-selected={called !== "" && called === selected} data-running={lit.has(called)} data-action={called || undefined} onClick={() => called && select({ kind: "action", id: byName.get(called) ?? "" })}>
+                  <li
+                    key={index}
+                    data-selected={called !== "" && called === selected}
+                    data-running={lit.has(called)}
+                    data-action={called || undefined}
+                    onClick={() => called && select({ kind: "action", id: byName.get(called) ?? "" })}
+                  >
                     {line.map((each, at) => (
                       <span key={at} className={each.kind}>
                         {each.text}

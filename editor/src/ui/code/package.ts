@@ -11,7 +11,11 @@ export async function textOfZip(content: ArrayBuffer, name: string): Promise<str
   if (end < 0) throw new Error("The server did not give a package.");
   let at = view.getUint32(end + 16, true);
   for (let left = view.getUint16(end + 10, true); left > 0 && view.getUint32(at, true) === ENTRY; left--) {
-    const [nameSize, extra, comment] = [28, 30, 32].map((offset) => view.getUint16(at + offset, true)) as [number, number, number];
+    const [nameSize, extra, comment] = [28, 30, 32].map((offset) => view.getUint16(at + offset, true)) as [
+      number,
+      number,
+      number,
+    ];
     if (new TextDecoder().decode(new Uint8Array(content, at + 46, nameSize)) === name) {
       const size = view.getUint32(at + 20, true);
       const local = view.getUint32(at + 42, true);

@@ -5,8 +5,13 @@ export interface Piece {
   kind: "plain" | "word" | "text" | "number" | "comment" | "name";
 }
 
-const WORDS = new Set("and as assert async await break class continue def del elif else except finally for from global if import in is lambda None nonlocal not or pass raise return True False try while with yield".split(" "));
-const TOKENS = /(#.*$)|("""[\s\S]*?"""|'''[\s\S]*?'''|"(?:[^"\\\n]|\\.)*"|'(?:[^'\\\n]|\\.)*')|(\b\d[\d._e+-]*\b)|([A-Za-z_]\w*)/gm;
+const WORDS = new Set(
+  "and as assert async await break class continue def del elif else except finally for from global if import in is lambda None nonlocal not or pass raise return True False try while with yield".split(
+    " ",
+  ),
+);
+const TOKENS =
+  /(#.*$)|("""[\s\S]*?"""|'''[\s\S]*?'''|"(?:[^"\\\n]|\\.)*"|'(?:[^'\\\n]|\\.)*')|(\b\d[\d._e+-]*\b)|([A-Za-z_]\w*)/gm;
 
 /** Lines of pieces; a text over several lines is a text in each of them. */
 export function pieces(source: string): Piece[][] {
@@ -21,7 +26,18 @@ export function pieces(source: string): Piece[][] {
   for (const found of source.matchAll(TOKENS)) {
     if (found.index > at) add(source.slice(at, found.index), "plain");
     const [text, comment, string, number] = found;
-    add(text, comment !== undefined ? "comment" : string !== undefined ? "text" : number !== undefined ? "number" : WORDS.has(text) ? "word" : "name");
+    add(
+      text,
+      comment !== undefined
+        ? "comment"
+        : string !== undefined
+          ? "text"
+          : number !== undefined
+            ? "number"
+            : WORDS.has(text)
+              ? "word"
+              : "name",
+    );
     at = found.index + text.length;
   }
   add(source.slice(at), "plain");

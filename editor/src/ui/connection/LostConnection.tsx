@@ -12,7 +12,8 @@ export function LostConnection() {
   const unsaved = useEditor((state) => state.doc?.unsaved ?? false);
   useEffect(() => {
     // What is open is told before anybody is let in.
-    if (status === "ready" && now().doc?.unsaved) tell("info", "What was changed and not saved is still here: the server has kept it.");
+    if (status === "ready" && now().doc?.unsaved)
+      tell("info", "What was changed and not saved is still here: the server has kept it.");
   }, [status]);
   if (status === "ready") return null;
   return (

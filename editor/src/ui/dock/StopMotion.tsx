@@ -51,7 +51,15 @@ export function StopMotion() {
       </svg>
       <span>
         <strong>{stopping ? "Stopping…" : "Stop motion"}</strong>
-        <small>{connected ? <>Not an emergency stop<span className="stop-key"> · Esc twice</span></> : "No connection: use the emergency stop"}</small>
+        <small>
+          {connected ? (
+            <>
+              Not an emergency stop<span className="stop-key"> · Esc twice</span>
+            </>
+          ) : (
+            "No connection: use the emergency stop"
+          )}
+        </small>
       </span>
     </button>
   );

@@ -1,19 +1,24 @@
 /** One action in the graph, with the places at which steps begin: tap one, then the action that follows; or drag. */
 
-import { Handle, type NodeProps, type Node, Position } from "@xyflow/react";
+import { Handle, type Node, type NodeProps, Position } from "@xyflow/react";
 import { beginStep, notEditable } from "../../commands/program";
 import { now, tell } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { ReachBadge } from "../points/Reach";
 import { type Box, lastIn, type Way } from "./graph";
 
-export type FlowNodeType = Node<{ box: Box; running: boolean; breakpoint: boolean; paused: boolean; trouble: string; target: boolean; from: boolean }, "box">;
+export type FlowNodeType = Node<
+  { box: Box; running: boolean; breakpoint: boolean; paused: boolean; trouble: string; target: boolean; from: boolean },
+  "box"
+>;
 
 export function FlowNode({ data }: NodeProps<FlowNodeType>) {
   const { box, running, paused, breakpoint, trouble, target, from } = data;
   return (
     <div className={`flow-node ${box.kind}`} data-running={running} data-target={target} data-from={from}>
-      {box.kind !== "start" && <Handle type="target" position={Position.Top} className="flow-into" isConnectableStart={false} aria-hidden />}
+      {box.kind !== "start" && (
+        <Handle type="target" position={Position.Top} className="flow-into" isConnectableStart={false} aria-hidden />
+      )}
       <div className="flow-name">
         {box.kind === "fold" && <Icon name="list" size={18} />}
         {breakpoint && <span className="breakpoint-dot" data-on="true" role="img" aria-label="pauses before it" />}
@@ -51,7 +56,9 @@ export function FlowNode({ data }: NodeProps<FlowNodeType>) {
             {way.label}
           </Handle>
         ))}
-        {box.ways.length === 0 && box.kind !== "end" && <Handle type="source" position={Position.Bottom} className="flow-none" isConnectable={false} aria-hidden />}
+        {box.ways.length === 0 && box.kind !== "end" && (
+          <Handle type="source" position={Position.Bottom} className="flow-none" isConnectable={false} aria-hidden />
+        )}
       </div>
     </div>
   );

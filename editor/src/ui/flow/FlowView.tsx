@@ -1,7 +1,16 @@
 /** The program as a graph. What is selected here is selected everywhere; a program that runs is followed. */
 
+import {
+  Background,
+  ControlButton,
+  Controls,
+  type Edge,
+  MarkerType,
+  ReactFlow,
+  ReactFlowProvider,
+  useReactFlow,
+} from "@xyflow/react";
 import { useEffect, useMemo, useRef } from "react";
-import { Background, ControlButton, Controls, type Edge, MarkerType, ReactFlow, ReactFlowProvider, useReactFlow } from "@xyflow/react";
 import "@xyflow/react/dist/base.css";
 import { connect, endStep, notEditable, removeAction, removeStep } from "../../commands/program";
 import { cannotLead } from "../../program/logic";
@@ -43,7 +52,10 @@ function Flow() {
   const reach = useEditor((state) => state.reach);
   const problems = useMemo(() => (doc ? problemsOf(doc, types, reach) : []), [doc, types, reach]);
   const folds = useFolds(problems);
-  const latest = useMemo(() => (doc ? graphOf(doc, types, folds.folded) : { boxes: [], lines: [] }), [doc, types, folds.folded]);
+  const latest = useMemo(
+    () => (doc ? graphOf(doc, types, folds.folded) : { boxes: [], lines: [] }),
+    [doc, types, folds.folded],
+  );
   const host = useRef<HTMLDivElement>(null);
   const graph = usePressed(host, latest);
   const { fitView } = useReactFlow();
@@ -63,7 +75,8 @@ function Flow() {
         paused,
         breakpoint: box.id in breakpoints,
         trouble: problems.find((each) => each.id === box.id)?.text ?? "",
-        target: connecting !== null && doc !== null && cannotLead(doc, connecting.from, firstIn(box), connecting.item) === "",
+        target:
+          connecting !== null && doc !== null && cannotLead(doc, connecting.from, firstIn(box), connecting.item) === "",
         from: connecting?.from === lastIn(box),
       },
     }),
@@ -96,7 +109,8 @@ function Flow() {
     void fitView(WHOLE);
   }, [size, fitView]);
 
-  const box = (id: string): Pick<Box, "id" | "kind" | "run" | "ways"> => graph.boxes.find((each) => each.id === id) ?? { id, kind: "action", run: [], ways: [] };
+  const box = (id: string): Pick<Box, "id" | "kind" | "run" | "ways"> =>
+    graph.boxes.find((each) => each.id === id) ?? { id, kind: "action", run: [], ways: [] };
 
   return (
     <div className="flow" role="region" aria-label="The program as a graph" ref={host}>
@@ -112,7 +126,9 @@ function Flow() {
         maxZoom={2}
         fitView
         fitViewOptions={WHOLE}
-        isValidConnection={({ source, target }) => doc !== null && cannotLead(doc, lastIn(box(source)), firstIn(box(target))) === ""}
+        isValidConnection={({ source, target }) =>
+          doc !== null && cannotLead(doc, lastIn(box(source)), firstIn(box(target))) === ""
+        }
         onConnect={({ source, target, sourceHandle }) => {
           const why = notEditable(now(), "AddLogicItem");
           if (why) return tell("info", why);
@@ -124,15 +140,26 @@ function Flow() {
         onPaneClick={() => (now().ui.connecting ? setUi({ connecting: null }) : select(null))}
         onNodesChange={(changes) => {
           // By the keyboard: Enter on a node that has the focus.
-          for (const change of changes) if (change.type === "select" && change.selected && change.id !== now().ui.selection?.id) choose(box(change.id));
+          for (const change of changes)
+            if (change.type === "select" && change.selected && change.id !== now().ui.selection?.id)
+              choose(box(change.id));
         }}
-        onDelete={({ nodes: gone, edges: lines }) => void remove(gone.map((each) => each.id), lines.map((each) => each.id))}
+        onDelete={({ nodes: gone, edges: lines }) =>
+          void remove(
+            gone.map((each) => each.id),
+            lines.map((each) => each.id),
+          )
+        }
         proOptions={{ hideAttribution: true }}
       >
         <Background gap={24} />
         <Controls showInteractive={false} position="bottom-left">
           {folds.runs > 0 && (
-            <ControlButton className="flow-fold-all" aria-label={folds.wished ? "Unfold all" : "Fold straight runs"} onClick={() => foldAll(!folds.wished)}>
+            <ControlButton
+              className="flow-fold-all"
+              aria-label={folds.wished ? "Unfold all" : "Fold straight runs"}
+              onClick={() => foldAll(!folds.wished)}
+            >
               {folds.wished ? "Unfold" : "Fold"}
             </ControlButton>
           )}

@@ -24,7 +24,8 @@ const keep = (ids: Iterable<string>): void => {
 /** All actions of a run are kept, so that it stays folded when its first one goes, or another comes before it. */
 export const fold = (run: readonly string[]): void => keep([...wishedOf(now().view.user[KEY]), ...run]);
 
-export const unfold = (run: readonly string[]): void => keep(wishedOf(now().view.user[KEY]).filter((id) => !run.includes(id)));
+export const unfold = (run: readonly string[]): void =>
+  keep(wishedOf(now().view.user[KEY]).filter((id) => !run.includes(id)));
 
 export function foldAll(on: boolean): void {
   const { doc } = now();
@@ -58,6 +59,10 @@ export function useFolds(problems: readonly Problem[]): Folds {
     const wished = wishedOf(kept);
     const runs = runsOf(doc);
     const seen = new Set([...last, executing, selected, from, ...problems.map((each) => each.id)]);
-    return { runs: runs.length, wished: runs.some((run) => run.some((id) => wished.includes(id))), folded: foldedRuns(doc, new Set(wished), seen) };
+    return {
+      runs: runs.length,
+      wished: runs.some((run) => run.some((id) => wished.includes(id))),
+      folded: foldedRuns(doc, new Set(wished), seen),
+    };
   }, [doc, kept, last, executing, selected, from, problems]);
 }

@@ -43,7 +43,11 @@ export interface Line {
 export const foldOf = (run: readonly string[]): string => `fold/${run[0] ?? ""}`;
 
 /** `folded` are the runs that are one node each. */
-export function graphOf(doc: OpenDocument, types: State["types"], folded: readonly string[][] = []): { boxes: Box[]; lines: Line[] } {
+export function graphOf(
+  doc: OpenDocument,
+  types: State["types"],
+  folded: readonly string[][] = [],
+): { boxes: Box[]; lines: Line[] } {
   const into = new Map(folded.flatMap((run) => run.map((id) => [id, foldOf(run)] as const)));
   const shown = (id: string) => into.get(id) ?? id;
   const lines = Object.values(doc.logic)
@@ -59,7 +63,15 @@ export function graphOf(doc: OpenDocument, types: State["types"], folded: readon
     })
     .filter(({ from, to }) => from !== to);
   const bare: Omit<Box, "x" | "y">[] = [
-    { id: START, kind: "start", name: "Start", detail: "", ways: lines.some((each) => each.from === START) ? [] : [{ id: "next", label: "next" }], run: [], ...BORDER },
+    {
+      id: START,
+      kind: "start",
+      name: "Start",
+      detail: "",
+      ways: lines.some((each) => each.from === START) ? [] : [{ id: "next", label: "next" }],
+      run: [],
+      ...BORDER,
+    },
     ...Object.values(doc.actions)
       .filter((action) => !into.has(action.id))
       .map((action) => ({
@@ -85,8 +97,10 @@ export function graphOf(doc: OpenDocument, types: State["types"], folded: readon
 }
 
 /** The action from which steps lead on from a node, and the one to which they lead. */
-export const lastIn = (box: Pick<Box, "id" | "kind" | "run">): string => (box.kind === "fold" ? (box.run.at(-1) ?? box.id) : box.id);
-export const firstIn = (box: Pick<Box, "id" | "kind" | "run">): string => (box.kind === "fold" ? (box.run[0] ?? box.id) : box.id);
+export const lastIn = (box: Pick<Box, "id" | "kind" | "run">): string =>
+  box.kind === "fold" ? (box.run.at(-1) ?? box.id) : box.id;
+export const firstIn = (box: Pick<Box, "id" | "kind" | "run">): string =>
+  box.kind === "fold" ? (box.run[0] ?? box.id) : box.id;
 
 function sized(ways: Way[]): Pick<Box, "ways" | "width" | "height"> {
   return { ways, width: NODE.width, height: NODE.height + (ways.length > 0 ? WAYS : 0) };
@@ -97,9 +111,12 @@ export function waysOf(doc: OpenDocument, types: State["types"], id: string): Wa
   const action = doc.actions[id];
   if (!action) return [];
   const ways = outgoing(doc, id);
-  const result = resultsOf(doc, types, action).find((each) => each.type === "boolean" || each.type === "integer" || each.type.endsWith("_enum"));
+  const result = resultsOf(doc, types, action).find(
+    (each) => each.type === "boolean" || each.type === "integer" || each.type.endsWith("_enum"),
+  );
   if (!result) return ways.length === 0 ? [{ id: "next", label: "next" }] : [];
-  if (result.type !== "boolean") return [ways.length === 0 ? { id: "next", label: "next" } : { id: "branch", label: "branch" }];
+  if (result.type !== "boolean")
+    return [ways.length === 0 ? { id: "next", label: "next" } : { id: "branch", label: "branch" }];
   const what = `${id}/default/${result.index}`;
   const asked = (value: string) => ways.some((each) => each.condition?.value === value);
   if (ways.some((each) => !each.condition)) return [{ id: "branch", label: "branch" }];
@@ -116,7 +133,8 @@ function placed(boxes: Omit<Box, "x" | "y">[], lines: Line[]): Map<string, { x: 
   graph.setDefaultEdgeLabel(() => ({}));
   for (const { id, width, height } of boxes) graph.setNode(id, { width, height });
   for (const { id, from, to, words } of lines) {
-    if (graph.hasNode(from) && graph.hasNode(to)) graph.setEdge(from, to, { width: words.length * 8, height: 18, labelpos: "c" }, id);
+    if (graph.hasNode(from) && graph.hasNode(to))
+      graph.setEdge(from, to, { width: words.length * 8, height: 18, labelpos: "c" }, id);
   }
   layout(graph);
   return new Map(

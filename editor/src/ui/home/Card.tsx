@@ -5,10 +5,10 @@ import { barred } from "../../commands/asking";
 import * as documents from "../../commands/documents";
 import { downloadPackage } from "../../commands/packages";
 import { runPackage } from "../../commands/run";
+import { keepOwnPicture, useOwn } from "../../commands/thumbnail";
 import { keepGeneral } from "../../commands/viewstate";
 import { count, type Entry } from "../../home/entries";
 import type { Requests, Run } from "../../protocol/types";
-import { keepOwnPicture, useOwn } from "../../commands/thumbnail";
 import { isRunning } from "../../store/selectors";
 import { now, tell, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
@@ -24,8 +24,20 @@ import { Thumbnail } from "./Thumbnail";
 
 type Doing = "open" | "copy" | "rename" | "describe" | "remove";
 const DO: Record<Entry["kind"], Partial<Record<Doing, keyof Requests>>> = {
-  scene: { open: "OpenScene", copy: "CopyScene", rename: "RenameScene", describe: "UpdateSceneDescription", remove: "DeleteScene" },
-  project: { open: "OpenProject", copy: "CopyProject", rename: "RenameProject", describe: "UpdateProjectDescription", remove: "DeleteProject" },
+  scene: {
+    open: "OpenScene",
+    copy: "CopyScene",
+    rename: "RenameScene",
+    describe: "UpdateSceneDescription",
+    remove: "DeleteScene",
+  },
+  project: {
+    open: "OpenProject",
+    copy: "CopyProject",
+    rename: "RenameProject",
+    describe: "UpdateProjectDescription",
+    remove: "DeleteProject",
+  },
   package: { open: "RunPackage", rename: "RenamePackage", remove: "DeletePackage" },
 };
 
@@ -53,15 +65,24 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
     return request ? barred({ ...now(), connection }, request) : "";
   };
   const whyOpen = why("open") || (running ? "A program runs: stop it first." : "");
-  const whyThis = whyOpen || (problems.length > 0 ? "Something is wrong with it, see its problems: it can be opened once they are mended." : "");
-  const run = useEditor((state) => (kind === "package" ? state.program.runs.find((each) => each.package_id === id) : undefined));
+  const whyThis =
+    whyOpen ||
+    (problems.length > 0 ? "Something is wrong with it, see its problems: it can be opened once they are mended." : "");
+  const run = useEditor((state) =>
+    kind === "package" ? state.program.runs.find((each) => each.package_id === id) : undefined,
+  );
   const template = useEditor((state) => isTemplate(state, id));
   const own = useOwn((all) => all[id] ?? false);
   const picture = useRef<HTMLInputElement>(null);
-  const keepPicture = (file: File | null) => void keepOwnPicture(id, file).then((wrong) => wrong && tell("error", wrong));
+  const keepPicture = (file: File | null) =>
+    void keepOwnPicture(id, file).then((wrong) => wrong && tell("error", wrong));
   const open = (paused = false) => {
     if (kind === "package") keepRecent(id);
-    void (kind === "scene" ? documents.openScene(id) : kind === "project" ? documents.openProject(id) : runPackage(id, paused));
+    void (kind === "scene"
+      ? documents.openScene(id)
+      : kind === "project"
+        ? documents.openProject(id)
+        : runPackage(id, paused));
   };
   const star = () => {
     const others = [...starsOf(now())].filter((each) => each !== id);
@@ -69,16 +90,45 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
   };
   const close = () => setDoing("");
   const choices: Choice[] = [
-    ...(kind === "scene" ? [{ id: "project", label: "New project on it…", not: barred({ ...now(), connection }, "NewProject"), act: () => onProject(id) }] : []),
+    ...(kind === "scene"
+      ? [
+          {
+            id: "project",
+            label: "New project on it…",
+            not: barred({ ...now(), connection }, "NewProject"),
+            act: () => onProject(id),
+          },
+        ]
+      : []),
     ...(kind === "package" ? [{ id: "paused", label: "Start paused", not: whyOpen, act: () => open(true) }] : []),
     ...(kind === "package"
-      ? [{ id: "download", label: "Download", act: () => void downloadPackage(id, name).then((wrong) => wrong && tell("error", wrong)) }]
+      ? [
+          {
+            id: "download",
+            label: "Download",
+            act: () => void downloadPackage(id, name).then((wrong) => wrong && tell("error", wrong)),
+          },
+        ]
       : [
           { id: "copy", label: "Duplicate…", not: why("copy"), act: () => setDoing("copy") },
           { id: "describe", label: "Describe…", not: why("describe"), act: () => setDoing("describe") },
           { id: "picture", label: "A picture of your own…", not: why("describe"), act: () => picture.current?.click() },
-          ...(own ? [{ id: "view", label: "Its picture from the view again", not: why("describe"), act: () => keepPicture(null) }] : []),
-          { id: "template", label: template ? "No template any more" : "Use as a template", not: why("describe"), act: () => keepTemplate(id, !template) },
+          ...(own
+            ? [
+                {
+                  id: "view",
+                  label: "Its picture from the view again",
+                  not: why("describe"),
+                  act: () => keepPicture(null),
+                },
+              ]
+            : []),
+          {
+            id: "template",
+            label: template ? "No template any more" : "Use as a template",
+            not: why("describe"),
+            act: () => keepTemplate(id, !template),
+          },
         ]),
     { id: "rename", label: "Rename…", not: why("rename"), act: () => setDoing("rename") },
     { id: "remove", label: "Delete…", not: why("remove"), act: () => setDoing("remove") },
@@ -105,11 +155,23 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
       <div className="card-text">
         <div className="card-name">
           {doing === "rename" ? (
-            <Inline label={`New name of ${name}`} value={name} taken={taken} onSave={(to) => documents.rename(kind, id, to)} onClose={close} />
+            <Inline
+              label={`New name of ${name}`}
+              value={name}
+              taken={taken}
+              onSave={(to) => documents.rename(kind, id, to)}
+              onClose={close}
+            />
           ) : (
             <h2>{name}</h2>
           )}
-          <Button look="plain" className="star" aria-pressed={starred} aria-label={starred ? `Take the star of ${name} away` : `Give ${name} a star`} onPress={star}>
+          <Button
+            look="plain"
+            className="star"
+            aria-pressed={starred}
+            aria-label={starred ? `Take the star of ${name} away` : `Give ${name} a star`}
+            onPress={star}
+          >
             <span aria-hidden="true">{starred ? "★" : "☆"}</span>
           </Button>
         </div>
@@ -128,21 +190,44 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
           </p>
         )}
         {doing === "describe" && kind !== "package" ? (
-          <Inline label={`Description of ${name}`} value={entry.description} many onSave={(to) => documents.describe(kind, id, to)} onClose={close} />
+          <Inline
+            label={`Description of ${name}`}
+            value={entry.description}
+            many
+            onSave={(to) => documents.describe(kind, id, to)}
+            onClose={close}
+          />
         ) : (
           entry.description && <p className="small description">{entry.description}</p>
         )}
-        {problems.length > 0 && <Problems entry={entry} whyOpen={whyOpen} onScene={() => onRelated("scene", entry.from?.name ?? "")} />}
+        {problems.length > 0 && (
+          <Problems entry={entry} whyOpen={whyOpen} onScene={() => onRelated("scene", entry.from?.name ?? "")} />
+        )}
       </div>
       <div className="card-actions">
-        <Button look="primary" icon={kind === "package" ? "play" : undefined} why={whyThis} onPress={() => open()} aria-label={`${kind === "package" ? "Run" : "Open"} ${name}`}>
+        <Button
+          look="primary"
+          icon={kind === "package" ? "play" : undefined}
+          why={whyThis}
+          onPress={() => open()}
+          aria-label={`${kind === "package" ? "Run" : "Open"} ${name}`}
+        >
           {kind === "package" ? "Run" : "Open"}
         </Button>
         <Related entry={entry} onRelated={onRelated} />
         <More label={`More about ${name}`} choices={choices} />
       </div>
       {doing === "copy" && (
-        <AskName title={`Duplicate ${name}`} initial={`${name} copy`} taken={taken} yes="Duplicate" onClose={close} onYes={(to) => void (kind === "scene" ? documents.duplicateScene(id, to) : documents.duplicateProject(id, to))} />
+        <AskName
+          title={`Duplicate ${name}`}
+          initial={`${name} copy`}
+          taken={taken}
+          yes="Duplicate"
+          onClose={close}
+          onYes={(to) =>
+            void (kind === "scene" ? documents.duplicateScene(id, to) : documents.duplicateProject(id, to))
+          }
+        />
       )}
       {doing === "remove" && <Deleting entry={entry} onClose={close} />}
     </li>
@@ -157,7 +242,13 @@ function detail({ kind, from, projects, executed }: Entry, run: Run | undefined)
 }
 
 /** What it belongs to, or what belongs to it. */
-function Related({ entry: { kind, name, from, projects }, onRelated }: { entry: Entry; onRelated: CardProps["onRelated"] }) {
+function Related({
+  entry: { kind, name, from, projects },
+  onRelated,
+}: {
+  entry: Entry;
+  onRelated: CardProps["onRelated"];
+}) {
   if (kind === "scene") {
     return projects ? (
       <Button look="plain" aria-label={`Projects on ${name}`} onPress={() => onRelated("project", name)}>
@@ -168,7 +259,11 @@ function Related({ entry: { kind, name, from, projects }, onRelated }: { entry: 
   if (!from || from.gone) return null;
   const to = kind === "project" ? ("scene" as const) : ("project" as const);
   return (
-    <Button look="plain" aria-label={`${to === "scene" ? "Scene" : "Project"} of ${name}`} onPress={() => onRelated(to, from.name)}>
+    <Button
+      look="plain"
+      aria-label={`${to === "scene" ? "Scene" : "Project"} of ${name}`}
+      onPress={() => onRelated(to, from.name)}
+    >
       {to === "scene" ? "Scene" : "Project"}
     </Button>
   );

@@ -13,7 +13,13 @@ export function Deleting({ entry: { kind, id, name }, onClose }: { entry: Entry;
     if (kind === "scene") documents.projectsOf(id).then(setNeeding, () => {});
   }, [kind, id]);
   return (
-    <Confirm title={`Delete ${name}?`} yes="Delete" not={needing.length > 0 ? "Its projects have to be deleted first." : ""} onClose={onClose} onYes={() => void DELETE[kind](id)}>
+    <Confirm
+      title={`Delete ${name}?`}
+      yes="Delete"
+      not={needing.length > 0 ? "Its projects have to be deleted first." : ""}
+      onClose={onClose}
+      onYes={() => void DELETE[kind](id)}
+    >
       {needing.length > 0 ? (
         <>
           <p>These projects are on this scene, and have to be deleted first:</p>

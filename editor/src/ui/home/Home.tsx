@@ -4,17 +4,17 @@ import { useState } from "react";
 import { Input, Label, SearchField, ToggleButton, ToggleButtonGroup } from "react-aria-components";
 import { barred } from "../../commands/asking";
 import { keepGeneral } from "../../commands/viewstate";
-import { chosen, entriesOf, type Entry, type Sort, SORTS } from "../../home/entries";
+import { chosen, type Entry, entriesOf, SORTS, type Sort } from "../../home/entries";
 import type { State } from "../../store/state";
 import { useEditor } from "../../store/store";
 import { Button, Waiting } from "../kit/kit";
+import { Notices } from "../notices/Notices";
 import { People } from "../people/People";
 import { Settings } from "../settings/Settings";
-import { Notices } from "../notices/Notices";
+import { Card } from "./Card";
 import { recentOf } from "./kept";
 import { NewProject } from "./NewProject";
 import { NewScene } from "./NewScene";
-import { Card } from "./Card";
 import { starsOf } from "./stars";
 import { UploadPackage } from "./UploadPackage";
 import "./home.css";
@@ -29,7 +29,11 @@ const EMPTY: Record<TabName, string> = {
 };
 const KINDS: Record<TabName, Entry["kind"]> = { projects: "project", scenes: "scene", packages: "package" };
 const TAB_OF: Record<Entry["kind"], TabName> = { project: "projects", scene: "scenes", package: "packages" };
-const SHOWN: Record<State["lists"]["shown"], TabName> = { ProjectsList: "projects", ScenesList: "scenes", PackagesList: "packages" };
+const SHOWN: Record<State["lists"]["shown"], TabName> = {
+  ProjectsList: "projects",
+  ScenesList: "scenes",
+  PackagesList: "packages",
+};
 
 export function Home() {
   const lists = useEditor((state) => state.lists);
@@ -43,14 +47,23 @@ export function Home() {
   const stars = useEditor(starsOf);
   const sort = useEditor(sortOf);
   const recent = useEditor(recentOf);
-  const entries = Object.fromEntries(TABS.map((each) => [each, entriesOf(lists, KINDS[each])])) as Record<TabName, Entry[] | null>;
+  const entries = Object.fromEntries(TABS.map((each) => [each, entriesOf(lists, KINDS[each])])) as Record<
+    TabName,
+    Entry[] | null
+  >;
   const here = entries[tab];
   const noProject = noRight || (lists.scenes?.length ? "" : "Make a scene first: a project is a program for a scene.");
   return (
     <div className="home">
       <header className="bar">
         <h1>Workplace</h1>
-        <Button look="plain" icon="play" aria-label="Operator" className="to-operator" onPress={() => (location.hash = "#/operator")}>
+        <Button
+          look="plain"
+          icon="play"
+          aria-label="Operator"
+          className="to-operator"
+          onPress={() => (location.hash = "#/operator")}
+        >
           <span>Operator</span>
         </Button>
         <People />
@@ -137,7 +150,7 @@ export function Home() {
 
 /** As the user sorts on every tablet. */
 function sortOf(state: State): Sort {
-  const kept = state.view.general["sort"];
+  const kept = state.view.general.sort;
   return SORTS.find(([each]) => each === kept)?.[0] ?? "changed";
 }
 
@@ -154,12 +167,26 @@ interface ListProps {
 function Cards({ entries, found, search, empty, highlight, onRelated, onProject }: ListProps) {
   if (entries === null) return <Waiting>Reading the list…</Waiting>;
   if (entries.length === 0) return <p className="empty quiet">{empty}</p>;
-  if (found.length === 0) return <p className="empty quiet">{search.trim() ? `Nothing is called “${search.trim()}”.` : "Nothing has a star. Tap the star of a tile to find it here."}</p>;
+  if (found.length === 0)
+    return (
+      <p className="empty quiet">
+        {search.trim()
+          ? `Nothing is called “${search.trim()}”.`
+          : "Nothing has a star. Tap the star of a tile to find it here."}
+      </p>
+    );
   const taken = entries.map((each) => each.name);
   return (
     <ul className="cards">
       {found.map((each) => (
-        <Card key={each.id} entry={each} marked={each.id === highlight} taken={taken} onRelated={onRelated} onProject={onProject} />
+        <Card
+          key={each.id}
+          entry={each}
+          marked={each.id === highlight}
+          taken={taken}
+          onRelated={onRelated}
+          onProject={onProject}
+        />
       ))}
     </ul>
   );

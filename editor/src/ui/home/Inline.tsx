@@ -38,7 +38,15 @@ export function Inline({ label, value, taken = [], many = false, onSave, onClose
   };
   return (
     <form className="field inline" onSubmit={save}>
-      {many ? <textarea rows={3} {...shared} onChange={(event) => setText(event.target.value)} /> : <input {...shared} onFocus={(event) => event.target.select()} onChange={(event) => setText(event.target.value)} />}
+      {many ? (
+        <textarea rows={3} {...shared} onChange={(event) => setText(event.target.value)} />
+      ) : (
+        <input
+          {...shared}
+          onFocus={(event) => event.target.select()}
+          onChange={(event) => setText(event.target.value)}
+        />
+      )}
       <RefusedText>{problem || refused}</RefusedText>
       <div className="actions">
         <Button onPress={onClose}>Cancel</Button>

@@ -13,9 +13,16 @@ export function NewProject({ initial = "", onClose }: { initial?: string; onClos
   const [scene, setScene] = useState(initial || (newest?.id ?? ""));
   const [logic, setLogic] = useState(true);
   const [from, setFrom] = useState("");
-  const make = (name: string) => void (from ? documents.fromTemplate("project", from, name) : documents.newProject(scene, name, "", logic));
+  const make = (name: string) =>
+    void (from ? documents.fromTemplate("project", from, name) : documents.newProject(scene, name, "", logic));
   return (
-    <AskName title="New project" yes="Make and open" taken={projects.map((each) => each.name)} onYes={make} onClose={onClose}>
+    <AskName
+      title="New project"
+      yes="Make and open"
+      taken={projects.map((each) => each.name)}
+      onYes={make}
+      onClose={onClose}
+    >
       <StartFrom of={projects} value={from} onChange={setFrom} />
       {!from && (
         <>

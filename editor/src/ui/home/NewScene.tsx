@@ -11,7 +11,13 @@ export function NewScene({ onClose }: { onClose: () => void }) {
   const [from, setFrom] = useState("");
   const make = (name: string) => void (from ? documents.fromTemplate("scene", from, name) : documents.newScene(name));
   return (
-    <AskName title="New scene" yes="Make and open" taken={scenes.map((each) => each.name)} onYes={make} onClose={onClose}>
+    <AskName
+      title="New scene"
+      yes="Make and open"
+      taken={scenes.map((each) => each.name)}
+      onYes={make}
+      onClose={onClose}
+    >
       <StartFrom of={scenes} value={from} onChange={setFrom} />
     </AskName>
   );

@@ -32,17 +32,28 @@ export function Problems({ entry: { kind, id, name, problems, from }, whyOpen, o
           <li key={each}>{each}</li>
         ))}
       </ul>
-      {kind === "project" && from && !from.gone && (ofScene ? (
-        <Button aria-label={`Show the scene of ${name} to mend it`} onPress={onScene}>
-          Show the scene
-        </Button>
-      ) : (
-        <Button why={whyOpen} aria-label={`Open the scene of ${name} to mend it`} onPress={() => void documents.openScene(from.id)}>
-          Open the scene
-        </Button>
-      ))}
+      {kind === "project" &&
+        from &&
+        !from.gone &&
+        (ofScene ? (
+          <Button aria-label={`Show the scene of ${name} to mend it`} onPress={onScene}>
+            Show the scene
+          </Button>
+        ) : (
+          <Button
+            why={whyOpen}
+            aria-label={`Open the scene of ${name} to mend it`}
+            onPress={() => void documents.openScene(from.id)}
+          >
+            Open the scene
+          </Button>
+        ))}
       {kind === "scene" && (
-        <Button why={noScene} aria-label={`Mend ${name}`} onPress={() => void faultyObjects(id, problems).then(setFaulty, (error) => tell("error", sentence(error)))}>
+        <Button
+          why={noScene}
+          aria-label={`Mend ${name}`}
+          onPress={() => void faultyObjects(id, problems).then(setFaulty, (error) => tell("error", sentence(error)))}
+        >
           Mend
         </Button>
       )}
@@ -52,10 +63,20 @@ export function Problems({ entry: { kind, id, name, problems, from }, whyOpen, o
           yes="Take them out"
           not={faulty.length > 0 ? "" : "None of its objects is at fault by itself: import the scene anew."}
           onClose={() => setFaulty(null)}
-          onYes={() => void takeOut(id, name, faulty).then((wrong) => (wrong ? tell("error", wrong) : tell("info", `${name} can be opened again.`)))}
+          onYes={() =>
+            void takeOut(id, name, faulty).then((wrong) =>
+              wrong ? tell("error", wrong) : tell("info", `${name} can be opened again.`),
+            )
+          }
         >
-          <p>{faulty.length > 0 ? `What is wrong goes out of the scene: ${faulty.join(", ")}. The scene as it is now stays as a copy.` : "The names of its objects do not stand in the problems."}</p>
-          <p className="quiet small">Is a kind of device missing? Once its driver is installed again, the problem goes by itself.</p>
+          <p>
+            {faulty.length > 0
+              ? `What is wrong goes out of the scene: ${faulty.join(", ")}. The scene as it is now stays as a copy.`
+              : "The names of its objects do not stand in the problems."}
+          </p>
+          <p className="quiet small">
+            Is a kind of device missing? Once its driver is installed again, the problem goes by itself.
+          </p>
         </Confirm>
       )}
     </details>

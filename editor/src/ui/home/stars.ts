@@ -6,7 +6,7 @@ let last: { kept: unknown; stars: ReadonlySet<string> } = { kept: undefined, sta
 
 /** The same set while it is the same. */
 export function starsOf(state: State): ReadonlySet<string> {
-  const kept = state.view.general["stars"];
+  const kept = state.view.general.stars;
   if (kept !== last.kept) last = { kept, stars: new Set(Array.isArray(kept) ? (kept as string[]) : []) };
   return last.stars;
 }

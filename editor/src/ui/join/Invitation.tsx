@@ -26,8 +26,9 @@ export function Invitation() {
       <h3>Others join at</h3>
       {best === undefined ? (
         <p className="small">
-          Only this machine reaches the server, at {location.origin}. For others, start it with <code>arcor2-hw serve --host 0.0.0.0</code>: it
-          then speaks TLS alone, and asks each for a token made by <code>arcor2-hw token add</code>.
+          Only this machine reaches the server, at {location.origin}. For others, start it with{" "}
+          <code>arcor2-hw serve --host 0.0.0.0</code>: it then speaks TLS alone, and asks each for a token made by{" "}
+          <code>arcor2-hw token add</code>.
         </p>
       ) : (
         <>
@@ -37,7 +38,9 @@ export function Invitation() {
               <strong>{best}</strong>
             </p>
             {others.length > 0 && <p className="quiet small">or at {others.join(", ")}</p>}
-            <p className="quiet small">Point a tablet’s camera at the code. Where the server asks for a token, each has one of his own.</p>
+            <p className="quiet small">
+              Point a tablet’s camera at the code. Where the server asks for a token, each has one of his own.
+            </p>
           </div>
         </>
       )}
@@ -56,7 +59,13 @@ function Code({ text }: { text: string }) {
   const rows = encodeQR(text, "raw", { ecc: "medium", border: QUIET });
   const path = rows.flatMap((row, y) => row.map((black, x) => (black ? `M${x} ${y}h1v1h-1z` : ""))).join("");
   return (
-    <svg className="join-code" viewBox={`0 0 ${rows.length} ${rows.length}`} role="img" aria-label={`A code with the address ${text}`} shapeRendering="crispEdges">
+    <svg
+      className="join-code"
+      viewBox={`0 0 ${rows.length} ${rows.length}`}
+      role="img"
+      aria-label={`A code with the address ${text}`}
+      shapeRendering="crispEdges"
+    >
       <path className="paper" d={`M0 0h${rows.length}v${rows.length}h-${rows.length}z`} />
       <path d={path} />
     </svg>

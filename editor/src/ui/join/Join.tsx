@@ -31,18 +31,38 @@ export function Join() {
       <form onSubmit={submit}>
         <h1>ARCOR2-HW</h1>
         <p className="quiet">Set up, program and run this workplace, together with everyone who is here.</p>
-        <Field label="Your name" value={name} onChange={setName} autoFocus autoComplete="nickname" maxLength={60} hint="Others see it beside what you work on." />
+        <Field
+          label="Your name"
+          value={name}
+          onChange={setName}
+          autoFocus
+          autoComplete="nickname"
+          maxLength={60}
+          hint="Others see it beside what you work on."
+        />
         {people.length > 0 && (
           <div className="people-here" role="group" aria-label="Who was here with this device">
             {people.map((each) => (
-              <Button key={each} aria-label={`Join as ${each}`} isDisabled={status === "joining"} onPress={() => enter(each)}>
+              <Button
+                key={each}
+                aria-label={`Join as ${each}`}
+                isDisabled={status === "joining"}
+                onPress={() => enter(each)}
+              >
                 {each}
               </Button>
             ))}
           </div>
         )}
         {(asksForToken || token) && (
-          <Field label="Token" type="password" value={token} onChange={setToken} autoComplete="off" hint="Who looks after the server makes it: arcor2-hw token add" />
+          <Field
+            label="Token"
+            type="password"
+            value={token}
+            onChange={setToken}
+            autoComplete="off"
+            hint="Who looks after the server makes it: arcor2-hw token add"
+          />
         )}
         {status === "refused" && (
           <p role="alert" className="notice-line bad">

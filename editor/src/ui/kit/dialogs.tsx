@@ -75,7 +75,16 @@ export function Confirm({ title, children, yes, not = "", onYes, onClose }: Conf
 }
 
 /** Asks for a name. */
-export function AskName({ title, label = "Name", initial = "", yes, taken = [], children, onYes, onClose }: AskNameProps) {
+export function AskName({
+  title,
+  label = "Name",
+  initial = "",
+  yes,
+  taken = [],
+  children,
+  onYes,
+  onClose,
+}: AskNameProps) {
   const [name, setName] = useState(initial);
   const clean = name.trim();
   const problem = clean !== initial && taken.includes(clean) ? "There is one of that name." : "";
@@ -88,7 +97,15 @@ export function AskName({ title, label = "Name", initial = "", yes, taken = [], 
   return (
     <Window title={title} onClose={onClose}>
       <form onSubmit={submit} className="ask-name">
-        <Field label={label} value={name} onChange={setName} autoFocus isInvalid={problem !== ""} hint={problem} autoComplete="off" />
+        <Field
+          label={label}
+          value={name}
+          onChange={setName}
+          autoFocus
+          isInvalid={problem !== ""}
+          hint={problem}
+          autoComplete="off"
+        />
         {children}
         <div className="actions">
           <Button onPress={onClose}>Cancel</Button>

@@ -82,7 +82,17 @@ interface AmountProps {
 }
 
 /** A number with its unit. `+5` adds to what is there, `-=5` takes away; `-5` is that number. */
-export function Amount({ label, unit, value, onChange, digits = 1, least = -Infinity, most = Infinity, step = 1, isDisabled = false }: AmountProps) {
+export function Amount({
+  label,
+  unit,
+  value,
+  onChange,
+  digits = 1,
+  least = -Infinity,
+  most = Infinity,
+  step = 1,
+  isDisabled = false,
+}: AmountProps) {
   const id = useId();
   const shown = round(value, digits);
   const [text, setText] = useState<string | null>(null);
@@ -148,7 +158,8 @@ function round(value: number, digits: number): string {
 export function parsed(text: string, value: number): number | null {
   const clean = text.trim().replace(",", ".");
   const change = /^([+-])=?\s*(\d*\.?\d+)$/.exec(clean);
-  if (change && (clean.startsWith("+") || clean.includes("="))) return value + (change[1] === "-" ? -1 : 1) * Number(change[2]);
+  if (change && (clean.startsWith("+") || clean.includes("=")))
+    return value + (change[1] === "-" ? -1 : 1) * Number(change[2]);
   return clean !== "" && Number.isFinite(Number(clean)) ? Number(clean) : null;
 }
 
@@ -170,12 +181,31 @@ export function MoreOrLess({ label, value, least, most, step, words, onChange, o
     <div className="more-or-less">
       <label htmlFor={id}>{label}</label>
       <output htmlFor={id}>{words(value)}</output>
-      <input id={id} type="range" min={least} max={most} step={step} value={value} aria-valuetext={words(value)} onChange={(event) => onChange(Number(event.target.value))} onPointerUp={end} onKeyUp={end} />
+      <input
+        id={id}
+        type="range"
+        min={least}
+        max={most}
+        step={step}
+        value={value}
+        aria-valuetext={words(value)}
+        onChange={(event) => onChange(Number(event.target.value))}
+        onPointerUp={end}
+        onKeyUp={end}
+      />
     </div>
   );
 }
 
-export function OnOff({ children, isSelected, onChange }: { children: ReactNode; isSelected: boolean; onChange: (on: boolean) => void }) {
+export function OnOff({
+  children,
+  isSelected,
+  onChange,
+}: {
+  children: ReactNode;
+  isSelected: boolean;
+  onChange: (on: boolean) => void;
+}) {
   return (
     <Switch className="on-off" isSelected={isSelected} onChange={onChange}>
       <span className="on-off-track" aria-hidden="true" />

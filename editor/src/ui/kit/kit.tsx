@@ -11,9 +11,9 @@ import {
   type TextFieldProps,
 } from "react-aria-components";
 import { tell } from "../../store/store";
+import type { AskNameProps, ConfirmProps } from "./dialogs";
 import { Icon, type IconName } from "./icons";
 import { lazily } from "./lazily";
-import type { AskNameProps, ConfirmProps } from "./dialogs";
 import type { MoreProps } from "./menu";
 
 export type { Choice } from "./menu";
@@ -36,7 +36,12 @@ interface PlainButtonProps extends Omit<ButtonProps, "children" | "className"> {
 export function Button({ look = "", icon, children, className, why = "", onPress, ...rest }: PlainButtonProps) {
   const press: ButtonProps["onPress"] = why ? () => tell("info", why) : onPress;
   return (
-    <AriaButton {...rest} onPress={press} aria-disabled={why !== "" || undefined} className={`button ${look} ${className ?? ""}`}>
+    <AriaButton
+      {...rest}
+      onPress={press}
+      aria-disabled={why !== "" || undefined}
+      className={`button ${look} ${className ?? ""}`}
+    >
       {icon && <Icon name={icon} />}
       {children}
       {why && <span className="hidden-but-read">, not now: {why}</span>}
@@ -44,7 +49,13 @@ export function Button({ look = "", icon, children, className, why = "", onPress
   );
 }
 
-export function Field({ label, hint, placeholder, type, ...rest }: TextFieldProps & { label: string; hint?: string; placeholder?: string }) {
+export function Field({
+  label,
+  hint,
+  placeholder,
+  type,
+  ...rest
+}: TextFieldProps & { label: string; hint?: string; placeholder?: string }) {
   return (
     <TextField {...rest} className="field">
       <Label>{label}</Label>

@@ -1,6 +1,6 @@
 /** Parts of the page that are loaded when they are needed, also when the server is away just then. */
 
-import { type ComponentType, lazy, type LazyExoticComponent } from "react";
+import { type ComponentType, type LazyExoticComponent, lazy } from "react";
 
 /** Pauses in s before each further attempt; the last one again and again. */
 const PAUSES = [0.5, 1, 2, 4];
@@ -17,6 +17,7 @@ export async function persistently<T>(load: () => Promise<T>): Promise<T> {
   }
 }
 
+// biome-ignore lint/suspicious/noExplicitAny: a component with any properties.
 export function lazily<C extends ComponentType<any>>(load: () => Promise<{ default: C }>): LazyExoticComponent<C> {
   return lazy(() => persistently(load));
 }

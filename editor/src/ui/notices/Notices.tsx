@@ -6,10 +6,10 @@
  */
 
 import { useEffect } from "react";
+import type { TaskStateData } from "../../protocol/types";
+import { without } from "../../store/records";
 import { isLive } from "../../store/selectors";
 import { dismiss, store, useEditor } from "../../store/store";
-import { without } from "../../store/records";
-import type { TaskStateData } from "../../protocol/types";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
 import { openOverlay } from "../search/Overlays";
@@ -43,7 +43,12 @@ export function Notices({ docked = false }: { docked?: boolean }) {
         <div key={each.id} className={`notice ${each.level}`} role={each.level === "error" ? "alert" : undefined}>
           <Icon name={each.level === "info" ? "info" : "warn"} />
           {docked ? (
-            <button type="button" className="notice-text" title="Show all messages" onClick={() => openOverlay("messages")}>
+            <button
+              type="button"
+              className="notice-text"
+              title="Show all messages"
+              onClick={() => openOverlay("messages")}
+            >
               <span>{each.text}</span>
               {more > 0 && <span className="tag">+{more}</span>}
             </button>
@@ -64,7 +69,11 @@ export function Notices({ docked = false }: { docked?: boolean }) {
 
 /** Leave out finished tasks that were started again. */
 function current(tasks: TaskStateData[]): TaskStateData[] {
-  return tasks.filter((each, n) => each.state === "running" || !tasks.slice(n + 1).some(({ kind, title }) => kind === each.kind && title === each.title));
+  return tasks.filter(
+    (each, n) =>
+      each.state === "running" ||
+      !tasks.slice(n + 1).some(({ kind, title }) => kind === each.kind && title === each.title),
+  );
 }
 
 function Task({ task }: { task: TaskStateData }) {
@@ -77,7 +86,11 @@ function Task({ task }: { task: TaskStateData }) {
   }, [id, state]);
   return (
     <div className={`notice task ${state === "failed" ? "error" : ""}`} data-state={state}>
-      {state === "running" ? <span className="spinner" aria-hidden="true" /> : <Icon name={state === "failed" ? "warn" : "check"} />}
+      {state === "running" ? (
+        <span className="spinner" aria-hidden="true" />
+      ) : (
+        <Icon name={state === "failed" ? "warn" : "check"} />
+      )}
       <div>
         <p>
           {title}
@@ -86,7 +99,14 @@ function Task({ task }: { task: TaskStateData }) {
         {message && <p className="quiet small">{message}</p>}
         {!over && progress !== undefined && <progress value={progress} max={1} aria-label={title} />}
       </div>
-      {over && <Button look="plain" icon="close" aria-label="Dismiss" onPress={() => store.setState((now) => ({ tasks: without(now.tasks, id) }))} />}
+      {over && (
+        <Button
+          look="plain"
+          icon="close"
+          aria-label="Dismiss"
+          onPress={() => store.setState((now) => ({ tasks: without(now.tasks, id) }))}
+        />
+      )}
     </div>
   );
 }

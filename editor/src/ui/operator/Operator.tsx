@@ -38,9 +38,13 @@ interface Shown {
 function shownState(state: State, starting: boolean, result: Result | null): Shown {
   const { state: phase } = state.program;
   if (starting) return { tone: "idle", word: "Starting…", icon: "play" };
-  if (isRunning(state)) return phase === "paused" ? { tone: "paused", word: STATES[phase], icon: "pause" } : { tone: "running", word: STATES[phase], icon: "play" };
+  if (isRunning(state))
+    return phase === "paused"
+      ? { tone: "paused", word: STATES[phase], icon: "pause" }
+      : { tone: "running", word: STATES[phase], icon: "play" };
   if (result) return { tone: TONES[result.tone], word: result.title, icon: ICONS[result.tone] };
-  if (state.live.state === "started" && usersOfDocument(state).length > 0) return { tone: "idle", word: "Devices are in use by the editor", icon: "plug" };
+  if (state.live.state === "started" && usersOfDocument(state).length > 0)
+    return { tone: "idle", word: "Devices are in use by the editor", icon: "plug" };
   return { tone: "idle", word: "Ready", icon: "check" };
 }
 
@@ -51,7 +55,10 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
   const packages = [...(lists.packages ?? [])].sort((a, b) => b.package_meta.built.localeCompare(a.package_meta.built));
   const [chosen, setChosen] = useState("");
   const [starting, setStarting] = useState(false);
-  const known = packages.find((each) => each.id === chosen) ?? packages.find((each) => each.id === program.packageId) ?? packages[0];
+  const known =
+    packages.find((each) => each.id === chosen) ??
+    packages.find((each) => each.id === program.packageId) ??
+    packages[0];
   const idle = !runs && !starting;
   const run = idle ? undismissedRun(state) : null;
   const result = resultOf(run ?? undefined);
@@ -75,13 +82,14 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
     await commands.runPackage(known.id);
     setStarting(false);
   };
-  const doing = program.running.map((id) => nameOf(state, id)).filter(Boolean).join(", ");
+  const doing = program.running
+    .map((id) => nameOf(state, id))
+    .filter(Boolean)
+    .join(", ");
   return (
     <div className="operator" data-tone={tone}>
       <header className="bar">
-        {!kiosk && (
-          <Button look="plain" icon="home" aria-label="To the editor" onPress={() => (location.hash = "")} />
-        )}
+        {!kiosk && <Button look="plain" icon="home" aria-label="To the editor" onPress={() => (location.hash = "")} />}
         <h1>{runs ? program.packageName || "A program" : "Operator"}</h1>
         <People />
         <Settings />
@@ -103,7 +111,9 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
               </p>
             )}
             {result?.detail && <p>{withNames(state, result.detail)}</p>}
-            {result?.tone === "bad" && <p className="operator-advice">Fix the cause, then press Start. If it fails again, call a programmer.</p>}
+            {result?.tone === "bad" && (
+              <p className="operator-advice">Fix the cause, then press Start. If it fails again, call a programmer.</p>
+            )}
             {idle && !run && <LastRun />}
           </div>
           {run && (
@@ -123,18 +133,39 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
               {packages.map((each) => (
                 <li key={each.id}>
                   <label className="operator-package" data-selected={each.id === known?.id}>
-                    <input type="radio" className="hidden-but-read" name="package" checked={each.id === known?.id} onChange={() => setChosen(each.id)} />
+                    <input
+                      type="radio"
+                      className="hidden-but-read"
+                      name="package"
+                      checked={each.id === known?.id}
+                      onChange={() => setChosen(each.id)}
+                    />
                     <strong>{each.package_meta.name}</strong>
                     <span className="quiet small">{each.project_meta ? `from ${each.project_meta.name}` : ""}</span>
                   </label>
                 </li>
               ))}
-              {packages.length === 0 && <p className="quiet">There is no package yet. Build one in the editor, under Run.</p>}
+              {packages.length === 0 && (
+                <p className="quiet">There is no package yet. Build one in the editor, under Run.</p>
+              )}
             </ul>
-            <Button look="primary" icon="play" className="operator-go" why={why} isDisabled={starting} onPress={() => void start()}>
+            <Button
+              look="primary"
+              icon="play"
+              className="operator-go"
+              why={why}
+              isDisabled={starting}
+              onPress={() => void start()}
+            >
               Start
             </Button>
-            {opened && <p className="quiet">{users.length > 0 ? why : `${opened} was left open in the editor. It is set aside while the program runs and keeps its unsaved changes.`}</p>}
+            {opened && (
+              <p className="quiet">
+                {users.length > 0
+                  ? why
+                  : `${opened} was left open in the editor. It is set aside while the program runs and keeps its unsaved changes.`}
+              </p>
+            )}
           </section>
         )}
         <History />
@@ -159,13 +190,16 @@ function LastRun() {
 function Devices() {
   const live = useEditor((state) => state.live);
   const doc = useEditor((state) => state.doc);
-  const wrong = Object.values(live.objects).filter((each) => each.state === "lost" || each.state === "failed" || each.answering === false);
+  const wrong = Object.values(live.objects).filter(
+    (each) => each.state === "lost" || each.state === "failed" || each.answering === false,
+  );
   if (!doc || wrong.length === 0) return null;
   return (
     <section className="exception" role="alert">
       {wrong.map((each) => (
         <p key={each.object_id}>
-          <Icon name="plug" /> <strong>{doc.objects[each.object_id]?.name ?? "A device"} does not answer.</strong> {each.reason}
+          <Icon name="plug" /> <strong>{doc.objects[each.object_id]?.name ?? "A device"} does not answer.</strong>{" "}
+          {each.reason}
         </p>
       ))}
     </section>

@@ -23,12 +23,28 @@ export function People() {
     const thing = looked && doc ? nameOf(now(), looked) : "";
     return thing ? `${name}, at ${thing}` : name;
   };
-  const names = [me, ...Object.keys(users).filter((name) => name !== me).sort()];
+  const names = [
+    me,
+    ...Object.keys(users)
+      .filter((name) => name !== me)
+      .sort(),
+  ];
   const shown = names.slice(0, 4);
   return (
-    <div className="people" role="group" aria-label={names.length === 1 ? "Only you are here" : `${names.length} people are here`}>
+    <div
+      className="people"
+      role="group"
+      aria-label={names.length === 1 ? "Only you are here" : `${names.length} people are here`}
+    >
       {shown.map((name) => (
-        <span key={name} className="person" title={called(name)} style={{ background: colourOf(name) }} role="img" aria-label={called(name)}>
+        <span
+          key={name}
+          className="person"
+          title={called(name)}
+          style={{ background: colourOf(name) }}
+          role="img"
+          aria-label={called(name)}
+        >
           {initials(name)}
         </span>
       ))}
@@ -50,15 +66,24 @@ function Gone() {
   if (!serves("TakeOverLocks")) return null;
   return (
     <>
-      {gone.split("\n").filter(Boolean).map((name) => (
-        <Button key={name} look="plain" className="gone" aria-label={`${name} left and still holds locks: take over`} onPress={() => setAsked(name)}>
-          <span className="person" aria-hidden="true">
-            {initials(name)}
-          </span>
-          <Icon name="lock" size={16} />
-          <span className="gone-word">{name} left</span>
-        </Button>
-      ))}
+      {gone
+        .split("\n")
+        .filter(Boolean)
+        .map((name) => (
+          <Button
+            key={name}
+            look="plain"
+            className="gone"
+            aria-label={`${name} left and still holds locks: take over`}
+            onPress={() => setAsked(name)}
+          >
+            <span className="person" aria-hidden="true">
+              {initials(name)}
+            </span>
+            <Icon name="lock" size={16} />
+            <span className="gone-word">{name} left</span>
+          </Button>
+        ))}
       {asked && (
         <Suspense fallback={null}>
           <TakeOver user={asked} onClose={() => setAsked("")} />

@@ -24,20 +24,38 @@ export default function TakeOver({ user, onClose }: { user: string; onClose: () 
       shown = false;
     };
   }, [user]);
-  const not = cannot || (present ? `${user} is connected again.` : missing ? `${user} holds no locks any more.` : holder ? "" : "Wait until the locks are listed.");
+  const not =
+    cannot ||
+    (present
+      ? `${user} is connected again.`
+      : missing
+        ? `${user} holds no locks any more.`
+        : holder
+          ? ""
+          : "Wait until the locks are listed.");
   const takeOver = async () => {
     const answer = await ask("TakeOverLocks", { user });
     if (answer) tell("info", `You took over from ${user}: ${answer.data.locks.map(called).join(", ")}.`);
   };
   return (
-    <Confirm title={`Take over from ${user}?`} yes="Take over" not={not} onYes={() => void takeOver()} onClose={onClose}>
+    <Confirm
+      title={`Take over from ${user}?`}
+      yes="Take over"
+      not={not}
+      onYes={() => void takeOver()}
+      onClose={onClose}
+    >
       {missing || present ? (
         <p>{not}</p>
       ) : !holder ? (
         <p role="status">Reading the locks…</p>
       ) : (
         <>
-          <p>{holder.left ? `${user} lost the connection at ${when(holder.left)} and still holds:` : `${user} still holds:`}</p>
+          <p>
+            {holder.left
+              ? `${user} lost the connection at ${when(holder.left)} and still holds:`
+              : `${user} still holds:`}
+          </p>
           <ul className="taken-over">
             {holder.locks.map((lock) => (
               <li key={lock.object_id}>
@@ -45,7 +63,9 @@ export default function TakeOver({ user, onClose }: { user: string; onClose: () 
               </li>
             ))}
           </ul>
-          <p>Everybody can edit these afterwards. Changes made by {user} stay. {user} is notified on returning.</p>
+          <p>
+            Everybody can edit these afterwards. Changes made by {user} stay. {user} is notified on returning.
+          </p>
         </>
       )}
     </Confirm>

@@ -19,9 +19,24 @@ const CopiesSection: Section["Body"] = ({ selection: { id } }) => {
       <summary>Copies in a row</summary>
       <div className="amounts">
         {(["x", "y", "z"] as const).map((axis) => (
-          <Amount key={axis} label={`Step ${axis.toUpperCase()}`} unit="mm" value={step[axis] * 1000} step={10} onChange={(next) => setStep({ ...step, [axis]: next / 1000 })} />
+          <Amount
+            key={axis}
+            label={`Step ${axis.toUpperCase()}`}
+            unit="mm"
+            value={step[axis] * 1000}
+            step={10}
+            onChange={(next) => setStep({ ...step, [axis]: next / 1000 })}
+          />
         ))}
-        <Amount label="Copies" unit="" digits={0} value={count} least={1} most={50} onChange={(next) => setCount(Math.round(next))} />
+        <Amount
+          label="Copies"
+          unit=""
+          digits={0}
+          value={count}
+          least={1}
+          most={50}
+          onChange={(next) => setCount(Math.round(next))}
+        />
       </div>
       <Button why={why} isDisabled={busy} onPress={() => void ask(copyPoint(id, count, step))}>
         {count === 1 ? "Make a copy" : `Make ${count} copies`}

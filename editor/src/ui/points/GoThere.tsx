@@ -1,15 +1,15 @@
 /** The robot sent to what is taught: shown by a ghost first, then moved. */
 
 import { useEffect, useState } from "react";
-import { hideGhost, moveToTaught, notReady, chosenRobot, showAt, showJoints } from "../../commands/robot";
+import { chosenRobot, hideGhost, moveToTaught, notReady, showAt, showJoints } from "../../commands/robot";
 import { theEngine } from "../../session/engine";
 import { now, useEditor } from "../../store/store";
 import { worldOf } from "../../viewmodel/frames";
 import { Button } from "../kit/kit";
 import { nameOf } from "../names";
 import { Answer } from "../robot/GoTab";
-import { mannerNow, useManner } from "../robot/manner";
 import { MannerFields } from "../robot/MannerFields";
+import { mannerNow, useManner } from "../robot/manner";
 import type { Section } from "../workplace/sections";
 import { RefusedText, useAsking } from "./Doing";
 import "../robot/robot.css";
@@ -21,7 +21,13 @@ const GoThere: Section["Body"] = ({ selection: { kind, id } }) => {
   // Joints belong to their robot, whichever is in hand.
   const robotId = joints?.robot_id ?? chosen?.robotId ?? "";
   const name = useEditor((state) => nameOf(state, robotId));
-  const cannotAsk = useEditor((state) => (state.connection.status === "ready" ? (chosen?.effector || joints ? "" : "Go online first: its end effectors are not known.") : "There is no connection to the server."));
+  const cannotAsk = useEditor((state) =>
+    state.connection.status === "ready"
+      ? chosen?.effector || joints
+        ? ""
+        : "Go online first: its end effectors are not known."
+      : "There is no connection to the server.",
+  );
   const why = useEditor((state) => notReady(state, chosen && { ...chosen, robotId }, "MoveToActionPoint"));
   const { speed } = useManner();
   const [answer, setAnswer] = useState<string | null>(null);
@@ -37,7 +43,9 @@ const GoThere: Section["Body"] = ({ selection: { kind, id } }) => {
     if (theEngine()?.item(robotId)?.visible === false) theEngine()?.focus(robotId);
     if (joints) {
       const known = now().reach;
-      const reach = Object.values(known).flatMap((each) => each.items).find((each) => each.id === id);
+      const reach = Object.values(known)
+        .flatMap((each) => each.items)
+        .find((each) => each.id === id);
       const problem = reach?.reason ?? "";
       showJoints(joints.robot_id, joints.joints, problem);
       setAnswer(problem);
@@ -53,7 +61,15 @@ const GoThere: Section["Body"] = ({ selection: { kind, id } }) => {
           look="primary"
           why={why}
           isDisabled={busy}
-          onPress={() => void ask(moveToTaught(joints ? { ...chosen, robotId, armId: joints.arm_id ?? "" } : chosen, kind === "joints" ? { joints_id: id } : { orientation_id: id }, mannerNow()))}
+          onPress={() =>
+            void ask(
+              moveToTaught(
+                joints ? { ...chosen, robotId, armId: joints.arm_id ?? "" } : chosen,
+                kind === "joints" ? { joints_id: id } : { orientation_id: id },
+                mannerNow(),
+              ),
+            )
+          }
         >
           Move it there
         </Button>

@@ -22,7 +22,13 @@ const JointsSection: Section["Body"] = ({ selection: { id } }) => {
   const point = useEditor((state) => (kept ? nameOf(state, kept.pointId) : ""));
   const robot = useEditor((state) => (kept ? nameOf(state, kept.robot_id) : ""));
   const why = useWhyNot(kept?.pointId ?? "", "UpdateActionPointJoints");
-  const noRobot = useEditor((state) => notReady(state, kept ? { robotId: kept.robot_id, armId: kept.arm_id ?? "", effector: "" } : null, "UpdateActionPointJointsUsingRobot"));
+  const noRobot = useEditor((state) =>
+    notReady(
+      state,
+      kept ? { robotId: kept.robot_id, armId: kept.arm_id ?? "", effector: "" } : null,
+      "UpdateActionPointJointsUsingRobot",
+    ),
+  );
   const { refused, busy, ask } = useAsking();
   if (!kept) return null;
   const orientations = Object.values(all ?? {}).filter((each) => each.pointId === kept.pointId);
@@ -30,7 +36,13 @@ const JointsSection: Section["Body"] = ({ selection: { id } }) => {
   const shown = shownJoints(kept.robot_id, kept.joints);
   return (
     <>
-      <NameField key={id} label="Name of the joints" name={kept.name} why={why} onRename={(name) => renameJoints(id, name)} />
+      <NameField
+        key={id}
+        label="Name of the joints"
+        name={kept.name}
+        why={why}
+        onRename={(name) => renameJoints(id, name)}
+      />
       <Button look="plain" icon="point" onPress={() => select({ kind: "point", id: kept.pointId })}>
         of {robot}, at {point}
       </Button>
@@ -49,7 +61,16 @@ const JointsSection: Section["Body"] = ({ selection: { id } }) => {
               least={joint.lower * joint.scale}
               most={joint.upper * joint.scale}
               isDisabled={why !== "" || busy}
-              onChange={(next) => void ask(setJoints(id, kept.joints.map((each) => (each.name === joint.name ? { ...each, value: next / joint.scale } : each))))}
+              onChange={(next) =>
+                void ask(
+                  setJoints(
+                    id,
+                    kept.joints.map((each) =>
+                      each.name === joint.name ? { ...each, value: next / joint.scale } : each,
+                    ),
+                  ),
+                )
+              }
             />
           </li>
         ))}
@@ -59,11 +80,26 @@ const JointsSection: Section["Body"] = ({ selection: { id } }) => {
           As the robot is
         </Button>
         {orientations.length > 1 ? (
-          <More label="Compute them anew" look="" icon="redo" choices={orientations.map((each) => ({ id: each.id, label: `for ${each.name}`, not: why, act: () => void ask(solveJoints(id, each.id)) }))}>
+          <More
+            label="Compute them anew"
+            look=""
+            icon="redo"
+            choices={orientations.map((each) => ({
+              id: each.id,
+              label: `for ${each.name}`,
+              not: why,
+              act: () => void ask(solveJoints(id, each.id)),
+            }))}
+          >
             Compute anew
           </More>
         ) : (
-          <Button icon="redo" why={why || (only ? "" : "The point has no orientation to compute them for.")} isDisabled={busy} onPress={() => only && void ask(solveJoints(id, only.id))}>
+          <Button
+            icon="redo"
+            why={why || (only ? "" : "The point has no orientation to compute them for.")}
+            isDisabled={busy}
+            onPress={() => only && void ask(solveJoints(id, only.id))}
+          >
             Compute anew
           </Button>
         )}

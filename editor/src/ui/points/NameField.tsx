@@ -3,7 +3,17 @@
 import { useId, useState } from "react";
 import { RefusedText, useAsking } from "./Doing";
 
-export function NameField({ label, name, why, onRename }: { label: string; name: string; why: string; onRename: (name: string) => Promise<string> }) {
+export function NameField({
+  label,
+  name,
+  why,
+  onRename,
+}: {
+  label: string;
+  name: string;
+  why: string;
+  onRename: (name: string) => Promise<string>;
+}) {
   const id = useId();
   const [text, setText] = useState<string | null>(null);
   const { refused, busy, ask } = useAsking();

@@ -27,7 +27,13 @@ const OrientationSection: Section["Body"] = ({ selection: { id } }) => {
   const angles = rollPitchYaw(one.orientation);
   return (
     <>
-      <NameField key={id} label="Name of the orientation" name={one.name} why={why} onRename={(name) => renameOrientation(id, name)} />
+      <NameField
+        key={id}
+        label="Name of the orientation"
+        name={one.name}
+        why={why}
+        onRename={(name) => renameOrientation(id, name)}
+      />
       <Button look="plain" icon="point" onPress={() => select({ kind: "point", id: one.pointId })}>
         at {point}
       </Button>
@@ -48,7 +54,12 @@ const OrientationSection: Section["Body"] = ({ selection: { id } }) => {
           />
         ))}
       </div>
-      <Button icon="robot" why={why || noRobot} isDisabled={busy} onPress={() => chosen && void ask(turnOrientationToRobot(id, chosen))}>
+      <Button
+        icon="robot"
+        why={why || noRobot}
+        isDisabled={busy}
+        onPress={() => chosen && void ask(turnOrientationToRobot(id, chosen))}
+      >
         Turn it as the robot is
       </Button>
       <RefusedText>{refused}</RefusedText>

@@ -20,21 +20,44 @@ import "./points.css";
 const PointSection: Section["Body"] = ({ selection: { id } }) => {
   const point = useEditor((state) => state.doc?.points[id]);
   const parents = useEditor((state) => possibleParents(state, id).join("\n"));
-  const names = useEditor((state) => possibleParents(state, id).map((each) => nameOf(state, each)).join("\n"));
+  const names = useEditor((state) =>
+    possibleParents(state, id)
+      .map((each) => nameOf(state, each))
+      .join("\n"),
+  );
   const chosen = useEditor(chosenRobot);
   const why = useWhyNot(id, "UpdateActionPointPosition");
   const noRobot = useEditor((state) => notReady(state, chosen, "UpdateActionPointUsingRobot"));
-  const byHand = useEditor((state) => (chosen && featuresOf(state, chosen.robotId)?.hand_teaching ? "" : "This robot cannot be moved by hand."));
+  const byHand = useEditor((state) =>
+    chosen && featuresOf(state, chosen.robotId)?.hand_teaching ? "" : "This robot cannot be moved by hand.",
+  );
   const { refused, busy, ask } = useAsking();
   if (!point) return null;
   const labels = names.split("\n");
   const choices = parents ? parents.split("\n").map((each, n) => [each, `on ${labels[n] ?? ""}`] as const) : [];
   return (
     <>
-      <NameField key={id} label="Name of the point" name={point.name} why={why} onRename={(name) => renamePoint(id, name)} />
-      <Pick label="Hangs" value={point.parent ?? ""} choices={[["", "in the world"], ...choices]} isDisabled={why !== "" || busy} onChange={(parent) => void ask(setParent(id, parent))} />
+      <NameField
+        key={id}
+        label="Name of the point"
+        name={point.name}
+        why={why}
+        onRename={(name) => renamePoint(id, name)}
+      />
+      <Pick
+        label="Hangs"
+        value={point.parent ?? ""}
+        choices={[["", "in the world"], ...choices]}
+        isDisabled={why !== "" || busy}
+        onChange={(parent) => void ask(setParent(id, parent))}
+      />
       <div className="actions start">
-        <Button icon="robot" why={why || noRobot} isDisabled={busy} onPress={() => chosen && void ask(movePointToRobot(id, chosen))}>
+        <Button
+          icon="robot"
+          why={why || noRobot}
+          isDisabled={busy}
+          onPress={() => chosen && void ask(movePointToRobot(id, chosen))}
+        >
           Put it where the robot is
         </Button>
         <HoldButton
@@ -63,15 +86,23 @@ export const RemovePoint: Section["Body"] = ({ selection: { id } }) => {
     const found = Object.values(of).filter((each) => each.pointId === id).length;
     return found === 0 ? [] : [found === 1 ? `1 ${one}` : `${found} ${several}`];
   };
-  const along = [...count(doc.actions, "action", "actions"), ...count(doc.orientations, "orientation", "orientations"), ...count(doc.joints, "set of joints", "sets of joints")];
-  return <Remove key={id} name={doc.points[id].name} why={why} along={along.join(", ")} onRemove={() => removePoint(id)} />;
+  const along = [
+    ...count(doc.actions, "action", "actions"),
+    ...count(doc.orientations, "orientation", "orientations"),
+    ...count(doc.joints, "set of joints", "sets of joints"),
+  ];
+  return (
+    <Remove key={id} name={doc.points[id].name} why={why} along={along.join(", ")} onRemove={() => removePoint(id)} />
+  );
 };
 
 /** What people write down about a point; all see it. The protocol has no request for a point's description. */
 function Note({ id }: { id: string }) {
   const key = `note/${id}`;
   const kept = useEditor((state) => state.view.shared[key]);
-  const why = useEditor((state) => (state.connection.status === "ready" && state.connection.role >= 2 ? "" : "read only"));
+  const why = useEditor((state) =>
+    state.connection.status === "ready" && state.connection.role >= 2 ? "" : "read only",
+  );
   const [text, setText] = useState<string | null>(null);
   return (
     <label className="field">

@@ -27,14 +27,23 @@ function rowsOf(doc: OpenDocument): Row[] {
     points
       .filter((each) => each.parent === parent)
       .flatMap((point) => [
-        { id: point.id, name: point.name, kind: "point" as const, depth, orientations: orientations.filter((each) => each.pointId === point.id).map((each) => each.id) },
+        {
+          id: point.id,
+          name: point.name,
+          kind: "point" as const,
+          depth,
+          orientations: orientations.filter((each) => each.pointId === point.id).map((each) => each.id),
+        },
         ...below(point.id, depth + 1),
       ]);
   const objects = Object.values(doc.objects)
     .filter((each) => each.pose && points.some((point) => point.parent === each.id))
     .sort((a, b) => a.name.localeCompare(b.name));
   return [
-    ...objects.flatMap((object) => [{ id: object.id, name: object.name, kind: "object" as const, depth: 0, orientations: [] }, ...below(object.id, 1)]),
+    ...objects.flatMap((object) => [
+      { id: object.id, name: object.name, kind: "object" as const, depth: 0, orientations: [] },
+      ...below(object.id, 1),
+    ]),
     { id: WORLD, name: "In the world", kind: "world", depth: 0, orientations: [] },
     ...below(undefined, 1),
   ];
@@ -70,7 +79,13 @@ export function PointTree() {
       }}
     >
       {(row) => (
-        <ListBoxItem id={row.id} textValue={row.name} className="thing" style={{ paddingLeft: 10 + row.depth * 18 }} onHoverStart={() => theEngine()?.hover(row.id)}>
+        <ListBoxItem
+          id={row.id}
+          textValue={row.name}
+          className="thing"
+          style={{ paddingLeft: 10 + row.depth * 18 }}
+          onHoverStart={() => theEngine()?.hover(row.id)}
+        >
           <Icon name={row.kind === "point" ? "point" : row.kind === "object" ? "box" : "home"} />
           <span className="thing-name">{row.name}</span>
           {row.orientations.map((id) => (

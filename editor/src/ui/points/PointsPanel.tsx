@@ -13,7 +13,7 @@ import { isRunning } from "../../store/selectors";
 import { now, setUi, tell, useEditor } from "../../store/store";
 import { composed, ORIGIN, worldOf } from "../../viewmodel/frames";
 import { pointSize } from "../../viewmodel/items";
-import { Amount, MoreOrLess, OnOff, OneOf } from "../kit/fields";
+import { Amount, MoreOrLess, OneOf, OnOff } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { nameOf } from "../names";
 import { usePlaceTap } from "../robot/usePlaceTap";
@@ -63,9 +63,25 @@ export default function PointsPanel() {
   return (
     <>
       <Cross />
-      {parentName && <OneOf label="A new point hangs" value={on} onChange={setOn} choices={[["parent", `on ${parentName}`], ["world", "in the world"]]} />}
+      {parentName && (
+        <OneOf
+          label="A new point hangs"
+          value={on}
+          onChange={setOn}
+          choices={[
+            ["parent", `on ${parentName}`],
+            ["world", "in the world"],
+          ]}
+        />
+      )}
       <div className="add-point">
-        <Button icon="robot" look="primary" why={why || noRobot} isDisabled={busy} onPress={() => chosen && added(addPointFromRobot(chosen))}>
+        <Button
+          icon="robot"
+          look="primary"
+          why={why || noRobot}
+          isDisabled={busy}
+          onPress={() => chosen && added(addPointFromRobot(chosen))}
+        >
           Where the robot is
         </Button>
         <Button icon="point" why={why} isDisabled={busy} aria-pressed={tapping} onPress={() => setTapping(!tapping)}>
@@ -83,7 +99,14 @@ export default function PointsPanel() {
         <p className="quiet small">{parent ? `In the frame of ${parentName}.` : "In the world."}</p>
         <div className="amounts">
           {(["x", "y", "z"] as const).map((axis) => (
-            <Amount key={axis} label={axis.toUpperCase()} unit="mm" value={typed[axis] * 1000} step={10} onChange={(next) => setTyped({ ...typed, [axis]: next / 1000 })} />
+            <Amount
+              key={axis}
+              label={axis.toUpperCase()}
+              unit="mm"
+              value={typed[axis] * 1000}
+              step={10}
+              onChange={(next) => setTyped({ ...typed, [axis]: next / 1000 })}
+            />
           ))}
         </div>
         <Button
@@ -99,7 +122,15 @@ export default function PointsPanel() {
       </details>
       <RefusedText>{refused}</RefusedText>
       <PointTree />
-      <MoreOrLess label="Size of points in the view" value={size} least={0.5} most={4} step={0.25} words={(value) => `${Math.round(value * 100)} %`} onChange={(next) => keepGeneral({ point_size: next })} />
+      <MoreOrLess
+        label="Size of points in the view"
+        value={size}
+        least={0.5}
+        most={4}
+        step={0.25}
+        words={(value) => `${Math.round(value * 100)} %`}
+        onChange={(next) => keepGeneral({ point_size: next })}
+      />
     </>
   );
 }

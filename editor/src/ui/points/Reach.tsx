@@ -7,7 +7,13 @@ import { useEditor } from "../../store/store";
 import { nameOf } from "../names";
 import "./reach.css";
 
-const SIGNS: Record<Reach, string> = { reachable: "✓", near_limit: "!", in_collision: "◆", out_of_reach: "✕", unknown: "?" };
+const SIGNS: Record<Reach, string> = {
+  reachable: "✓",
+  near_limit: "!",
+  in_collision: "◆",
+  out_of_reach: "✕",
+  unknown: "?",
+};
 const WORDS: Record<Reach, string> = {
   reachable: "reaches it",
   near_limit: "near a limit",
@@ -15,7 +21,13 @@ const WORDS: Record<Reach, string> = {
   out_of_reach: "out of reach",
   unknown: "not known",
 };
-const TONES: Record<Reach, string> = { reachable: "good", near_limit: "warn", in_collision: "bad", out_of_reach: "bad", unknown: "" };
+const TONES: Record<Reach, string> = {
+  reachable: "good",
+  near_limit: "warn",
+  in_collision: "bad",
+  out_of_reach: "bad",
+  unknown: "",
+};
 
 interface Answer extends ReachOfItem {
   robot: string;
@@ -26,7 +38,11 @@ function answers(state: State, id: string): Answer[] {
   const found: Answer[] = [];
   for (const one of Object.values(state.reach)) {
     const item = one.items.find((each) => each.id === id);
-    if (item) found.push({ ...item, robot: [nameOf(state, one.robot_id), one.arm_id, one.end_effector_id].filter(Boolean).join(" · ") });
+    if (item)
+      found.push({
+        ...item,
+        robot: [nameOf(state, one.robot_id), one.arm_id, one.end_effector_id].filter(Boolean).join(" · "),
+      });
   }
   return found;
 }
@@ -85,5 +101,8 @@ export function ReachOfAction({ id }: { id: string }) {
 }
 
 function best(found: Answer[]): Answer | undefined {
-  return found.reduce<Answer | undefined>((known, each) => (known && !worse(known.reach, each.reach) ? known : each), undefined);
+  return found.reduce<Answer | undefined>(
+    (known, each) => (known && !worse(known.reach, each.reach) ? known : each),
+    undefined,
+  );
 }

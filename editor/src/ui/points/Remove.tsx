@@ -4,11 +4,30 @@ import { tell } from "../../store/store";
 import { Button } from "../kit/kit";
 import { RefusedText, useAsking } from "./Doing";
 
-export function Remove({ name, why, along, onRemove }: { name: string; why: string; along: string; onRemove: () => Promise<string> }) {
+export function Remove({
+  name,
+  why,
+  along,
+  onRemove,
+}: {
+  name: string;
+  why: string;
+  along: string;
+  onRemove: () => Promise<string>;
+}) {
   const { refused, busy, ask } = useAsking();
   return (
     <div className="remove">
-      <Button look="danger" why={why} isDisabled={busy} onPress={() => void ask(onRemove()).then((done) => done && tell("info", `${name} is gone${along ? `, with ${along}` : ""}. Undo brings it back.`))}>
+      <Button
+        look="danger"
+        why={why}
+        isDisabled={busy}
+        onPress={() =>
+          void ask(onRemove()).then(
+            (done) => done && tell("info", `${name} is gone${along ? `, with ${along}` : ""}. Undo brings it back.`),
+          )
+        }
+      >
         Remove {name}
       </Button>
       {along && <p className="quiet small">{`With it: ${along}.`}</p>}

@@ -1,6 +1,12 @@
 /** What is taught at a point: orientations and joints, with whether robots get there. */
 
-import { addJointsFromRobot, addOrientation, addOrientationFromRobot, removeJoints, removeOrientation } from "../../commands/points";
+import {
+  addJointsFromRobot,
+  addOrientation,
+  addOrientationFromRobot,
+  removeJoints,
+  removeOrientation,
+} from "../../commands/points";
 import { chosenRobot, notReady } from "../../commands/robot";
 import { theEngine } from "../../session/engine";
 import type { Kind } from "../../store/state";
@@ -35,12 +41,24 @@ export const Orientations: Section["Body"] = ({ selection: { id } }) => {
         {taught.map((each) => (
           <li key={each.id}>
             <Taught kind="orientation" id={each.id} name={each.name} />
-            <Button look="plain" icon="close" aria-label={`Remove the orientation ${each.name}`} why={why} isDisabled={busy} onPress={() => void ask(removeOrientation(each.id))} />
+            <Button
+              look="plain"
+              icon="close"
+              aria-label={`Remove the orientation ${each.name}`}
+              why={why}
+              isDisabled={busy}
+              onPress={() => void ask(removeOrientation(each.id))}
+            />
           </li>
         ))}
       </ul>
       <div className="actions start">
-        <Button icon="robot" why={why || noRobot} isDisabled={busy} onPress={() => chosen && void ask(addOrientationFromRobot(id, chosen))}>
+        <Button
+          icon="robot"
+          why={why || noRobot}
+          isDisabled={busy}
+          onPress={() => chosen && void ask(addOrientationFromRobot(id, chosen))}
+        >
           From the robot
         </Button>
         <More
@@ -49,7 +67,12 @@ export const Orientations: Section["Body"] = ({ selection: { id } }) => {
           look=""
           choices={[
             { id: "down", label: "Tool straight down", not: why, act: down },
-            { id: "parent", label: "As what the point hangs on", not: why, act: () => void ask(addOrientation(id, { x: 0, y: 0, z: 0, w: 1 })) },
+            {
+              id: "parent",
+              label: "As what the point hangs on",
+              not: why,
+              act: () => void ask(addOrientation(id, { x: 0, y: 0, z: 0, w: 1 })),
+            },
           ]}
         >
           Add
@@ -65,9 +88,15 @@ export const JointsList: Section["Body"] = ({ selection: { id } }) => {
   const chosen = useEditor(chosenRobot);
   const why = useWhyNot(id, "AddActionPointJointsUsingRobot");
   const noRobot = useEditor((state) => notReady(state, chosen, "AddActionPointJointsUsingRobot"));
-  const robots = useEditor((state) => Object.values(doc?.joints ?? {}).map((each) => nameOf(state, each.robot_id)).join("\n")).split("\n");
+  const robots = useEditor((state) =>
+    Object.values(doc?.joints ?? {})
+      .map((each) => nameOf(state, each.robot_id))
+      .join("\n"),
+  ).split("\n");
   const { refused, busy, ask } = useAsking();
-  const taught = Object.values(doc?.joints ?? {}).map((each, n) => ({ ...each, robot: robots[n] ?? "" })).filter((each) => each.pointId === id);
+  const taught = Object.values(doc?.joints ?? {})
+    .map((each, n) => ({ ...each, robot: robots[n] ?? "" }))
+    .filter((each) => each.pointId === id);
   return (
     <>
       <ul className="taught">
@@ -75,11 +104,23 @@ export const JointsList: Section["Body"] = ({ selection: { id } }) => {
           <li key={each.id}>
             <Taught kind="joints" id={each.id} name={`${each.name} · ${each.robot}`} />
             {!each.is_valid && <span className="tag warn">point has moved</span>}
-            <Button look="plain" icon="close" aria-label={`Remove the joints ${each.name}`} why={why} isDisabled={busy} onPress={() => void ask(removeJoints(each.id))} />
+            <Button
+              look="plain"
+              icon="close"
+              aria-label={`Remove the joints ${each.name}`}
+              why={why}
+              isDisabled={busy}
+              onPress={() => void ask(removeJoints(each.id))}
+            />
           </li>
         ))}
       </ul>
-      <Button icon="robot" why={why || noRobot} isDisabled={busy} onPress={() => chosen && void ask(addJointsFromRobot(id, chosen))}>
+      <Button
+        icon="robot"
+        why={why || noRobot}
+        isDisabled={busy}
+        onPress={() => chosen && void ask(addJointsFromRobot(id, chosen))}
+      >
         From the robot
       </Button>
       <RefusedText>{refused}</RefusedText>
@@ -90,7 +131,13 @@ export const JointsList: Section["Body"] = ({ selection: { id } }) => {
 /** Opens it; shown in the view while the pointer is on it. */
 function Taught({ kind, id, name }: { kind: Kind; id: string; name: string }) {
   return (
-    <Button className="taught-name" look="plain" onPress={() => select({ kind, id })} onHoverStart={() => theEngine()?.hover(id)} onHoverEnd={() => theEngine()?.hover("")}>
+    <Button
+      className="taught-name"
+      look="plain"
+      onPress={() => select({ kind, id })}
+      onHoverStart={() => theEngine()?.hover(id)}
+      onHoverEnd={() => theEngine()?.hover("")}
+    >
       <Icon name={kind === "joints" ? "robot" : "point"} size={18} />
       {name}
       <ReachBadge id={id} />

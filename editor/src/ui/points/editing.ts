@@ -13,4 +13,5 @@ export function whyNotNow(state: State, id: string, request: keyof Requests): st
   return barred(state, request);
 }
 
-export const useWhyNot = (id: string, request: keyof Requests): string => useEditor((state) => whyNotNow(state, id, request));
+export const useWhyNot = (id: string, request: keyof Requests): string =>
+  useEditor((state) => whyNotNow(state, id, request));

@@ -11,11 +11,31 @@ const of =
 
 export const pointSections: readonly Section[] = [
   { id: "point", title: "Point", applies: of("point"), Body: lazily(() => import("./PointSection")) },
-  { id: "orientation", title: "Orientation", applies: of("orientation"), Body: lazily(() => import("./OrientationSection")) },
+  {
+    id: "orientation",
+    title: "Orientation",
+    applies: of("orientation"),
+    Body: lazily(() => import("./OrientationSection")),
+  },
   { id: "joints", title: "Joints", applies: of("joints"), Body: lazily(() => import("./JointsSection")) },
   { id: "go", title: "Robot", applies: of("orientation", "joints"), Body: lazily(() => import("./GoThere")) },
-  { id: "orientations", title: "Orientations", applies: of("point"), Body: lazily(() => import("./TaughtSection").then((module) => ({ default: module.Orientations }))) },
-  { id: "joints-list", title: "Joints", applies: of("point"), Body: lazily(() => import("./TaughtSection").then((module) => ({ default: module.JointsList }))) },
+  {
+    id: "orientations",
+    title: "Orientations",
+    applies: of("point"),
+    Body: lazily(() => import("./TaughtSection").then((module) => ({ default: module.Orientations }))),
+  },
+  {
+    id: "joints-list",
+    title: "Joints",
+    applies: of("point"),
+    Body: lazily(() => import("./TaughtSection").then((module) => ({ default: module.JointsList }))),
+  },
   { id: "copies", title: "Copies", applies: of("point"), Body: lazily(() => import("./CopiesSection")) },
-  { id: "remove-point", title: "Remove", applies: of("point"), Body: lazily(() => import("./PointSection").then((module) => ({ default: module.RemovePoint }))) },
+  {
+    id: "remove-point",
+    title: "Remove",
+    applies: of("point"),
+    Body: lazily(() => import("./PointSection").then((module) => ({ default: module.RemovePoint }))),
+  },
 ];

@@ -1,11 +1,18 @@
 /** What an action is told: each parameter from a value, the result of an earlier action, or a parameter of the project. */
 
 import { useEffect, useState } from "react";
-import { addParameter, awaited, dynamicValues, lastDynamicValues, notEditable, setParameter } from "../../commands/program";
-import type { ActionParameter, ParameterMeta } from "../../protocol/types";
+import {
+  addParameter,
+  awaited,
+  dynamicValues,
+  lastDynamicValues,
+  notEditable,
+  setParameter,
+} from "../../commands/program";
 import { linkTo, metaOf, usable } from "../../program/logic";
 import { freeName, words } from "../../program/naming";
-import { decoded, extraOf, initial, SIMPLE, sourceOf, type Source, TYPE_WORDS } from "../../program/values";
+import { decoded, extraOf, initial, SIMPLE, type Source, sourceOf, TYPE_WORDS } from "../../program/values";
+import type { ActionParameter, ParameterMeta } from "../../protocol/types";
 import type { State } from "../../store/state";
 import { now, useEditor } from "../../store/store";
 import { nameOf } from "../names";
@@ -22,20 +29,36 @@ const ActionParameters: Section["Body"] = ({ selection: { id } }) => {
   const action = doc?.actions[id];
   if (!doc || !action) return null;
   const meta = metaOf(types, doc, action);
-  if (!meta) return <p className="quiet small">What it can be told is not known: its device is gone, or cannot do this any more.</p>;
+  if (!meta)
+    return (
+      <p className="quiet small">What it can be told is not known: its device is gone, or cannot do this any more.</p>
+    );
   if (meta.parameters.length === 0) return <p className="quiet small">It needs nothing.</p>;
   return (
     <>
       <ReachOfAction id={id} />
       {meta.parameters.map((wanted) => (
-        <One key={`${id}/${wanted.name}`} actionId={id} wanted={wanted} parameter={action.parameters.find((each) => each.name === wanted.name)} />
+        <One
+          key={`${id}/${wanted.name}`}
+          actionId={id}
+          wanted={wanted}
+          parameter={action.parameters.find((each) => each.name === wanted.name)}
+        />
       ))}
     </>
   );
 };
 export default ActionParameters;
 
-function One({ actionId, wanted, parameter }: { actionId: string; wanted: ParameterMeta; parameter: ActionParameter | undefined }) {
+function One({
+  actionId,
+  wanted,
+  parameter,
+}: {
+  actionId: string;
+  wanted: ParameterMeta;
+  parameter: ActionParameter | undefined;
+}) {
   const state = useEditor((each) => each);
   const why = notEditable(state);
   const chosen = parameter ? sourceOf(parameter) : "value";
@@ -46,21 +69,41 @@ function One({ actionId, wanted, parameter }: { actionId: string; wanted: Parame
   if (!doc) return null;
   const results = usable(doc, types, actionId, type);
   const simple = (SIMPLE as readonly string[]).includes(type);
-  const constants = Object.values(doc.parameters).filter((each) => each.type === type && each.name !== "scene_id" && each.name !== "project_id");
-  const sources: Source[] = type === "image" ? ["link"] : ["value", ...(results.length > 0 || chosen === "link" ? (["link"] as const) : []), ...(simple ? (["project_parameter"] as const) : [])];
-  const set = (of: Source, json: string) => setParameter(actionId, { name, type: of === "value" ? type : of, value: json });
+  const constants = Object.values(doc.parameters).filter(
+    (each) => each.type === type && each.name !== "scene_id" && each.name !== "project_id",
+  );
+  const sources: Source[] =
+    type === "image"
+      ? ["link"]
+      : [
+          "value",
+          ...(results.length > 0 || chosen === "link" ? (["link"] as const) : []),
+          ...(simple ? (["project_parameter"] as const) : []),
+        ];
+  const set = (of: Source, json: string) =>
+    setParameter(actionId, { name, type: of === "value" ? type : of, value: json });
   const label = words(name);
   const field = { label, name: label, why, hint: wanted.description };
   return (
     <div className="parameter">
       {source === "value" ? (
-        <Literal state={state} actionId={actionId} wanted={wanted} json={chosen === "value" ? (parameter?.value ?? initial(wanted)) : undefined} field={field} onSet={(json) => set("value", json)} />
+        <Literal
+          state={state}
+          actionId={actionId}
+          wanted={wanted}
+          json={chosen === "value" ? (parameter?.value ?? initial(wanted)) : undefined}
+          field={field}
+          onSet={(json) => set("value", json)}
+        />
       ) : source === "link" ? (
         <ValueField
           {...field}
           type="string"
           json={chosen === "link" ? parameter?.value : undefined}
-          choices={results.map((each) => ({ json: JSON.stringify(linkTo(each)), label: `${each.name} of ${each.action.name}` }))}
+          choices={results.map((each) => ({
+            json: JSON.stringify(linkTo(each)),
+            label: `${each.name} of ${each.action.name}`,
+          }))}
           hint="what an earlier action found out"
           onSet={(json) => set("link", json)}
         />
@@ -69,11 +112,21 @@ function One({ actionId, wanted, parameter }: { actionId: string; wanted: Parame
           {...field}
           type="string"
           json={chosen === "project_parameter" ? parameter?.value : undefined}
-          choices={[...constants.map((each) => ({ json: JSON.stringify(each.id), label: `${each.name} = ${String(decoded(each.value))}` })), { json: NEW, label: `New, with the present value…` }]}
+          choices={[
+            ...constants.map((each) => ({
+              json: JSON.stringify(each.id),
+              label: `${each.name} = ${String(decoded(each.value))}`,
+            })),
+            { json: NEW, label: `New, with the present value…` },
+          ]}
           hint="one value for the whole program"
           onSet={async (json) => {
             if (json !== NEW) return set("project_parameter", json);
-            const made = await sharedFrom(name, type, chosen === "value" ? (parameter?.value ?? initial(wanted)) : initial(wanted));
+            const made = await sharedFrom(
+              name,
+              type,
+              chosen === "value" ? (parameter?.value ?? initial(wanted)) : initial(wanted),
+            );
             return "problem" in made ? made.problem : set("project_parameter", JSON.stringify(made.id));
           }}
         />
@@ -82,7 +135,14 @@ function One({ actionId, wanted, parameter }: { actionId: string; wanted: Parame
         <div className="chips sources" role="radiogroup" aria-label={`Where ${label} comes from`}>
           {sources.map((each) => (
             <label key={each} className="chip" data-selected={source === each}>
-              <input type="radio" className="hidden-but-read" name={`${actionId}/${name}/source`} checked={source === each} disabled={why !== ""} onChange={() => setSource(each)} />
+              <input
+                type="radio"
+                className="hidden-but-read"
+                name={`${actionId}/${name}/source`}
+                checked={source === each}
+                disabled={why !== ""}
+                onChange={() => setSource(each)}
+              />
               {SOURCES[each]}
             </label>
           ))}
@@ -95,8 +155,15 @@ function One({ actionId, wanted, parameter }: { actionId: string; wanted: Parame
 /** Stands for the choice to make a project parameter on the spot; no id is JSON's null. */
 const NEW = "null";
 
-async function sharedFrom(name: string, type: string, value: string | undefined): Promise<{ id: string } | { problem: string }> {
-  const free = freeName(name, Object.values(now().doc?.parameters ?? {}).map((each) => each.name));
+async function sharedFrom(
+  name: string,
+  type: string,
+  value: string | undefined,
+): Promise<{ id: string } | { problem: string }> {
+  const free = freeName(
+    name,
+    Object.values(now().doc?.parameters ?? {}).map((each) => each.name),
+  );
   const problem = await addParameter(free, type, value ?? '""');
   if (problem) return { problem };
   const made = await awaited((state) => Object.values(state.doc?.parameters ?? {}).find((each) => each.name === free));
@@ -115,8 +182,20 @@ interface LiteralProps {
 function Literal({ state, actionId, wanted, json, field, onSet }: LiteralProps) {
   const dynamic = useDynamic(state, actionId, wanted);
   const choices = dynamic.choices ?? placesFor(state, actionId, wanted.type);
-  const hint = [field.hint, dynamic.note, choices && !dynamic.choices && TYPE_WORDS[wanted.type]].filter(Boolean).join(" · ");
-  return <ValueField {...field} hint={hint} type={wanted.type} json={json} extra={extraOf(wanted)} choices={choices} onSet={onSet} />;
+  const hint = [field.hint, dynamic.note, choices && !dynamic.choices && TYPE_WORDS[wanted.type]]
+    .filter(Boolean)
+    .join(" · ");
+  return (
+    <ValueField
+      {...field}
+      hint={hint}
+      type={wanted.type}
+      json={json}
+      extra={extraOf(wanted)}
+      choices={choices}
+      onSet={onSet}
+    />
+  );
 }
 
 /** Poses, positions and joints of the project that may be chosen, those of the action's own point first. */
@@ -125,16 +204,23 @@ function placesFor(state: State, actionId: string, type: string): Choice[] | und
   if (!doc) return undefined;
   const action = doc.actions[actionId];
   const robot = action?.type.split("/")[0];
-  const first = <T extends { pointId: string }>(of: T[]) => of.sort((a, b) => Number(b.pointId === action?.pointId) - Number(a.pointId === action?.pointId));
-  const on = (each: { name: string; pointId: string }) => (each.name === "default" ? nameOf(state, each.pointId) : `${nameOf(state, each.pointId)}, ${each.name}`);
+  const first = <T extends { pointId: string }>(of: T[]) =>
+    of.sort((a, b) => Number(b.pointId === action?.pointId) - Number(a.pointId === action?.pointId));
+  const on = (each: { name: string; pointId: string }) =>
+    each.name === "default" ? nameOf(state, each.pointId) : `${nameOf(state, each.pointId)}, ${each.name}`;
   const best: Record<string, string> = {};
   for (const { items, robot_id } of Object.values(state.reach)) {
     if (robot_id !== robot) continue;
-    for (const { id, reach } of items) if (reach === "out_of_reach" || reach === "in_collision") best[id] = reach === "out_of_reach" ? " – out of reach" : " – would collide";
+    for (const { id, reach } of items)
+      if (reach === "out_of_reach" || reach === "in_collision")
+        best[id] = reach === "out_of_reach" ? " – out of reach" : " – would collide";
   }
   switch (type) {
     case "pose":
-      return first(Object.values(doc.orientations)).map((each) => ({ json: JSON.stringify(each.id), label: on(each) + (best[each.id] ?? "") }));
+      return first(Object.values(doc.orientations)).map((each) => ({
+        json: JSON.stringify(each.id),
+        label: on(each) + (best[each.id] ?? ""),
+      }));
     case "position":
       return Object.values(doc.points).map((each) => ({ json: JSON.stringify(each.id), label: each.name }));
     case "joints":
@@ -164,23 +250,36 @@ function useDynamic(state: State, actionId: string, wanted: ParameterMeta): { ch
   const action = state.doc?.actions[actionId];
   const objectId = action?.type.split("/")[0] ?? "";
   const online = state.live.state === "started";
-  const parents = (wanted.dynamic_value_parents ?? []).map((id) => ({ id, value: knownValue(state, action?.parameters.find((each) => each.name === id)) }));
+  const parents = (wanted.dynamic_value_parents ?? []).map((id) => ({
+    id,
+    value: knownValue(
+      state,
+      action?.parameters.find((each) => each.name === id),
+    ),
+  }));
   const missing = parents.filter((each) => each.value === null).map((each) => words(each.id));
   const key = JSON.stringify([objectId, wanted.name, parents]);
   const [asked, setAsked] = useState<{ key: string; values: string[] } | null>(null);
   useEffect(() => {
     if (!wanted.dynamic_value || !online || missing.length > 0) return;
     let ended = false;
-    dynamicValues(objectId, wanted.name, parents as Known[]).then((values) => ended || setAsked({ key, values }), () => {});
+    dynamicValues(objectId, wanted.name, parents as Known[]).then(
+      (values) => ended || setAsked({ key, values }),
+      () => {},
+    );
     return () => {
       ended = true;
     };
   }, [key, online, wanted.dynamic_value]);
   if (!wanted.dynamic_value) return {};
-  if (missing.length > 0) return { note: `what there is depends on ${missing.join(" and ")}, which is found out when it runs` };
+  if (missing.length > 0)
+    return { note: `what there is depends on ${missing.join(" and ")}, which is found out when it runs` };
   const fresh = asked?.key === key && online;
   const values = fresh ? asked.values : lastDynamicValues(objectId, wanted.name, parents as Known[]);
   if (!values) return { note: online ? "asking the device…" : "go online to choose from what the device has" };
-  const choices = values.map((each) => ({ json: wanted.type.startsWith("integer") ? each : JSON.stringify(each), label: each }));
+  const choices = values.map((each) => ({
+    json: wanted.type.startsWith("integer") ? each : JSON.stringify(each),
+    label: each,
+  }));
   return { choices, note: fresh ? undefined : "as the device told last" };
 }

@@ -4,12 +4,19 @@
  */
 
 import { useMemo, useState } from "react";
+import {
+  Button as AriaButton,
+  Input,
+  Label,
+  SearchField,
+  ToggleButton,
+  ToggleButtonGroup,
+} from "react-aria-components";
 import { createPortal } from "react-dom";
-import { Button as AriaButton, Input, Label, SearchField, ToggleButton, ToggleButtonGroup } from "react-aria-components";
-import { addAction, notEditable, type Where } from "../../commands/program";
 import { aimedPlace } from "../../commands/aimed";
-import type { ObjectAction } from "../../protocol/types";
+import { addAction, notEditable, type Where } from "../../commands/program";
 import { words } from "../../program/naming";
+import type { ObjectAction } from "../../protocol/types";
 import type { State } from "../../store/state";
 import { now, tell, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
@@ -42,14 +49,19 @@ export function AddAction() {
   const onPoint = selected && !anew ? selected : "";
   const offers = useMemo(() => offersOf(now(), onPoint), [doc, types, onPoint, online]);
   const wanted = search.trim().toLowerCase();
-  const found = offers.filter((each) => `${each.object} ${words(each.meta.name)} ${each.meta.description ?? ""} ${each.category}`.toLowerCase().includes(wanted));
+  const found = offers.filter((each) =>
+    `${each.object} ${words(each.meta.name)} ${each.meta.description ?? ""} ${each.category}`
+      .toLowerCase()
+      .includes(wanted),
+  );
   const used = wanted ? [] : recent.flatMap((key) => offers.filter((each) => each.key === key));
 
   const add = async (offer: Offer) => {
     const why = cannot || offer.why;
     if (why) return tell("info", `${words(offer.meta.name)}: ${why}`);
     const where = placeFor(onPoint);
-    if (!where) return tell("info", "The cross points at nothing: turn the view so that it is on the table or a thing.");
+    if (!where)
+      return tell("info", "The cross points at nothing: turn the view so that it is on the table or a thing.");
     setBusy(offer.key);
     recent = [offer.key, ...recent.filter((each) => each !== offer.key)].slice(0, RECENT);
     await addAction(offer.objectId, offer.meta, where);
@@ -57,7 +69,12 @@ export function AddAction() {
   };
   const row = (offer: Offer, prefix = "") => (
     <li key={prefix + offer.key}>
-      <AriaButton className="offer" aria-disabled={offer.why !== "" || cannot !== "" || undefined} isDisabled={busy !== ""} onPress={() => void add(offer)}>
+      <AriaButton
+        className="offer"
+        aria-disabled={offer.why !== "" || cannot !== "" || undefined}
+        isDisabled={busy !== ""}
+        onPress={() => void add(offer)}
+      >
         <span className="offer-name">
           {words(offer.meta.name)}
           {prefix && <span className="quiet small"> · {offer.object}</span>}
@@ -84,7 +101,9 @@ export function AddAction() {
             {selected ? `On ${pointName}` : "On a point"}
           </ToggleButton>
         </ToggleButtonGroup>
-        <p className="quiet small">{onPoint ? "It goes on the point that is selected." : "A new point is made where the cross in the view is."}</p>
+        <p className="quiet small">
+          {onPoint ? "It goes on the point that is selected." : "A new point is made where the cross in the view is."}
+        </p>
       </div>
       {!onPoint && <Cross />}
       <SearchField className="field" value={search} onChange={setSearch}>
@@ -100,12 +119,15 @@ export function AddAction() {
       {groups(found).map(([object, of]) => (
         <section key={object} className="offers" aria-label={object}>
           <h3>
-            <Icon name={CATEGORY_ICONS[of[0]?.category ?? ""] ?? "box"} /> {object} {of[0]?.category && <span className="tag">{of[0].category}</span>}
+            <Icon name={CATEGORY_ICONS[of[0]?.category ?? ""] ?? "box"} /> {object}{" "}
+            {of[0]?.category && <span className="tag">{of[0].category}</span>}
           </h3>
           <ul>{of.map((offer) => row(offer))}</ul>
         </section>
       ))}
-      {found.length === 0 && <p className="quiet">{offers.length ? "No action is called that." : "No device of this scene has actions."}</p>}
+      {found.length === 0 && (
+        <p className="quiet">{offers.length ? "No action is called that." : "No device of this scene has actions."}</p>
+      )}
     </>
   );
 }
@@ -141,7 +163,9 @@ function groups(offers: Offer[]): [string, Offer[]][] {
 function offersOf(state: State, pointId: string): Offer[] {
   const { doc, types } = state;
   const rank = (type: string) => (type in types.robots ? 0 : 1);
-  const objects = Object.values(doc?.objects ?? {}).sort((a, b) => rank(a.type) - rank(b.type) || a.name.localeCompare(b.name));
+  const objects = Object.values(doc?.objects ?? {}).sort(
+    (a, b) => rank(a.type) - rank(b.type) || a.name.localeCompare(b.name),
+  );
   return objects.flatMap((object) => {
     const type = types.byName[object.type];
     return (types.actions[object.type] ?? []).map((meta) => ({
@@ -160,7 +184,9 @@ function whyNot(state: State, objectId: string, meta: ObjectAction, pointId: str
   if (meta.disabled) return meta.problem ?? "It cannot be used.";
   const needsJoints = meta.parameters.some((each) => each.type === "joints");
   if (needsJoints && state.live.state !== "started") {
-    const there = Object.values(state.doc?.joints ?? {}).some((each) => each.pointId === pointId && each.robot_id === objectId);
+    const there = Object.values(state.doc?.joints ?? {}).some(
+      (each) => each.pointId === pointId && each.robot_id === objectId,
+    );
     if (!there) return "It needs joints: go online, and they are taken from the robot.";
   }
   const needsImage = meta.parameters.some((each) => each.type === "image");
@@ -168,7 +194,9 @@ function whyNot(state: State, objectId: string, meta: ObjectAction, pointId: str
     const { doc, types } = state;
     const given = Object.values(doc?.actions ?? {}).some((action) => {
       const [id = "", method] = action.type.split("/");
-      return types.actions[doc?.objects[id]?.type ?? ""]?.find((each) => each.name === method)?.returns.includes("image");
+      return types.actions[doc?.objects[id]?.type ?? ""]
+        ?.find((each) => each.name === method)
+        ?.returns.includes("image");
     });
     if (!given) return "It needs a picture: add the action that takes one first.";
   }

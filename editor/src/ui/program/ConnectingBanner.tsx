@@ -10,11 +10,11 @@ export default function ConnectingBanner() {
   const connecting = useEditor((state) => state.ui.connecting);
   useEffect(() => {
     if (!connecting) return;
-    const escape = (event: KeyboardEvent) => {
+    const onKey = (event: KeyboardEvent) => {
       if (event.key === "Escape") cancelStep();
     };
-    window.addEventListener("keydown", escape);
-    return () => window.removeEventListener("keydown", escape);
+    window.addEventListener("keydown", onKey);
+    return () => window.removeEventListener("keydown", onKey);
   }, [connecting]);
   if (!connecting) return null;
   return (

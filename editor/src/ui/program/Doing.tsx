@@ -1,9 +1,9 @@
 /** What can be done with an action: try it, run to it, rename, duplicate, remove; and how the last tries ended. */
 
 import { type FormEvent, useState } from "react";
-import { duplicateAction, notEditable, removeAction, renameAction } from "../../commands/program";
 import { barred } from "../../commands/asking";
 import { stopMotion } from "../../commands/operation";
+import { duplicateAction, notEditable, removeAction, renameAction } from "../../commands/program";
 import { breakAt, cancel, execute, notRunnable, runTo } from "../../commands/run";
 import { metaOf } from "../../program/logic";
 import { useEditor } from "../../store/store";
@@ -22,7 +22,13 @@ const Doing: Section["Body"] = ({ selection: { id } }) => {
   const meta = metaOf(types, doc, action);
   const why = notEditable(state, "RemoveAction");
   const running = live.executing === id;
-  const notNow = notEditable(state, "ExecuteAction") || (live.state !== "started" ? "Go online first: it moves the real devices." : live.executing ? "Another action is being tried." : "");
+  const notNow =
+    notEditable(state, "ExecuteAction") ||
+    (live.state !== "started"
+      ? "Go online first: it moves the real devices."
+      : live.executing
+        ? "Another action is being tried."
+        : "");
   const stays = doc.project?.has_logic ? notRunnable(state) : "The project has no program.";
   return (
     <>
@@ -39,7 +45,11 @@ const Doing: Section["Body"] = ({ selection: { id } }) => {
         <Button icon="play" why={stays} onPress={() => void runTo(id)}>
           Run to here
         </Button>
-        <Button aria-pressed={id in breakpoints} why={barred(state, "SetBreakpoints")} onPress={() => void breakAt(id, !(id in breakpoints))}>
+        <Button
+          aria-pressed={id in breakpoints}
+          why={barred(state, "SetBreakpoints")}
+          onPress={() => void breakAt(id, !(id in breakpoints))}
+        >
           <span className="breakpoint-dot" data-on={id in breakpoints} aria-hidden="true" /> Pause before it
         </Button>
       </div>
@@ -54,9 +64,12 @@ const Doing: Section["Body"] = ({ selection: { id } }) => {
         .reverse()
         .map((each) => (
           <div key={each.time} className={`outcome ${each.error ? "bad" : "good"}`} role="status">
-            <strong>{each.error ? "Failed" : "Done"}</strong> <span className="quiet small">{ago(new Date(each.time).toISOString())}</span>
+            <strong>{each.error ? "Failed" : "Done"}</strong>{" "}
+            <span className="quiet small">{ago(new Date(each.time).toISOString())}</span>
             {each.error && <p>{each.error}</p>}
-            {each.results && each.results.length > 0 && <Values names={action.flows[0]?.outputs ?? []} values={each.results} />}
+            {each.results && each.results.length > 0 && (
+              <Values names={action.flows[0]?.outputs ?? []} values={each.results} />
+            )}
           </div>
         ))}
       {renaming ? (

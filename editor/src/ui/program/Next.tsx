@@ -1,7 +1,17 @@
 /** The steps that lead on from an action, and the buttons that begin another one: then a tap says where it leads. */
 
 import { beginStep, endStep, notEditable, removeStep } from "../../commands/program";
-import { cannotLead, conditionsOf, conditionWords, END, linkTo, outgoing, placeOf, resultAt, START } from "../../program/logic";
+import {
+  cannotLead,
+  conditionsOf,
+  conditionWords,
+  END,
+  linkTo,
+  outgoing,
+  placeOf,
+  resultAt,
+  START,
+} from "../../program/logic";
 import { runsOf } from "../../program/runs";
 import type { ProjectLogicIf } from "../../protocol/types";
 import { select, useEditor } from "../../store/store";
@@ -24,9 +34,13 @@ const Next: Section["Body"] = ({ selection: { id } }) => {
   const own = conditionsOf(doc, types, id)[0];
   const asked = ways.find((each) => each.condition)?.condition;
   const result = asked ? resultAt(doc, types, asked.what) : own?.action.id === id ? own : undefined;
-  const run = state.ui.mode === "flow" || state.ui.mode === "split" ? runsOf(doc).find((each) => each.includes(id)) : undefined;
+  const run =
+    state.ui.mode === "flow" || state.ui.mode === "split" ? runsOf(doc).find((each) => each.includes(id)) : undefined;
   const free = (value: string) => !ways.some((each) => each.condition?.value === value);
-  const on = (value: string): ProjectLogicIf => ({ what: asked?.what ?? linkTo(result as NonNullable<typeof result>), value });
+  const on = (value: string): ProjectLogicIf => ({
+    what: asked?.what ?? linkTo(result as NonNullable<typeof result>),
+    value,
+  });
   return (
     <>
       {ways.length === 0 && <p className="quiet small">Nothing yet.</p>}
@@ -34,10 +48,18 @@ const Next: Section["Body"] = ({ selection: { id } }) => {
         {ways.map((way) => (
           <li key={way.id}>
             <Button look="plain" className="way" onPress={() => select({ kind: "logic", id: way.id })}>
-              {conditionWords(doc, types, way) && <span className={`branch ${branchOf(way.condition)}`}>{conditionWords(doc, types, way)}</span>}
+              {conditionWords(doc, types, way) && (
+                <span className={`branch ${branchOf(way.condition)}`}>{conditionWords(doc, types, way)}</span>
+              )}
               <span aria-hidden="true">→</span> {nameOf(state, placeOf(way.end))}
             </Button>
-            <Button look="plain" icon="close" aria-label={`Remove the step to ${nameOf(state, placeOf(way.end))}`} why={why} onPress={() => void removeStep(way.id)} />
+            <Button
+              look="plain"
+              icon="close"
+              aria-label={`Remove the step to ${nameOf(state, placeOf(way.end))}`}
+              why={why}
+              onPress={() => void removeStep(way.id)}
+            />
           </li>
         ))}
       </ul>
@@ -84,7 +106,8 @@ const Next: Section["Body"] = ({ selection: { id } }) => {
 };
 export default Next;
 
-export const branchOf = (condition: ProjectLogicIf | undefined): string => (!condition ? "always" : condition.value === "true" || condition.value === "false" ? condition.value : "value");
+export const branchOf = (condition: ProjectLogicIf | undefined): string =>
+  !condition ? "always" : condition.value === "true" || condition.value === "false" ? condition.value : "value";
 
 /** Where a step can lead, for who does not tap in the view. */
 function Targets({ from }: { from: string }) {

@@ -3,10 +3,10 @@
 import { type FormEvent, useState } from "react";
 import { Button as AriaButton } from "react-aria-components";
 import { addParameter, notEditable, override, removeParameter, updateParameter } from "../../commands/program";
-import type { ParameterMeta } from "../../protocol/types";
 import { words } from "../../program/naming";
 import { usersOf } from "../../program/problems";
-import { extraOf, read, SIMPLE, type Simple, textOf, TYPE_WORDS } from "../../program/values";
+import { extraOf, read, SIMPLE, type Simple, TYPE_WORDS, textOf } from "../../program/values";
+import type { ParameterMeta } from "../../protocol/types";
 import { select, useEditor } from "../../store/store";
 import { Button, Field } from "../kit/kit";
 import { ValueField } from "./ValueField";
@@ -39,7 +39,9 @@ function One({ id }: { id: string }) {
   const why = notEditable(state, "UpdateProjectParameter");
   const users = usersOf(doc, types, { parameter: id });
   const { range } = parameter;
-  const cannotRemove = notEditable(state, "RemoveProjectParameter") || (users.length > 0 ? `It is used by ${users.map((each) => doc.actions[each]?.name).join(", ")}.` : "");
+  const cannotRemove =
+    notEditable(state, "RemoveProjectParameter") ||
+    (users.length > 0 ? `It is used by ${users.map((each) => doc.actions[each]?.name).join(", ")}.` : "");
   return (
     <section className="constant" aria-label={parameter.name}>
       <ValueField
@@ -52,7 +54,13 @@ function One({ id }: { id: string }) {
         why={why}
         onSet={(value) => updateParameter(id, { value })}
       >
-        <Button look="plain" icon="close" aria-label={`Remove ${parameter.name}`} why={cannotRemove} onPress={() => void removeParameter(id)} />
+        <Button
+          look="plain"
+          icon="close"
+          aria-label={`Remove ${parameter.name}`}
+          why={cannotRemove}
+          onPress={() => void removeParameter(id)}
+        />
       </ValueField>
       <p className="small used">
         {users.length === 0 ? <span className="quiet">not used yet</span> : "used by "}
@@ -97,12 +105,23 @@ function NewParameter() {
       <div className="chips" role="radiogroup" aria-label="Kind of value">
         {SIMPLE.map((each) => (
           <label key={each} className="chip" data-selected={type === each}>
-            <input type="radio" className="hidden-but-read" name="kind-of-value" checked={type === each} onChange={() => setType(each)} />
+            <input
+              type="radio"
+              className="hidden-but-read"
+              name="kind-of-value"
+              checked={type === each}
+              onChange={() => setType(each)}
+            />
             {TYPE_WORDS[each]}
           </label>
         ))}
       </div>
-      <Field label={type === "boolean" ? "Value (yes or no)" : "Value"} value={text} onChange={setText} autoComplete="off" />
+      <Field
+        label={type === "boolean" ? "Value (yes or no)" : "Value"}
+        value={text}
+        onChange={setText}
+        autoComplete="off"
+      />
       {problem && (
         <p className="error" role="alert">
           {problem}
@@ -143,7 +162,10 @@ function Overrides() {
           })}
         </select>
       </div>
-      {object && types.byName[object.type]?.settings.map((setting) => <Override key={setting.name} objectId={object.id} setting={setting} />)}
+      {object &&
+        types.byName[object.type]?.settings.map((setting) => (
+          <Override key={setting.name} objectId={object.id} setting={setting} />
+        ))}
     </section>
   );
 }
@@ -155,7 +177,9 @@ function Override({ objectId, setting }: { objectId: string; setting: ParameterM
   const { name, type } = setting;
   const replaced = state.doc?.overrides[objectId]?.[name]?.value;
   const given = object.parameters.find((each) => each.name === name)?.value ?? setting.default_value;
-  const why = notEditable(state, "AddOverride") || (state.live.state === "stopped" ? "" : "Go offline first: it holds from the next start.");
+  const why =
+    notEditable(state, "AddOverride") ||
+    (state.live.state === "stopped" ? "" : "Go offline first: it holds from the next start.");
   return (
     <ValueField
       label={words(name)}
@@ -164,11 +188,19 @@ function Override({ objectId, setting }: { objectId: string; setting: ParameterM
       json={replaced ?? given}
       extra={extraOf(setting)}
       why={why}
-      hint={replaced === undefined ? setting.description : `instead of ${textOf(type, given) || "nothing"} in the scene`}
+      hint={
+        replaced === undefined ? setting.description : `instead of ${textOf(type, given) || "nothing"} in the scene`
+      }
       onSet={(value) => override(objectId, { name, type }, value)}
     >
       {replaced !== undefined && (
-        <Button look="plain" icon="undo" aria-label={`${words(name)} as in the scene`} why={why} onPress={() => void override(objectId, { name, type }, undefined)} />
+        <Button
+          look="plain"
+          icon="undo"
+          aria-label={`${words(name)} as in the scene`}
+          why={why}
+          onPress={() => void override(objectId, { name, type }, undefined)}
+        />
       )}
     </ValueField>
   );

@@ -8,7 +8,11 @@ import { Icon } from "../kit/icons";
 import { selectionOf, withNames } from "../names";
 
 export function Problems({ problems }: { problems: Problem[] }) {
-  const known = useEditor((state) => Object.values(state.doc?.objects ?? {}).every((each) => each.type in state.types.actions || !(each.type in state.types.byName)));
+  const known = useEditor((state) =>
+    Object.values(state.doc?.objects ?? {}).every(
+      (each) => each.type in state.types.actions || !(each.type in state.types.byName),
+    ),
+  );
   if (!known) return <p className="quiet">Reading what the devices can do…</p>;
   if (problems.length === 0) {
     return (
@@ -32,7 +36,9 @@ export function Problems({ problems }: { problems: Problem[] }) {
           >
             <Icon name={each.level === "error" ? "warn" : "info"} />
             <span>
-              <span className="hidden-but-read">{each.level === "error" ? "Must be cured: " : "Should be looked at: "}</span>
+              <span className="hidden-but-read">
+                {each.level === "error" ? "Must be cured: " : "Should be looked at: "}
+              </span>
               {withNames(now(), each.text)}
             </span>
           </AriaButton>

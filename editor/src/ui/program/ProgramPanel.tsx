@@ -39,7 +39,9 @@ export default function ProgramPanel() {
         {(Object.keys(TABS) as Tab[]).map((each) => (
           <ToggleButton key={each} id={each} className="tab">
             {TABS[each]}
-            {each === "problems" && problems.length > 0 && <span className={`tag ${errors ? "bad" : "warn"}`}>{problems.length}</span>}
+            {each === "problems" && problems.length > 0 && (
+              <span className={`tag ${errors ? "bad" : "warn"}`}>{problems.length}</span>
+            )}
           </ToggleButton>
         ))}
       </ToggleButtonGroup>

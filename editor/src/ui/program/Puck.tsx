@@ -17,7 +17,9 @@ const Puck: Section["Body"] = ({ selection: { id, kind } }) => {
   };
   return (
     <>
-      <p className="quiet small">Drag it in the view while it is selected. All see it where it is put; the program stays the same.</p>
+      <p className="quiet small">
+        Drag it in the view while it is selected. All see it where it is put; the program stays the same.
+      </p>
       <div className="row">
         <Button look="plain" why={why} onPress={move}>
           To the middle of the view

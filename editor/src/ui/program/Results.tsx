@@ -1,12 +1,12 @@
 /** What an action tells: names by which other actions and steps use it, and who does. */
 
+import { useState } from "react";
 import { nameResults, notEditable } from "../../commands/program";
 import { metaOf } from "../../program/logic";
 import { newOutputs } from "../../program/naming";
 import { usersOf } from "../../program/problems";
 import { TYPE_WORDS } from "../../program/values";
 import { select, useEditor } from "../../store/store";
-import { useState } from "react";
 import { Button } from "../kit/kit";
 import type { Section } from "../workplace/sections";
 import { ValueField } from "./ValueField";
@@ -26,7 +26,14 @@ const Results: Section["Body"] = ({ selection: { id } }) => {
     return (
       <>
         <p className="quiet small">Its results are not kept.</p>
-        <Button why={why} onPress={() => void nameResults(id, newOutputs(doc, action.type.split("/")[1] ?? action.name, returns.length)).then(setProblem)}>
+        <Button
+          why={why}
+          onPress={() =>
+            void nameResults(id, newOutputs(doc, action.type.split("/")[1] ?? action.name, returns.length)).then(
+              setProblem,
+            )
+          }
+        >
           Keep its results
         </Button>
         {problem && (
@@ -48,7 +55,12 @@ const Results: Section["Body"] = ({ selection: { id } }) => {
           type="string"
           json={JSON.stringify(outputs[index] ?? "")}
           why={why}
-          onSet={(json) => nameResults(id, outputs.map((each, at) => (at === index ? (JSON.parse(json) as string) : each)))}
+          onSet={(json) =>
+            nameResults(
+              id,
+              outputs.map((each, at) => (at === index ? (JSON.parse(json) as string) : each)),
+            )
+          }
         />
       ))}
       {users.length > 0 && (

@@ -1,13 +1,12 @@
 /** One step: from where to where, and the result on which it depends. Changing it never takes it away meanwhile. */
 
+import { useState } from "react";
 import { beginStep, notEditable, removeStep, setCondition } from "../../commands/program";
 import { conditionsOf, linkTo, outgoing, placeOf, resultAt, START } from "../../program/logic";
-import { select, useEditor } from "../../store/store";
-import { useState } from "react";
+import { now, select, useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 import { nameOf, selectionOf } from "../names";
 import type { Section } from "../workplace/sections";
-import { now } from "../../store/store";
 import { ValueField } from "./ValueField";
 import "./program.css";
 
@@ -25,7 +24,12 @@ const Step: Section["Body"] = ({ selection: { id } }) => {
   const alone = outgoing(doc, from).length === 1;
   const choose = async (what: string) => {
     const chosen = results.find((each) => linkTo(each) === what);
-    setProblem(await setCondition(id, chosen && { what, value: chosen.type === "boolean" ? "true" : chosen.type === "string_enum" ? '"value"' : "0" }));
+    setProblem(
+      await setCondition(
+        id,
+        chosen && { what, value: chosen.type === "boolean" ? "true" : chosen.type === "string_enum" ? '"value"' : "0" },
+      ),
+    );
   };
   return (
     <>
@@ -41,7 +45,12 @@ const Step: Section["Body"] = ({ selection: { id } }) => {
       {results.length > 0 ? (
         <div className="field">
           <label htmlFor="depends-on">It depends on</label>
-          <select id="depends-on" value={step.condition?.what ?? ""} disabled={why !== ""} onChange={(event) => void choose(event.target.value)}>
+          <select
+            id="depends-on"
+            value={step.condition?.what ?? ""}
+            disabled={why !== ""}
+            onChange={(event) => void choose(event.target.value)}
+          >
             <option value="">{alone ? "nothing: it is always taken" : "nothing: it is taken when no other is"}</option>
             {results.map((each) => (
               <option key={linkTo(each)} value={linkTo(each)}>
@@ -51,7 +60,11 @@ const Step: Section["Body"] = ({ selection: { id } }) => {
           </select>
         </div>
       ) : (
-        <p className="quiet small">{from === START ? "The program begins with it." : `${nameOf(state, from)} has no result that could decide: yes or no, a whole number or a choice.`}</p>
+        <p className="quiet small">
+          {from === START
+            ? "The program begins with it."
+            : `${nameOf(state, from)} has no result that could decide: yes or no, a whole number or a choice.`}
+        </p>
       )}
       {step.condition && result && (
         <ValueField

@@ -2,13 +2,13 @@
 
 import { useMemo } from "react";
 import { Button as AriaButton, ToggleButton } from "react-aria-components";
-import { keepView } from "../../commands/viewstate";
-import { breakAt } from "../../commands/run";
 import { barred } from "../../commands/asking";
+import { breakAt } from "../../commands/run";
+import { keepView } from "../../commands/viewstate";
 import { conditionWords, incoming, outgoing, placeOf, START } from "../../program/logic";
 import type { Problem } from "../../program/problems";
-import type { OpenDocument } from "../../store/state";
 import { theEngine } from "../../session/engine";
+import type { OpenDocument } from "../../store/state";
 import { select, setUi, tell, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { nameOf, withNames } from "../names";
@@ -24,7 +24,11 @@ export function Steps({ problems }: { problems: Problem[] }) {
   return (
     <>
       <label className="check">
-        <input type="checkbox" checked={state.view.user["hide_steps"] !== true} onChange={(event) => keepView("user", { hide_steps: event.target.checked ? null : true })} />
+        <input
+          type="checkbox"
+          checked={state.view.user.hide_steps !== true}
+          onChange={(event) => keepView("user", { hide_steps: event.target.checked ? null : true })}
+        />
         <span>Steps are drawn in the 3D view</span>
       </label>
       <ol className="steps">
@@ -32,7 +36,9 @@ export function Steps({ problems }: { problems: Problem[] }) {
           const action = doc.actions[id];
           if (!action) return null;
           const problem = problems.find((each) => each.id === id);
-          const after = incoming(doc, id).map((item) => conditionWords(doc, types, item)).filter(Boolean);
+          const after = incoming(doc, id)
+            .map((item) => conditionWords(doc, types, item))
+            .filter(Boolean);
           const running = program.running.includes(id) || state.live.executing === id;
           return (
             <li key={id} data-running={running} data-selected={state.ui.selection?.id === id}>

@@ -3,8 +3,8 @@
  * chosen, at once. A value that cannot be, or that the server refuses, stays in the field with the reason below.
  */
 
-import { useEffect, useId, useState } from "react";
 import type { ReactNode } from "react";
+import { useEffect, useId, useState } from "react";
 import { type Extra, rangeWords, read, textOf } from "../../program/values";
 
 export interface Choice {
@@ -32,7 +32,19 @@ interface ValueFieldProps {
   children?: ReactNode;
 }
 
-export function ValueField({ label, name, type, json, extra = {}, choices, hint, secret = false, why = "", onSet, children }: ValueFieldProps) {
+export function ValueField({
+  label,
+  name,
+  type,
+  json,
+  extra = {},
+  choices,
+  hint,
+  secret = false,
+  why = "",
+  onSet,
+  children,
+}: ValueFieldProps) {
   const stored = secret && (json ?? "").startsWith('"***');
   const known = stored ? "" : textOf(type, json);
   const [text, setText] = useState(known);
@@ -56,8 +68,17 @@ export function ValueField({ label, name, type, json, extra = {}, choices, hint,
   };
   const range = rangeWords(extra);
   const about = [hint, range].filter(Boolean).join(" · ");
-  const described = { id, "aria-invalid": problem !== "" || undefined, "aria-describedby": `${id}-about`, disabled: why !== "" };
-  const listed = choices ?? (type === "boolean" ? BOOLEAN : extra.allowed_values?.map((each) => ({ json: JSON.stringify(each), label: String(each) })));
+  const described = {
+    id,
+    "aria-invalid": problem !== "" || undefined,
+    "aria-describedby": `${id}-about`,
+    disabled: why !== "",
+  };
+  const listed =
+    choices ??
+    (type === "boolean"
+      ? BOOLEAN
+      : extra.allowed_values?.map((each) => ({ json: JSON.stringify(each), label: String(each) })));
   return (
     <div className="field value-field">
       <div className="value-head">
@@ -68,14 +89,23 @@ export function ValueField({ label, name, type, json, extra = {}, choices, hint,
         <div className="chips" role="radiogroup" aria-label={name} id={id}>
           {listed.map((each) => (
             <label key={each.json} className="chip" data-selected={each.json === json}>
-              <input type="radio" className="hidden-but-read" name={id} checked={each.json === json} disabled={why !== ""} onChange={() => void set(each.json)} />
+              <input
+                type="radio"
+                className="hidden-but-read"
+                name={id}
+                checked={each.json === json}
+                disabled={why !== ""}
+                onChange={() => void set(each.json)}
+              />
               {each.label}
             </label>
           ))}
         </div>
       ) : listed ? (
         <select {...described} value={json ?? ""} onChange={(event) => void set(event.target.value)}>
-          {!listed.some((each) => each.json === json) && <option value={json ?? ""}>{known ? `${known} (not in the list)` : "choose…"}</option>}
+          {!listed.some((each) => each.json === json) && (
+            <option value={json ?? ""}>{known ? `${known} (not in the list)` : "choose…"}</option>
+          )}
           {listed.map((each) => (
             <option key={each.json} value={each.json}>
               {each.label}

@@ -11,16 +11,27 @@ export const programSections: readonly Section[] = [
   {
     id: "next",
     title: "What follows",
-    applies: ({ kind, id }, state) => state.doc?.project?.has_logic === true && (kind === "action" || (kind === "terminal" && id === "START")),
+    applies: ({ kind, id }, state) =>
+      state.doc?.project?.has_logic === true && (kind === "action" || (kind === "terminal" && id === "START")),
     Body: lazily(() => import("./Next")),
   },
   { id: "results", title: "What it tells", applies: isAction, Body: lazily(() => import("./Results")) },
-  { id: "step", title: "When it is taken", applies: ({ kind }) => kind === "logic", Body: lazily(() => import("./Step")) },
+  {
+    id: "step",
+    title: "When it is taken",
+    applies: ({ kind }) => kind === "logic",
+    Body: lazily(() => import("./Step")),
+  },
   {
     id: "breakpoint",
     title: "Breakpoint",
     applies: ({ kind }, state) => kind === "point" && state.doc?.project != null,
     Body: lazily(() => import("./Breakpoint")),
   },
-  { id: "puck", title: "In the view", applies: ({ kind }) => kind === "terminal" || kind === "action", Body: lazily(() => import("./Puck")) },
+  {
+    id: "puck",
+    title: "In the view",
+    applies: ({ kind }) => kind === "terminal" || kind === "action",
+    Body: lazily(() => import("./Puck")),
+  },
 ];

@@ -25,7 +25,11 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
   const why = useEditor((state) => notReady(state, chosen));
   const { safe } = useManner();
   const selection = useEditor((state) => state.ui.selection);
-  const selected = useEditor((state) => (selection && selection.kind !== "logic" && selection.kind !== "joints" && selection.id !== chosen.robotId ? nameOf(state, selection.id) : ""));
+  const selected = useEditor((state) =>
+    selection && selection.kind !== "logic" && selection.kind !== "joints" && selection.id !== chosen.robotId
+      ? nameOf(state, selection.id)
+      : "",
+  );
   const [goal, setGoal] = useState<Pose | null>(() => effectorPose(chosen) ?? null);
   const [tapping, setTapping] = useState(true);
   const [turning, setTurning] = useState(false);
@@ -60,13 +64,27 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
   });
   if (!goal) {
     return (
-      <Button why={why} onPress={() => setGoal(effectorPose(chosen) ?? { position: { x: 0.3, y: 0, z: 0.3 }, orientation: { x: 1, y: 0, z: 0, w: 0 } })}>
+      <Button
+        why={why}
+        onPress={() =>
+          setGoal(
+            effectorPose(chosen) ?? { position: { x: 0.3, y: 0, z: 0.3 }, orientation: { x: 1, y: 0, z: 0, w: 0 } },
+          )
+        }
+      >
         Begin where the tool is
       </Button>
     );
   }
   const angles = rollPitchYaw(goal.orientation);
-  const notYet = answer === null ? "Set a goal first: it is shown before the robot goes there." : answer.goal !== goal ? "It is asked whether it can go there." : safe ? answer.problem : "";
+  const notYet =
+    answer === null
+      ? "Set a goal first: it is shown before the robot goes there."
+      : answer.goal !== goal
+        ? "It is asked whether it can go there."
+        : safe
+          ? answer.problem
+          : "";
   return (
     <>
       <OnOff isSelected={tapping} onChange={setTapping}>
@@ -75,14 +93,24 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
       <OneOf
         label="Drag the goal in the view"
         value={turning ? "turn" : "move"}
-        choices={[["move", "Move it"], ["turn", "Turn it"]]}
+        choices={[
+          ["move", "Move it"],
+          ["turn", "Turn it"],
+        ]}
         onChange={(next) => setTurning(next === "turn")}
       />
-      <Answer answer={answer && answer.problem} />
+      <Answer answer={answer?.problem ?? null} />
       <WayWords answer={answer} />
       <div className="amounts">
         {AXES.map((axis) => (
-          <Amount key={axis} label={axis.toUpperCase()} unit="mm" value={goal.position[axis] * 1000} step={10} onChange={(next) => show({ ...goal, position: { ...goal.position, [axis]: next / 1000 } })} />
+          <Amount
+            key={axis}
+            label={axis.toUpperCase()}
+            unit="mm"
+            value={goal.position[axis] * 1000}
+            step={10}
+            onChange={(next) => show({ ...goal, position: { ...goal.position, [axis]: next / 1000 } })}
+          />
         ))}
         {ANGLES.map((name, n) => (
           <Amount
@@ -101,7 +129,11 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
       </div>
       <PadDock chosen={chosen} refused={refused} hint={why || notYet}>
         <div className="actions start">
-          <Button look="primary" why={why || notYet} onPress={() => void moveToPose(chosen, goal, mannerNow()).then(setRefused)}>
+          <Button
+            look="primary"
+            why={why || notYet}
+            onPress={() => void moveToPose(chosen, goal, mannerNow()).then(setRefused)}
+          >
             Move there
           </Button>
           <Button onPress={giveUp}>Back to the tool</Button>
@@ -109,7 +141,12 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
             <Button
               onPress={() => {
                 const { doc, ui } = now();
-                if (doc) show(ui.selection?.kind === "orientation" ? worldOf(doc, ui.selection.id) : { ...goal, position: worldOf(doc, ui.selection?.id).position });
+                if (doc)
+                  show(
+                    ui.selection?.kind === "orientation"
+                      ? worldOf(doc, ui.selection.id)
+                      : { ...goal, position: worldOf(doc, ui.selection?.id).position },
+                  );
               }}
             >
               At {selected}

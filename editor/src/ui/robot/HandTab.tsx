@@ -15,7 +15,9 @@ export function HandTab({ chosen }: { chosen: Chosen }) {
   const cannot = ready || (can ? "" : "This robot does not support hand teaching.");
   return (
     <>
-      <p className="quiet small">Hold the button and move the arm by hand. The arm is stiff again as soon as you release it.</p>
+      <p className="quiet small">
+        Hold the button and move the arm by hand. The arm is stiff again as soon as you release it.
+      </p>
       <p role="status">
         <span className={`tag ${free ? "warn" : ""}`}>{free ? "The arm is free" : "The arm is stiff"}</span>
       </p>

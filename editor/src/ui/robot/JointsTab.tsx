@@ -10,8 +10,8 @@ import { telemetry } from "../../store/telemetry";
 import { Amount, OneOf } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { HoldButton } from "./HoldButton";
-import { HOLD_HINT, PadDock } from "./PadDock";
 import { FASTEST, mannerNow, setManner, useManner } from "./manner";
+import { HOLD_HINT, PadDock } from "./PadDock";
 import { useTelemetry } from "./useTelemetry";
 
 const DEGREES = 180 / Math.PI;
@@ -30,7 +30,13 @@ export function shownJoints(robotId: string, joints: readonly Joint[]): ShownJoi
   return joints.map((joint) => {
     const limit = limits.find((each) => each.name === joint.name);
     const prismatic = limit?.prismatic ?? false;
-    return { ...joint, scale: prismatic ? 1000 : DEGREES, unit: prismatic ? "mm" : "°", lower: limit?.lower ?? -Infinity, upper: limit?.upper ?? Infinity };
+    return {
+      ...joint,
+      scale: prismatic ? 1000 : DEGREES,
+      unit: prismatic ? "mm" : "°",
+      lower: limit?.lower ?? -Infinity,
+      upper: limit?.upper ?? Infinity,
+    };
   });
 }
 
@@ -44,12 +50,19 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
   const hold = way === "hold" && features?.jog === true;
   const cannot = why || (hold || features?.move_to_joints ? "" : "This robot does not move to joints.");
   if (!joints) return <p className="quiet">The robot reports no joint positions.</p>;
-  const shown = shownJoints(robotId, [...joints].map(([name, value]) => ({ name, value })));
+  const shown = shownJoints(
+    robotId,
+    [...joints].map(([name, value]) => ({ name, value })),
+  );
 
   const go = (name: string, value: number) => {
     setRefused("");
     const present = telemetry.latest(robotId)?.joints ?? joints;
-    void moveToJoints(chosen, [...present].map(([each, was]) => ({ name: each, value: each === name ? value : was })), mannerNow()).then(setRefused);
+    void moveToJoints(
+      chosen,
+      [...present].map(([each, was]) => ({ name: each, value: each === name ? value : was })),
+      mannerNow(),
+    ).then(setRefused);
   };
   const jog = (name: string, sign: number, prismatic: boolean) => {
     setRefused("");
@@ -58,9 +71,36 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
   };
   return (
     <>
-      <OneOf label="A press" quiet value={hold ? "hold" : "step"} onChange={(next) => setManner({ way: next })} choices={features?.jog ? [["step", "Step"], ["hold", "Hold to move"]] : [["step", "Step"]]} />
-      {!hold && <Amount label="Step" unit="°" digits={2} value={angle * DEGREES} least={0.01} most={180} onChange={(next) => setManner({ angle: next / DEGREES })} />}
-      <PadDock chosen={chosen} refused={refused} hint={cannot || (hold ? HOLD_HINT : "Each press moves one joint by one step.")}>
+      <OneOf
+        label="A press"
+        quiet
+        value={hold ? "hold" : "step"}
+        onChange={(next) => setManner({ way: next })}
+        choices={
+          features?.jog
+            ? [
+                ["step", "Step"],
+                ["hold", "Hold to move"],
+              ]
+            : [["step", "Step"]]
+        }
+      />
+      {!hold && (
+        <Amount
+          label="Step"
+          unit="°"
+          digits={2}
+          value={angle * DEGREES}
+          least={0.01}
+          most={180}
+          onChange={(next) => setManner({ angle: next / DEGREES })}
+        />
+      )}
+      <PadDock
+        chosen={chosen}
+        refused={refused}
+        hint={cannot || (hold ? HOLD_HINT : "Each press moves one joint by one step.")}
+      >
         <ul className="joints">
           {shown.map((joint) => {
             const prismatic = joint.unit === "mm";
@@ -74,7 +114,13 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
                 {([-1, 1] as const).map((sign) => {
                   const words = `${joint.name.replaceAll("_", " ")} ${sign > 0 ? "up" : "down"}${hold ? ", as long as it is held" : ""}`;
                   return hold ? (
-                    <HoldButton key={sign} label={words} why={cannot} onHold={() => jog(joint.name, sign, prismatic)} onOver={setRefused}>
+                    <HoldButton
+                      key={sign}
+                      label={words}
+                      why={cannot}
+                      onHold={() => jog(joint.name, sign, prismatic)}
+                      onOver={setRefused}
+                    >
                       {sign > 0 ? "+" : "−"}
                     </HoldButton>
                   ) : (
@@ -82,7 +128,9 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
                       key={sign}
                       aria-label={words}
                       why={cannot || beyond(joint, joint.value + sign * step)}
-                      onPress={() => go(joint.name, (telemetry.latest(robotId)?.joints.get(joint.name) ?? joint.value) + sign * step)}
+                      onPress={() =>
+                        go(joint.name, (telemetry.latest(robotId)?.joints.get(joint.name) ?? joint.value) + sign * step)
+                      }
                     >
                       {sign > 0 ? "+" : "−"}
                     </Button>
@@ -117,7 +165,11 @@ export function Limits({ joint: { value, lower, upper, scale, unit } }: { joint:
   const part = Math.min(1, Math.max(0, (value - lower) / (upper - lower)));
   const near = Math.min(part, 1 - part) < 0.05;
   return (
-    <span className="joint-limits" data-near={near} title={`from ${(lower * scale).toFixed(0)} to ${(upper * scale).toFixed(0)} ${unit}`}>
+    <span
+      className="joint-limits"
+      data-near={near}
+      title={`from ${(lower * scale).toFixed(0)} to ${(upper * scale).toFixed(0)} ${unit}`}
+    >
       <span style={{ left: `${part * 100}%` }} />
       {near && <span className="hidden-but-read">near its limit</span>}
     </span>

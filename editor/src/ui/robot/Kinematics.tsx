@@ -2,7 +2,7 @@
 
 import { useEffect, useState } from "react";
 import { featuresOf } from "../../commands/robot";
-import { readKinematics, type RobotKinematics } from "../../session/kinematics";
+import { type RobotKinematics, readKinematics } from "../../session/kinematics";
 import { useEditor } from "../../store/store";
 import { ago } from "../times";
 

@@ -7,7 +7,15 @@ export function MannerFields() {
   const { speed, safe, linear } = useManner();
   return (
     <div className="manner">
-      <MoreOrLess label="Speed" value={speed} least={0.01} most={1} step={0.01} words={(value) => `${Math.round(value * 100)} %`} onChange={(next) => setManner({ speed: next })} />
+      <MoreOrLess
+        label="Speed"
+        value={speed}
+        least={0.01}
+        most={1}
+        step={0.01}
+        words={(value) => `${Math.round(value * 100)} %`}
+        onChange={(next) => setManner({ speed: next })}
+      />
       <OnOff isSelected={safe} onChange={(next) => setManner({ safe: next })}>
         Look for collisions first
       </OnOff>

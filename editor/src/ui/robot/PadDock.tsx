@@ -41,12 +41,19 @@ function MotionNote({ chosen: { robotId }, refused, hint }: Omit<PadDockProps, "
   const motion = useEditor((state) => state.live.motions[robotId]);
   const goal = useEditor((state) => (motion?.goal ? nameOf(state, motion.goal) : ""));
   const hold = useEditor((state) => state.live.holds[robotId]);
-  const moved = motion && `${PHASES[motion.phase]}${goal && ` ${motion.phase === "start" ? "to " : ""}${goal}`}${motion.phase === "start" ? "…" : "."} ${motion.message}`;
+  const moved =
+    motion &&
+    `${PHASES[motion.phase]}${goal && ` ${motion.phase === "start" ? "to " : ""}${goal}`}${motion.phase === "start" ? "…" : "."} ${motion.message}`;
   const held = hold && `${hold.user} is ${hold.kind === "jog" ? "jogging" : "hand-teaching"}.`;
   const tone = refused ? "error" : held ? "warn" : motion ? motion.phase : "quiet";
   const words = refused || held || moved || hint;
   return (
-    <p className={`pad-note small ${tone}`} role={refused ? "alert" : "status"} tabIndex={refused ? 0 : undefined} title={words}>
+    <p
+      className={`pad-note small ${tone}`}
+      role={refused ? "alert" : "status"}
+      tabIndex={refused ? 0 : undefined}
+      title={words}
+    >
       {words}
     </p>
   );

@@ -35,13 +35,26 @@ export default function RobotChip() {
   };
   return (
     <div className="robot-chip">
-      <button type="button" className="button" aria-pressed={open} aria-label={`Active robot: ${words}`} onClick={() => setUi({ tool: open ? "" : "robot" })}>
+      <button
+        type="button"
+        className="button"
+        aria-pressed={open}
+        aria-label={`Active robot: ${words}`}
+        onClick={() => setUi({ tool: open ? "" : "robot" })}
+      >
         <Icon name="robot" />
         <span className="chip-words">{words}</span>
         {moving && <span className="tag warn">moving</span>}
       </button>
       {online && project && (
-        <button type="button" className="button primary" aria-disabled={why !== "" || asking || undefined} aria-label="Keep the robot's place as a point" onClick={keep} disabled={asking}>
+        <button
+          type="button"
+          className="button primary"
+          aria-disabled={why !== "" || asking || undefined}
+          aria-label="Keep the robot's place as a point"
+          onClick={keep}
+          disabled={asking}
+        >
           <Icon name="plus" />
           Point
         </button>

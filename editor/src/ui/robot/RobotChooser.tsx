@@ -9,7 +9,11 @@ import { nameOf } from "../names";
 export function RobotChooser() {
   const chosen = useEditor(chosenRobot);
   const robots = useEditor((state) => robotsOf(state).join("\n"));
-  const names = useEditor((state) => robotsOf(state).map((id) => nameOf(state, id)).join("\n"));
+  const names = useEditor((state) =>
+    robotsOf(state)
+      .map((id) => nameOf(state, id))
+      .join("\n"),
+  );
   const arms = useEditor((state) => (chosen ? state.live.arms[chosen.robotId] : undefined));
   const arm = useEditor((state) => (chosen ? armOf(state, chosen) : undefined));
   if (!chosen) return null;
@@ -18,13 +22,28 @@ export function RobotChooser() {
   return (
     <div className="robot-chooser">
       {ids.length > 1 && (
-        <Pick label="Robot" value={chosen.robotId} choices={ids.map((id, n) => [id, labels[n] ?? ""])} onChange={(robotId) => chooseRobot({ robotId, armId: "", effector: "" })} />
+        <Pick
+          label="Robot"
+          value={chosen.robotId}
+          choices={ids.map((id, n) => [id, labels[n] ?? ""])}
+          onChange={(robotId) => chooseRobot({ robotId, armId: "", effector: "" })}
+        />
       )}
       {arms && arms.length > 1 && (
-        <Pick label="Arm" value={chosen.armId} choices={arms.map(({ id }) => [id, id])} onChange={(armId) => chooseRobot({ ...chosen, armId, effector: "" })} />
+        <Pick
+          label="Arm"
+          value={chosen.armId}
+          choices={arms.map(({ id }) => [id, id])}
+          onChange={(armId) => chooseRobot({ ...chosen, armId, effector: "" })}
+        />
       )}
       {arm && arm.effectors.length > 1 && (
-        <Pick label="End effector" value={chosen.effector} choices={arm.effectors.map((id) => [id, id])} onChange={(effector) => chooseRobot({ ...chosen, effector })} />
+        <Pick
+          label="End effector"
+          value={chosen.effector}
+          choices={arm.effectors.map((id) => [id, id])}
+          onChange={(effector) => chooseRobot({ ...chosen, effector })}
+        />
       )}
     </div>
   );

@@ -21,7 +21,10 @@ export function Status({ chosen }: { chosen: Chosen }) {
   return (
     <div className="robot-status">
       <Pose chosen={chosen} />
-      {tools.map(([what, names]) => names.length > 0 && <p key={what} className="quiet small">{`${what}: ${names.join(", ")}`}</p>)}
+      {tools.map(
+        ([what, names]) =>
+          names.length > 0 && <p key={what} className="quiet small">{`${what}: ${names.join(", ")}`}</p>,
+      )}
       {alarms?.map((alarm) => (
         <p key={alarm.code} className="small alarm" role="alert">
           {alarm.text} {alarm.remedy && <span className="quiet">{alarm.remedy}</span>}

@@ -2,7 +2,15 @@
 
 import { useState } from "react";
 import { holdJog } from "../../commands/holds";
-import { alignDown, type Chosen, effectorPose, featuresOf, moveToPose, notReady, stepEffector } from "../../commands/robot";
+import {
+  alignDown,
+  type Chosen,
+  effectorPose,
+  featuresOf,
+  moveToPose,
+  notReady,
+  stepEffector,
+} from "../../commands/robot";
 import type { Pose, Position, StepAxis } from "../../protocol/types";
 import { now, useEditor } from "../../store/store";
 import { worldOf } from "../../viewmodel/frames";
@@ -10,8 +18,8 @@ import { Amount, OneOf } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { nameOf } from "../names";
 import { HoldButton } from "./HoldButton";
-import { HOLD_HINT, PadDock } from "./PadDock";
 import { ANGLES, DISTANCES, FASTEST, type FrameName, mannerNow, setManner, useManner } from "./manner";
+import { HOLD_HINT, PadDock } from "./PadDock";
 
 const AXES: readonly StepAxis[] = ["x", "y", "z"];
 const DEGREES = 180 / Math.PI;
@@ -24,7 +32,9 @@ function framed(kind: string | undefined): boolean {
 export function ToolTab({ chosen }: { chosen: Chosen }) {
   const { frame, way, what, distance, angle, speed } = useManner();
   const selection = useEditor((state) => state.ui.selection);
-  const selected = useEditor((state) => (framed(selection?.kind) && selection && selection.id !== chosen.robotId ? nameOf(state, selection.id) : ""));
+  const selected = useEditor((state) =>
+    framed(selection?.kind) && selection && selection.id !== chosen.robotId ? nameOf(state, selection.id) : "",
+  );
   const features = useEditor((state) => featuresOf(state, chosen.robotId));
   const why = useEditor((state) => notReady(state, chosen, "StepRobotEef"));
   const [refused, setRefused] = useState("");
@@ -37,7 +47,9 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
     setRefused("");
     const pose = poseOf(used, chosen);
     const mode = used === "world" || used === "robot" ? used : "relative";
-    void stepEffector(chosen, { what, axis, mode, step: sign * (turning ? angle : distance), pose }, mannerNow()).then(setRefused);
+    void stepEffector(chosen, { what, axis, mode, step: sign * (turning ? angle : distance), pose }, mannerNow()).then(
+      setRefused,
+    );
   };
   const jog = (axis: StepAxis, sign: number) => {
     setRefused("");
@@ -53,25 +65,65 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
     });
   };
   const hint = hold ? HOLD_HINT : `Each press ${turning ? "turns" : "moves"} the tool one step.`;
-  const words = (axis: StepAxis, sign: number) => `${turning ? "Turn about" : "Move along"} ${sign > 0 ? "+" : "−"}${axis.toUpperCase()}${hold ? ", as long as it is held" : ""}`;
+  const words = (axis: StepAxis, sign: number) =>
+    `${turning ? "Turn about" : "Move along"} ${sign > 0 ? "+" : "−"}${axis.toUpperCase()}${hold ? ", as long as it is held" : ""}`;
 
   return (
     <>
-      <OneOf label="A press" quiet value={hold ? "hold" : "step"} onChange={(next) => setManner({ way: next })} choices={features?.jog ? [["step", "Step"], ["hold", "Hold to move"]] : [["step", "Step"]]} />
-      <OneOf label="What" quiet value={what} onChange={(next) => setManner({ what: next })} choices={[["position", "Move"], ["orientation", "Turn"]]} />
+      <OneOf
+        label="A press"
+        quiet
+        value={hold ? "hold" : "step"}
+        onChange={(next) => setManner({ way: next })}
+        choices={
+          features?.jog
+            ? [
+                ["step", "Step"],
+                ["hold", "Hold to move"],
+              ]
+            : [["step", "Step"]]
+        }
+      />
+      <OneOf
+        label="What"
+        quiet
+        value={what}
+        onChange={(next) => setManner({ what: next })}
+        choices={[
+          ["position", "Move"],
+          ["orientation", "Turn"],
+        ]}
+      />
       <OneOf
         label="Axes of"
         value={used}
         onChange={(next) => setManner({ frame: next })}
-        choices={[["world", "World"], ["robot", "Robot"], ["tool", "Tool"], ...(selected ? [["selected", selected] as const] : [])]}
+        choices={[
+          ["world", "World"],
+          ["robot", "Robot"],
+          ["tool", "Tool"],
+          ...(selected ? [["selected", selected] as const] : []),
+        ]}
       />
       {!hold && (turning ? <Angles angle={angle} /> : <Distances distance={distance} />)}
       <div className="actions start">
-        <Button why={why || (features?.inverse_kinematics ? "" : "This robot computes no joints for a pose.")} onPress={() => void alignDown(chosen, mannerNow()).then(setRefused)}>
+        <Button
+          why={why || (features?.inverse_kinematics ? "" : "This robot computes no joints for a pose.")}
+          onPress={() => void alignDown(chosen, mannerNow()).then(setRefused)}
+        >
           Tool straight down
         </Button>
         {selection?.kind === "orientation" && (
-          <Button why={why} onPress={() => void moveToPose(chosen, { orientation: poseOf("selected", chosen)?.orientation ?? { x: 0, y: 0, z: 0, w: 1 } }, mannerNow()).then(setRefused)}>
+          <Button
+            why={why}
+            onPress={() =>
+              void moveToPose(
+                chosen,
+                { orientation: poseOf("selected", chosen)?.orientation ?? { x: 0, y: 0, z: 0, w: 1 } },
+                mannerNow(),
+              ).then(setRefused)
+            }
+          >
             Turn as {selected}
           </Button>
         )}
@@ -87,11 +139,22 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
                 </>
               );
               return hold ? (
-                <HoldButton key={`${axis}${sign}`} label={words(axis, sign)} why={cannot} onHold={() => jog(axis, sign)} onOver={setRefused}>
+                <HoldButton
+                  key={`${axis}${sign}`}
+                  label={words(axis, sign)}
+                  why={cannot}
+                  onHold={() => jog(axis, sign)}
+                  onOver={setRefused}
+                >
                   {content}
                 </HoldButton>
               ) : (
-                <Button key={`${axis}${sign}`} aria-label={words(axis, sign)} why={cannot} onPress={() => press(axis, sign)}>
+                <Button
+                  key={`${axis}${sign}`}
+                  aria-label={words(axis, sign)}
+                  why={cannot}
+                  onPress={() => press(axis, sign)}
+                >
                   {content}
                 </Button>
               );
@@ -113,8 +176,21 @@ function poseOf(frame: FrameName, chosen: Chosen): Pose | undefined {
 function Distances({ distance }: { distance: number }) {
   return (
     <div className="step-size">
-      <OneOf label="Step, mm" value={String(distance)} onChange={(next) => setManner({ distance: Number(next) })} choices={DISTANCES.map((each) => [String(each), String(each * 1000)] as const)} />
-      <Amount label="Or" unit="mm" digits={2} value={distance * 1000} least={0.01} most={300} onChange={(next) => setManner({ distance: next / 1000 })} />
+      <OneOf
+        label="Step, mm"
+        value={String(distance)}
+        onChange={(next) => setManner({ distance: Number(next) })}
+        choices={DISTANCES.map((each) => [String(each), String(each * 1000)] as const)}
+      />
+      <Amount
+        label="Or"
+        unit="mm"
+        digits={2}
+        value={distance * 1000}
+        least={0.01}
+        most={300}
+        onChange={(next) => setManner({ distance: next / 1000 })}
+      />
     </div>
   );
 }
@@ -122,8 +198,21 @@ function Distances({ distance }: { distance: number }) {
 function Angles({ angle }: { angle: number }) {
   return (
     <div className="step-size">
-      <OneOf label="Step, °" value={String(angle)} onChange={(next) => setManner({ angle: Number(next) })} choices={ANGLES.map((each) => [String(each), String(Math.round(each * DEGREES * 10) / 10)] as const)} />
-      <Amount label="Or" unit="°" digits={2} value={angle * DEGREES} least={0.01} most={180} onChange={(next) => setManner({ angle: next / DEGREES })} />
+      <OneOf
+        label="Step, °"
+        value={String(angle)}
+        onChange={(next) => setManner({ angle: Number(next) })}
+        choices={ANGLES.map((each) => [String(each), String(Math.round(each * DEGREES * 10) / 10)] as const)}
+      />
+      <Amount
+        label="Or"
+        unit="°"
+        digits={2}
+        value={angle * DEGREES}
+        least={0.01}
+        most={180}
+        onChange={(next) => setManner({ angle: next / DEGREES })}
+      />
     </div>
   );
 }

@@ -6,13 +6,23 @@ const START = { position: { x: 0.1, y: 0.2, z: 0.3 }, orientation: { x: 1, y: 0,
 const NO_WAY = new Vector3();
 
 test("a goal that is pulled keeps how it is turned", () => {
-  const goal = dragged(START, { handle: { do: "axis", axis: "z" }, translation: new Vector3(0, 0, 0.05), axis: new Vector3(0, 0, 1), angle: 0 });
+  const goal = dragged(START, {
+    handle: { do: "axis", axis: "z" },
+    translation: new Vector3(0, 0, 0.05),
+    axis: new Vector3(0, 0, 1),
+    angle: 0,
+  });
   expect(goal.position.z).toBeCloseTo(0.35);
   expect(goal.orientation).toEqual(START.orientation);
 });
 
 test("a goal that is turned by a ring stays where it is", () => {
-  const { position, orientation } = dragged(START, { handle: { do: "ring", axis: "z" }, translation: NO_WAY, axis: new Vector3(0, 0, 1), angle: Math.PI / 2 });
+  const { position, orientation } = dragged(START, {
+    handle: { do: "ring", axis: "z" },
+    translation: NO_WAY,
+    axis: new Vector3(0, 0, 1),
+    angle: Math.PI / 2,
+  });
   expect(position).toEqual(START.position);
   // Looking down, and a quarter turn about the vertical: still looking down.
   expect(1 - 2 * (orientation.x ** 2 + orientation.y ** 2)).toBeCloseTo(-1);

@@ -10,13 +10,21 @@ import { plusOf, turnedAbout } from "../../transform/placing";
 import { ORIGIN } from "../../viewmodel/frames";
 
 /** Where a goal is that was dragged from `start`. */
-export function dragged(start: Pose, { handle, translation, axis, angle }: Pick<Drag, "handle" | "translation" | "axis" | "angle">): Pose {
+export function dragged(
+  start: Pose,
+  { handle, translation, axis, angle }: Pick<Drag, "handle" | "translation" | "axis" | "angle">,
+): Pose {
   if (handle.do === "ring") return turnedAbout(start, axis, angle);
   return { ...start, position: plusOf(start.position, translation, 1) };
 }
 
 /** `axes`: along those of the goal, or of the world. Nothing is shown without a goal. */
-export function useGoalGizmo(goal: Pose | null, mode: "move" | "turn", axes: "goal" | "world", onDrag: (goal: Pose) => void): void {
+export function useGoalGizmo(
+  goal: Pose | null,
+  mode: "move" | "turn",
+  axes: "goal" | "world",
+  onDrag: (goal: Pose) => void,
+): void {
   const latest = useRef({ goal, mode, axes, onDrag });
   latest.current = { goal, mode, axes, onDrag };
   const shown = goal !== null;
@@ -29,7 +37,9 @@ export function useGoalGizmo(goal: Pose | null, mode: "move" | "turn", axes: "go
       if (one.phase === "start") start = current.goal;
       else if (start && current.goal) {
         // At its end a new one, too: the gizmo goes there.
-        current.onDrag(one.phase === "move" ? dragged(start, one) : { ...(one.phase === "cancel" ? start : current.goal) });
+        current.onDrag(
+          one.phase === "move" ? dragged(start, one) : { ...(one.phase === "cancel" ? start : current.goal) },
+        );
       }
     };
     // The view may be made anew meanwhile, with another quality.

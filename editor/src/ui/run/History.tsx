@@ -5,7 +5,13 @@ import { useEditor } from "../../store/store";
 import { ago, useTicking } from "../times";
 import { seconds } from "./Trace";
 
-export const WORDS: Record<RunEnd, string> = { running: "running", finished: "finished", stopped: "stopped", failed: "failed", lost: "interrupted" };
+export const WORDS: Record<RunEnd, string> = {
+  running: "running",
+  finished: "finished",
+  stopped: "stopped",
+  failed: "failed",
+  lost: "interrupted",
+};
 const TONES: Record<RunEnd, string> = { running: "good", finished: "good", stopped: "", failed: "bad", lost: "warn" };
 const SHOWN = 10;
 

@@ -18,7 +18,8 @@ export function LastResult({ projectId }: { projectId: string }) {
   return (
     <section className={`last-result ${result.tone}`} aria-label="Last run">
       <p>
-        <Icon name={ICONS[result.tone]} /> <strong>{result.title}</strong> <span className="small">{ago(run.ended ?? run.started)}</span>
+        <Icon name={ICONS[result.tone]} /> <strong>{result.title}</strong>{" "}
+        <span className="small">{ago(run.ended ?? run.started)}</span>
       </p>
       {result.detail && <p>{withNames(now(), result.detail)}</p>}
       {result.tone === "bad" && <ShowAction id={result.actionId} />}

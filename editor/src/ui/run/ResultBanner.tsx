@@ -19,7 +19,8 @@ export default function ResultBanner() {
     <div className={`result-banner ${result.tone}`} role={result.tone === "bad" ? "alert" : "status"}>
       <Icon name={ICONS[result.tone]} />
       <p>
-        <strong>{result.title}</strong> <span className="small">{`${result.name}, ${ago(run.ended ?? run.started)}. ${withNames(now(), result.detail)}`}</span>
+        <strong>{result.title}</strong>{" "}
+        <span className="small">{`${result.name}, ${ago(run.ended ?? run.started)}. ${withNames(now(), result.detail)}`}</span>
       </p>
       {result.tone === "bad" && <ShowAction id={result.actionId} />}
       <Button look="plain" icon="close" aria-label="Dismiss the result" onPress={() => keepGeneral(dismissal(run))} />

@@ -23,7 +23,9 @@ export default function RunBar() {
     <div className="runbar" role="group" aria-label="The program">
       <span className="runbar-state" role="status">
         <strong>{STATES[phase]}</strong>
-        {at.length > 0 && <span className="small quiet">{phase === "paused" ? ` before ${at.join(", ")}` : ` ${at.join(", ")}`}</span>}
+        {at.length > 0 && (
+          <span className="small quiet">{phase === "paused" ? ` before ${at.join(", ")}` : ` ${at.join(", ")}`}</span>
+        )}
       </span>
       <RunButtons />
     </div>

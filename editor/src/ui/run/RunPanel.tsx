@@ -1,8 +1,8 @@
 /** Run the open project and follow it: state, result, and each action with its parameters and results. */
 
 import { useState } from "react";
-import { notEditable } from "../../commands/program";
 import { barred } from "../../commands/asking";
+import { notEditable } from "../../commands/program";
 import { breakAt, build, notRunnable, run } from "../../commands/run";
 import { isRunning } from "../../store/selectors";
 import { select, setUi, useEditor } from "../../store/store";
@@ -34,7 +34,13 @@ export default function RunPanel() {
       {(runs || busy) && (
         <p className="run-state" role="status">
           <strong>{runs ? STATES[program.state] : "Building…"}</strong>
-          {program.running.length > 0 && <span> {program.state === "paused" && "before "}{program.running.map((id) => nameOf(state, id)).join(", ")}</span>}
+          {program.running.length > 0 && (
+            <span>
+              {" "}
+              {program.state === "paused" && "before "}
+              {program.running.map((id) => nameOf(state, id)).join(", ")}
+            </span>
+          )}
         </p>
       )}
       {runs ? (
@@ -54,7 +60,9 @@ export default function RunPanel() {
               Build…
             </Button>
           </div>
-          <p className="quiet small">{doc?.unsaved ? "Unsaved changes are saved first. " : ""}“Build” makes a package for the operator's screen.</p>
+          <p className="quiet small">
+            {doc?.unsaved ? "Unsaved changes are saved first. " : ""}“Build” makes a package for the operator's screen.
+          </p>
         </>
       )}
       {broken.length > 0 && (
@@ -63,7 +71,13 @@ export default function RunPanel() {
           <ul className="row">
             {broken.map((id) => (
               <li key={id}>
-                <Button look="plain" icon="close" aria-label={`Do not pause at ${nameOf(state, id)}`} why={barred(state, "SetBreakpoints")} onPress={() => void breakAt(id, false)}>
+                <Button
+                  look="plain"
+                  icon="close"
+                  aria-label={`Do not pause at ${nameOf(state, id)}`}
+                  why={barred(state, "SetBreakpoints")}
+                  onPress={() => void breakAt(id, false)}
+                >
                   {nameOf(state, id)}
                 </Button>
               </li>
@@ -79,7 +93,15 @@ export default function RunPanel() {
         }}
       />
       <History />
-      {asking && doc?.project && <AskName title="Build a package" initial={doc.project.name} yes={doc.unsaved ? "Save and build" : "Build"} onYes={(name) => void build(name)} onClose={() => setAsking(false)} />}
+      {asking && doc?.project && (
+        <AskName
+          title="Build a package"
+          initial={doc.project.name}
+          yes={doc.unsaved ? "Save and build" : "Build"}
+          onYes={(name) => void build(name)}
+          onClose={() => setAsking(false)}
+        />
+      )}
     </>
   );
 }

@@ -26,9 +26,21 @@ export function Trace({ onChoose }: { onChoose: (actionId: string) => void }) {
       <ol className="trace" reversed>
         {shown.map((entry) => (
           <li key={entry.number} data-failed={entry.error !== undefined} data-running={entry.duration === undefined}>
-            <AriaButton className="trace-row" aria-expanded={open === entry.number} onPress={() => setOpen(open === entry.number ? 0 : entry.number)}>
+            <AriaButton
+              className="trace-row"
+              aria-expanded={open === entry.number}
+              onPress={() => setOpen(open === entry.number ? 0 : entry.number)}
+            >
               <span className="trace-name">{entry.name || "an action"}</span>
-              <span className="quiet small">{entry.error !== undefined ? "failed" : entry.duration === undefined ? (paused ? "waits" : "runs now") : seconds(entry.duration)}</span>
+              <span className="quiet small">
+                {entry.error !== undefined
+                  ? "failed"
+                  : entry.duration === undefined
+                    ? paused
+                      ? "waits"
+                      : "runs now"
+                    : seconds(entry.duration)}
+              </span>
             </AriaButton>
             {open === entry.number && <Detail entry={entry} onChoose={onChoose} />}
           </li>
@@ -60,5 +72,9 @@ function Detail({ entry, onChoose }: { entry: TraceEntry; onChoose: (actionId: s
 }
 
 export function seconds(duration: number): string {
-  return duration < 0.995 ? `${Math.round(duration * 1000)} ms` : duration < 59.5 ? `${duration.toFixed(1)} s` : `${Math.floor(duration / 60)} min ${Math.round(duration % 60)} s`;
+  return duration < 0.995
+    ? `${Math.round(duration * 1000)} ms`
+    : duration < 59.5
+      ? `${duration.toFixed(1)} s`
+      : `${Math.floor(duration / 60)} min ${Math.round(duration % 60)} s`;
 }

@@ -46,15 +46,26 @@ export function AddMesh({ why, onBack }: { why: string; onBack: () => void }) {
       <h3>Mesh</h3>
       <div className="field">
         <label htmlFor="mesh-file">File: STL, GLB, OBJ, PLY or DAE</label>
-        <input id="mesh-file" type="file" accept=".stl,.glb,.gltf,.obj,.ply,.dae" onChange={(event) => void read(event.target.files?.[0])} />
+        <input
+          id="mesh-file"
+          type="file"
+          accept=".stl,.glb,.gltf,.obj,.ply,.dae"
+          onChange={(event) => void read(event.target.files?.[0])}
+        />
       </div>
       <RefusedText>{wrong}</RefusedText>
       {mesh && (
         <>
           <MeshPreview geometry={mesh.geometry} />
-          <OneOf label="One unit of the file is" value={unit} choices={LENGTH_UNITS.map((each) => [each, `1 ${each}`] as const)} onChange={setUnit} />
+          <OneOf
+            label="One unit of the file is"
+            value={unit}
+            choices={LENGTH_UNITS.map((each) => [each, `1 ${each}`] as const)}
+            onChange={setUnit}
+          />
           <p className="small">
-            So it is {mesh.size.map((each) => show(each * WORTH[unit], "mm")).join(" × ")} mm. <span className="quiet">{mesh.triangles} triangles.</span>
+            So it is {mesh.size.map((each) => show(each * WORTH[unit], "mm")).join(" × ")} mm.{" "}
+            <span className="quiet">{mesh.triangles} triangles.</span>
           </p>
           <Field label="Name" value={name} onChange={setName} autoComplete="off" />
           <RefusedText>{refused}</RefusedText>

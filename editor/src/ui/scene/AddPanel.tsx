@@ -8,8 +8,8 @@ import { tell, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
 import { CATEGORY_ICONS } from "../program/categories";
-import { AddObject } from "./AddObject";
 import { AddMesh } from "./AddMesh";
+import { AddObject } from "./AddObject";
 import "./scene.css";
 
 const SHAPES: readonly (readonly [ShapeKind, string])[] = [
@@ -27,7 +27,10 @@ export default function AddPanel() {
   if (type) return <AddObject type={type} why={why} onBack={() => setChosen("")} />;
   if (chosen === "mesh") return <AddMesh why={why} onBack={() => setChosen("")} />;
   const wanted = search.trim().toLowerCase();
-  const found = Object.values(types).filter((each) => isDevice(each) && `${each.type} ${each.category ?? ""} ${each.description}`.toLowerCase().includes(wanted));
+  const found = Object.values(types).filter(
+    (each) =>
+      isDevice(each) && `${each.type} ${each.category ?? ""} ${each.description}`.toLowerCase().includes(wanted),
+  );
   const groups = new Map<string, ObjectTypeMeta[]>();
   for (const each of found.sort((a, b) => a.type.localeCompare(b.type))) {
     const group = each.category ?? "Other";
@@ -50,29 +53,37 @@ export default function AddPanel() {
         <Label className="hidden-but-read">Search</Label>
         <Input placeholder="Search devices" />
       </SearchField>
-      {[...groups].sort(([a], [b]) => a.localeCompare(b)).map(([group, members]) => (
-        <section key={group} aria-label={group}>
-          <h3 className="quiet small">{group}</h3>
-          <ul className="kinds">
-            {members.map((each) => (
-              <li key={each.type}>
-                <button
-                  type="button"
-                  className="kind"
-                  aria-disabled={each.disabled || undefined}
-                  onClick={() => (each.disabled ? tell("info", `${each.type} cannot be used: ${each.problem ?? "nobody knows why"}`) : setChosen(each.type))}
-                >
-                  <Icon name={CATEGORY_ICONS[group] ?? "box"} />
-                  <span>
-                    <strong>{each.type}</strong>
-                    <span className={`small ${each.disabled ? "error" : "quiet"}`}>{each.disabled ? each.problem : first(each.description)}</span>
-                  </span>
-                </button>
-              </li>
-            ))}
-          </ul>
-        </section>
-      ))}
+      {[...groups]
+        .sort(([a], [b]) => a.localeCompare(b))
+        .map(([group, members]) => (
+          <section key={group} aria-label={group}>
+            <h3 className="quiet small">{group}</h3>
+            <ul className="kinds">
+              {members.map((each) => (
+                <li key={each.type}>
+                  <button
+                    type="button"
+                    className="kind"
+                    aria-disabled={each.disabled || undefined}
+                    onClick={() =>
+                      each.disabled
+                        ? tell("info", `${each.type} cannot be used: ${each.problem ?? "nobody knows why"}`)
+                        : setChosen(each.type)
+                    }
+                  >
+                    <Icon name={CATEGORY_ICONS[group] ?? "box"} />
+                    <span>
+                      <strong>{each.type}</strong>
+                      <span className={`small ${each.disabled ? "error" : "quiet"}`}>
+                        {each.disabled ? each.problem : first(each.description)}
+                      </span>
+                    </span>
+                  </button>
+                </li>
+              ))}
+            </ul>
+          </section>
+        ))}
       {found.length === 0 && <p className="quiet">No kind of device is called “{search.trim()}”.</p>}
     </>
   );

@@ -1,7 +1,7 @@
 /** How a mesh looks before it is uploaded: seen from above and the side, drawn once. */
 
-import type { BufferGeometry } from "three";
 import { useEffect, useRef } from "react";
+import type { BufferGeometry } from "three";
 
 /** Triangles that are drawn at most: beyond, each so-and-so-manyth. */
 const MOST = 20_000;
@@ -12,7 +12,16 @@ export function MeshPreview({ geometry }: { geometry: BufferGeometry }) {
     const context = canvas.current?.getContext("2d");
     if (context) draw(context, geometry);
   }, [geometry]);
-  return <canvas ref={canvas} width={600} height={320} className="mesh-preview" role="img" aria-label="The mesh, seen from the front, right and above" />;
+  return (
+    <canvas
+      ref={canvas}
+      width={600}
+      height={320}
+      className="mesh-preview"
+      role="img"
+      aria-label="The mesh, seen from the front, right and above"
+    />
+  );
 }
 
 /** An axonometric drawing: the farther a triangle, the earlier it is drawn; the steeper it stands, the darker it is. */
@@ -26,18 +35,25 @@ function draw(context: CanvasRenderingContext2D, geometry: BufferGeometry): void
   const corner = (n: number) => {
     const at = index ? index.getX(n) : n;
     const [x, y, z] = [position.getX(at), position.getY(at), position.getZ(at)];
-    return { right: (x + y) * 0.7071, up: z * 0.8165 + (y - x) * 0.4082, far: (y - x) * 0.5774 - z * 0.5774 };
+    return { right: (x + y) * Math.SQRT1_2, up: z * 0.8165 + (y - x) * 0.4082, far: (y - x) * 0.5774 - z * 0.5774 };
   };
   const triangles: { corners: ReturnType<typeof corner>[]; far: number; light: number }[] = [];
   for (let n = 0; n < count; n += each) {
     const corners = [corner(3 * n), corner(3 * n + 1), corner(3 * n + 2)];
     const [a, b, c] = corners as [ReturnType<typeof corner>, ReturnType<typeof corner>, ReturnType<typeof corner>];
     const cross = (b.right - a.right) * (c.up - a.up) - (b.up - a.up) * (c.right - a.right);
-    const [u, v] = [Math.hypot(b.right - a.right, b.up - a.up, b.far - a.far), Math.hypot(c.right - a.right, c.up - a.up, c.far - a.far)];
+    const [u, v] = [
+      Math.hypot(b.right - a.right, b.up - a.up, b.far - a.far),
+      Math.hypot(c.right - a.right, c.up - a.up, c.far - a.far),
+    ];
     triangles.push({ corners, far: a.far + b.far + c.far, light: u && v ? Math.min(1, Math.abs(cross) / (u * v)) : 0 });
   }
   const all = triangles.flatMap(({ corners }) => corners);
-  const bounds = (of: (one: (typeof all)[number]) => number) => all.reduce<[number, number]>(([least, most], one) => [Math.min(least, of(one)), Math.max(most, of(one))], [Infinity, -Infinity]);
+  const bounds = (of: (one: (typeof all)[number]) => number) =>
+    all.reduce<[number, number]>(
+      ([least, most], one) => [Math.min(least, of(one)), Math.max(most, of(one))],
+      [Infinity, -Infinity],
+    );
   const [left, right] = bounds((one) => one.right);
   const [low, high] = bounds((one) => one.up);
   const scale = 0.9 * Math.min(width / Math.max(1e-9, right - left), height / Math.max(1e-9, high - low));

@@ -15,8 +15,16 @@ import "./scene.css";
 const Body: Section["Body"] = ({ selection: { id } }) => {
   const object = useEditor((state) => state.doc?.objects[id]);
   const holder = useEditor((state) => heldBy(state, id));
-  const why = useEditor((state) => (heldBy(state, id) ? `${heldBy(state, id)} works on it.` : notBuildable(state, "RemoveFromScene")));
-  const cannotRename = useEditor((state) => (holder ? `${holder} works on it.` : state.doc?.project ? "Objects belong to the scene: close the project, and open the scene." : ""));
+  const why = useEditor((state) =>
+    heldBy(state, id) ? `${heldBy(state, id)} works on it.` : notBuildable(state, "RemoveFromScene"),
+  );
+  const cannotRename = useEditor((state) =>
+    holder
+      ? `${holder} works on it.`
+      : state.doc?.project
+        ? "Objects belong to the scene: close the project, and open the scene."
+        : "",
+  );
   const [needing, setNeeding] = useState<string[] | null>(null);
   if (!object) return null;
   const remove = async () => {
@@ -27,7 +35,12 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
   };
   return (
     <>
-      <NameField label="Name of the object" name={object.name} why={cannotRename} onRename={(name) => renameObject(id, name)} />
+      <NameField
+        label="Name of the object"
+        name={object.name}
+        why={cannotRename}
+        onRename={(name) => renameObject(id, name)}
+      />
       <div className="tool-actions">
         <Button icon="plus" why={why} onPress={() => void duplicateObject(object)}>
           Duplicate
@@ -38,7 +51,12 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
       </div>
       <Seeing id={id} />
       {needing && (
-        <Confirm title={`Remove ${object.name}?`} yes="Remove" onClose={() => setNeeding(null)} onYes={() => void removeObject(id, true)}>
+        <Confirm
+          title={`Remove ${object.name}?`}
+          yes="Remove"
+          onClose={() => setNeeding(null)}
+          onYes={() => void removeObject(id, true)}
+        >
           <p>These projects use it, and lose its actions and points when the scene is saved:</p>
           <ul>
             {needing.map((each) => (
@@ -53,11 +71,15 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
 
 /** How the user sees it; the others see it as they like. */
 function Seeing({ id }: { id: string }) {
-  const aside = useEditor((state) => Array.isArray(state.view.user["blocklist"]) && state.view.user["blocklist"].includes(id));
-  const opacity = useEditor((state) => Number((state.view.user["opacity"] as Record<string, unknown> | undefined)?.[id] ?? 1));
+  const aside = useEditor(
+    (state) => Array.isArray(state.view.user.blocklist) && state.view.user.blocklist.includes(id),
+  );
+  const opacity = useEditor((state) =>
+    Number((state.view.user.opacity as Record<string, unknown> | undefined)?.[id] ?? 1),
+  );
   const [now_, setNow] = useState<number | null>(null);
   const put = (value: number) => {
-    const rest = { ...(now().view.user["opacity"] as Record<string, number> | undefined) };
+    const rest = { ...(now().view.user.opacity as Record<string, number> | undefined) };
     if (value >= 1) delete rest[id];
     else rest[id] = value;
     keepView("user", { opacity: rest });

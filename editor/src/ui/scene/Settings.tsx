@@ -1,8 +1,8 @@
 /** Fields for the settings of an object: what has no default comes first, the rest below. */
 
-import type { Parameter, ParameterMeta } from "../../protocol/types";
-import { extraOf } from "../../program/values";
 import { words } from "../../program/naming";
+import { extraOf } from "../../program/values";
+import type { Parameter, ParameterMeta } from "../../protocol/types";
 import { ValueField } from "../program/ValueField";
 
 /** JSON of each setting that is not left at its default. */
@@ -10,15 +10,31 @@ export type Values = Record<string, string>;
 
 /** Values as the server takes them. */
 export function parametersOf(settings: ParameterMeta[], values: Values): Parameter[] {
-  return settings.flatMap(({ name, type }) => (values[name] === undefined ? [] : [{ name, type, value: values[name] }]));
+  return settings.flatMap(({ name, type }) =>
+    values[name] === undefined ? [] : [{ name, type, value: values[name] }],
+  );
 }
 
 /** Names of settings that nobody has said and that have no default. */
 export function missing(settings: ParameterMeta[], values: Values): string[] {
-  return settings.filter(({ name, default_value }) => default_value === undefined && (values[name] === undefined || values[name] === '""')).map(({ name }) => name);
+  return settings
+    .filter(
+      ({ name, default_value }) => default_value === undefined && (values[name] === undefined || values[name] === '""'),
+    )
+    .map(({ name }) => name);
 }
 
-export function SettingsFields({ settings, values, why, onChange }: { settings: ParameterMeta[]; values: Values; why: string; onChange: (values: Values) => void }) {
+export function SettingsFields({
+  settings,
+  values,
+  why,
+  onChange,
+}: {
+  settings: ParameterMeta[];
+  values: Values;
+  why: string;
+  onChange: (values: Values) => void;
+}) {
   const needed = settings.filter((each) => each.default_value === undefined);
   const others = settings.filter((each) => each.default_value !== undefined);
   const field = (each: ParameterMeta) => (

@@ -36,7 +36,9 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
             look="primary"
             why={why}
             isDisabled={busy || lacking.length > 0}
-            onPress={() => void ask(setParameters(id, parametersOf(settings, draft))).then((done) => done && setDraft(null))}
+            onPress={() =>
+              void ask(setParameters(id, parametersOf(settings, draft))).then((done) => done && setDraft(null))
+            }
           >
             Save the settings
           </Button>

@@ -16,7 +16,10 @@ export function TypeUse({ type, onDeleted }: { type: ObjectTypeMeta; onDeleted: 
   const { refused, ask } = useAsking();
   useEffect(() => {
     let here = true;
-    void scenesUsing(type.type).then((found) => here && setScenes(found), () => here && setScenes([]));
+    void scenesUsing(type.type).then(
+      (found) => here && setScenes(found),
+      () => here && setScenes([]),
+    );
     void whyNot("DeleteObjectTypes", [type.type]).then((found) => here && setWhy(found));
     return () => {
       here = false;
@@ -27,7 +30,9 @@ export function TypeUse({ type, onDeleted }: { type: ObjectTypeMeta; onDeleted: 
   const installed = type.built_in || type.modified === undefined;
   return (
     <div className="type-use">
-      <p className="quiet small">{scenes.length > 0 ? `Used in ${scenes.join(", ")}.` : "Not used in any saved scene."}</p>
+      <p className="quiet small">
+        {scenes.length > 0 ? `Used in ${scenes.join(", ")}.` : "Not used in any saved scene."}
+      </p>
       {!installed && (
         <Button why={cannot || why} onPress={() => setSure(true)}>
           Delete this kind…
@@ -35,7 +40,12 @@ export function TypeUse({ type, onDeleted }: { type: ObjectTypeMeta; onDeleted: 
       )}
       <RefusedText>{refused}</RefusedText>
       {sure && (
-        <Confirm title={`Delete ${type.type}?`} yes="Delete" onClose={() => setSure(false)} onYes={() => void ask(deleteType(type.type)).then((done) => done && onDeleted())}>
+        <Confirm
+          title={`Delete ${type.type}?`}
+          yes="Delete"
+          onClose={() => setSure(false)}
+          onYes={() => void ask(deleteType(type.type)).then((done) => done && onDeleted())}
+        >
           <p>The kind goes, with its code. No scene uses it. This cannot be undone.</p>
         </Confirm>
       )}

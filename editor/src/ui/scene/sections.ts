@@ -16,7 +16,8 @@ export const settingsSections: readonly Section[] = [
   {
     id: "settings",
     title: "Settings",
-    applies: ({ kind, id }, state) => kind === "object" && (state.types.byName[state.doc?.objects[id]?.type ?? ""]?.settings.length ?? 0) > 0,
+    applies: ({ kind, id }, state) =>
+      kind === "object" && (state.types.byName[state.doc?.objects[id]?.type ?? ""]?.settings.length ?? 0) > 0,
     Body: lazily(() => import("./SettingsSection")),
   },
 ];

@@ -7,7 +7,7 @@ import { now } from "../../store/store";
 const NOTHING: string[] = [];
 
 export function asideOf(state: State): string[] {
-  const kept = state.view.user["blocklist"];
+  const kept = state.view.user.blocklist;
   return Array.isArray(kept) ? (kept as string[]) : NOTHING;
 }
 

@@ -2,9 +2,9 @@
 
 import { version } from "../../../package.json";
 import { useEditor } from "../../store/store";
+import { Invitation } from "../join/Invitation";
 import { Window } from "../kit/dialogs";
 import { Button } from "../kit/kit";
-import { Invitation } from "../join/Invitation";
 import { SaveDiagnosis } from "./SaveDiagnosis";
 import "./search.css";
 

@@ -17,7 +17,9 @@ export function openOverlay(open: Open): void {
 
 /** Whether a key is typed into something. */
 export function writing(target: EventTarget | null): boolean {
-  return target instanceof HTMLElement && (target.isContentEditable || /^(INPUT|TEXTAREA|SELECT)$/.test(target.tagName));
+  return (
+    target instanceof HTMLElement && (target.isContentEditable || /^(INPUT|TEXTAREA|SELECT)$/.test(target.tagName))
+  );
 }
 
 export function Overlays() {
@@ -25,7 +27,15 @@ export function Overlays() {
   useEffect(() => {
     const key = (event: KeyboardEvent) => {
       const wanted: Open = event.key === "/" ? "search" : event.key === "?" ? "about" : "";
-      if (!wanted || event.ctrlKey || event.metaKey || event.altKey || writing(event.target) || document.querySelector(".overlay")) return;
+      if (
+        !wanted ||
+        event.ctrlKey ||
+        event.metaKey ||
+        event.altKey ||
+        writing(event.target) ||
+        document.querySelector(".overlay")
+      )
+        return;
       event.preventDefault();
       openOverlay(wanted);
     };
@@ -34,5 +44,15 @@ export function Overlays() {
   }, []);
   if (!open) return null;
   const close = () => openOverlay("");
-  return <Suspense fallback={null}>{open === "search" ? <Palette onClose={close} /> : open === "about" ? <About onClose={close} /> : <Messages onClose={close} />}</Suspense>;
+  return (
+    <Suspense fallback={null}>
+      {open === "search" ? (
+        <Palette onClose={close} />
+      ) : open === "about" ? (
+        <About onClose={close} />
+      ) : (
+        <Messages onClose={close} />
+      )}
+    </Suspense>
+  );
 }

@@ -36,14 +36,20 @@ export default function Palette({ onClose }: { onClose: () => void }) {
           <Input placeholder="Type a part of its name" />
         </SearchField>
         <div className="found" tabIndex={0} role="group" aria-label="What was found">
-          <ListBox aria-label="Found" items={shown} selectionMode="none" onAction={(key) => choose(String(key))} renderEmptyState={() => <p className="quiet">Nothing is called that.</p>}>
-          {(entry) => (
-            <ListBoxItem id={entry.id} textValue={entry.words} className="found-entry">
-              <span>{entry.words}</span>
-              <span className="quiet small">{entry.why || entry.detail}</span>
-            </ListBoxItem>
-          )}
-        </ListBox>
+          <ListBox
+            aria-label="Found"
+            items={shown}
+            selectionMode="none"
+            onAction={(key) => choose(String(key))}
+            renderEmptyState={() => <p className="quiet">Nothing is called that.</p>}
+          >
+            {(entry) => (
+              <ListBoxItem id={entry.id} textValue={entry.words} className="found-entry">
+                <span>{entry.words}</span>
+                <span className="quiet small">{entry.why || entry.detail}</span>
+              </ListBoxItem>
+            )}
+          </ListBox>
         </div>
       </Autocomplete>
     </Window>

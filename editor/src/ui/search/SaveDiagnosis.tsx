@@ -13,7 +13,10 @@ export function SaveDiagnosis() {
   return (
     <section aria-label="Diagnosis">
       <h3>Something went wrong?</h3>
-      <p className="quiet small">A file with what is open, devices, versions and the last lines of the log, without secrets, for whoever helps you. It is saved here and sent to nobody.</p>
+      <p className="quiet small">
+        A file with what is open, devices, versions and the last lines of the log, without secrets, for whoever helps
+        you. It is saved here and sent to nobody.
+      </p>
       <Button icon="save" why={why} isDisabled={busy} onPress={() => void ask(saveDiagnosis())}>
         {busy ? "Gathering…" : "Save a file for diagnosis"}
       </Button>

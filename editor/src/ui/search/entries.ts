@@ -23,23 +23,47 @@ export function entriesOf(state: State): Entry[] {
 
 function ofWorkplace(state: State): Entry[] {
   const { history, live } = state;
-  const entry = (id: string, words: string, why: string, act: () => unknown, detail = "command"): Entry => ({ id, words, detail, why, act: () => void act() });
-  const cannotSave = barred(state, state.doc?.project ? "SaveProject" : "SaveScene") || (state.doc?.unsaved ? "" : "Nothing has changed.");
+  const entry = (id: string, words: string, why: string, act: () => unknown, detail = "command"): Entry => ({
+    id,
+    words,
+    detail,
+    why,
+    act: () => void act(),
+  });
+  const cannotSave =
+    barred(state, state.doc?.project ? "SaveProject" : "SaveScene") ||
+    (state.doc?.unsaved ? "" : "Nothing has changed.");
   const cannotUndo = barred(state, "Undo");
   const cannotSwitch = barred(state, "StartScene") || (isRunning(state) ? "A program runs." : "");
   const online = live.state === "started";
   return [
     ...(online ? [entry("stop", "Stop motion", "", stopMotion, "command, no emergency stop")] : []),
-    ...TOOLS.filter((tool) => tool.shown?.(state) ?? true).map((tool) => entry(`tool/${tool.id}`, tool.label, tool.barred?.(state) ?? "", () => setUi({ tool: tool.id }), "tool")),
+    ...TOOLS.filter((tool) => tool.shown?.(state) ?? true).map((tool) =>
+      entry(`tool/${tool.id}`, tool.label, tool.barred?.(state) ?? "", () => setUi({ tool: tool.id }), "tool"),
+    ),
     entry("save", "Save", cannotSave, documents.save),
-    entry("undo", history?.undo ? `Undo ${history.undo.text}` : "Undo", cannotUndo || (history?.undo ? "" : "There is nothing to undo."), documents.undo),
-    entry("redo", history?.redo ? `Redo ${history.redo.text}` : "Redo", cannotUndo || (history?.redo ? "" : "There is nothing to redo."), documents.redo),
+    entry(
+      "undo",
+      history?.undo ? `Undo ${history.undo.text}` : "Undo",
+      cannotUndo || (history?.undo ? "" : "There is nothing to undo."),
+      documents.undo,
+    ),
+    entry(
+      "redo",
+      history?.redo ? `Redo ${history.redo.text}` : "Redo",
+      cannotUndo || (history?.redo ? "" : "There is nothing to redo."),
+      documents.redo,
+    ),
     online
       ? entry("offline", "Go offline", cannotSwitch, goOffline)
       : entry("online", "Go online", cannotSwitch || (live.state === "stopped" ? "" : "It is on its way."), goOnline),
-    entry("cross", aimsAlways(state) ? "No more picking by the cross" : "Pick by the cross", "", () => keepGeneral({ aiming: !aimsAlways(state) || null })),
+    entry("cross", aimsAlways(state) ? "No more picking by the cross" : "Pick by the cross", "", () =>
+      keepGeneral({ aiming: !aimsAlways(state) || null }),
+    ),
     entry("all", "Show all in the view", "", () => theEngine()?.focus()),
-    ...(state.ui.selection ? [entry("zoom", "Zoom to what is selected", "", () => theEngine()?.focus(now().ui.selection?.id))] : []),
+    ...(state.ui.selection
+      ? [entry("zoom", "Zoom to what is selected", "", () => theEngine()?.focus(now().ui.selection?.id))]
+      : []),
   ];
 }
 
@@ -98,8 +122,20 @@ function everywhere(state: State): Entry[] {
         remember("hand", leftHanded ? "" : "left");
       },
     },
-    { id: "messages", words: "Messages: what was told, with times", detail: "help", why: "", act: () => openOverlay("messages") },
-    { id: "about", words: "About, keys, invite others, diagnosis", detail: "help", why: "", act: () => openOverlay("about") },
+    {
+      id: "messages",
+      words: "Messages: what was told, with times",
+      detail: "help",
+      why: "",
+      act: () => openOverlay("messages"),
+    },
+    {
+      id: "about",
+      words: "About, keys, invite others, diagnosis",
+      detail: "help",
+      why: "",
+      act: () => openOverlay("about"),
+    },
     { id: "leave", words: "Leave", detail: "command", why: "", act: leave },
   ];
 }

@@ -4,7 +4,12 @@ import { expect, test } from "vitest";
 import { type Entry, found } from "./found";
 
 const entry = (id: string, words: string, detail = "command"): Entry => ({ id, words, detail, why: "", act: () => {} });
-const ALL = [entry("undo", "Undo the move of pick"), entry("pick", "pick", "action"), entry("robot", "arm_left", "UR5e"), entry("go", "Go online")];
+const ALL = [
+  entry("undo", "Undo the move of pick"),
+  entry("pick", "pick", "action"),
+  entry("robot", "arm_left", "UR5e"),
+  entry("go", "Go online"),
+];
 const ids = (search: string, recent: string[] = []) => found(ALL, search, recent).map((each) => each.id);
 
 test("what begins with the words comes first, every word must fit, also in what kind it is", () => {

@@ -21,6 +21,14 @@ export function found(entries: readonly Entry[], search: string, recent: readonl
     return [...used, ...entries.filter((each) => !recent.includes(each.id))].slice(0, MOST);
   }
   const fits = (each: Entry) => parts.every((part) => `${each.words} ${each.detail}`.toLowerCase().includes(part));
-  const rank = (each: Entry) => (each.words.toLowerCase().startsWith(parts.join(" ")) ? 0 : each.words.toLowerCase().includes(parts[0] ?? "") ? 1 : 2);
-  return entries.filter(fits).sort((a, b) => rank(a) - rank(b)).slice(0, MOST);
+  const rank = (each: Entry) =>
+    each.words.toLowerCase().startsWith(parts.join(" "))
+      ? 0
+      : each.words.toLowerCase().includes(parts[0] ?? "")
+        ? 1
+        : 2;
+  return entries
+    .filter(fits)
+    .sort((a, b) => rank(a) - rank(b))
+    .slice(0, MOST);
 }

@@ -2,9 +2,9 @@
 
 import { useEffect } from "react";
 import { remember, remembered } from "../../session/memory";
+import { leave } from "../../session/session";
 import type { Ui } from "../../store/state";
 import { setUi, useEditor } from "../../store/store";
-import { leave } from "../../session/session";
 import { type Choice, More } from "../kit/kit";
 import { openOverlay } from "../search/Overlays";
 
@@ -23,13 +23,17 @@ export function useScreenSettings(): void {
   const left = useEditor((state) => state.ui.leftHanded);
   useEffect(() => {
     const follow = () => setUi({ systemDark: dark.matches });
-    setUi({ theme: (remembered("theme") || "system") as Ui["theme"], leftHanded: remembered("hand") === "left", systemDark: dark.matches });
+    setUi({
+      theme: (remembered("theme") || "system") as Ui["theme"],
+      leftHanded: remembered("hand") === "left",
+      systemDark: dark.matches,
+    });
     dark.addEventListener("change", follow);
     return () => dark.removeEventListener("change", follow);
   }, []);
   useEffect(() => {
-    document.documentElement.dataset["theme"] = theme;
-    document.documentElement.dataset["hand"] = left ? "left" : "right";
+    document.documentElement.dataset.theme = theme;
+    document.documentElement.dataset.hand = left ? "left" : "right";
   }, [theme, left]);
 }
 

@@ -24,13 +24,21 @@ export function AtTheCross() {
         items={candidates.map((id) => ({ id }))}
         dependencies={[chosen]}
         onAction={(key) => pick([String(key)])}
-        renderEmptyState={() => <p className="quiet">Nothing is near the cross: turn the view until it is at what you look for.</p>}
+        renderEmptyState={() => (
+          <p className="quiet">Nothing is near the cross: turn the view until it is at what you look for.</p>
+        )}
       >
         {({ id }) => {
           const state = now();
           const kind = selectionOf(state, id)?.kind ?? "object";
           return (
-            <ListBoxItem id={id} textValue={nameOf(state, id)} className="thing" data-chosen={id === chosen} onHoverStart={() => useAiming.setState({ chosen: id })}>
+            <ListBoxItem
+              id={id}
+              textValue={nameOf(state, id)}
+              className="thing"
+              data-chosen={id === chosen}
+              onHoverStart={() => useAiming.setState({ chosen: id })}
+            >
               <Icon name={ICONS[kind]} />
               <span className="thing-name">{nameOf(state, id)}</span>
               <span className="quiet small">

@@ -41,7 +41,11 @@ export function InTheView({ narrowed }: { narrowed: boolean }) {
         }}
       />
       {SIGHTS.map(([key, words]) => (
-        <OnOff key={key} isSelected={view[key] !== true} onChange={(on) => keepView("user", { [key]: on ? null : true })}>
+        <OnOff
+          key={key}
+          isSelected={view[key] !== true}
+          onChange={(on) => keepView("user", { [key]: on ? null : true })}
+        >
           {words}
         </OnOff>
       ))}

@@ -19,8 +19,20 @@ export default function Neighbours({ id }: { id: string }) {
   const alone = "There is nothing else in the list of things.";
   return (
     <span className="neighbours">
-      <Button look="plain" icon="left" aria-label={`To the thing before, ${rows.before?.name ?? ""}`} why={rows.before ? "" : alone} onPress={() => to(rows.before)} />
-      <Button look="plain" icon="right" aria-label={`To the thing after, ${rows.after?.name ?? ""}`} why={rows.after ? "" : alone} onPress={() => to(rows.after)} />
+      <Button
+        look="plain"
+        icon="left"
+        aria-label={`To the thing before, ${rows.before?.name ?? ""}`}
+        why={rows.before ? "" : alone}
+        onPress={() => to(rows.before)}
+      />
+      <Button
+        look="plain"
+        icon="right"
+        aria-label={`To the thing after, ${rows.after?.name ?? ""}`}
+        why={rows.after ? "" : alone}
+        onPress={() => to(rows.after)}
+      />
     </span>
   );
 }

@@ -11,7 +11,15 @@ import { Icon, type IconName } from "../kit/icons";
 import { selectionOf } from "../names";
 import { asideOf } from "../scene/seeing";
 
-export const ICONS: Record<Kind, IconName> = { object: "box", point: "point", orientation: "point", joints: "robot", action: "action", logic: "list", terminal: "play" };
+export const ICONS: Record<Kind, IconName> = {
+  object: "box",
+  point: "point",
+  orientation: "point",
+  joints: "robot",
+  action: "action",
+  logic: "list",
+  terminal: "play",
+};
 
 const NOTHING: string[] = [];
 
@@ -36,7 +44,7 @@ interface ThingTreeProps {
 export function ThingTree({ label, rows, unfolded }: ThingTreeProps) {
   const locks = useEditor((state) => state.locks);
   const aside = useEditor(asideOf);
-  const folded = foldedOf(useEditor((state) => state.view.user["collapsed"]));
+  const folded = foldedOf(useEditor((state) => state.view.user.collapsed));
   const parents = flat(rows).filter((row) => row.below.length > 0);
   const open = new Set(parents.map((row) => row.id).filter((id) => unfolded || !folded.includes(id)));
   const fold = (keys: ReadonlySet<unknown>) => {
@@ -51,14 +59,29 @@ export function ThingTree({ label, rows, unfolded }: ThingTreeProps) {
     const holder = heldBy(now(), row.id);
     const detail = holder ? `${holder} works on it` : aside.includes(row.id) ? "hidden" : row.detail;
     return (
-      <TreeItem id={row.id} textValue={`${row.name} ${detail}`} className="thing thing-row" onHoverStart={() => theEngine()?.hover(row.id)}>
+      <TreeItem
+        id={row.id}
+        textValue={`${row.name} ${detail}`}
+        className="thing thing-row"
+        onHoverStart={() => theEngine()?.hover(row.id)}
+      >
         <TreeItemContent>
           {({ hasChildItems, isExpanded, level }) => (
             <>
               <span style={{ width: (level - 1) * 16 }} className="thing-indent" />
               {hasChildItems ? (
                 <Button slot="chevron" className="thing-fold" isDisabled={unfolded}>
-                  <svg width="16" height="16" viewBox="0 0 16 16" fill="none" stroke="currentColor" strokeWidth="2" strokeLinecap="round" aria-hidden="true" data-open={isExpanded}>
+                  <svg
+                    width="16"
+                    height="16"
+                    viewBox="0 0 16 16"
+                    fill="none"
+                    stroke="currentColor"
+                    strokeWidth="2"
+                    strokeLinecap="round"
+                    aria-hidden="true"
+                    data-open={isExpanded}
+                  >
                     <path d="M6 3l5 5-5 5" />
                   </svg>
                 </Button>
@@ -78,7 +101,15 @@ export function ThingTree({ label, rows, unfolded }: ThingTreeProps) {
     );
   };
   return (
-    <Tree aria-label={label} className="things" items={rows} dependencies={[locks, aside, unfolded]} expandedKeys={open} onExpandedChange={fold} onAction={(key) => goTo(String(key))}>
+    <Tree
+      aria-label={label}
+      className="things"
+      items={rows}
+      dependencies={[locks, aside, unfolded]}
+      expandedKeys={open}
+      onExpandedChange={fold}
+      onAction={(key) => goTo(String(key))}
+    >
       {item}
     </Tree>
   );

@@ -3,24 +3,40 @@
 import { useMemo, useState } from "react";
 import { Input, Label, SearchField, ToggleButton, ToggleButtonGroup } from "react-aria-components";
 import { keepView } from "../../commands/viewstate";
-import { asideOf } from "../scene/seeing";
 import { useEditor } from "../../store/store";
-import { type Group, GROUPS } from "../../viewmodel/seeing";
+import { GROUPS, type Group } from "../../viewmodel/seeing";
 import { allOf, counts, fitting, narrowed, type Row, thingsOf } from "../../viewmodel/things";
 import { OneOf } from "../kit/fields";
+import { asideOf } from "../scene/seeing";
 import { AtTheCross } from "./AtTheCross";
 import { InTheView } from "./InTheView";
 import { ThingTree } from "./ThingTree";
 import "./things.css";
 
-const WORDS: Record<Group, string> = { robots: "Robots", objects: "Objects", points: "Points", actions: "Actions", program: "Program", others: "Others" };
+const WORDS: Record<Group, string> = {
+  robots: "Robots",
+  objects: "Objects",
+  points: "Points",
+  actions: "Actions",
+  program: "Program",
+  others: "Others",
+};
 const HIDDEN = "hidden";
 
 export default function ThingsPanel() {
   const [by, setBy] = useState<"list" | "cross">("list");
   return (
     <>
-      <OneOf quiet label="Found by" value={by} choices={[["list", "All"], ["cross", "At the cross"]]} onChange={setBy} />
+      <OneOf
+        quiet
+        label="Found by"
+        value={by}
+        choices={[
+          ["list", "All"],
+          ["cross", "At the cross"],
+        ]}
+        onChange={setBy}
+      />
       {by === "list" ? <All /> : <AtTheCross />}
     </>
   );
@@ -29,14 +45,20 @@ export default function ThingsPanel() {
 function All() {
   const doc = useEditor((state) => state.doc);
   const types = useEditor((state) => state.types);
-  const kept = useEditor((state) => state.view.user["filters"]);
+  const kept = useEditor((state) => state.view.user.filters);
   const aside = useEditor(asideOf);
   const [search, setSearch] = useState("");
   const things = useMemo(() => thingsOf({ doc, types }), [doc, types]);
   const rows = useMemo(() => allOf(things), [things]);
   const number = useMemo(() => counts(rows), [rows]);
   const hidden = rows.filter((row) => aside.includes(row.id)).length;
-  const groups = new Set<string>(Array.isArray(kept) ? kept.filter((each) => (each === HIDDEN ? hidden > 0 : GROUPS.includes(each as Group) && number[each as Group] > 0)) : []);
+  const groups = new Set<string>(
+    Array.isArray(kept)
+      ? kept.filter((each) =>
+          each === HIDDEN ? hidden > 0 : GROUPS.includes(each as Group) && number[each as Group] > 0,
+        )
+      : [],
+  );
   const ofKind = fitting(new Set([...groups].filter((each) => each !== HIDDEN)), search);
   const fits = (row: Row) => ofKind(row) && (!groups.has(HIDDEN) || aside.includes(row.id));
   const narrow = search.trim() !== "" || groups.size > 0;
@@ -52,7 +74,13 @@ function All() {
         <Label className="hidden-but-read">Search</Label>
         <Input placeholder={`Search ${rows.length} things`} />
       </SearchField>
-      <ToggleButtonGroup className="chips" aria-label="Only these kinds" selectionMode="multiple" selectedKeys={groups} onSelectionChange={(keys) => keepView("user", { filters: keys.size > 0 ? [...keys] : null })}>
+      <ToggleButtonGroup
+        className="chips"
+        aria-label="Only these kinds"
+        selectionMode="multiple"
+        selectedKeys={groups}
+        onSelectionChange={(keys) => keepView("user", { filters: keys.size > 0 ? [...keys] : null })}
+      >
         {GROUPS.filter((group) => number[group] > 0).map((group) => (
           <ToggleButton key={group} id={group} className="button chip">
             {WORDS[group]} <small>{number[group]}</small>
@@ -70,7 +98,15 @@ function All() {
           <ThingTree label={label} rows={part} unfolded={narrow} />
         </section>
       ))}
-      {found.length === 0 && <p className="quiet">{rows.length === 0 ? "Nothing is in the workplace yet." : groups.size > 0 ? "Nothing of these kinds is called that." : "Nothing is called that."}</p>}
+      {found.length === 0 && (
+        <p className="quiet">
+          {rows.length === 0
+            ? "Nothing is in the workplace yet."
+            : groups.size > 0
+              ? "Nothing of these kinds is called that."
+              : "Nothing is called that."}
+        </p>
+      )}
       <InTheView narrowed={groupsOfAny(groups)} />
     </>
   );

@@ -1,7 +1,7 @@
 /** Keys for a number, large enough for fingers, with units and changes; the keyboard writes into the same field. */
 
 import { type FormEvent, useId, useState } from "react";
-import { amount, ANGLE_UNITS, isAngle, LENGTH_UNITS, show, type Unit } from "../../transform/amounts";
+import { ANGLE_UNITS, amount, isAngle, LENGTH_UNITS, show, type Unit } from "../../transform/amounts";
 import { Button } from "../kit/kit";
 
 interface NumberPadProps {
@@ -64,7 +64,13 @@ export function NumberPad({ label, value, unit, by, onlyBy = false, onUnit, onBy
       </div>
       <div className="pad-keys">
         {KEYS.map((key) => (
-          <Button key={key} className="pad-key" excludeFromTabOrder aria-label={key === "−" ? "minus" : key === "." ? "point" : key} onPress={() => setText(text + (key === "−" ? "-" : key))}>
+          <Button
+            key={key}
+            className="pad-key"
+            excludeFromTabOrder
+            aria-label={key === "−" ? "minus" : key === "." ? "point" : key}
+            onPress={() => setText(text + (key === "−" ? "-" : key))}
+          >
             {key}
           </Button>
         ))}
@@ -72,7 +78,14 @@ export function NumberPad({ label, value, unit, by, onlyBy = false, onUnit, onBy
           +
         </Button>
         {(isAngle(unit) ? ANGLE_UNITS : LENGTH_UNITS).map((each) => (
-          <Button key={each} className="pad-key" excludeFromTabOrder aria-pressed={each === unit} aria-label={`in ${each}`} onPress={() => onUnit(each)}>
+          <Button
+            key={each}
+            className="pad-key"
+            excludeFromTabOrder
+            aria-pressed={each === unit}
+            aria-label={`in ${each}`}
+            onPress={() => onUnit(each)}
+          >
             {each}
           </Button>
         ))}

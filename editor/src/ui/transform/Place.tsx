@@ -7,8 +7,28 @@ import type { GizmoMode } from "../../engine/gizmo/handles";
 import type { ObjectModel, Pose } from "../../protocol/types";
 import type { Selection, State } from "../../store/state";
 import { now, tell, useEditor } from "../../store/store";
-import { ANGLE_STEPS, type AngleUnit, LENGTH_STEPS, type LengthUnit, stepWords, type Unit } from "../../transform/amounts";
-import { angles, AXES, type Axis, type FrameName, moved, placedAt, poseFrom, poseText, same, squared, turned, turnedTo } from "../../transform/placing";
+import {
+  ANGLE_STEPS,
+  type AngleUnit,
+  LENGTH_STEPS,
+  type LengthUnit,
+  stepWords,
+  type Unit,
+} from "../../transform/amounts";
+import {
+  AXES,
+  type Axis,
+  angles,
+  type FrameName,
+  moved,
+  placedAt,
+  poseFrom,
+  poseText,
+  same,
+  squared,
+  turned,
+  turnedTo,
+} from "../../transform/placing";
 import { measures } from "../../transform/sizes";
 import { notMovable, notSizable, type Target, targetOf } from "../../transform/target";
 import { type Snap, TOOL, type ToolSettings, toolSettings } from "../../transform/tool";
@@ -66,19 +86,46 @@ function Placing({ selection, target }: { selection: Selection; target: Target }
   const settle = (pose: Pose, model?: ObjectModel) => void place(targetOf(now(), selection) ?? target, pose, model);
   return (
     <>
-      {modes.length > 1 && <OneOf label="What to do" quiet value={mode} choices={modes} onChange={(next) => (setMode(next), setOpen(""))} />}
+      {modes.length > 1 && (
+        <OneOf
+          label="What to do"
+          quiet
+          value={mode}
+          choices={modes}
+          onChange={(next) => (setMode(next), setOpen(""))}
+        />
+      )}
       {why && <p className="small quiet">{why}</p>}
       <div className="axis-rows">
         {mode === "size"
-          ? target.model && <Sizes model={target.model} target={target} settings={settings} why={why} open={open} onOpen={setOpen} />
+          ? target.model && (
+              <Sizes model={target.model} target={target} settings={settings} why={why} open={open} onOpen={setOpen} />
+            )
           : AXES.map((axis) => (
-              <Coordinate key={axis} {...{ axis, mode, target, settings, frame, relative, why, selection }} open={open === axis} onOpen={(on) => setOpen(on ? axis : "")} />
+              <Coordinate
+                key={axis}
+                {...{ axis, mode, target, settings, frame, relative, why, selection }}
+                open={open === axis}
+                onOpen={(on) => setOpen(on ? axis : "")}
+              />
             ))}
       </div>
       <div className="tool-settings">
         <Steps settings={settings} turn={mode === "turn"} />
-        {mode !== "size" && <Pick label="Axes of" value={settings.frame} choices={framesOf(state, target)} onChange={(value) => keep({ frame: value as FrameName })} />}
-        <Pick label="Snap to" value={settings.snap} choices={SNAPS} onChange={(value) => keep({ snap: value as Snap })} />
+        {mode !== "size" && (
+          <Pick
+            label="Axes of"
+            value={settings.frame}
+            choices={framesOf(state, target)}
+            onChange={(value) => keep({ frame: value as FrameName })}
+          />
+        )}
+        <Pick
+          label="Snap to"
+          value={settings.snap}
+          choices={SNAPS}
+          onChange={(value) => keep({ snap: value as Snap })}
+        />
       </div>
       <div className="tool-actions">
         <Button
@@ -91,7 +138,10 @@ function Placing({ selection, target }: { selection: Selection; target: Target }
           Put back
         </Button>
         {target.turns && (
-          <Button isDisabled={why !== ""} onPress={() => settle({ ...target.pose, orientation: squared(target.pose.orientation, frame.orientation) })}>
+          <Button
+            isDisabled={why !== ""}
+            onPress={() => settle({ ...target.pose, orientation: squared(target.pose.orientation, frame.orientation) })}
+          >
             Square up
           </Button>
         )}
@@ -132,7 +182,8 @@ function Coordinate({ axis, mode, target, settings, frame, relative, why, select
   const unit: Unit = turn ? settings.angle : settings.length;
   const size = turn ? settings.angleStep : settings.lengthStep;
   const label = turn && !relative ? ANGLES[axis] : axis.toUpperCase();
-  const by = (pose: Pose, amount: number) => (turn ? turned(pose, frame, axis, amount) : moved(pose, frame, axis, amount));
+  const by = (pose: Pose, amount: number) =>
+    turn ? turned(pose, frame, axis, amount) : moved(pose, frame, axis, amount);
   return (
     <>
       <Row
@@ -159,7 +210,11 @@ function Coordinate({ axis, mode, target, settings, frame, relative, why, select
           onBy={(next) => keep({ by: next })}
           onDone={(next) => {
             const latest = targetOf(now(), selection) ?? target;
-            const pose = relative ? by(latest.pose, next) : turn ? turnedTo(latest.pose, frame, axis, next) : placedAt(latest.pose, frame, axis, next);
+            const pose = relative
+              ? by(latest.pose, next)
+              : turn
+                ? turnedTo(latest.pose, frame, axis, next)
+                : placedAt(latest.pose, frame, axis, next);
             void place(latest, pose);
           }}
           onClose={() => onOpen(false)}
@@ -206,7 +261,16 @@ function Sizes({ model, target, settings, why, open, onOpen }: SizesProps) {
         }}
       />
       {open === label && (
-        <NumberPad label={label} value={value} unit={settings.length} by={settings.by} onUnit={(next) => keep({ length: next as LengthUnit })} onBy={(next) => keep({ by: next })} onDone={(next) => put(label, next)} onClose={() => onOpen("")} />
+        <NumberPad
+          label={label}
+          value={value}
+          unit={settings.length}
+          by={settings.by}
+          onUnit={(next) => keep({ length: next as LengthUnit })}
+          onBy={(next) => keep({ by: next })}
+          onDone={(next) => put(label, next)}
+          onClose={() => onOpen("")}
+        />
       )}
     </div>
   ));
@@ -224,14 +288,30 @@ function Steps({ settings, turn }: { settings: ToolSettings; turn: boolean }) {
   const worth = turn ? Math.PI / 180 : 0.001;
   return (
     <>
-      <Pick label="Step" value={known && !free ? String(known[0]) : FREE} choices={choices} onChange={(next) => (setFree(next === FREE), next === FREE || put(Number(next)))} />
-      {(free || !known) && <Amount label="Own step" unit={turn ? "°" : "mm"} digits={3} value={value / worth} least={0.001} most={10_000} onChange={(next) => put(next * worth)} />}
+      <Pick
+        label="Step"
+        value={known && !free ? String(known[0]) : FREE}
+        choices={choices}
+        onChange={(next) => (setFree(next === FREE), next === FREE || put(Number(next)))}
+      />
+      {(free || !known) && (
+        <Amount
+          label="Own step"
+          unit={turn ? "°" : "mm"}
+          digits={3}
+          value={value / worth}
+          least={0.001}
+          most={10_000}
+          onChange={(next) => put(next * worth)}
+        />
+      )}
     </>
   );
 }
 
 function framesOf(state: State, target: Target): [FrameName, string][] {
-  const parent = target.kind === "point" ? state.doc?.points[target.id]?.parent : state.doc?.orientations[target.id]?.pointId;
+  const parent =
+    target.kind === "point" ? state.doc?.points[target.id]?.parent : state.doc?.orientations[target.id]?.pointId;
   const robots = Object.values(state.doc?.objects ?? {}).some((each) => each.type in state.types.robots);
   const choices: [FrameName, string][] = [["world", "the world"]];
   if (parent) choices.push(["parent", nameOf(state, parent)]);
@@ -260,4 +340,3 @@ async function paste(target: Target, settle: (pose: Pose) => void): Promise<void
   if (pose) settle(pose);
   else tell("info", "What was copied is no pose: 3 numbers are a position in m, 4 a quaternion, 6 or 7 both.");
 }
-

@@ -1,7 +1,7 @@
 /** One coordinate: a step less, the value, a step more. The value is a wheel: it is rolled or dragged by steps, a tap opens the keys. */
 
 import { type KeyboardEvent, type PointerEvent, useEffect, useRef } from "react";
-import { show, stepWords, type Unit, isAngle } from "../../transform/amounts";
+import { isAngle, show, stepWords, type Unit } from "../../transform/amounts";
 import { Button } from "../kit/kit";
 
 interface RowProps {

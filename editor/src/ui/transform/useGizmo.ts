@@ -12,7 +12,7 @@ import { theEngine } from "../../session/engine";
 import type { Selection, State } from "../../store/state";
 import { now, store } from "../../store/store";
 import { show } from "../../transform/amounts";
-import { minus, moved, onGrid, plusOf, rounded, turnedAbout, type Axis } from "../../transform/placing";
+import { type Axis, minus, moved, onGrid, plusOf, rounded, turnedAbout } from "../../transform/placing";
 import { halfOf, lifted, pulled } from "../../transform/sizes";
 import { frameOf, notMovable, notSizable, type Target, targetOf } from "../../transform/target";
 import { toolSettings } from "../../transform/tool";
@@ -50,12 +50,21 @@ export function useGizmo(selection: Selection, mode: GizmoMode): void {
       if (!engine || engine.gizmo.isDragging) return;
       const state = now();
       const target = targetOf(state, mine);
-      const possible = target && (mode === "size" ? target.model && !notSizable(state, target) : (mode === "move" ? target.moves : target.turns) && !notMovable(state, target));
+      const possible =
+        target &&
+        (mode === "size"
+          ? target.model && !notSizable(state, target)
+          : (mode === "move" ? target.moves : target.turns) && !notMovable(state, target));
       if (!target || !possible) return engine.gizmo.hide();
       const { frame } = toolSettings(state);
       const own = mode === "size" ? target.pose.orientation : toolFrame(state, target).orientation;
       const half = mode === "size" && target.model ? { half: halfOf(target.model) } : {};
-      engine.gizmo.show({ mode, at: target.pose.position, axes: frame === "view" && mode !== "size" ? "view" : own, ...half });
+      engine.gizmo.show({
+        mode,
+        at: target.pose.position,
+        axes: frame === "view" && mode !== "size" ? "view" : own,
+        ...half,
+      });
     };
     update();
     const stop = store.subscribe(update);
@@ -153,7 +162,9 @@ class Follower {
       return best ? { ...start.pose, position: best } : free;
     }
     if (snap === "surface" && doc) {
-      const hit = engine.pick(drag.x, drag.y, 0).find((each) => each.normal && each.id !== start.id && each.id in doc.objects);
+      const hit = engine
+        .pick(drag.x, drag.y, 0)
+        .find((each) => each.normal && each.id !== start.id && each.id in doc.objects);
       const point = hit?.point ?? engine.floor(drag.x, drag.y);
       if (!point) return free;
       const normal = hit?.normal ?? { x: 0, y: 0, z: 1 };

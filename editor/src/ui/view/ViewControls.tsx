@@ -1,17 +1,17 @@
 /** At the edge of the view: all of it, a cube to look from its sides, to fly or to turn, and views that were kept. */
 
 import { useEffect, useRef, useState } from "react";
-import type { ViewMode, ViewName, Viewpoint } from "../../engine/camera";
-import type { Engine } from "../../engine/engine";
 import { followWishes } from "../../commands/handover";
 import { keepGeneral, keepView } from "../../commands/viewstate";
+import type { ViewMode, ViewName, Viewpoint } from "../../engine/camera";
+import type { Engine } from "../../engine/engine";
 import { aimsAlways, useAiming } from "../../session/aiming";
 import { now, useEditor } from "../../store/store";
 import { Aim } from "../aim/Aim";
 import { OffScreen } from "../aim/OffScreen";
 import { AskName, Button, type Choice, More } from "../kit/kit";
-import { FlyPad } from "./FlyPad";
 import { writing } from "../search/Overlays";
+import { FlyPad } from "./FlyPad";
 import "../aim/aim.css";
 import "./view.css";
 
@@ -36,8 +36,14 @@ interface Bookmark extends Viewpoint {
 
 function bookmarksOf(kept: unknown): Bookmark[] {
   if (!Array.isArray(kept)) return [];
-  const triple = (value: unknown) => Array.isArray(value) && value.length === 3 && value.every((each) => typeof each === "number" && Number.isFinite(each));
-  return kept.filter((each: Partial<Bookmark> | null): each is Bookmark => typeof each?.name === "string" && triple(each.position) && triple(each.target));
+  const triple = (value: unknown) =>
+    Array.isArray(value) &&
+    value.length === 3 &&
+    value.every((each) => typeof each === "number" && Number.isFinite(each));
+  return kept.filter(
+    (each: Partial<Bookmark> | null): each is Bookmark =>
+      typeof each?.name === "string" && triple(each.position) && triple(each.target),
+  );
 }
 
 export default function ViewControls({ engine }: { engine: Engine }) {
@@ -59,11 +65,20 @@ export default function ViewControls({ engine }: { engine: Engine }) {
   };
   const choices: Choice[] = [
     { id: "home", label: "From the corner", act: () => look("home") },
-    ...SIDES.map(([id, words]) => ({ id, label: `From ${words === "Top" ? "above" : `the ${words.toLowerCase()}`}`, act: () => look(id) })),
+    ...SIDES.map(([id, words]) => ({
+      id,
+      label: `From ${words === "Top" ? "above" : `the ${words.toLowerCase()}`}`,
+      act: () => look(id),
+    })),
     mode === "orbit"
       ? { id: "fly", label: "Fly through it", icon: "play" as const, act: () => change("fly") }
       : { id: "orbit", label: "Turn around it", icon: "redo" as const, act: () => change("orbit") },
-    { id: "cross", label: always ? "No more picking by the cross" : "Pick by the cross ( X )", icon: "point", act: switchCross },
+    {
+      id: "cross",
+      label: always ? "No more picking by the cross" : "Pick by the cross ( X )",
+      icon: "point",
+      act: switchCross,
+    },
     { id: "keep", label: "Keep this view…", icon: "plus", act: () => setNaming(true) },
     ...bookmarks.map((each, n) => ({
       id: `go ${n}`,
@@ -131,12 +146,20 @@ function Cube({ engine, onLook }: { engine: Engine; onLook: (from: ViewName) => 
     const turn = () => {
       const e = engine.view.camera.matrixWorldInverse.elements;
       // Right, down and towards the eye: how far a direction goes there.
-      const along = (row: number, [x, y, z]: Direction) => (e[row] ?? 0) * x + (e[4 + row] ?? 0) * y + (e[8 + row] ?? 0) * z;
+      const along = (row: number, [x, y, z]: Direction) =>
+        (e[row] ?? 0) * x + (e[4 + row] ?? 0) * y + (e[8 + row] ?? 0) * z;
       SIDES.forEach(([, , faces, words, upper], n) => {
         const face = cube.current?.children[n] as HTMLElement | undefined;
         if (!face) return;
         const towards = along(2, faces) > 0.01;
-        const parts = [along(0, words), -along(1, words), -along(0, upper), along(1, upper), HALF * along(0, faces), -HALF * along(1, faces)];
+        const parts = [
+          along(0, words),
+          -along(1, words),
+          -along(0, upper),
+          along(1, upper),
+          HALF * along(0, faces),
+          -HALF * along(1, faces),
+        ];
         const transform = towards ? `matrix(${parts.map((each) => each.toFixed(3)).join()})` : "";
         if (face.style.transform === transform) return;
         face.style.transform = transform;

@@ -40,7 +40,14 @@ export function Centre() {
       )}
       <div className="centre-top">
         {project && (
-          <ToggleButtonGroup className="modes" aria-label="How it is shown" selectionMode="single" disallowEmptySelection selectedKeys={[mode]} onSelectionChange={(keys) => setUi({ mode: [...keys][0] as Mode })}>
+          <ToggleButtonGroup
+            className="modes"
+            aria-label="How it is shown"
+            selectionMode="single"
+            disallowEmptySelection
+            selectedKeys={[mode]}
+            onSelectionChange={(keys) => setUi({ mode: [...keys][0] as Mode })}
+          >
             {modes.map((each) => (
               <ToggleButton key={each} id={each} className="button mode">
                 {WORDS[each]}

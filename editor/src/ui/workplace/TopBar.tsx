@@ -29,7 +29,11 @@ export function TopBar() {
         icon="home"
         aria-label="Close, and go to the lists"
         onPress={() => {
-          const why = running ? "A program runs: stop it first." : live !== "stopped" ? "Go offline first: the devices would be left." : cannotSave;
+          const why = running
+            ? "A program runs: stop it first."
+            : live !== "stopped"
+              ? "Go offline first: the devices would be left."
+              : cannotSave;
           if (why) tell("info", why);
           else if (unsaved) setAsking(true);
           else void documents.close(false);
@@ -42,16 +46,39 @@ export function TopBar() {
           <span className={unsaved ? "tag warn" : ""}>{running ? "running" : unsaved ? "not saved" : "saved"}</span>
         </p>
       </div>
-      <Button icon="save" className="word-on-wide" isDisabled={!unsaved || running || cannotSave !== ""} onPress={() => void documents.save()} aria-label="Save">
+      <Button
+        icon="save"
+        className="word-on-wide"
+        isDisabled={!unsaved || running || cannotSave !== ""}
+        onPress={() => void documents.save()}
+        aria-label="Save"
+      >
         <span>Save</span>
       </Button>
-      <Button look="plain" icon="undo" aria-label={history?.undo ? `Undo ${history.undo.text}` : "Undo"} why={cannotUndo || (history?.undo ? "" : "There is nothing to undo.")} onPress={() => void documents.undo()} />
-      <Button look="plain" icon="redo" aria-label={history?.redo ? `Redo ${history.redo.text}` : "Redo"} why={cannotUndo || (history?.redo ? "" : "There is nothing to redo.")} onPress={() => void documents.redo()} />
+      <Button
+        look="plain"
+        icon="undo"
+        aria-label={history?.undo ? `Undo ${history.undo.text}` : "Undo"}
+        why={cannotUndo || (history?.undo ? "" : "There is nothing to undo.")}
+        onPress={() => void documents.undo()}
+      />
+      <Button
+        look="plain"
+        icon="redo"
+        aria-label={history?.redo ? `Redo ${history.redo.text}` : "Redo"}
+        why={cannotUndo || (history?.redo ? "" : "There is nothing to redo.")}
+        onPress={() => void documents.redo()}
+      />
       <LiveSwitch />
       <People />
       <Settings />
       {asking && (
-        <Confirm title="Close without saving?" yes="Throw the changes away" onClose={() => setAsking(false)} onYes={() => void documents.close(true)}>
+        <Confirm
+          title="Close without saving?"
+          yes="Throw the changes away"
+          onClose={() => setAsking(false)}
+          onYes={() => void documents.close(true)}
+        >
           <p>What was changed since it was saved would be lost, also what others have changed.</p>
         </Confirm>
       )}
@@ -66,7 +93,9 @@ function LiveSwitch() {
   const running = useEditor(isRunning);
   const cannot = useEditor((state) => barred(state, "StartScene"));
   const objects = useEditor((state) => state.live.objects);
-  const wrong = Object.values(objects).filter((each) => each.state === "failed" || each.state === "lost" || each.answering === false).length;
+  const wrong = Object.values(objects).filter(
+    (each) => each.state === "failed" || each.state === "lost" || each.answering === false,
+  ).length;
   const busy = live === "starting" || live === "stopping";
   return (
     <Button

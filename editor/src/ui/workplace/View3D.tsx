@@ -37,7 +37,15 @@ export function View3D() {
     const begin = async () => {
       const { Engine } = await persistently(() => import("../../engine/engine"));
       if (ended || !canvas.current || !labels.current) return;
-      made = new Engine({ canvas: canvas.current, labels: labels.current, telemetry, asset: readShown, trouble: once, quality: chosen(quality), dark: themeAtStart.current === "dark" });
+      made = new Engine({
+        canvas: canvas.current,
+        labels: labels.current,
+        telemetry,
+        asset: readShown,
+        trouble: once,
+        quality: chosen(quality),
+        dark: themeAtStart.current === "dark",
+      });
       const shown = made;
       shown.onTap = (hits, floor) => {
         if (!tapTaken(hits, floor)) pick(hits.map((hit) => hit.id));
@@ -79,7 +87,13 @@ export function View3D() {
 
   return (
     <main className="view">
-      <canvas ref={canvas} key={quality} tabIndex={0} role="application" aria-label="3D view of the workplace. Keys W, A, S, D, Q and E fly; the list of things has the same for the keyboard." />
+      <canvas
+        ref={canvas}
+        key={quality}
+        tabIndex={0}
+        role="application"
+        aria-label="3D view of the workplace. Keys W, A, S, D, Q and E fly; the list of things has the same for the keyboard."
+      />
       <div ref={labels} className="view-labels" aria-hidden="true" />
       {!engine && !failed && <Waiting>Preparing the view…</Waiting>}
       {failed && (

@@ -6,8 +6,8 @@
 import type { ComponentType } from "react";
 import type { Selection, State } from "../../store/state";
 import { calibrateSections } from "../calibrate/sections";
-import { programSections } from "../program/sections";
 import { pointSections } from "../points/sections";
+import { programSections } from "../program/sections";
 import { objectSections, settingsSections } from "../scene/sections";
 import { about } from "./sections/about";
 import { place } from "./sections/place";
@@ -19,4 +19,12 @@ export interface Section {
   Body: ComponentType<{ selection: Selection }>;
 }
 
-export const SECTIONS: readonly Section[] = [about, ...pointSections, ...programSections, place, ...objectSections, ...calibrateSections, ...settingsSections];
+export const SECTIONS: readonly Section[] = [
+  about,
+  ...pointSections,
+  ...programSections,
+  place,
+  ...objectSections,
+  ...calibrateSections,
+  ...settingsSections,
+];

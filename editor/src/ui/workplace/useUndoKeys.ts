@@ -17,7 +17,9 @@ export function useUndoKeys(): void {
       event.preventDefault();
       const state = now();
       const step = state.history?.[wanted];
-      const why = barred(state, wanted === "undo" ? "Undo" : "Redo") || (step || event.timeStamp - last < NEWS ? "" : `There is nothing to ${wanted}.`);
+      const why =
+        barred(state, wanted === "undo" ? "Undo" : "Redo") ||
+        (step || event.timeStamp - last < NEWS ? "" : `There is nothing to ${wanted}.`);
       if (why) return tell("info", why);
       last = event.timeStamp;
       void (wanted === "undo" ? documents.undo() : documents.redo());
@@ -27,7 +29,13 @@ export function useUndoKeys(): void {
   }, []);
 }
 
-export function undoOrRedo({ key, ctrlKey, metaKey, shiftKey, altKey }: Pick<KeyboardEvent, "key" | "ctrlKey" | "metaKey" | "shiftKey" | "altKey">): "undo" | "redo" | null {
+export function undoOrRedo({
+  key,
+  ctrlKey,
+  metaKey,
+  shiftKey,
+  altKey,
+}: Pick<KeyboardEvent, "key" | "ctrlKey" | "metaKey" | "shiftKey" | "altKey">): "undo" | "redo" | null {
   if (!(ctrlKey || metaKey) || altKey) return null;
   const letter = key.toLowerCase();
   if (letter === "z") return shiftKey ? "redo" : "undo";
@@ -35,5 +43,9 @@ export function undoOrRedo({ key, ctrlKey, metaKey, shiftKey, altKey }: Pick<Key
 }
 
 function isWriting(target: EventTarget | null): boolean {
-  return target instanceof HTMLElement && (target.isContentEditable || target.matches("input:not([type=checkbox], [type=radio], [type=range]), textarea, select"));
+  return (
+    target instanceof HTMLElement &&
+    (target.isContentEditable ||
+      target.matches("input:not([type=checkbox], [type=radio], [type=range]), textarea, select"))
+  );
 }

@@ -2,10 +2,10 @@
 
 import { Suspense, useEffect, useState } from "react";
 import { askFor, noLongerAsk } from "../../../commands/handover";
+import { serves } from "../../../session/session";
 import { hasAsked } from "../../../store/handover";
 import { heldBy } from "../../../store/selectors";
 import { useEditor } from "../../../store/store";
-import { serves } from "../../../session/session";
 import { Icon } from "../../kit/icons";
 import { Button } from "../../kit/kit";
 import { lazily } from "../../kit/lazily";
@@ -25,20 +25,24 @@ export default function Holder({ id }: { id: string }) {
     return () => clearInterval(timer);
   }, []);
   if (!holder) return null;
-  const how = here ? `It is free when ${holder} is done with it, or a few minutes after ${holder} loses the connection.` : `${holder} lost the connection. It is free in a few minutes, or when somebody takes over.`;
+  const how = here
+    ? `It is free when ${holder} is done with it, or a few minutes after ${holder} loses the connection.`
+    : `${holder} lost the connection. It is free in a few minutes, or when somebody takes over.`;
   return (
     <div className="holder" role="status">
       <p className="tag warn">
         <Icon name="lock" size={16} /> {here ? `${holder} works on it` : `Locked by ${holder}, who left`}
       </p>
       <p className="quiet small">
-        {since > 0 && `Since ${new Date(since).toLocaleTimeString("en-GB", { hour: "2-digit", minute: "2-digit" })}, ${ago(new Date(since).toISOString())}. `}
+        {since > 0 &&
+          `Since ${new Date(since).toLocaleTimeString("en-GB", { hour: "2-digit", minute: "2-digit" })}, ${ago(new Date(since).toISOString())}. `}
         {how}
       </p>
       {here &&
         (asked ? (
           <p className="small">
-            {holder} is asked for it, and you are told when it is free. <Button onPress={() => noLongerAsk(id)}>No more</Button>
+            {holder} is asked for it, and you are told when it is free.{" "}
+            <Button onPress={() => noLongerAsk(id)}>No more</Button>
           </p>
         ) : (
           <Button icon="people" onPress={() => askFor(id)}>

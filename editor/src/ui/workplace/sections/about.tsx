@@ -38,7 +38,13 @@ const Body: Section["Body"] = ({ selection: { kind, id } }) => {
   );
 };
 
-export const TONE: Record<string, string> = { online: "good", back: "good", lost: "bad", failed: "bad", connecting: "warn" };
+export const TONE: Record<string, string> = {
+  online: "good",
+  back: "good",
+  lost: "bad",
+  failed: "bad",
+  connecting: "warn",
+};
 
 /** An action's name as words. */
 function words(name: string): string {

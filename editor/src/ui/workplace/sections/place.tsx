@@ -6,6 +6,7 @@ import type { Section } from "../sections";
 export const place: Section = {
   id: "place",
   title: "Place",
-  applies: ({ kind, id }, state) => kind === "point" || kind === "orientation" || state.doc?.objects[id]?.pose !== undefined,
+  applies: ({ kind, id }, state) =>
+    kind === "point" || kind === "orientation" || state.doc?.objects[id]?.pose !== undefined,
   Body: lazily(() => import("../../transform/Place")),
 };

@@ -2,9 +2,9 @@
 
 import { barred } from "../../../commands/asking";
 import { retryObject } from "../../../commands/operation";
+import { serves } from "../../../session/session";
 import { derivesFrom } from "../../../store/selectors";
 import { useEditor } from "../../../store/store";
-import { serves } from "../../../session/session";
 import { Button } from "../../kit/kit";
 import { TONE } from "../sections/about";
 
@@ -23,10 +23,19 @@ export default function Panel() {
   const cannot = useEditor((state) => barred(state, "RetryObject"));
   const troubled = (id: string) => live.objects[id]?.state === "failed" || live.objects[id]?.state === "lost";
   // Boxes and tables are no devices.
-  const inert = useEditor((state) => Object.values(state.doc?.objects ?? {}).filter((each) => derivesFrom(state, each.type, "VirtualCollisionObject")).map((each) => each.id).join());
-  const devices = Object.values(doc?.objects ?? {}).filter((each) => troubled(each.id) || !inert.split(",").includes(each.id));
+  const inert = useEditor((state) =>
+    Object.values(state.doc?.objects ?? {})
+      .filter((each) => derivesFrom(state, each.type, "VirtualCollisionObject"))
+      .map((each) => each.id)
+      .join(),
+  );
+  const devices = Object.values(doc?.objects ?? {}).filter(
+    (each) => troubled(each.id) || !inert.split(",").includes(each.id),
+  );
   // What is in trouble stands first.
-  const objects = devices.sort((a, b) => Number(troubled(b.id)) - Number(troubled(a.id)) || a.name.localeCompare(b.name));
+  const objects = devices.sort(
+    (a, b) => Number(troubled(b.id)) - Number(troubled(a.id)) || a.name.localeCompare(b.name),
+  );
   return (
     <>
       {live.state === "stopped" && <p className="quiet">The workplace is offline. {live.message}</p>}
@@ -53,7 +62,11 @@ export default function Panel() {
                 </p>
               ))}
               {failed && live.state === "started" && serves("RetryObject") && (
-                <Button isDisabled={cannot !== ""} onPress={() => void retryObject(object.id)} aria-label={`Try ${object.name} again`}>
+                <Button
+                  isDisabled={cannot !== ""}
+                  onPress={() => void retryObject(object.id)}
+                  aria-label={`Try ${object.name} again`}
+                >
                   Try again
                 </Button>
               )}

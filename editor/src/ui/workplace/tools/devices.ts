@@ -3,4 +3,9 @@
 import { lazily } from "../../kit/lazily";
 import type { Tool } from "../tools";
 
-export const devices: Tool = { id: "devices", label: "Devices", icon: "plug", Panel: lazily(() => import("./DevicesPanel")) };
+export const devices: Tool = {
+  id: "devices",
+  label: "Devices",
+  icon: "plug",
+  Panel: lazily(() => import("./DevicesPanel")),
+};

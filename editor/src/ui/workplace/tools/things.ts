@@ -3,4 +3,9 @@
 import { lazily } from "../../kit/lazily";
 import type { Tool } from "../tools";
 
-export const things: Tool = { id: "things", label: "Things", icon: "tree", Panel: lazily(() => import("../../things/ThingsPanel")) };
+export const things: Tool = {
+  id: "things",
+  label: "Things",
+  icon: "tree",
+  Panel: lazily(() => import("../../things/ThingsPanel")),
+};
