@@ -1,0 +1,1 @@
+"""Access control: tokens, roles, TLS certificates, origin and host checks."""

@@ -1,0 +1,1 @@
+"""What connected users share: presence, locks, previews, view states and tasks."""

@@ -1,0 +1,1 @@
+"""Clients of the compute workers, the processes that run numerics."""

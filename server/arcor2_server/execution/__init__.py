@@ -1,0 +1,1 @@
+"""The Execution service: packages, the running program, run history and breakpoints."""

@@ -1,0 +1,1 @@
+"""Cell hosts, the processes that own the device instances."""

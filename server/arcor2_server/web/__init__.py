@@ -1,0 +1,1 @@
+"""The HTTP server and the static files of the web editor."""

@@ -1,0 +1,1 @@
+"""The websocket endpoints, the connected clients and the event hub."""
