@@ -28,7 +28,7 @@ from arcor2_server.build.candidates import Candidates
 from arcor2_server.build.reading import from_script
 from arcor2_server.build.script import from_logic
 from arcor2_server.build.service import BuildService, Ingredients
-from arcor2_server.object_types import ObjectTypes
+from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import AssetStore, Storage
 from benchmarks.figures import Figure, Report, median

@@ -10,8 +10,8 @@ from arcor2_hw.compute.world import Body, BoxShape, KeptFile, RobotModel, Standi
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import Box
 from arcor2_hw.data.robot import Joint
-from arcor2_server.collisions import Placed, first_hit
-from arcor2_server.compute import Compute
+from arcor2_server.compute.workers import Compute
+from arcor2_server.workspace.collisions import Placed, first_hit
 from benchmarks.figures import Figure, Report, median, percentile
 
 UR5E: Final = Path(next(iter(arcor2_drivers.__path__))) / "universal_robots" / "urdf" / "ur5e"

@@ -23,7 +23,7 @@ from arcor2_hw.data import rpc
 from arcor2_hw.data.events import SceneStateEnum
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.project import Project
-from arcor2_server.editor import FILES
+from arcor2_server.web.editor import FILES
 from benchmarks.figures import Figure, Report, median, percentile
 from tests.e2e.harness import Cell, running_cell, scene_state, until
 from tests.editor.screen import Screen, running_browser, screen_of

@@ -14,7 +14,7 @@ import trimesh
 from arcor2_hw.compute.preparing_tasks import PrepareAsset
 from arcor2_hw.compute.world import KeptFile
 from arcor2_server.app import running_services
-from arcor2_server.compute import Compute
+from arcor2_server.compute.workers import Compute
 from arcor2_server.settings import ServerSettings
 from benchmarks.figures import Figure, Report, median
 

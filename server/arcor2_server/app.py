@@ -12,64 +12,37 @@ from litestar.plugins import PluginProtocol
 from litestar.plugins.core import MsgspecDIPlugin
 
 from arcor2_hw.data.role import Role
-from arcor2_server.access import Access, role_needed
+from arcor2_server.access.admission import Access, role_needed
+from arcor2_server.access.origin import HostNames, own_pages_only
 from arcor2_server.build.service import BuildService
-from arcor2_server.cell.online import OnlineCell
-from arcor2_server.cell.told import tell_hosts
-from arcor2_server.classic import SOCKET
-from arcor2_server.collisions import CollisionWorld
-from arcor2_server.editor import editor_routes
-from arcor2_server.endpoint import Endpoint
-from arcor2_server.execution import Execution
-from arcor2_server.execution_socket import execution_endpoint
-from arcor2_server.hub import Hub
-from arcor2_server.locks import Locks
-from arcor2_server.object_types import ObjectTypes
-from arcor2_server.origin import HostNames, own_pages_only
-from arcor2_server.packages import Packages
-from arcor2_server.private_files import tighten
-from arcor2_server.response_headers import add_headers
+from arcor2_server.collaboration.locks import Locks
+from arcor2_server.collaboration.users import Users
+from arcor2_server.documents import Session
+from arcor2_server.execution.service import Execution
+from arcor2_server.files import tighten
+from arcor2_server.hosts.workspace_updates import tell_hosts
+from arcor2_server.log.redaction import REDACTION
+from arcor2_server.object_types.registry import ObjectTypes
+from arcor2_server.online.online_scene import OnlineCell
 from arcor2_server.rest import routes
-from arcor2_server.rest.answers import ROLE, http_refusal
+from arcor2_server.rest.responses import ROLE, http_refusal
 
 # Imported for their handlers.
-from arcor2_server.rpc import (  # noqa: F401
-    action_points,
-    actions,
-    aiming,
-    build,
-    calibration,
-    calibration_records,
-    cameras,
-    copying,
-    editor,
-    execution,
-    general,
-    history,
-    joints,
-    lists,
-    locking,
-    logic,
-    object_types,
-    operation,
-    orientations,
-    parameters,
-    perpendicular,
-    project,
-    reachability,
-    robot,
-    runs,
-    scene,
-    scene_objects,
+from arcor2_server.rpc import (
     temporary,
 )
-from arcor2_server.secrets_out import REDACTION
 from arcor2_server.services import Services
-from arcor2_server.session import Session
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import AssetStore, Storage
-from arcor2_server.storage.hiding import hide_stored
-from arcor2_server.users import Users
+from arcor2_server.storage.packages import Packages
+from arcor2_server.storage.secret_migration import hide_stored
+from arcor2_server.web.editor import editor_routes
+from arcor2_server.web.response_headers import add_headers
+from arcor2_server.websocket.classic_ports import SOCKET
+from arcor2_server.websocket.endpoint import Endpoint
+from arcor2_server.websocket.execution_endpoint import execution_endpoint
+from arcor2_server.websocket.hub import Hub
+from arcor2_server.workspace.collisions import CollisionWorld
 
 log = structlog.get_logger(__name__)
 

@@ -3,43 +3,43 @@
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from arcor2_server.aiming import Aiming
-from arcor2_server.arm_calibrations import ArmCalibrations
-from arcor2_server.breakpoints import SharedBreakpoints
-from arcor2_server.calibration import Calibration, CalibrationService, RunningCalibrations
-from arcor2_server.collisions import CollisionWorld
-from arcor2_server.compute import Compute
-from arcor2_server.data_damage import DataDamage
-from arcor2_server.edit_news import EditNews
-from arcor2_server.kept import KeptAnswers
-from arcor2_server.markers import Markers
-from arcor2_server.prepared import PreparedAssets
-from arcor2_server.presence import PresenceBoard
-from arcor2_server.previews import Previews
-from arcor2_server.reachability import ReachabilityBoard
-from arcor2_server.runs import Runs
-from arcor2_server.secret_store import SecretStore
-from arcor2_server.session.saved_problems import SavedProblems
-from arcor2_server.setting_secrets import SettingSecrets
+from arcor2_server.collaboration.presence import PresenceBoard
+from arcor2_server.collaboration.previews import Previews
+from arcor2_server.collaboration.tasks import Tasks
+from arcor2_server.collaboration.view_states import ViewStates
+from arcor2_server.compute.calibration import Calibration, CalibrationService, RunningCalibrations
+from arcor2_server.compute.workers import Compute
+from arcor2_server.documents.edit_notifications import EditNews
+from arcor2_server.documents.saved_problems import SavedProblems
+from arcor2_server.documents.setting_secrets import SettingSecrets
+from arcor2_server.execution.breakpoints import SharedBreakpoints
+from arcor2_server.execution.runs import Runs
+from arcor2_server.object_types.notifications import TypeNews
+from arcor2_server.rpc.answer_cache import KeptAnswers
 from arcor2_server.storage.calibrations import Calibrations
-from arcor2_server.storage.shared import SharedData
-from arcor2_server.tasks import Tasks
-from arcor2_server.type_news import TypeNews
-from arcor2_server.views import ViewStates
+from arcor2_server.storage.damage_notices import DataDamage
+from arcor2_server.storage.secret_store import SecretStore
+from arcor2_server.storage.shared_data import SharedData
+from arcor2_server.workspace.collisions import CollisionWorld
+from arcor2_server.workspace.display_models import PreparedAssets
+from arcor2_server.workspace.markers import Markers
+from arcor2_server.workspace.object_aiming import Aiming
+from arcor2_server.workspace.reachability import ReachabilityBoard
+from arcor2_server.workspace.robot_calibrations import ArmCalibrations
 
 if TYPE_CHECKING:
     from arcor2_hw.data.events import Event
-    from arcor2_server.access import Access
+    from arcor2_server.access.admission import Access
     from arcor2_server.build.service import BuildService
-    from arcor2_server.cell.online import OnlineCell
-    from arcor2_server.execution import Execution
-    from arcor2_server.hub import Hub
-    from arcor2_server.locks import Locks
-    from arcor2_server.object_types import ObjectTypes
-    from arcor2_server.session import Session
+    from arcor2_server.collaboration.locks import Locks
+    from arcor2_server.collaboration.users import Users
+    from arcor2_server.documents import Session
+    from arcor2_server.execution.service import Execution
+    from arcor2_server.object_types.registry import ObjectTypes
+    from arcor2_server.online.online_scene import OnlineCell
     from arcor2_server.settings import ServerSettings
     from arcor2_server.storage import AssetStore, Storage
-    from arcor2_server.users import Users
+    from arcor2_server.websocket.hub import Hub
 
 
 @dataclass(slots=True)

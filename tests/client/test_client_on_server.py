@@ -30,7 +30,7 @@ from arcor2_hw.data.project import ActionParameter, Flow
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Conflict, ConnectionLost, NotFound
-from arcor2_server.tokens import TokenFile
+from arcor2_server.access.tokens import TokenFile
 from tests.server.core.serving import COMMAND, READY_WITHIN, ServerProcess, running
 
 pytestmark = pytest.mark.timeout(90)

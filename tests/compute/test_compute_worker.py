@@ -21,10 +21,10 @@ from arcor2_hw.compute.worker import function_of
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound
-from arcor2_server import compute as compute_module
-from arcor2_server import compute_process
-from arcor2_server.compute import Compute
-from arcor2_server.compute_process import ComputeProcess, error_of
+from arcor2_server.compute import process
+from arcor2_server.compute import workers as compute_module
+from arcor2_server.compute.process import ComputeProcess, error_of
+from arcor2_server.compute.workers import Compute
 
 KNOWN = [Position(0, 0, 0), Position(1, 0, 0), Position(0, 1, 0), Position(1, 1, 0)]
 
@@ -99,7 +99,7 @@ async def test_a_stopped_process_is_given_up(compute: Compute, monkeypatch: pyte
     await compute.run(question())
     pid = compute.pid(Room.CALIBRATION)
     assert pid is not None
-    monkeypatch.setattr(compute_process, "START_WITHIN", 0.3)
+    monkeypatch.setattr(process, "START_WITHIN", 0.3)
     os.kill(pid, signal.SIGSTOP)
     with pytest.raises(ComputeTimeout, match=r"A frame by touch took longer than 0\.1 s"):
         await compute.run(question(), within=0.1)
@@ -119,11 +119,11 @@ worker.main(sys.argv[1:])
 
 async def test_one_that_computes_for_ever_ends_itself(compute: Compute, monkeypatch: pytest.MonkeyPatch) -> None:
     """The deadline is kept by the kernel: a library that never returns is ended all the same."""
-    monkeypatch.setattr(compute_process, "COMMAND", ("-P", "-c", ENDLESS))
+    monkeypatch.setattr(process, "COMMAND", ("-P", "-c", ENDLESS))
     begun = time.monotonic()
     with pytest.raises(ComputeTimeout, match=r"longer than 0\.2 s"):
         await compute.run(question(), within=0.2)
-    assert time.monotonic() - begun < compute_process.START_WITHIN
+    assert time.monotonic() - begun < process.START_WITHIN
     monkeypatch.undo()
     assert (await compute.run(question(0.5))).pose.position.x == pytest.approx(0.5)
 
@@ -136,7 +136,7 @@ print("a library says why")
 
 
 async def test_one_that_talks_nonsense_is_ended(compute: Compute, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compute_process, "COMMAND", ("-P", "-c", NONSENSE))
+    monkeypatch.setattr(process, "COMMAND", ("-P", "-c", NONSENSE))
     with pytest.raises(ComputeStopped) as raised:
         await compute.run(question())
     assert "a library says why" in raised.value.detail

@@ -30,7 +30,7 @@ from arcor2_hw.data.editor import Reach
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import InvalidData, KinematicsError, NotFound
-from arcor2_server.compute import Compute
+from arcor2_server.compute.workers import Compute
 
 UR5E = KeptFile(str(Path(arcor2_drivers.universal_robots.__path__[0]) / "urdf" / "ur5e"), "ur5e")
 DOWN = Orientation(1, 0, 0, 0)

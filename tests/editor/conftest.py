@@ -7,7 +7,7 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import Browser
 
-from arcor2_server.editor import FILES
+from arcor2_server.web.editor import FILES
 from tests.e2e.harness import Cell, running_cell
 from tests.editor.screen import running_browser
 

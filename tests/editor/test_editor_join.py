@@ -16,7 +16,7 @@ import pytest_asyncio
 from playwright.async_api import Browser, expect
 
 from arcor2_hw.data.role import Role
-from arcor2_server.tokens import TokenFile
+from arcor2_server.access.tokens import TokenFile
 from tests.editor.screen import VIEWPORTS, Screen, screen_of
 from tests.server.core.serving import ServerProcess, running
 

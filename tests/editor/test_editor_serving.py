@@ -9,8 +9,8 @@ import pytest
 from litestar import Litestar
 
 from arcor2_server.app import create_app, running_services
-from arcor2_server.editor import NONCE, editor_routes
 from arcor2_server.settings import ServerSettings
+from arcor2_server.web.editor import NONCE, editor_routes
 
 SCRIPT = b"export const answer = 42;\n" * 20
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from arcor2_fakes.two_axis_robot.servo import Servo
-from arcor2_server.fakes import InstalledFake, installed_fakes
+from arcor2_server.cli.installed_fakes import InstalledFake, installed_fakes
 from tests.fakes.conftest import FakeProcess
 
 FAULTS = {"silence", "reset", "half_frame", "garbage", "slow", "refuse", "heal"}

@@ -23,7 +23,7 @@ class Joining(Data, frozen=True):
 
 def joining(settings: ServerSettings, port: int) -> Joining:
     """Give how others join; `port` is the one at which it was asked, for a server that took any free one."""
-    from arcor2_server.access import is_loopback  # which needs the routes, of which this is one
+    from arcor2_server.access.admission import is_loopback  # which needs the routes, of which this is one
 
     scheme = "https" if settings.fingerprint else "http"
     at = settings.port or port

@@ -13,11 +13,11 @@ from litestar.handlers import BaseRouteHandler, WebsocketRouteHandler
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error
-from arcor2_server import audit
-from arcor2_server.connection_limits import CONNECTION
-from arcor2_server.rest.answers import AS_ROLE, OPEN, PERSON, ROLE
+from arcor2_server.access.tokens import FILE, Token, TokenFile
+from arcor2_server.log import audit
+from arcor2_server.rest.responses import AS_ROLE, OPEN, PERSON, ROLE
 from arcor2_server.settings import ServerSettings
-from arcor2_server.tokens import FILE, Token, TokenFile
+from arcor2_server.web.connection_limits import CONNECTION
 
 log = structlog.get_logger(__name__)
 

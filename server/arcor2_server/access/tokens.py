@@ -15,7 +15,7 @@ import msgspec
 from arcor2_hw.data.base import Data, Timestamp, now
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Conflict, InvalidData, NotFound, StorageError
-from arcor2_server.private_files import aside, write_private
+from arcor2_server.files import aside, write_private
 
 FILE: Final = "tokens.json"
 COPY: Final = "tokens.copy.json"

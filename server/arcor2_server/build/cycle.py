@@ -8,9 +8,9 @@ from arcor2_hw.data.object_type import ParameterMeta
 from arcor2_hw.data.project import ActionParameter, ActionParameterType, parse_link
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, InvalidProject
 from arcor2_server.build import expressions
-from arcor2_server.build.flow import BRANCHABLE, END_NODE, Condition, Flow
 from arcor2_server.build.frame import NOTE, REFERENCES, Frame, References
 from arcor2_server.build.layout import arrange
+from arcor2_server.documents.logic_graph import BRANCHABLE, END_NODE, Condition, Flow
 
 Block = list[ast.stmt]
 Stack = list[tuple[int, Block]]

@@ -20,8 +20,8 @@ from arcor2_hw.exceptions import Conflict, InvalidPackage, InvalidProject, NotFo
 from arcor2_server.build import package, script, snapshot
 from arcor2_server.build.candidates import Candidates
 from arcor2_server.build.reading import from_script
-from arcor2_server.session.checks import complete_parameters, project_problems
-from arcor2_server.session.renaming import with_present_names
+from arcor2_server.documents.checks import complete_parameters, project_problems
+from arcor2_server.documents.renamed_actions import with_present_names
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services

@@ -16,7 +16,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from arcor2_server.build.flow import END_NODE, Edge
+from arcor2_server.documents.logic_graph import END_NODE, Edge
 
 MAX_NESTING: Final = 12
 """Blocks within blocks that the text may have; deeper ones are moved out. Python itself ends at 100 indentations."""

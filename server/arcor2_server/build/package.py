@@ -12,7 +12,7 @@ from pathlib import Path, PurePosixPath
 from typing import Final
 
 from arcor2_hw.exceptions import InvalidPackage, StorageError
-from arcor2_server.packages import MAX_FILES, inside
+from arcor2_server.storage.packages import MAX_FILES, inside
 
 Files = Mapping[str, bytes]
 """Content by path, relative, with slashes."""

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import InvalidProject
-from arcor2_server.build import flow
 from arcor2_server.build.cycle import Cycle
 from arcor2_server.build.frame import Frame, TypeFacts
+from arcor2_server.documents import logic_graph
 
 
 def from_logic(scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -> str:
@@ -17,7 +17,7 @@ def from_logic(scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -
     Raises InvalidProject naming the action that is wrong, NotFound for an object type that `types` does not have.
     """
     frame = Frame(scene, project, types)
-    body = Cycle(frame, flow.read(project)).statements()
+    body = Cycle(frame, logic_graph.read(project)).statements()
     return frame.module([ast.While(ast.Constant(True), body, [])])
 
 

@@ -16,10 +16,11 @@ from arcor2_hw.data.package import PackageMeta
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import InvalidProject, NotFound
-from arcor2_server.build import package, points, script, snapshot, versions
+from arcor2_server.build import package, points, script, snapshot
 from arcor2_server.build.frame import TypeFacts
-from arcor2_server.object_types import ObjectTypes, PackageType
-from arcor2_server.session.renaming import with_present_names
+from arcor2_server.documents.renamed_actions import with_present_names
+from arcor2_server.object_types.registry import ObjectTypes, PackageType
+from arcor2_server.storage import package_versions
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services
@@ -88,7 +89,7 @@ def files_of(made_of: Ingredients) -> dict[str, bytes]:
     }
     for module, model in made_of.models.items():
         files[f"data/models/{module}.json"] = _document(model)
-    files[versions.FILE] = _document(versions.present(snapshot.imported_packages(files)))
+    files[package_versions.FILE] = _document(package_versions.present(snapshot.imported_packages(files)))
     return files
 
 

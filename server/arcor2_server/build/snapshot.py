@@ -13,7 +13,7 @@ from arcor2_server.build.naming import Names
 from arcor2_server.build.style import docstring
 
 if TYPE_CHECKING:
-    from arcor2_server.object_types import (
+    from arcor2_server.object_types.registry import (
         PackageType,  # with it comes the database, which the command line has no use for
     )
 

@@ -11,7 +11,7 @@ from rich.table import Table
 from arcor2_hw.analysis import Library, SourceFile, TypeAnalysis
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectAction, ParameterMeta
-from arcor2_server.cli.status import ExitStatus
+from arcor2_server.cli.exit_status import ExitStatus
 
 PIPE_WIDTH = 160
 """Characters of a line where the output is no terminal."""

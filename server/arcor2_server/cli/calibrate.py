@@ -20,7 +20,7 @@ from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import InvalidData
-from arcor2_server.cli.calibrating import (
+from arcor2_server.cli.calibration_files import (
     calibrated,
     compute,
     picture_of,
@@ -29,8 +29,8 @@ from arcor2_server.cli.calibrating import (
     show_json,
     write,
 )
-from arcor2_server.cli.reaching import Failed
-from arcor2_server.cli.status import ExitStatus
+from arcor2_server.cli.exit_status import ExitStatus
+from arcor2_server.cli.server_connection import Failed
 from arcor2_server.cli.tables import console
 
 app = App(

@@ -17,9 +17,9 @@ from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import Conflict, ConnectionLost, DeviceTimeout, InvalidData, NotFound
-from arcor2_server.cli.calibrating import calibrated, pose_table, progress, read_as
-from arcor2_server.cli.reaching import HERE, Failed, Server
-from arcor2_server.cli.status import ExitStatus
+from arcor2_server.cli.calibration_files import calibrated, pose_table, progress, read_as
+from arcor2_server.cli.exit_status import ExitStatus
+from arcor2_server.cli.server_connection import HERE, Failed, Server
 from arcor2_server.cli.tables import console
 
 app = App(name="online", help="Calibrate cameras and robots of the scene that a running server has in operation.")

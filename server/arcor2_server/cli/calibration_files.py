@@ -17,11 +17,11 @@ from arcor2_hw.calibration.refusals import CalibrationRefused
 from arcor2_hw.compute.task import MAX_PICTURE, Task
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.exceptions import InvalidData, NotFound
-from arcor2_server import logging as server_logging
-from arcor2_server.cli.reaching import Failed, run
-from arcor2_server.cli.status import ExitStatus
-from arcor2_server.compute import Compute
-from arcor2_server.compute_process import Told
+from arcor2_server.cli.exit_status import ExitStatus
+from arcor2_server.cli.server_connection import Failed, run
+from arcor2_server.compute.process import Told
+from arcor2_server.compute.workers import Compute
+from arcor2_server.log import setup as server_logging
 
 T = TypeVar("T")
 R = TypeVar("R")

@@ -10,7 +10,7 @@ from cyclopts import Parameter, validators
 from rich.console import Console
 
 from arcor2_hw.exceptions import Arcor2Error
-from arcor2_server.cli.status import ExitStatus
+from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.demo.display import Display
 from arcor2_server.demo.run import Demo
 from arcor2_server.settings import default_data_dir

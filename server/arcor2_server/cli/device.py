@@ -9,8 +9,8 @@ from rich.table import Table
 from arcor2_hw.analysis import Library, installed_types
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectTypeMeta
-from arcor2_server.cli.reaching import HERE, Server, run
-from arcor2_server.cli.status import ExitStatus
+from arcor2_server.cli.exit_status import ExitStatus
+from arcor2_server.cli.server_connection import HERE, Server, run
 from arcor2_server.cli.tables import console
 
 app = App(name="device", help="Devices: which there are, how they are; bring in one of your own.")

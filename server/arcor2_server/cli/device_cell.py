@@ -13,8 +13,8 @@ from rich.table import Table
 from arcor2_hw.data.cell import Cell, exported, read_cell, write_cell
 from arcor2_hw.data.found import Checked
 from arcor2_hw.exceptions import InvalidData, NotFound
-from arcor2_server.cli.reaching import HERE, Server, run
-from arcor2_server.cli.status import ExitStatus
+from arcor2_server.cli.exit_status import ExitStatus
+from arcor2_server.cli.server_connection import HERE, Server, run
 from arcor2_server.cli.tables import console
 
 VIRTUAL: Final = "VirtualCollisionObject"

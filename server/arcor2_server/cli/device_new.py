@@ -11,8 +11,8 @@ from typing import Annotated, Final, NamedTuple
 
 from cyclopts import Parameter
 
+from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.cli.starter_kinds import KINDS, NO_ACT, Base
-from arcor2_server.cli.status import ExitStatus
 
 LONGEST_NAME: Final = 24
 STARTER: Final = files("arcor2_server.cli") / "starter"

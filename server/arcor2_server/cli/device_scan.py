@@ -9,7 +9,7 @@ from cyclopts import Parameter
 from rich.table import Table
 
 from arcor2_hw.data.found import Found
-from arcor2_server.cli.status import ExitStatus
+from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.cli.tables import console
 
 WITHIN: Final = 15.0

@@ -5,9 +5,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from arcor2_server.cli.exchanging import Force, say
-from arcor2_server.cli.reaching import HERE, Failed, Server, run
-from arcor2_server.cli.status import ExitStatus
+from arcor2_server.cli.exit_status import ExitStatus
+from arcor2_server.cli.export_files import Force, say
+from arcor2_server.cli.server_connection import HERE, Failed, Server, run
 
 
 def diagnosis(

@@ -18,15 +18,15 @@ from arcor2_hw.analysis import SourceFile, installed_types
 from arcor2_hw.client.rest import Listed
 from arcor2_hw.data.base import Unset
 from arcor2_hw.exceptions import InvalidPackage
-from arcor2_server.cli.reaching import Failed, Server, printable
-from arcor2_server.cli.status import ExitStatus
+from arcor2_server.cli.exit_status import ExitStatus
+from arcor2_server.cli.server_connection import Failed, Server, printable
 from arcor2_server.cli.tables import console
 from arcor2_server.exchange import archive as archives
 from arcor2_server.exchange.archive import Archive, Kind
-from arcor2_server.exchange.bringing import Part, Target, renamed
 from arcor2_server.exchange.differences import Difference, differences, names_of, told
-from arcor2_server.exchange.findings import Known, find
-from arcor2_server.exchange.gathering import Source
+from arcor2_server.exchange.export import Source
+from arcor2_server.exchange.import_ import Part, Target, renamed
+from arcor2_server.exchange.validation import Known, find
 
 Output = Annotated[Path | None, Parameter(name=["--output", "-o"], help="The file; NAME.zip when not given.")]
 Force = Annotated[bool, Parameter(help="Replace the file when there is one.", negative=())]

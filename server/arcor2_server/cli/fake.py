@@ -16,9 +16,9 @@ from rich.console import Console
 from rich.table import Table
 
 from arcor2_hw.exceptions import ConnectionLost, Refused
-from arcor2_server.cli.status import ExitStatus
+from arcor2_server.cli.exit_status import ExitStatus
+from arcor2_server.cli.installed_fakes import InstalledFake, installed_fakes
 from arcor2_server.demo.control import ask
-from arcor2_server.fakes import InstalledFake, installed_fakes
 from arcor2_server.settings import default_data_dir
 
 app = App(name="fake", help="Simulated devices: list them, run one, let one fail while it runs.")

@@ -8,7 +8,7 @@ from importlib.metadata import version
 from cyclopts import App
 from cyclopts.exceptions import CycloptsError
 
-from arcor2_server.cli.status import ExitStatus
+from arcor2_server.cli.exit_status import ExitStatus
 
 # A command's imports make many objects that stay; searching them for cycles again and again takes 6 % of a start.
 gc.set_threshold(200_000)

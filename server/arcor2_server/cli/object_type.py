@@ -9,11 +9,11 @@ from cyclopts import App, Parameter
 from arcor2_hw.analysis import Library, SourceFile, TypeAnalysis, module_name
 from arcor2_hw.client import Rest
 from arcor2_hw.data.base import Unset, is_valid_name
-from arcor2_server.cli import exchanging as x
-from arcor2_server.cli.reaching import HERE, Failed, Server, run
-from arcor2_server.cli.status import ExitStatus
+from arcor2_server.cli import export_files
+from arcor2_server.cli.exit_status import ExitStatus
+from arcor2_server.cli.server_connection import HERE, Failed, Server, run
 from arcor2_server.exchange.archive import Archive
-from arcor2_server.exchange.gathering import Source
+from arcor2_server.exchange.export import Source
 
 app = App(name="object-type", help="Bring object types into a server, list, check and compare them, take them out.")
 
@@ -95,21 +95,23 @@ def add(
             for one in await _in_order(given, client.rest):
                 source = one.source if isinstance(one.source, str) else one.source.decode()
                 await client.rest.put_object_type(one.name, source)
-                x.say(f"{one.name} added")
+                export_files.say(f"{one.name} added")
             for meta in await client.get_object_types():
                 if meta.type in given and not isinstance(meta.shadows, Unset):
-                    x.say(f"{meta.type} takes the place of the installed type of {meta.shadows} until you remove it")
+                    export_files.say(
+                        f"{meta.type} takes the place of the installed type of {meta.shadows} until you remove it"
+                    )
 
     return run("object-type add", work)
 
 
 @app.command(name="list")
-def list_types(*, as_json: x.Json = False, server: Server = HERE) -> int:
+def list_types(*, as_json: export_files.Json = False, server: Server = HERE) -> int:
     """Show the object types that were brought into a server."""
 
     async def work() -> None:
         async with server.rest() as rest:
-            x.show_list(await rest.object_types(), "No object types were brought in.", as_json)
+            export_files.show_list(await rest.object_types(), "No object types were brought in.", as_json)
 
     return run("object-type list", work)
 
@@ -121,7 +123,7 @@ def remove(name: str, /, *, server: Server = HERE) -> int:
     async def work() -> None:
         async with server.rest() as rest:
             await rest.delete_object_type(name)
-        x.say(f"{name} removed")
+        export_files.say(f"{name} removed")
 
     return run("object-type remove", work)
 
@@ -129,8 +131,8 @@ def remove(name: str, /, *, server: Server = HERE) -> int:
 @app.command
 def export(
     *names: Annotated[str, Parameter(help="Object types that were brought in.")],
-    output: x.Output = None,
-    force: x.Force = False,
+    output: export_files.Output = None,
+    force: export_files.Force = False,
     server: Server = HERE,
 ) -> int:
     """Write object types into one file, with their bases, mixins, models and meshes."""
@@ -141,7 +143,7 @@ def export(
         async with server.client() as client:
             archive = await Source(client).object_types(names)
         path = output or Path(f"{names[0]}.zip")
-        x.write(archive, path, force)
+        export_files.write(archive, path, force)
 
     return run("object-type export", work)
 
@@ -151,8 +153,8 @@ def import_types(
     file: Annotated[Path, Parameter(help="What `arcor2-hw object-type export` wrote.")],
     /,
     *,
-    overwrite: x.Overwrite = None,
-    dry_run: x.DryRun = False,
+    overwrite: export_files.Overwrite = None,
+    dry_run: export_files.DryRun = False,
     server: Server = HERE,
 ) -> int:
     """Bring the object types of a file into a server, with their models and meshes.
@@ -160,13 +162,15 @@ def import_types(
     What is there already and the same is left alone. What differs is named and nothing is done, unless --overwrite
     allows it: types (with their models), assets, or all.
     """
-    return run("object-type import", lambda: x.bring_in(file, "object-type", server, overwrite or [], None, dry_run))
+    return run(
+        "object-type import", lambda: export_files.bring_in(file, "object-type", server, overwrite or [], None, dry_run)
+    )
 
 
 @app.command
-def validate(*files: Annotated[Path, Parameter(help="Export files.")], as_json: x.Json = False) -> int:
+def validate(*files: Annotated[Path, Parameter(help="Export files.")], as_json: export_files.Json = False) -> int:
     """Check export files without a server. For a Python file there is `arcor2-hw analyse`."""
-    return run("object-type validate", lambda: x.validate(list(files), "object-type", as_json))
+    return run("object-type validate", lambda: export_files.validate(list(files), "object-type", as_json))
 
 
 async def _one(source: Source, name: str) -> Archive:
@@ -179,8 +183,8 @@ def diff(
     new: Annotated[str, Parameter(help="Likewise: what it is compared with.")],
     /,
     *,
-    as_json: x.Json = False,
+    as_json: export_files.Json = False,
     server: Server = HERE,
 ) -> int:
     """Show what differs between two object types and what they need; the status tells whether anything does."""
-    return run("object-type diff", lambda: x.compare(old, new, "object-type", server, _one, as_json))
+    return run("object-type diff", lambda: export_files.compare(old, new, "object-type", server, _one, as_json))

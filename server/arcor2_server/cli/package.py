@@ -13,8 +13,8 @@ from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.editor import Run
 from arcor2_hw.data.package import PackageStateEnum, PackageSummary
 from arcor2_hw.exceptions import ConnectionLost, NotFound
-from arcor2_server.cli.reaching import HERE, Failed, Server, run
-from arcor2_server.cli.status import ExitStatus
+from arcor2_server.cli.exit_status import ExitStatus
+from arcor2_server.cli.server_connection import HERE, Failed, Server, run
 
 app = App(name="package", help="List the packages of a running server, run one, or show what was run.")
 

@@ -8,12 +8,13 @@ from litestar import Litestar
 from arcor2_hw.data.events import EVENTS
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import RPCS
-from arcor2_server.rest.answers import OPEN, ROLE
+from arcor2_server.rest.responses import OPEN, ROLE
 
 _HEAD = """# Roles
 
 The least role that each request, event and route needs; whoever has a role may do what the ones before it may.
-This page is made from the declarations in the source: `python -m arcor2_server.role_table > docs/reference/roles.md`.
+This page is generated from the declarations in the source:
+`python -m arcor2_server.cli.role_table > docs/reference/roles.md`.
 """
 
 

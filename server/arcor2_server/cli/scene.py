@@ -5,20 +5,20 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from arcor2_server.cli import exchanging as x
-from arcor2_server.cli.reaching import HERE, Server, run
-from arcor2_server.exchange.gathering import Source
+from arcor2_server.cli import export_files
+from arcor2_server.cli.server_connection import HERE, Server, run
+from arcor2_server.exchange.export import Source
 
 app = App(name="scene", help="List the scenes of a server; bring them out, in, check and compare them.")
 
 
 @app.command(name="list")
-def list_scenes(*, as_json: x.Json = False, server: Server = HERE) -> int:
+def list_scenes(*, as_json: export_files.Json = False, server: Server = HERE) -> int:
     """Show the saved scenes of a server."""
 
     async def work() -> None:
         async with server.rest() as rest:
-            x.show_list(await rest.scenes(), "There are no scenes.", as_json)
+            export_files.show_list(await rest.scenes(), "There are no scenes.", as_json)
 
     return run("scene list", work)
 
@@ -28,15 +28,15 @@ def export(
     name: Annotated[str, Parameter(help="Name of the scene, or its id.")],
     /,
     *,
-    output: x.Output = None,
-    force: x.Force = False,
+    output: export_files.Output = None,
+    force: export_files.Force = False,
     server: Server = HERE,
 ) -> int:
     """Write a scene, as it was saved last, into one file with all it needs: object types, models, meshes."""
 
     async def work() -> None:
         async with server.client() as client:
-            x.write(await Source(client).scene(name), output, force)
+            export_files.write(await Source(client).scene(name), output, force)
 
     return run("scene export", work)
 
@@ -46,9 +46,9 @@ def import_scene(
     file: Annotated[Path, Parameter(help="What `arcor2-hw scene export` wrote, or `project export`.")],
     /,
     *,
-    overwrite: x.Overwrite = None,
+    overwrite: export_files.Overwrite = None,
     name: Annotated[str | None, Parameter(help="Bring it in as a copy under this name.")] = None,
-    dry_run: x.DryRun = False,
+    dry_run: export_files.DryRun = False,
     server: Server = HERE,
 ) -> int:
     """Bring a scene into a server, with all it needs.
@@ -56,13 +56,13 @@ def import_scene(
     What is there already and the same is left alone. What differs is named and nothing is done, unless --overwrite
     allows it: scene, types (with their models), assets, or all.
     """
-    return run("scene import", lambda: x.bring_in(file, "scene", server, overwrite or [], name, dry_run))
+    return run("scene import", lambda: export_files.bring_in(file, "scene", server, overwrite or [], name, dry_run))
 
 
 @app.command
-def validate(*files: Annotated[Path, Parameter(help="Export files.")], as_json: x.Json = False) -> int:
+def validate(*files: Annotated[Path, Parameter(help="Export files.")], as_json: export_files.Json = False) -> int:
     """Check export files without a server. Every problem names the entry at fault."""
-    return run("scene validate", lambda: x.validate(list(files), "scene", as_json))
+    return run("scene validate", lambda: export_files.validate(list(files), "scene", as_json))
 
 
 @app.command
@@ -71,8 +71,8 @@ def diff(
     new: Annotated[str, Parameter(help="Likewise: what it is compared with.")],
     /,
     *,
-    as_json: x.Json = False,
+    as_json: export_files.Json = False,
     server: Server = HERE,
 ) -> int:
     """Show what differs between two scenes and what they need; the status tells whether anything does."""
-    return run("scene diff", lambda: x.compare(old, new, "scene", server, Source.scene, as_json))
+    return run("scene diff", lambda: export_files.compare(old, new, "scene", server, Source.scene, as_json))

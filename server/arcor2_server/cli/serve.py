@@ -29,12 +29,12 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.cell import Cell, read_cell
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound, StorageError
-from arcor2_server import classic
-from arcor2_server import logging as server_logging
-from arcor2_server.access import is_local, is_loopback
-from arcor2_server.cli.status import ExitStatus
+from arcor2_server.access.admission import is_local, is_loopback
+from arcor2_server.access.tokens import TokenFile
+from arcor2_server.cli.exit_status import ExitStatus
+from arcor2_server.log import setup as server_logging
 from arcor2_server.settings import DEVICE_FILES_NAME, LegacyListener, ServerSettings
-from arcor2_server.tokens import TokenFile
+from arcor2_server.websocket.classic_ports import ports_from_environment
 
 log = structlog.get_logger(__name__)
 
@@ -128,7 +128,7 @@ def serve(
             markers=seen,
             insecure=insecure or None,
             legacy=legacy,
-            classic_ports=classic.classic_ports() if classic_ports else None,
+            classic_ports=ports_from_environment() if classic_ports else None,
         )
         server_logging.set_up(log_level)
     except (InvalidData, KeyError) as error:
@@ -230,7 +230,7 @@ def _certificate(
     """
     if given is None and not self_signed and (settings.insecure or is_loopback(settings.host)):
         return settings, None
-    from arcor2_server import certificate  # only here: it costs time that a server without TLS does not have
+    from arcor2_server.access import certificate  # only here: it costs time that a server without TLS does not have
 
     try:
         files = given or certificate.self_signed(settings.data_dir, settings.host)
@@ -252,8 +252,8 @@ async def run(
     StorageError when the data cannot be used.
     """
     from arcor2_server.app import create_app, running_services
-    from arcor2_server.connection_limits import ConnectionLimits
-    from arcor2_server.http_server import Server, configuration
+    from arcor2_server.web.connection_limits import ConnectionLimits
+    from arcor2_server.web.http_server import Server, configuration
 
     async with running_services(settings) as services:
         for notice in services.damage.notices:

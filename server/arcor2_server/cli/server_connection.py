@@ -22,7 +22,7 @@ from arcor2_hw.exceptions import (
     NotConnected,
     NotFound,
 )
-from arcor2_server.cli.status import ExitStatus
+from arcor2_server.cli.exit_status import ExitStatus
 
 DEFAULT_URL: Final = "ws://127.0.0.1:6789"
 

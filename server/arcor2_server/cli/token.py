@@ -10,9 +10,9 @@ from rich.table import Table
 
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error, NotFound, StorageError
-from arcor2_server.cli.status import ExitStatus
+from arcor2_server.access.tokens import TokenFile
+from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.settings import default_data_dir
-from arcor2_server.tokens import TokenFile
 
 app = App(name="token", help="Say who may connect to a server, and in which role. A running server follows at once.")
 

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from arcor2_hw.data.base import now
 from arcor2_hw.exceptions import NotFound
-from arcor2_server.lock_table import (
+from arcor2_server.collaboration.lock_table import (
     ACTION,
     ADDING_OBJECT,
     OWN_ROOTS,

@@ -8,11 +8,11 @@ from msgspec import UNSET
 from arcor2_hw.data.editor import Presence, UserPresenceData
 from arcor2_hw.data.events import Event
 from arcor2_hw.data.role import Role
-from arcor2_server.client import Client
-from arcor2_server.hub import Hub, encode
-from arcor2_server.newest import Newest
+from arcor2_server.collaboration.throttle import Newest
+from arcor2_server.collaboration.users import Users
 from arcor2_server.rpc.registry import RequestRefused, make_event
-from arcor2_server.users import Users
+from arcor2_server.websocket.client import Client
+from arcor2_server.websocket.hub import Hub, encode
 
 PERIOD: Final = 1 / 15
 """Seconds between two events of one user."""

@@ -7,12 +7,12 @@ from typing import Final
 from msgspec import UNSET
 
 from arcor2_hw.data.editor import MovePreview, MovePreviewData
-from arcor2_server.client import Client
-from arcor2_server.hub import Hub, encode
-from arcor2_server.locks import Locks
-from arcor2_server.newest import Newest
+from arcor2_server.collaboration.locks import Locks
+from arcor2_server.collaboration.throttle import Newest
+from arcor2_server.documents.changes import Change
 from arcor2_server.rpc.registry import make_event
-from arcor2_server.session.changes import Change
+from arcor2_server.websocket.client import Client
+from arcor2_server.websocket.hub import Hub, encode
 
 PERIOD: Final = 1 / 30
 """Seconds between two events of one item."""

@@ -8,11 +8,11 @@ import structlog
 
 from arcor2_hw.data.base import now
 from arcor2_hw.data.events import Event, LockData, NotificationData, NotificationLevel
-from arcor2_server.client import Client
-from arcor2_server.hub import Hub
-from arcor2_server.locks import Locks
+from arcor2_server.collaboration.locks import Locks
 from arcor2_server.rpc.registry import RequestRefused, make_event
 from arcor2_server.settings import ServerSettings
+from arcor2_server.websocket.client import Client
+from arcor2_server.websocket.hub import Hub
 
 log = structlog.get_logger(__name__)
 

@@ -10,10 +10,10 @@ import msgspec
 
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.editor import ViewScope, ViewState
-from arcor2_server.client import Client
-from arcor2_server.hub import Hub, encode
 from arcor2_server.rpc.registry import RequestRefused, make_event
-from arcor2_server.storage.shared import SharedData
+from arcor2_server.storage.shared_data import SharedData
+from arcor2_server.websocket.client import Client
+from arcor2_server.websocket.hub import Hub, encode
 
 LARGEST_VALUE: Final = 64 * 1024
 LARGEST_VIEW: Final = 1024 * 1024

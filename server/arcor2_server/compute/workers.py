@@ -9,7 +9,7 @@ import structlog
 
 from arcor2_hw.compute.task import ComputeBusy, ComputeStopped, Room, Task
 from arcor2_hw.compute.world import World
-from arcor2_server.compute_process import ComputeProcess, Told
+from arcor2_server.compute.process import ComputeProcess, Told
 
 log = structlog.get_logger(__name__)
 R = TypeVar("R")

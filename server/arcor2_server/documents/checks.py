@@ -28,13 +28,13 @@ from arcor2_hw.data.project_index import ProjectLookup
 from arcor2_hw.data.robot import RobotMeta
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound
-from arcor2_server.session.document import Document
-from arcor2_server.session.placing import check_parent
-from arcor2_server.session.renaming import with_present_name
+from arcor2_server.documents.document import Document
+from arcor2_server.documents.renamed_actions import with_present_name
+from arcor2_server.documents.reparenting import check_parent
 
 
 class Types(Protocol):
-    """What the checks need to know of object types (arcor2_server.object_types.ObjectTypes)."""
+    """What the checks need to know of object types (arcor2_server.object_types.registry.ObjectTypes)."""
 
     def meta(self, name: str) -> ObjectTypeMeta:
         """Give one type; NotFound."""

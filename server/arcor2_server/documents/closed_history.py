@@ -14,12 +14,12 @@ from msgspec.structs import replace
 from arcor2_hw.data.base import now
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
-from arcor2_server.data_damage import DataDamage
-from arcor2_server.private_files import DIRECTORY_MODE, write_private
-from arcor2_server.session.changes import OF_SCENE, Change, Edit, How, Item, Kind, decode_changes, decode_items
-from arcor2_server.session.document import UNTIMED, Document
-from arcor2_server.session.history import History
-from arcor2_server.session.unsaved import Unsaved
+from arcor2_server.documents.changes import OF_SCENE, Change, Edit, How, Item, Kind, decode_changes, decode_items
+from arcor2_server.documents.document import UNTIMED, Document
+from arcor2_server.documents.history import History
+from arcor2_server.documents.unsaved import Unsaved
+from arcor2_server.files import DIRECTORY_MODE, write_private
+from arcor2_server.storage.damage_notices import DataDamage
 
 log = structlog.get_logger(__name__)
 

@@ -6,11 +6,11 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectAction
 from arcor2_hw.data.project import END, START, Action, LogicItem
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
-from arcor2_server.session.changes import Change, Kind
-from arcor2_server.session.checks import Types, action_meta, check_action, object_problems
-from arcor2_server.session.document import OWNED, Document, action_of, reference
-from arcor2_server.session.logic import check_logic_item, check_no_loops
-from arcor2_server.session.placing import check_no_loop, check_parent
+from arcor2_server.documents.changes import Change, Kind
+from arcor2_server.documents.checks import Types, action_meta, check_action, object_problems
+from arcor2_server.documents.document import OWNED, Document, action_of, reference
+from arcor2_server.documents.logic import check_logic_item, check_no_loops
+from arcor2_server.documents.reparenting import check_no_loop, check_parent
 
 _NAMED_IN_POINT = (Kind.ORIENTATION, Kind.JOINTS)
 _NAMED = (Kind.OBJECT, Kind.POINT, Kind.ACTION, Kind.PARAMETER, *_NAMED_IN_POINT)

@@ -9,9 +9,9 @@ from arcor2_hw.data.object_type import ObjectTypeMeta
 from arcor2_hw.data.project import Action, Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import NotFound
-from arcor2_server.session.changes import Change, Kind
-from arcor2_server.session.document import Document
-from arcor2_server.session.placing import changes_for_parent
+from arcor2_server.documents.changes import Change, Kind
+from arcor2_server.documents.document import Document
+from arcor2_server.documents.reparenting import changes_for_parent
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services

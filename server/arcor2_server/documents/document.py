@@ -23,7 +23,7 @@ from arcor2_hw.data.project import (
 )
 from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.exceptions import InvalidData, NotFound
-from arcor2_server.session.changes import OF_SCENE, Change, Item, Kind
+from arcor2_server.documents.changes import OF_SCENE, Change, Item, Kind
 
 OWNED: Final = (Kind.ORIENTATION, Kind.JOINTS, Kind.ACTION)
 """Kinds that belong to an action point."""

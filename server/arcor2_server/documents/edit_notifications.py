@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any, Final
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.editor import HistoryChangedData, HistoryStep
 from arcor2_hw.data.events import Event
-from arcor2_server.client import Client
-from arcor2_server.hub import encode
+from arcor2_server.documents.changes import Change, Edit, How, Kind
+from arcor2_server.documents.history import History
 from arcor2_server.rpc.registry import make_event
-from arcor2_server.session.changes import Change, Edit, How, Kind
-from arcor2_server.session.history import History
+from arcor2_server.websocket.client import Client
+from arcor2_server.websocket.hub import encode
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services

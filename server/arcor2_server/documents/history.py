@@ -3,7 +3,7 @@
 from collections import defaultdict, deque
 from collections.abc import Iterator
 
-from arcor2_server.session.changes import Edit, How
+from arcor2_server.documents.changes import Edit, How
 
 
 class History:

@@ -12,9 +12,9 @@ from typing import Any
 import structlog
 
 from arcor2_hw.exceptions import StorageError
-from arcor2_server.session.changes import Edit
-from arcor2_server.session.journal_file import JournalFile
-from arcor2_server.session.journal_records import Base, Loss, Recovered
+from arcor2_server.documents.changes import Edit
+from arcor2_server.documents.journal_file import JournalFile
+from arcor2_server.documents.journal_records import Base, Loss, Recovered
 
 log = structlog.get_logger(__name__)
 

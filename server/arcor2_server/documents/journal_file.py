@@ -18,9 +18,8 @@ import msgspec
 import structlog
 
 from arcor2_hw.data.base import now
-from arcor2_server.private_files import FILE_MODE, aside, ensure_private
-from arcor2_server.session.changes import Edit
-from arcor2_server.session.journal_records import (
+from arcor2_server.documents.changes import Edit
+from arcor2_server.documents.journal_records import (
     COLUMNS,
     Base,
     Damaged,
@@ -35,6 +34,7 @@ from arcor2_server.session.journal_records import (
     read_rows,
     write,
 )
+from arcor2_server.files import FILE_MODE, aside, ensure_private
 
 log = structlog.get_logger(__name__)
 

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from arcor2_hw.data.project import BareProject
 from arcor2_hw.data.scene import BareScene
-from arcor2_server.session.changes import (
+from arcor2_server.documents.changes import (
     Edit,
     How,
     Item,

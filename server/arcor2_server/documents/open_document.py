@@ -15,11 +15,11 @@ from arcor2_hw.data.project import (
     ProjectRobotJoints,
 )
 from arcor2_hw.data.scene import BareScene, Scene, SceneObject
+from arcor2_server.documents.changes import Kind
+from arcor2_server.documents.document import Document
+from arcor2_server.documents.journal_records import Times
+from arcor2_server.documents.unsaved import Unsaved
 from arcor2_server.rpc.registry import RequestRefused, make_event
-from arcor2_server.session.changes import Kind
-from arcor2_server.session.document import Document
-from arcor2_server.session.journal_records import Times
-from arcor2_server.session.unsaved import Unsaved
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services

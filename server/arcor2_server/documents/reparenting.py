@@ -9,8 +9,8 @@ from arcor2_hw.data.geometry import Orientation
 from arcor2_hw.data.project import BareActionPoint
 from arcor2_hw.data.project_index import ProjectLookup, global_pose, relative_pose
 from arcor2_hw.exceptions import InvalidData, NotFound
-from arcor2_server.session.changes import Change, Kind
-from arcor2_server.session.document import Document
+from arcor2_server.documents.changes import Change, Kind
+from arcor2_server.documents.document import Document
 
 SAME_ROTATION: Final = 1e-9
 """Angle in rad below which two frames count as turned alike, so that what hangs on them need not be rewritten."""

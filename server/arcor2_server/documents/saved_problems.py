@@ -12,9 +12,9 @@ from arcor2_hw.analysis.snapshot import code_digest
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.project import BareProject, Project
 from arcor2_hw.data.scene import BareScene, Scene
-from arcor2_server.object_types import ObjectTypes
-from arcor2_server.private_files import write_private
-from arcor2_server.session.checks import project_problems, scene_problems
+from arcor2_server.documents.checks import project_problems, scene_problems
+from arcor2_server.files import write_private
+from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.storage import Storage
 
 log = structlog.get_logger(__name__)

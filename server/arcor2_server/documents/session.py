@@ -15,17 +15,17 @@ from arcor2_hw.data.project import (
 )
 from arcor2_hw.data.scene import BareScene, Scene
 from arcor2_hw.exceptions import NotFound, StorageError
+from arcor2_server.documents.changes import OF_SCENE, Change, Edit, How, Kind
+from arcor2_server.documents.checks import scene_problems
+from arcor2_server.documents.closed_history import ClosedHistories
+from arcor2_server.documents.document import Document
+from arcor2_server.documents.history import History
+from arcor2_server.documents.journal import Journal
+from arcor2_server.documents.journal_records import ALL, Base, Recovered, Times
+from arcor2_server.documents.open_document import OpenDocument
+from arcor2_server.documents.renamed_actions import with_present_names
+from arcor2_server.documents.unsaved import Unsaved
 from arcor2_server.rpc.registry import RequestRefused
-from arcor2_server.session.changes import OF_SCENE, Change, Edit, How, Kind
-from arcor2_server.session.checks import scene_problems
-from arcor2_server.session.closed import ClosedHistories
-from arcor2_server.session.document import Document
-from arcor2_server.session.history import History
-from arcor2_server.session.journal import Journal
-from arcor2_server.session.journal_records import ALL, Base, Recovered, Times
-from arcor2_server.session.open_document import OpenDocument
-from arcor2_server.session.renaming import with_present_names
-from arcor2_server.session.unsaved import Unsaved
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services

@@ -24,9 +24,9 @@ from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.data.secret import HIDDEN, ObjectSecrets, is_reference, is_secret_name
 from arcor2_hw.exceptions import AddressChanged, InvalidData, InvalidPackage, NotFound
 from arcor2_hw.runtime.documents import read_document
-from arcor2_server.secret_store import Secret, SecretStore
-from arcor2_server.session.changes import Change, Kind
-from arcor2_server.session.journal_records import Recovered
+from arcor2_server.documents.changes import Change, Kind
+from arcor2_server.documents.journal_records import Recovered
+from arcor2_server.storage.secret_store import Secret, SecretStore
 
 PACKAGED: Final = ("scene.json", "project.json")
 """Documents in the folder `data` of a package that may hold settings."""

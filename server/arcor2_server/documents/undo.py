@@ -5,13 +5,13 @@ from collections.abc import Iterable, Sequence
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.project import END, START
 from arcor2_hw.data.role import Role
-from arcor2_server.lock_table import PROJECT, SCENE
+from arcor2_server.collaboration.lock_table import PROJECT, SCENE
+from arcor2_server.documents.changes import OF_SCENE, Change, Edit, How, Kind, net
+from arcor2_server.documents.checks import Types
+from arcor2_server.documents.consistency import Unsound, check_sound, title
+from arcor2_server.documents.document import Document, action_of
+from arcor2_server.documents.history import History
 from arcor2_server.rpc.registry import RequestRefused
-from arcor2_server.session.changes import OF_SCENE, Change, Edit, How, Kind, net
-from arcor2_server.session.checks import Types
-from arcor2_server.session.document import Document, action_of
-from arcor2_server.session.history import History
-from arcor2_server.session.soundness import Unsound, check_sound, title
 
 
 def changes_back(edits: Iterable[Edit]) -> list[Change]:

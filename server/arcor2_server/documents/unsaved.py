@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from arcor2_server.session.changes import OF_SCENE, Change, Kind
-from arcor2_server.session.document import Document
+from arcor2_server.documents.changes import OF_SCENE, Change, Kind
+from arcor2_server.documents.document import Document
 
 _Values = dict[tuple[Kind, str], Any]
 

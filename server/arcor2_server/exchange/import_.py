@@ -19,9 +19,9 @@ from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error, Conflict, DeviceTimeout, InvalidPackage
 from arcor2_server.exchange.archive import Archive, AssetFile, with_needed
-from arcor2_server.exchange.findings import Known, find
-from arcor2_server.exchange.gathering import Source
-from arcor2_server.exchange.undoing import Undoing
+from arcor2_server.exchange.export import Source
+from arcor2_server.exchange.rollback import Undoing
+from arcor2_server.exchange.validation import Known, find
 
 Part = Literal["all", "scene", "project", "types", "assets"]
 """What of an export may take the place of something else on the server."""

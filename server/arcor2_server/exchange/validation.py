@@ -13,9 +13,9 @@ from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error, InvalidProject, NotFound
 from arcor2_server.build import script
 from arcor2_server.build.candidates import Candidates
+from arcor2_server.documents.checks import project_findings, scene_findings
+from arcor2_server.documents.renamed_actions import with_present_names
 from arcor2_server.exchange.archive import PROJECT, SCENE, SCRIPT, Archive, mesh_of
-from arcor2_server.session.checks import project_findings, scene_findings
-from arcor2_server.session.renaming import with_present_names
 
 
 class Finding(Data, frozen=True):

@@ -6,9 +6,9 @@ from typing import IO
 
 from arcor2_hw.data.events import ChangeType
 from arcor2_hw.data.package import PackageSummary
-from arcor2_server.hub import Hub
-from arcor2_server.packages import Packages
 from arcor2_server.rpc.registry import make_event
+from arcor2_server.storage.packages import Packages
+from arcor2_server.websocket.hub import Hub
 
 
 class KeptPackages(abc.ABC):

@@ -17,9 +17,9 @@ from arcor2_hw.data.editor import ActionOfRun, Run, RunEnd, TraceEntry
 from arcor2_hw.data.events import ActionStateAfterData, ActionStateBeforeData
 from arcor2_hw.exceptions import StorageError
 from arcor2_hw.runtime import messages as m
-from arcor2_server.hub import Hub
 from arcor2_server.rpc.registry import make_event
-from arcor2_server.storage.shared import SharedData
+from arcor2_server.storage.shared_data import SharedData
+from arcor2_server.websocket.hub import Hub
 
 log = structlog.get_logger(__name__)
 

@@ -15,8 +15,8 @@ from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.data.secret import HIDDEN
 from arcor2_hw.exceptions import NotFound
 from arcor2_hw.runtime.messages import DeviceChanged, HeldPart
-from arcor2_server.hub import Hub
 from arcor2_server.rpc.registry import RequestRefused, make_event
+from arcor2_server.websocket.hub import Hub
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services

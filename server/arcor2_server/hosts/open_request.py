@@ -6,7 +6,7 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.runtime import messages as m
-from arcor2_server.cell.devices import overlay_for
+from arcor2_server.hosts.devices import overlay_for
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services

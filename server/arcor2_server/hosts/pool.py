@@ -11,7 +11,7 @@ import structlog
 
 from arcor2_hw.data.device import DEVICE_FILES
 from arcor2_hw.exceptions import Arcor2Error
-from arcor2_server.cell.host import CellHost, HostUser
+from arcor2_server.hosts.process import CellHost, HostUser
 
 log = structlog.get_logger(__name__)
 

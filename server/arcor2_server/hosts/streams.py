@@ -5,9 +5,9 @@ from typing import Final
 
 from arcor2_hw.data.rpc import RobotEventKind
 from arcor2_hw.runtime import messages as m
-from arcor2_server.client import Client
-from arcor2_server.hub import Hub
 from arcor2_server.rpc.registry import RequestRefused
+from arcor2_server.websocket.client import Client
+from arcor2_server.websocket.hub import Hub
 
 _KINDS: Final = {"RobotJoints": RobotEventKind.JOINTS, "RobotEef": RobotEventKind.EEF_POSE}
 

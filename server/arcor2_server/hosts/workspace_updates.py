@@ -14,7 +14,7 @@ from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.exceptions import InvalidPackage
 from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.documents import read_document
-from arcor2_server.collisions import Placed
+from arcor2_server.workspace.collisions import Placed
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services

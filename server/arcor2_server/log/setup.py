@@ -8,8 +8,8 @@ from typing import Any
 import msgspec
 import structlog
 
-from arcor2_server.recent_log import RECENT
-from arcor2_server.secrets_out import REDACTION
+from arcor2_server.log.recent import RECENT
+from arcor2_server.log.redaction import REDACTION
 
 
 class _StandardError:

@@ -27,10 +27,10 @@ from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ObjectTypeS
 from arcor2_hw.data.robot import RobotMeta
 from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_hw.runtime.messages import TypeCode
-from arcor2_server.private_files import write_private
-from arcor2_server.robot_packages import robot_packages
+from arcor2_server.files import write_private
+from arcor2_server.object_types.changes import Changes, PendingChanges
+from arcor2_server.object_types.robot_packages import robot_packages
 from arcor2_server.storage import AssetStore, Storage
-from arcor2_server.type_changes import Changes, PendingChanges
 
 log = structlog.get_logger(__name__)
 

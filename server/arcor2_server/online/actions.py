@@ -16,7 +16,7 @@ from arcor2_hw.exceptions import Arcor2Error, Cancelled, InvalidData
 from arcor2_server.rpc.registry import RequestRefused
 
 if TYPE_CHECKING:
-    from arcor2_server.cell.online import OnlineCell
+    from arcor2_server.online.online_scene import OnlineCell
 
 log = structlog.get_logger(__name__)
 

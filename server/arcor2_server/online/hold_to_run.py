@@ -19,9 +19,9 @@ from arcor2_hw.data.rpc import HoldHandTeachingArgs, JogRobotArgs
 from arcor2_hw.data.rpc.operation import LONGEST_LEASE_MS
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.runtime import messages as m
-from arcor2_server.cell.host import CellHost
-from arcor2_server.client import Client
+from arcor2_server.hosts.process import CellHost
 from arcor2_server.rpc.registry import RequestRefused, make_event
+from arcor2_server.websocket.client import Client
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services

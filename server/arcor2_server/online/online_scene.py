@@ -14,16 +14,16 @@ from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import Arcor2Error, ConnectionLost
 from arcor2_hw.runtime import messages as m
-from arcor2_server.cell.actions import LastStop, RunningAction
-from arcor2_server.cell.devices import DeviceBoard
-from arcor2_server.cell.holding import HeldRobots
-from arcor2_server.cell.host import CellHost, json_of
-from arcor2_server.cell.hosts import CellHosts
-from arcor2_server.cell.opening import opening
-from arcor2_server.cell.scene_task import SceneTask
-from arcor2_server.cell.streams import RobotStreams
-from arcor2_server.cell.told import calibrations, with_world
-from arcor2_server.locks import PROJECT, SCENE, SERVER
+from arcor2_server.collaboration.locks import PROJECT, SCENE, SERVER
+from arcor2_server.hosts.devices import DeviceBoard
+from arcor2_server.hosts.open_request import opening
+from arcor2_server.hosts.pool import CellHosts
+from arcor2_server.hosts.process import CellHost, json_of
+from arcor2_server.hosts.streams import RobotStreams
+from arcor2_server.hosts.workspace_updates import calibrations, with_world
+from arcor2_server.online.actions import LastStop, RunningAction
+from arcor2_server.online.hold_to_run import HeldRobots
+from arcor2_server.online.progress import SceneTask
 from arcor2_server.rpc.registry import RequestRefused, make_event
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@
 from arcor2_hw.data.device import Connection
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.data.events import ObjectStateData, SceneStateEnum
-from arcor2_server.tasks import Task, Tasks
+from arcor2_server.collaboration.tasks import Task, Tasks
 
 _UP = frozenset({Connection.ONLINE, Connection.BACK})
 

@@ -9,11 +9,11 @@ from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.rpc import StopAllData, StopKind, StopOutcome
 from arcor2_hw.exceptions import ConnectionLost, DeviceTimeout, NotFound
 from arcor2_hw.runtime.messages import DeviceStop
-from arcor2_server.cell.actions import RunningAction
-from arcor2_server.cell.host import CellHost
+from arcor2_server.hosts.process import CellHost
+from arcor2_server.online.actions import RunningAction
 
 if TYPE_CHECKING:
-    from arcor2_server.cell.devices import DeviceBoard
+    from arcor2_server.hosts.devices import DeviceBoard
     from arcor2_server.services import Services
 
 log = structlog.get_logger(__name__)

@@ -8,9 +8,9 @@ from typing import IO
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.role import Role
 from arcor2_server.build.importing import ImportedIds, ImportOptions, import_package
-from arcor2_server.packages import MAX_UPLOAD
 from arcor2_server.rest.operations import MIB, Binary, Upload, operation
 from arcor2_server.services import Services
+from arcor2_server.storage.packages import MAX_UPLOAD
 
 BUILD = "Build"
 ZIP = "application/zip"

@@ -12,11 +12,11 @@ from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.texts import check_texts
 from arcor2_hw.exceptions import InvalidData
-from arcor2_server.calibration import RobotView
-from arcor2_server.rest.naming import camelized_names, snaked
+from arcor2_server.compute.calibration import RobotView
+from arcor2_server.rest.field_names import camelized_names, snaked
 from arcor2_server.rest.operations import MIB, Upload, operation
-from arcor2_server.robot_models import model_of_uri
 from arcor2_server.services import Services
+from arcor2_server.workspace.robot_models import model_of_uri
 
 T = TypeVar("T")
 CALIBRATION = "Calibration"

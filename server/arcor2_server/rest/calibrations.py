@@ -29,8 +29,8 @@ from arcor2_hw.exceptions import InvalidData
 from arcor2_server.rest.calibration import CALIBRATION, CalibrateRobotArgs, read_args
 from arcor2_server.rest.calibration_records import RecordAs, keep, keep_touched
 from arcor2_server.rest.operations import MIB, Binary, Upload, Uploads, operation
-from arcor2_server.robot_models import model_of_uri
 from arcor2_server.services import Services
+from arcor2_server.workspace.robot_models import model_of_uri
 
 MAX_PICTURES: Final = 256 * MIB
 """Bytes of all pictures together."""

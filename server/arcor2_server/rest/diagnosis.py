@@ -6,7 +6,7 @@ import msgspec
 
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
-from arcor2_server.diagnosis import LARGEST_NOTES, ClientNotes, packed, parts
+from arcor2_server.rest.diagnosis_bundle import LARGEST_NOTES, ClientNotes, packed, parts
 from arcor2_server.rest.general import SERVER
 from arcor2_server.rest.operations import Binary, operation
 from arcor2_server.services import Services

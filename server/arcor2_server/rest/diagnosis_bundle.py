@@ -14,8 +14,8 @@ from typing import Any, Final
 import msgspec
 
 from arcor2_hw.data.base import Data, Unset, now
-from arcor2_server.recent_log import RECENT
-from arcor2_server.secrets_out import clean, hide, secrets_in
+from arcor2_server.log.recent import RECENT
+from arcor2_server.log.redaction import clean, hide, secrets_in
 from arcor2_server.services import Services
 
 LARGEST_PART: Final = 4 * 1024 * 1024

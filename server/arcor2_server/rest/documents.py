@@ -9,9 +9,9 @@ from typing import Any, Final
 import msgspec
 
 from arcor2_hw.data.role import Role
-from arcor2_server.rest.answers import WebApiError
-from arcor2_server.rest.naming import camel
+from arcor2_server.rest.field_names import camel
 from arcor2_server.rest.operations import OPERATIONS, Operation, operation
+from arcor2_server.rest.responses import WebApiError
 from arcor2_server.services import Services
 from arcor2_server.settings import ServerSettings
 

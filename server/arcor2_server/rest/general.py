@@ -3,8 +3,8 @@
 import asyncio
 
 from arcor2_hw.data.role import Role
-from arcor2_server.cell.devices import DeviceStatus
-from arcor2_server.joining import Joining, joining
+from arcor2_server.access.addresses import Joining, joining
+from arcor2_server.hosts.devices import DeviceStatus
 from arcor2_server.rest.operations import operation
 from arcor2_server.services import Services
 

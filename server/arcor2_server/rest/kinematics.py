@@ -2,11 +2,11 @@
 
 from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
 from arcor2_hw.data.role import Role
-from arcor2_server.arm_calibrations import InForce
 from arcor2_server.rest.general import SERVER
 from arcor2_server.rest.operations import operation
-from arcor2_server.robot_models import model_of_type
 from arcor2_server.services import Services
+from arcor2_server.workspace.robot_calibrations import InForce
+from arcor2_server.workspace.robot_models import model_of_type
 
 
 class RobotKinematics(Data, frozen=True):

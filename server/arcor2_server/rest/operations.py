@@ -22,11 +22,11 @@ from litestar.response import Stream
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.texts import check_texts
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
-from arcor2_server import audit
-from arcor2_server.rest.answers import AS_ROLE, OPEN, PERSON, ROLE, SERVICE, InternalError, Unsupported, refusal
+from arcor2_server.log import audit
 from arcor2_server.rest.encodings import accepted_encodings
-from arcor2_server.rest.naming import camelized, camelized_names, snake, snaked
-from arcor2_server.rest.receiving import receiving
+from arcor2_server.rest.field_names import camelized, camelized_names, snake, snaked
+from arcor2_server.rest.responses import AS_ROLE, OPEN, PERSON, ROLE, SERVICE, InternalError, Unsupported, refusal
+from arcor2_server.rest.uploads import receiving
 
 log = structlog.get_logger(__name__)
 F = TypeVar("F", bound=Callable[..., Awaitable[Any]])

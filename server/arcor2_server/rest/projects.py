@@ -13,7 +13,7 @@ from arcor2_hw.exceptions import Conflict, InvalidData, NotFound
 from arcor2_server.rest.operations import operation
 from arcor2_server.rest.scenes import STORAGE, IdDesc, check_id
 from arcor2_server.services import Services
-from arcor2_server.storage.beside import Beside
+from arcor2_server.storage.project_tables import Beside
 
 
 class ProjectSources(Data, frozen=True):

@@ -6,12 +6,12 @@ from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import Box, Cylinder, Mesh, Models, Sphere
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
-from arcor2_server import focus
-from arcor2_server.collisions import Placed
 from arcor2_server.rest.operations import operation
 from arcor2_server.rest.scenes import check_id
-from arcor2_server.scene_world import attach, detach, hit, kept_mesh
 from arcor2_server.services import Services
+from arcor2_server.workspace import point_registration
+from arcor2_server.workspace.collisions import Placed
+from arcor2_server.workspace.scene_collisions import attach, detach, hit, kept_mesh
 
 SCENE = "Scene"
 
@@ -152,7 +152,7 @@ async def system_running(services: Services) -> bool:
 @operation("PUT", "/utils/focus", SCENE, Role.OPERATOR)
 async def find_by_focus(body: MeshFocusAction) -> Pose:
     """Give where an object stands of which a robot touched at least three points: by least squares."""
-    return focus.fit(body.mesh_focus_points, body.robot_space_points).pose
+    return point_registration.fit(body.mesh_focus_points, body.robot_space_points).pose
 
 
 @operation("PUT", "/utils/line-safe", SCENE, Role.OPERATOR, plain=True)

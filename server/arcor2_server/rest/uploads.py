@@ -10,8 +10,8 @@ from litestar.exceptions import HTTPException
 
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.exceptions import Arcor2Error
-from arcor2_server.rest.answers import PERSON
-from arcor2_server.tasks import Task
+from arcor2_server.collaboration.tasks import Task
+from arcor2_server.rest.responses import PERSON
 
 RECEIVED: Final = 0.9
 """How far the task is when all has come: what came is checked and kept then."""

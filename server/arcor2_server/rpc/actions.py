@@ -7,18 +7,18 @@ from arcor2_hw.data.events import ChangeType
 from arcor2_hw.data.project import Action, BareAction, LogicItem
 from arcor2_hw.data.rpc import AddActionArgs, RemoveActionArgs, RenameActionArgs, UpdateActionArgs
 from arcor2_hw.exceptions import InvalidData
-from arcor2_server.rpc.editing import commit, drop_locks, require_free, require_held, tell, unlock
-from arcor2_server.rpc.registry import Context, RequestRefused, rpc
-from arcor2_server.session.changes import Change, Kind
-from arcor2_server.session.checks import (
+from arcor2_server.documents.changes import Change, Kind
+from arcor2_server.documents.checks import (
     action_meta,
     check_flows,
     check_outputs_unique,
     check_parameters,
     complete_parameters,
 )
-from arcor2_server.session.document import Document, action_of
-from arcor2_server.session.logic import check_logic_item
+from arcor2_server.documents.document import Document, action_of
+from arcor2_server.documents.logic import check_logic_item
+from arcor2_server.rpc.editing import commit, drop_locks, require_free, require_held, tell, unlock
+from arcor2_server.rpc.registry import Context, RequestRefused, rpc
 
 
 def _check_name(context: Context, name: str) -> None:

@@ -17,15 +17,15 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.rpc import CalibrateCameraArgs, CalibrateRobotArgs, GetCameraPoseArgs, MarkersCornersArgs
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
-from arcor2_server.calibration import RobotView
-from arcor2_server.cell.motion import require_not_moving
-from arcor2_server.compute_process import Told
-from arcor2_server.robot_models import model_of
+from arcor2_server.compute.calibration import RobotView
+from arcor2_server.compute.process import Told
+from arcor2_server.documents.changes import Kind
+from arcor2_server.online.motion import require_not_moving
 from arcor2_server.rpc.cameras import PICTURE_WITHIN, camera_parameters, require_camera
 from arcor2_server.rpc.editing import require_held
 from arcor2_server.rpc.registry import Context, RequestRefused, make_event, rpc
 from arcor2_server.services import Services
-from arcor2_server.session.changes import Kind
+from arcor2_server.workspace.robot_models import model_of
 
 log = structlog.get_logger(__name__)
 

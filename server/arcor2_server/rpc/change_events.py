@@ -9,9 +9,9 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.events import ChangeType
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.project import BareAction
+from arcor2_server.documents.changes import Change, Kind
+from arcor2_server.documents.document import OWNED, Document
 from arcor2_server.rpc.registry import Context
-from arcor2_server.session.changes import Change, Kind
-from arcor2_server.session.document import OWNED, Document
 
 _EVENTS: Final = {
     Kind.OBJECT: "SceneObjectChanged",

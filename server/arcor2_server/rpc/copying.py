@@ -11,10 +11,10 @@ from arcor2_hw.data.base import new_id
 from arcor2_hw.data.events import ChangeType
 from arcor2_hw.data.project import Action, ActionParameter, ActionParameterType
 from arcor2_hw.data.rpc import CopyActionPointArgs
+from arcor2_server.documents.changes import Change, Kind
+from arcor2_server.documents.document import OWNED, Document, reference
 from arcor2_server.rpc.editing import commit
 from arcor2_server.rpc.registry import Context, rpc
-from arcor2_server.session.changes import Change, Kind
-from arcor2_server.session.document import OWNED, Document, reference
 
 _EVENTS = {Kind.POINT: "ActionPointChanged", Kind.ORIENTATION: "OrientationChanged", Kind.JOINTS: "JointsChanged"}
 _PREFIXES = {Kind.POINT: "acp", Kind.ORIENTATION: "ori", Kind.JOINTS: "joi", Kind.ACTION: "act"}

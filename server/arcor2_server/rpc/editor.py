@@ -11,8 +11,8 @@ from arcor2_hw.data.rpc import (
     SetViewStateData,
 )
 from arcor2_hw.exceptions import NotFound
+from arcor2_server.documents.changes import OF_SCENE, Kind
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
-from arcor2_server.session.changes import OF_SCENE, Kind
 
 
 # ---------------------------------------------------------------------------------------------- view state

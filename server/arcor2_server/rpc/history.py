@@ -16,20 +16,20 @@ from arcor2_hw.data.rpc import (
     UndoArgs,
     UndoData,
 )
-from arcor2_server.locks import Locked
-from arcor2_server.rpc.change_events import tell_changes
-from arcor2_server.rpc.editing import drop_locks
-from arcor2_server.rpc.registry import Context, RequestRefused, rpc
-from arcor2_server.session.aftermath import uses_object
-from arcor2_server.session.changes import OF_SCENE, Change, Edit, How, Kind, net
-from arcor2_server.session.document import Document
-from arcor2_server.session.taking_back import (
+from arcor2_server.collaboration.locks import Locked
+from arcor2_server.documents.changes import OF_SCENE, Change, Edit, How, Kind, net
+from arcor2_server.documents.dependents import uses_object
+from arcor2_server.documents.document import Document
+from arcor2_server.documents.undo import (
     changes_back,
     ids_that_move,
     ids_to_lock,
     require_possible,
     role_for,
 )
+from arcor2_server.rpc.change_events import tell_changes
+from arcor2_server.rpc.editing import drop_locks
+from arcor2_server.rpc.registry import Context, RequestRefused, rpc
 
 LONGEST_LIST: Final = 20
 """Things that History names of one edit."""

@@ -16,10 +16,10 @@ from arcor2_hw.data.rpc import (
     WriteLockArgs,
     WriteUnlockArgs,
 )
-from arcor2_server.locks import PROJECT, SCENE
+from arcor2_server.collaboration.locks import PROJECT, SCENE
+from arcor2_server.documents.changes import Kind
 from arcor2_server.rpc.registry import Context, RequestRefused, make_event, rpc
 from arcor2_server.services import Services
-from arcor2_server.session.changes import Kind
 
 log = structlog.get_logger(__name__)
 

@@ -9,12 +9,12 @@ from arcor2_hw.data.events import ChangeType, LockData
 from arcor2_hw.data.object_type import ObjectAction
 from arcor2_hw.data.project import Action, LogicItem
 from arcor2_hw.data.rpc import AddLogicItemArgs, RemoveLogicItemArgs, UpdateLogicItemArgs
+from arcor2_server.documents.changes import Kind
+from arcor2_server.documents.checks import action_meta
+from arcor2_server.documents.document import Document, action_of
+from arcor2_server.documents.logic import check_logic_item
 from arcor2_server.rpc.editing import commit, tell
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
-from arcor2_server.session.changes import Kind
-from arcor2_server.session.checks import action_meta
-from arcor2_server.session.document import Document, action_of
-from arcor2_server.session.logic import check_logic_item
 
 
 def _document(context: Context) -> Document:

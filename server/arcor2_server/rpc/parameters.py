@@ -16,12 +16,12 @@ from arcor2_hw.data.rpc import (
 )
 from arcor2_hw.data.scene import SceneObjectOverride
 from arcor2_hw.exceptions import InvalidData, NotFound
-from arcor2_server.locks import PROJECT
+from arcor2_server.collaboration.locks import PROJECT
+from arcor2_server.documents.changes import Change, Kind
+from arcor2_server.documents.checks import check_project_parameter, check_setting
+from arcor2_server.documents.document import Document
 from arcor2_server.rpc.editing import commit, drop_locks, hide_secrets, require_free, require_held, tell, unlock
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
-from arcor2_server.session.changes import Change, Kind
-from arcor2_server.session.checks import check_project_parameter, check_setting
-from arcor2_server.session.document import Document
 
 
 @rpc("AddProjectParameter")

@@ -20,14 +20,14 @@ from arcor2_hw.data.rpc import (
 )
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import NotFound
-from arcor2_server.locks import PROJECT
+from arcor2_server.collaboration.locks import PROJECT
+from arcor2_server.documents.changes import Kind
+from arcor2_server.documents.checks import project_problems
+from arcor2_server.documents.renamed_actions import with_present_names
 from arcor2_server.rpc.editing import commit, opening_allowed, require_held, require_name_free, require_no_program
 from arcor2_server.rpc.object_types import notice_new_types
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
 from arcor2_server.rpc.scene import save_open_scene
-from arcor2_server.session.changes import Kind
-from arcor2_server.session.checks import project_problems
-from arcor2_server.session.renaming import with_present_names
 
 _BARE = BareProject.__struct_fields__
 

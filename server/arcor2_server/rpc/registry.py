@@ -12,8 +12,8 @@ from arcor2_hw.data.rpc import RPCS
 from arcor2_hw.exceptions import Arcor2Error
 
 if TYPE_CHECKING:
-    from arcor2_server.client import Client
     from arcor2_server.services import Services
+    from arcor2_server.websocket.client import Client
 
 
 class RequestRefused(Arcor2Error):

@@ -39,9 +39,8 @@ from arcor2_hw.data.rpc import (
 )
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import NotInControl
-from arcor2_server import solving
-from arcor2_server.cell.host import CellError
-from arcor2_server.cell.motion import (
+from arcor2_server.hosts.process import CellError
+from arcor2_server.online.motion import (
     Told,
     move,
     require_feature,
@@ -50,10 +49,11 @@ from arcor2_server.cell.motion import (
     require_speed,
     take_control,
 )
-from arcor2_server.cell.online import OnlineCell
-from arcor2_server.robot_models import model_of_type
+from arcor2_server.online.online_scene import OnlineCell
 from arcor2_server.rpc.editing import optional
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
+from arcor2_server.workspace import kinematics
+from arcor2_server.workspace.robot_models import model_of_type
 
 
 @asynccontextmanager
@@ -138,9 +138,9 @@ async def register_for_robot_event(context: Context, args: RegisterForRobotEvent
 async def inverse_kinematics(context: Context, args: InverseKinematicsArgs) -> list[Joint]:
     """Give joints that reach a pose: as the robot computes them, else by its model, for which nothing need run."""
     async with _modelled(context, args.robot_id, args.arm_id) as robot:
-        if solving.solves(context.services, robot, "inverse_kinematics"):
+        if kinematics.solves(context.services, robot, "inverse_kinematics"):
             return await solve_inverse(context, args)
-        return await solving.inverse(context.services, robot, args)
+        return await kinematics.inverse(context.services, robot, args)
 
 
 @asynccontextmanager
@@ -176,7 +176,7 @@ async def solve_inverse(context: Context, args: InverseKinematicsArgs) -> list[J
         # Some controllers answer only whom they obey. The question moves nothing: its model answers as well.
         if error.code != NotInControl.code or model_of_type(context.services, robot.type) is None:
             raise
-        return await solving.inverse(context.services, robot, args)
+        return await kinematics.inverse(context.services, robot, args)
     return joints
 
 
@@ -185,8 +185,8 @@ async def forward_kinematics(context: Context, args: ForwardKinematicsArgs) -> P
     """Give the pose that joints lead to: as the robot computes it, else by its model, for which nothing need run."""
     async with _modelled(context, args.robot_id, args.arm_id) as robot:
         services = context.services
-        if not solving.solves(services, robot, "forward_kinematics"):
-            return await solving.forward(services, robot, args)
+        if not kinematics.solves(services, robot, "forward_kinematics"):
+            return await kinematics.forward(services, robot, args)
         cell = services.cell
         arguments: dict[str, Any] = cell.arm(args.robot_id, optional(args.arm_id))
         arguments |= {"end_effector_id": args.end_effector_id, "joints": args.joints}

@@ -21,7 +21,10 @@ from arcor2_hw.data.rpc import (
 )
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import InvalidData, NotFound
-from arcor2_server.locks import ADDING_OBJECT, SCENE
+from arcor2_server.collaboration.locks import ADDING_OBJECT, SCENE
+from arcor2_server.documents.changes import Kind
+from arcor2_server.documents.checks import check_name, object_problems, settings_problems
+from arcor2_server.documents.dependents import VIRTUAL, uses_object
 from arcor2_server.rpc.editing import (
     commit,
     drop_locks,
@@ -34,9 +37,6 @@ from arcor2_server.rpc.editing import (
 )
 from arcor2_server.rpc.object_types import require_mesh
 from arcor2_server.rpc.registry import Context, RequestRefused, rpc
-from arcor2_server.session.aftermath import VIRTUAL, uses_object
-from arcor2_server.session.changes import Kind
-from arcor2_server.session.checks import check_name, object_problems, settings_problems
 
 
 @rpc("AddObjectToScene")

@@ -12,12 +12,12 @@ from arcor2_hw.data.events import ChangeType, Event, MainScreen, OpenProjectData
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.rpc import TemporaryPackageArgs
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.documents.checks import project_problems
+from arcor2_server.documents.renamed_actions import with_present_names
+from arcor2_server.execution.runs import How
 from arcor2_server.rpc.execution import how
 from arcor2_server.rpc.registry import Context, RequestRefused, make_event, rpc
-from arcor2_server.runs import How
 from arcor2_server.services import Services
-from arcor2_server.session.checks import project_problems
-from arcor2_server.session.renaming import with_present_names
 
 log = structlog.get_logger(__name__)
 

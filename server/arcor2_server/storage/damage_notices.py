@@ -8,11 +8,11 @@ import structlog
 
 from arcor2_hw.data.base import now
 from arcor2_hw.data.events import Event, NotificationData, NotificationLevel
-from arcor2_server.private_files import aside, write_private
+from arcor2_server.files import aside, write_private
 from arcor2_server.rpc.registry import make_event
 
 if TYPE_CHECKING:
-    from arcor2_server.hub import Hub
+    from arcor2_server.websocket.hub import Hub
 
 log = structlog.get_logger(__name__)
 

@@ -9,7 +9,7 @@ from sqlalchemy import delete, select
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.project import ProjectParameter
 from arcor2_hw.data.scene import SceneObjectOverride
-from arcor2_server.setting_secrets import objects_of
+from arcor2_server.documents.setting_secrets import objects_of
 from arcor2_server.storage.models import BreakpointsRow, ExecutionTokenRow, ProjectBesideRow, ProjectRow
 from arcor2_server.storage.store import Storage
 

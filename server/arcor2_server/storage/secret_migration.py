@@ -7,7 +7,7 @@ from sqlalchemy import select
 
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
-from arcor2_server.setting_secrets import SettingSecrets, objects_of
+from arcor2_server.documents.setting_secrets import SettingSecrets, objects_of
 from arcor2_server.storage.models import ProjectBesideRow, ProjectRow, SceneRow
 
 if TYPE_CHECKING:

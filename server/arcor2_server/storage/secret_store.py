@@ -9,8 +9,8 @@ import msgspec
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.secret import new_reference
 from arcor2_hw.exceptions import StorageError
-from arcor2_server.data_damage import DataDamage
-from arcor2_server.private_files import write_private
+from arcor2_server.files import write_private
+from arcor2_server.storage.damage_notices import DataDamage
 
 
 class Secret(Data, frozen=True):

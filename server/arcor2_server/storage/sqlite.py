@@ -9,7 +9,7 @@ from sqlalchemy import text
 from sqlalchemy.ext.asyncio import AsyncEngine
 
 from arcor2_hw.exceptions import StorageError
-from arcor2_server.private_files import ensure_private
+from arcor2_server.files import ensure_private
 
 
 def check_opens(path: Path) -> None:

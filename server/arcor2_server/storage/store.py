@@ -17,7 +17,7 @@ from arcor2_hw.data.object_type import Box, Cylinder, Mesh, Model3dType, Models,
 from arcor2_hw.data.project import BareProject, Project
 from arcor2_hw.data.scene import BareScene, Scene
 from arcor2_hw.exceptions import NotFound, StorageError
-from arcor2_server.setting_secrets import SettingSecrets
+from arcor2_server.documents.setting_secrets import SettingSecrets
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage.models import ModelRow, ObjectTypeRow, ProjectRow, ProjectSourceRow, SceneRow
 from arcor2_server.storage.schema import bring_up_to_date

@@ -13,10 +13,10 @@ from litestar.handlers import HTTPRouteHandler
 
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.role import Role
-from arcor2_server.rest.answers import OPEN, ROLE
 from arcor2_server.rest.encodings import accepted_encodings
+from arcor2_server.rest.responses import OPEN, ROLE
 
-FILES: Final = Path(__file__).with_name("editor_files")
+FILES: Final = Path(__file__).parents[1] / "editor_files"
 """Where the build puts the editor; absent in a checkout where it was not built."""
 NONCE: Final = b"__NONCE__"
 """What stands in the page where each answer puts a nonce of its own, for the styles that components insert."""

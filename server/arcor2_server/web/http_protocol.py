@@ -6,8 +6,8 @@ from typing import Any, Final, cast
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
-from arcor2_server.connection_limits import CONNECTION, Connection
-from arcor2_server.wire import WireProtocol
+from arcor2_server.web.connection_limits import CONNECTION, Connection
+from arcor2_server.websocket.transport import WireProtocol
 
 SLOWEST: Final = 500
 """Bytes per second that the other side must send of a body, or take of an answer, at least."""

@@ -12,10 +12,10 @@ from typing import Any, Final, cast
 import structlog
 import uvicorn
 
-from arcor2_server.connection_limits import Connection, ConnectionLimits
-from arcor2_server.http_protocol import HttpProtocol
 from arcor2_server.settings import ServerSettings
-from arcor2_server.wire import WireProtocol
+from arcor2_server.web.connection_limits import Connection, ConnectionLimits
+from arcor2_server.web.http_protocol import HttpProtocol
+from arcor2_server.websocket.transport import WireProtocol
 
 log = structlog.get_logger(__name__)
 

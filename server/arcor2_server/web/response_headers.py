@@ -6,7 +6,7 @@ from urllib.parse import parse_qsl
 from litestar.datastructures import MutableScopeHeaders
 from litestar.types import Message, Scope
 
-from arcor2_server.access import PARAMETER
+from arcor2_server.access.admission import PARAMETER
 
 EVERYWHERE: Final = {
     "X-Content-Type-Options": "nosniff",

@@ -20,8 +20,8 @@ _ADDRESSES: Final = {
 }
 
 
-def classic_ports(environment: Mapping[str, str] = os.environ) -> dict[str, int]:
-    """Give the port of each service. InvalidData naming the variable that has none, or one that two services have."""
+def ports_from_environment(environment: Mapping[str, str] = os.environ) -> dict[str, int]:
+    """Return the port of each service. InvalidData naming the variable that has none, or one that two services have."""
     ports = {name: _number(environment, variable, default) for name, (variable, default) in _NUMBERS.items()} | {
         name: _of_address(environment, variable, default) for name, (variable, default) in _ADDRESSES.items()
     }

@@ -12,8 +12,8 @@ import structlog
 
 from arcor2_hw.data.events import Event
 from arcor2_hw.data.role import Role
+from arcor2_server.access.tokens import Token
 from arcor2_server.settings import ServerSettings
-from arcor2_server.tokens import Token
 
 log = structlog.get_logger(__name__)
 _numbers = itertools.count(1)

@@ -8,9 +8,9 @@ from arcor2_hw.data.base import Data
 from arcor2_hw.data.events import Event
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import Rpc
-from arcor2_server.endpoint import AUTHENTICATE, Endpoint, Route, Speech, routes
 from arcor2_server.rpc.registry import Context
 from arcor2_server.services import Services
+from arcor2_server.websocket.endpoint import AUTHENTICATE, Endpoint, Route, Speech, routes
 
 API_VERSION: Final = "1.2.0"
 """Of the Execution service whose behaviour this is: an ARServer of the original refuses another major version."""

@@ -5,8 +5,8 @@ from collections.abc import Callable
 import msgspec
 
 from arcor2_hw.data.events import EVENTS, Event, MainScreen, ShowMainScreenData
-from arcor2_server.client import Client
 from arcor2_server.rpc.registry import make_event
+from arcor2_server.websocket.client import Client
 
 encode = msgspec.json.Encoder().encode
 

@@ -9,7 +9,7 @@ from websockets.exceptions import InvalidState
 from websockets.frames import Frame
 from websockets.http11 import Request
 
-from arcor2_server.connection_limits import Connection
+from arcor2_server.web.connection_limits import Connection
 
 CLOSE_WITHIN: Final = 1.0
 """Seconds that a client without a pong has to take the close frame."""

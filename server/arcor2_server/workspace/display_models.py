@@ -21,8 +21,8 @@ from arcor2_hw.compute.world import KeptFile
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, StorageError
+from arcor2_server.collaboration.tasks import Task
 from arcor2_server.storage.assets import Asset
-from arcor2_server.tasks import Task
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services

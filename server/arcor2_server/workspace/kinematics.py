@@ -10,8 +10,8 @@ from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.rpc import ForwardKinematicsArgs, InverseKinematicsArgs
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error, KinematicsError
-from arcor2_server.robot_models import model_of
-from arcor2_server.scene_world import in_names, present_joints, robots, things
+from arcor2_server.workspace.robot_models import model_of
+from arcor2_server.workspace.scene_collisions import in_names, present_joints, robots, things
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services

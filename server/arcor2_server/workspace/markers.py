@@ -8,8 +8,8 @@ import structlog
 
 from arcor2_hw.calibration.configuration import CalibrationConfiguration
 from arcor2_hw.exceptions import Conflict, StorageError
-from arcor2_server.data_damage import DataDamage
-from arcor2_server.private_files import write_private
+from arcor2_server.files import write_private
+from arcor2_server.storage.damage_notices import DataDamage
 
 log = structlog.get_logger(__name__)
 

@@ -8,7 +8,7 @@ from arcor2_hw.data.robot import RobotArg
 from arcor2_server.rpc.registry import RequestRefused
 
 if TYPE_CHECKING:
-    from arcor2_server.session.document import Document
+    from arcor2_server.documents.document import Document
 
 
 @dataclass(slots=True)

@@ -18,10 +18,10 @@ from arcor2_hw.data.project_index import global_pose
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error, NotFound
-from arcor2_server.robot_models import model_of
 from arcor2_server.rpc.registry import make_event
-from arcor2_server.scene_world import in_names, robot_model, robots, things
-from arcor2_server.standing_arms import PERIOD, StandingArms
+from arcor2_server.workspace.robot_models import model_of
+from arcor2_server.workspace.scene_collisions import in_names, robot_model, robots, things
+from arcor2_server.workspace.stopped_robots import PERIOD, StandingArms
 
 if TYPE_CHECKING:
     from arcor2_hw.data.rpc.editor import ReachabilityArgs

@@ -11,8 +11,8 @@ from arcor2_hw.data.object_type import Mesh
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error, Conflict
-from arcor2_server.collisions import Hit, Placed, first_hit
-from arcor2_server.robot_models import model_of_type, settings_of
+from arcor2_server.workspace.collisions import Hit, Placed, first_hit
+from arcor2_server.workspace.robot_models import model_of_type, settings_of
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.scene import SceneObject
-from arcor2_server.scene_world import present_joints
+from arcor2_server.workspace.scene_collisions import present_joints
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services

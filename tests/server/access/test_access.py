@@ -21,11 +21,11 @@ from websockets.exceptions import ConnectionClosedError
 
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData, NotFound
-from arcor2_server import certificate
-from arcor2_server.access import Access, AccessRefused
-from arcor2_server.cli.status import ExitStatus
+from arcor2_server.access import certificate
+from arcor2_server.access.admission import Access, AccessRefused
+from arcor2_server.access.tokens import COPY, FILE, TokenFile
+from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.settings import LegacyListener, ServerSettings
-from arcor2_server.tokens import COPY, FILE, TokenFile
 from tests.server.core.serving import COMMAND, ServerProcess, Talker, running, talking
 
 

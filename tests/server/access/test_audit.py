@@ -8,8 +8,8 @@ import httpx
 
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import RPCS
-from arcor2_server import audit
-from arcor2_server.tokens import TokenFile
+from arcor2_server.access.tokens import TokenFile
+from arcor2_server.log import audit
 from tests.server.core.serving import running, talking
 
 SECRET = "swordfish-4711"

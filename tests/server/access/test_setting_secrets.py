@@ -29,9 +29,9 @@ from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.data.secret import HIDDEN, ObjectSecrets, is_reference
 from arcor2_hw.exceptions import AddressChanged, InvalidData
 from arcor2_server.app import running_services
-from arcor2_server.secret_store import Secret
-from arcor2_server.setting_secrets import SettingSecrets
+from arcor2_server.documents.setting_secrets import SettingSecrets
 from arcor2_server.settings import ServerSettings
+from arcor2_server.storage.secret_store import Secret
 from tests.server.core.serving import ServerProcess, running
 
 CODE, OTHER, UNSAVED = "swordfish-4711", "halibut-0815", "haddock-42"

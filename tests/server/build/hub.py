@@ -12,10 +12,10 @@ from msgspec import UNSET
 from arcor2_hw.analysis import InstalledType, SourceFile
 from arcor2_hw.data.object_type import ObjectModel, ObjectTypeSource
 from arcor2_server.build.service import BuildService
-from arcor2_server.object_types import ObjectTypes, PackageType
+from arcor2_server.object_types.notifications import TypeNews
+from arcor2_server.object_types.registry import ObjectTypes, PackageType
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import AssetStore, Storage
-from arcor2_server.type_news import TypeNews
 
 
 @contextlib.asynccontextmanager
@@ -42,7 +42,7 @@ async def opened(
                 installed.append(
                     InstalledType(one.name, one.entry_point, one.distribution, one.version, str(one.folder), file)
                 )
-        monkeypatch.setattr("arcor2_server.object_types.installed_types", lambda: installed)
+        monkeypatch.setattr("arcor2_server.object_types.registry.installed_types", lambda: installed)
         assets = await AssetStore.open(directory / "assets")
         object_types = ObjectTypes(storage, assets)
         await object_types.load()

@@ -22,7 +22,7 @@ from arcor2_hw.exceptions import Conflict, InvalidPackage, InvalidProject, NotFo
 from arcor2_server.build import package
 from arcor2_server.build.importing import ImportOptions, import_package
 from arcor2_server.build.reading import NotUnderstood
-from arcor2_server.object_types import PackageType
+from arcor2_server.object_types.registry import PackageType
 from tests.server.build import hub, workplace
 from tests.server.build.conftest import make_code
 

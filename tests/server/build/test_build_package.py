@@ -24,12 +24,12 @@ from arcor2_hw.data.project import END, START, Project
 from arcor2_hw.data.project_index import ProjectIndex, global_pose
 from arcor2_hw.data.rpc import BuildProjectArgs, BuildProjectData
 from arcor2_hw.exceptions import InvalidPackage, InvalidProject, NotFound, StorageError
-from arcor2_server.build import package, versions
+from arcor2_server.build import package
 from arcor2_server.build.service import BuildService, Ingredients, files_of
-from arcor2_server.object_types import PackageType
+from arcor2_server.object_types.registry import PackageType
 from arcor2_server.rpc.build import build_project
 from arcor2_server.rpc.registry import Context, RequestRefused
-from arcor2_server.storage import Storage
+from arcor2_server.storage import Storage, package_versions
 from tests.server.build import hub, workplace
 from tests.server.build.conftest import STOCK
 
@@ -213,30 +213,35 @@ def test_a_type_checker_accepts_a_package(directory: Path, pytestconfig: pytest.
 
 
 def test_versions_that_differ_are_named(directory: Path) -> None:
-    assert versions.check_versions(directory) == []
+    assert package_versions.check_versions(directory) == []
     file = directory / "versions.json"
     built = json.loads(file.read_bytes())
     built["distributions"] = {"msgspec": "0.1", "no-such-distribution": "3"}
     built["python"] = "3.9.1"
     file.write_text(json.dumps(built))
-    assert [line.partition(" with ")[2].partition(",")[0] for line in versions.check_versions(directory)[1:]] == [
+    assert [
+        line.partition(" with ")[2].partition(",")[0] for line in package_versions.check_versions(directory)[1:]
+    ] == [
         "msgspec 0.1",
         "no-such-distribution 3",
     ]
-    assert "Python 3.9.1" in versions.check_versions(directory)[0]
+    assert "Python 3.9.1" in package_versions.check_versions(directory)[0]
     file.write_text("{")
-    assert "cannot be read" in versions.check_versions(directory)[0]
+    assert "cannot be read" in package_versions.check_versions(directory)[0]
     file.unlink()
-    assert versions.check_versions(directory) == []
+    assert package_versions.check_versions(directory) == []
 
 
 def test_compiled_modules_that_stand_alone_have_their_distribution() -> None:
-    assert versions.present({"rtde_control", "pymodbus", "json"}).distributions.keys() == {"ur-rtde", "pymodbus"}
+    assert package_versions.present({"rtde_control", "pymodbus", "json"}).distributions.keys() == {
+        "ur-rtde",
+        "pymodbus",
+    }
 
 
 def test_what_is_ours_in_older_sources_is_no_version_of_another(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(versions, "_distributions", lambda: {"arcor2": "pymodbus", "arcor2_web": "pymodbus"})
-    assert versions.present({"arcor2", "arcor2_web", "arcor2_object_types"}).distributions == {}
+    monkeypatch.setattr(package_versions, "_distributions", lambda: {"arcor2": "pymodbus", "arcor2_web": "pymodbus"})
+    assert package_versions.present({"arcor2", "arcor2_web", "arcor2_object_types"}).distributions == {}
 
 
 def test_a_package_appears_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

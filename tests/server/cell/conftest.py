@@ -17,21 +17,21 @@ from arcor2_hw.data.rpc import RPCS
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import NotFound
 from arcor2_hw.runtime.messages import TypeCode
-from arcor2_server.cell.online import OnlineCell
-from arcor2_server.cell.told import tell_hosts
-from arcor2_server.execution import Execution
-from arcor2_server.hub import Hub
-from arcor2_server.locks import Locks
-from arcor2_server.presence import PresenceBoard
+from arcor2_server.collaboration.locks import Locks
+from arcor2_server.collaboration.presence import PresenceBoard
+from arcor2_server.collaboration.users import Users
+from arcor2_server.documents import Session
+from arcor2_server.execution.service import Execution
+from arcor2_server.hosts.workspace_updates import tell_hosts
+from arcor2_server.online.online_scene import OnlineCell
 from arcor2_server.rpc import execution as _execution  # noqa: F401 - for their handlers
 from arcor2_server.rpc import robot as _robot  # noqa: F401 - for their handlers
 from arcor2_server.rpc import runs as _runs  # noqa: F401 - for their handlers
 from arcor2_server.rpc.registry import HANDLERS, Context
 from arcor2_server.services import Services
-from arcor2_server.session import Session
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import AssetStore
-from arcor2_server.users import Users
+from arcor2_server.websocket.hub import Hub
 from tests.runtime.conftest import type_code
 
 PATIENCE = 15.0

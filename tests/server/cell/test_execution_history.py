@@ -9,12 +9,12 @@ import pytest
 from arcor2_hw.data.editor import Run, RunEnd, TraceEntry
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.runtime import messages as m
-from arcor2_server import runs
-from arcor2_server.hub import Hub
-from arcor2_server.runs import Runs
+from arcor2_server.execution import runs
+from arcor2_server.execution.runs import Runs
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import Storage
-from arcor2_server.storage.shared import SharedData
+from arcor2_server.storage.shared_data import SharedData
+from arcor2_server.websocket.hub import Hub
 from tests.runtime.conftest import scene_object
 from tests.server.cell.conftest import Recorder, Server, serving
 from tests.server.cell.test_execution import LAMP, PROJECT, until_stopped, write

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from arcor2_hw.runtime import messages as m
-from arcor2_server.cell import host as host_module
-from arcor2_server.cell.host import CellHost, _Wire
+from arcor2_server.hosts import process as host_module
+from arcor2_server.hosts.process import CellHost, _Wire
 
 
 class Listener:

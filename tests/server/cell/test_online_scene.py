@@ -23,7 +23,7 @@ from arcor2_hw.data.project import (
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import ConnectionLost
-from arcor2_server.cell.host import CellError
+from arcor2_server.hosts.process import CellError
 from arcor2_server.rpc.registry import RequestRefused
 from tests.runtime.conftest import scene_object
 

@@ -14,7 +14,7 @@ from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import ObjectTypeMeta
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
-from arcor2_server.collisions import Placed
+from arcor2_server.workspace.collisions import Placed
 from tests.runtime.conftest import Package
 from tests.runtime.test_host_safe_moves import (
     ACROSS,

@@ -17,10 +17,10 @@ from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.cell import read_cell
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.exceptions import InvalidData
-from arcor2_server.cli.calibrating import angles
+from arcor2_server.cli.calibration_files import angles
+from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.cli.main import app
 from arcor2_server.cli.serve import _markers
-from arcor2_server.cli.status import ExitStatus
 from benchmarks import rendering
 from tests.server.core.serving import ServerProcess
 

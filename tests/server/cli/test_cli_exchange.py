@@ -19,9 +19,9 @@ from arcor2_hw.data.object_type import Box, Mesh, ObjectModel
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.project import ActionParameter, Flow, ProjectParameter
 from arcor2_hw.data.role import Role
+from arcor2_server.access.tokens import TokenFile
+from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.cli.main import app
-from arcor2_server.cli.status import ExitStatus
-from arcor2_server.tokens import TokenFile
 from tests.runtime.older_sources import SOURCES
 from tests.server.core.serving import ServerProcess
 

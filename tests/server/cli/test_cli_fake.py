@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-import arcor2_server.fakes
-from arcor2_server.fakes import InstalledFake, installed_fakes
+import arcor2_server.cli.installed_fakes
+from arcor2_server.cli.installed_fakes import InstalledFake, installed_fakes
 
 CLI = [sys.executable, "-m", "arcor2_server.cli.main", "fake"]
 EVERY_WIRE = {"silence", "reset", "half_frame", "garbage", "slow", "refuse", "heal"}
@@ -53,7 +53,7 @@ def tester() -> Iterator[Running]:
 def test_every_fake_in_the_tree_is_listed_with_wire_and_text() -> None:
     listed = arcor2_hw_fake("list")
     assert listed.returncode == 0, listed.stderr
-    folder = Path(arcor2_server.fakes.__file__).parents[2] / "fakes" / "arcor2_fakes"
+    folder = Path(arcor2_server.cli.installed_fakes.__file__).parents[2] / "fakes" / "arcor2_fakes"
     there = {main.parent.name for main in folder.glob("*/__main__.py") if _committed(main)}
     found = {fake.name: fake for fake in installed_fakes()}
     assert there <= set(found)
@@ -99,7 +99,9 @@ def test_a_fake_of_another_distribution(
         (tmp_path / "fakery" / "x.py").write_text(source)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(
-        arcor2_server.fakes, "entry_points", lambda group: [EntryPoint("x", "fakery.x", group)] if group else []
+        arcor2_server.cli.installed_fakes,
+        "entry_points",
+        lambda group: [EntryPoint("x", "fakery.x", group)] if group else [],
     )
     (found,) = installed_fakes()
     if isinstance(expected, str):

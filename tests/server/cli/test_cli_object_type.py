@@ -9,9 +9,9 @@ import pytest
 
 from arcor2_hw.analysis import module_name
 from arcor2_hw.client import Client
+from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.cli.main import app
-from arcor2_server.cli.status import ExitStatus
-from arcor2_server.exchange.bringing import SHADOWS
+from arcor2_server.exchange.import_ import SHADOWS
 from tests.runtime.older_sources import SOURCES
 from tests.server.core.serving import ServerProcess
 

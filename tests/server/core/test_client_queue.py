@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from arcor2_server.client import Client, CloseCode, Wire
 from arcor2_server.settings import ServerSettings
+from arcor2_server.websocket.client import Client, CloseCode, Wire
 
 
 class ValveWire(Wire):
@@ -82,7 +82,7 @@ async def test_order_and_newest_of_a_stream(wire: ValveWire, tmp_path: Path) -> 
 async def test_who_lags_too_far_behind_is_closed_and_dropped(
     wire: ValveWire, tmp_path: Path, limits: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("arcor2_server.client.ABORT_AFTER", 0.05)
+    monkeypatch.setattr("arcor2_server.websocket.client.ABORT_AFTER", 0.05)
     client = client_of(wire, tmp_path, **limits)
     writer = asyncio.create_task(client.write())
     wire.open.clear()

@@ -13,11 +13,11 @@ from litestar.datastructures import Address
 
 from arcor2_hw.exceptions import DeviceTimeout
 from arcor2_server.app import running_services
-from arcor2_server.endpoint import Endpoint
 from arcor2_server.rpc.registry import AT_ONCE, HANDLERS, Context, Handler, RequestRefused
 from arcor2_server.services import Services
 from arcor2_server.settings import ServerSettings
-from arcor2_server.wire import EXTENSION
+from arcor2_server.websocket.endpoint import Endpoint
+from arcor2_server.websocket.transport import EXTENSION
 
 
 class Protocol:
@@ -177,7 +177,7 @@ async def test_what_nobody_foresaw_is_answered_with_a_reference_to_the_log(
         monkeypatch.setitem(AT_ONCE, "SystemInfo", no_kept_answer)
         ann = connect()
         with structlog.testing.capture_logs() as logged:
-            monkeypatch.setattr("arcor2_server.endpoint.log", structlog.get_logger())
+            monkeypatch.setattr("arcor2_server.websocket.endpoint.log", structlog.get_logger())
             for number, name in enumerate(("SaveScene", "SaveProject", "SystemInfo"), 1):
                 ann.say(id=number, request=name)
             answers = {one["id"]: one for one in (await ann.heard(4))[1:]}

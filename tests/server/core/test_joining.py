@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from arcor2_server import joining as module
-from arcor2_server.joining import joining
+from arcor2_server.access import addresses as module
+from arcor2_server.access.addresses import joining
 from arcor2_server.settings import ServerSettings
 
 

@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from arcor2_hw.exceptions import NotFound
-from arcor2_server.locks import Locked, Locks
+from arcor2_server.collaboration.locks import Locked, Locks
 
 PARENTS = {"ap1": "box", "ap2": "ap1", "ori": "ap1", "act": "ap2", "free": "", "ori2": "free", "box": "", "robot": ""}
 

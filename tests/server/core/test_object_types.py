@@ -14,10 +14,10 @@ from msgspec import UNSET
 from arcor2_hw.analysis import Library, worker
 from arcor2_hw.data.object_type import Box, Mesh, ObjectModel, ObjectTypeSource, Sphere
 from arcor2_hw.exceptions import InvalidData, NotFound
-from arcor2_server.object_types import ObjectTypes
+from arcor2_server.object_types.changes import Changes
+from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import AssetStore, Storage
-from arcor2_server.type_changes import Changes
 from tests.server.core.serving import ServerProcess, running, talking
 
 LAMP = '''

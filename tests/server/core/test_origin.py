@@ -10,8 +10,8 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import InvalidStatus
 
 from arcor2_hw.exceptions import InvalidData
-from arcor2_server import origin as module
-from arcor2_server.origin import HostNames, machine_names, may_connect
+from arcor2_server.access import origin as module
+from arcor2_server.access.origin import HostNames, machine_names, may_connect
 from arcor2_server.settings import ServerSettings
 from tests.server.core.serving import ServerProcess
 

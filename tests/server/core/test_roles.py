@@ -10,12 +10,12 @@ from arcor2_hw.data.events import EVENTS
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import RPCS
 from arcor2_server.app import create_app, running_services
-from arcor2_server.client import Client, Wire
-from arcor2_server.hub import Hub
-from arcor2_server.rest.answers import ROLE
-from arcor2_server.role_table import page
+from arcor2_server.cli.role_table import page
+from arcor2_server.rest.responses import ROLE
 from arcor2_server.rpc.registry import HANDLERS, make_event
 from arcor2_server.settings import ServerSettings
+from arcor2_server.websocket.client import Client, Wire
+from arcor2_server.websocket.hub import Hub
 from tests.server.core.serving import running, talking
 from tests.server.core.test_every_message_answered import meaningless
 
@@ -84,4 +84,4 @@ async def test_the_page_of_roles_is_what_is_declared(tmp_path: Path) -> None:
     async with running_services(ServerSettings(data_dir=tmp_path)) as services:
         made = page(create_app(services))
     text = (Path(__file__).resolve().parents[3] / "docs/reference/roles.md").read_text()
-    assert text == made, "run: python -m arcor2_server.role_table > docs/reference/roles.md"
+    assert text == made, "run: python -m arcor2_server.cli.role_table > docs/reference/roles.md"

@@ -13,7 +13,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from arcor2_server.cli.status import ExitStatus
+from arcor2_server.cli.exit_status import ExitStatus
 from tests.server.core import serving
 from tests.server.core.serving import COMMAND, ServerProcess, running, talking
 

@@ -16,9 +16,9 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 
 from arcor2_hw.data.project import Action
 from arcor2_hw.data.rpc import RPCS
-from arcor2_server.session.changes import Kind
-from arcor2_server.session.checks import action_meta, project_problems
-from arcor2_server.session.logic import check_logic_item
+from arcor2_server.documents.changes import Kind
+from arcor2_server.documents.checks import action_meta, project_problems
+from arcor2_server.documents.logic import check_logic_item
 from tests.server.machine.client import Client, Flat, flat
 from tests.server.machine.crash_copy import copy_at_one_moment
 from tests.server.machine.picture import Picture

@@ -14,9 +14,9 @@ from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import Mesh, ObjectModel, ObjectTypeSource
 from arcor2_hw.data.rpc import RPCS
 from arcor2_server.app import running_services
-from arcor2_server.endpoint import Endpoint
 from arcor2_server.services import Services
 from arcor2_server.settings import ServerSettings
+from arcor2_server.websocket.endpoint import Endpoint
 from tests.server.protocol import devices
 from tests.server.session.desk import Person, Refused
 

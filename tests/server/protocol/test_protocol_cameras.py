@@ -20,8 +20,8 @@ from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.camera import CameraParameters, Corner, MarkerCorners
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.exceptions import Arcor2Error, NotFound
-from arcor2_server.calibration import RobotView
-from arcor2_server.compute_process import Told
+from arcor2_server.compute.calibration import RobotView
+from arcor2_server.compute.process import Told
 from tests.server.protocol.stage import Actor, Stage, happens, open_stage, refused
 
 PARAMETERS = {"fx": 600, "fy": 610, "cx": 320, "cy": 240, "dist_coefs": [0, 0, 0, 0]}

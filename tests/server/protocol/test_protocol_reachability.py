@@ -15,9 +15,9 @@ from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import Box, ObjectModel, ObjectTypeSource
 from arcor2_hw.data.project import ProjectRobotJoints
 from arcor2_hw.data.robot import Joint
-from arcor2_server.collisions import Placed
-from arcor2_server.robot_models import model_of
-from arcor2_server.session.changes import Kind
+from arcor2_server.documents.changes import Kind
+from arcor2_server.workspace.collisions import Placed
+from arcor2_server.workspace.robot_models import model_of
 from tests.server.protocol.devices import PART
 from tests.server.protocol.stage import PATIENCE, Actor, Stage, open_stage, refused, until
 

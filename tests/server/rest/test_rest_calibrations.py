@@ -18,11 +18,11 @@ from arcor2_hw.calibration.records import CalibrationKind, CalibrationRecord
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.exceptions import Conflict, StorageError
-from arcor2_server.data_damage import DataDamage
-from arcor2_server.hub import Hub
-from arcor2_server.markers import Markers
 from arcor2_server.services import Services
 from arcor2_server.storage.calibrations import Calibrations
+from arcor2_server.storage.damage_notices import DataDamage
+from arcor2_server.websocket.hub import Hub
+from arcor2_server.workspace.markers import Markers
 from benchmarks import rendering
 from tests.server.rest.asking import granted, refused
 

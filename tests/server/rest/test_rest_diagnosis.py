@@ -18,12 +18,12 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.secret import HIDDEN, is_secret_name
+from arcor2_server.access.tokens import TokenFile
+from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.cli.main import app
-from arcor2_server.cli.status import ExitStatus
-from arcor2_server.diagnosis import LARGEST_PART, packed
-from arcor2_server.recent_log import LONGEST_LINE, RecentLog
-from arcor2_server.secrets_out import clean, hide, secrets_in
-from arcor2_server.tokens import TokenFile
+from arcor2_server.log.recent import LONGEST_LINE, RecentLog
+from arcor2_server.log.redaction import clean, hide, secrets_in
+from arcor2_server.rest.diagnosis_bundle import LARGEST_PART, packed
 from tests.server.core.serving import ServerProcess, running
 
 PASSWORD = "opensesame-7"

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import Box, Cylinder, Mesh, Models, Sphere
-from arcor2_server.collisions import Hit, Placed, first_hit
+from arcor2_server.workspace.collisions import Hit, Placed, first_hit
 
 
 def inside(point: Position, placed: Placed, inflation: float) -> bool:

@@ -15,7 +15,7 @@ import schemathesis
 
 from arcor2_server.rest import OPERATIONS
 from arcor2_server.rest.documents import document
-from arcor2_server.rest.naming import camel
+from arcor2_server.rest.field_names import camel
 from tests.protocol import openapi
 
 SERVICES = {

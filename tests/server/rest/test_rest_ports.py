@@ -11,9 +11,9 @@ from websockets.asyncio.client import ClientConnection, connect
 
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
-from arcor2_server.classic import SOCKET, classic_ports
-from arcor2_server.execution_socket import EVENTS, REQUESTS
-from arcor2_server.tokens import TokenFile
+from arcor2_server.access.tokens import TokenFile
+from arcor2_server.websocket.classic_ports import SOCKET, ports_from_environment
+from arcor2_server.websocket.execution_endpoint import EVENTS, REQUESTS
 from tests.protocol import PROTOCOL
 from tests.server.core.serving import ServerProcess, Talker, running, talking
 from tests.server.rest.asking import granted
@@ -30,7 +30,7 @@ ANY = {
 
 
 def test_they_come_from_the_environment() -> None:
-    assert classic_ports({}) == {
+    assert ports_from_environment({}) == {
         "Storage": 10000,
         "Scene": 5013,
         "Execution": 5009,
@@ -43,7 +43,7 @@ def test_they_come_from_the_environment() -> None:
         "ARCOR2_BUILD_URL": "http://build:2/",
         "ARCOR2_EXECUTION_URL": "ws://x:3",
     }
-    ports = classic_ports(given)
+    ports = ports_from_environment(given)
     assert (ports["Scene"], ports["Build"], ports[SOCKET], ports["Storage"]) == (1, 2, 3, 10000)
 
 
@@ -60,12 +60,12 @@ def test_they_come_from_the_environment() -> None:
 )
 def test_what_is_no_port_names_its_variable(variable: str, value: str) -> None:
     with pytest.raises(InvalidData, match=variable):
-        classic_ports({variable: value})
+        ports_from_environment({variable: value})
 
 
 def test_two_services_cannot_have_one_port() -> None:
     with pytest.raises(InvalidData, match="Execution and Scene"):
-        classic_ports({"ARCOR2_SCENE_SERVICE_PORT": "5009"})
+        ports_from_environment({"ARCOR2_SCENE_SERVICE_PORT": "5009"})
 
 
 def ports_of(server: ServerProcess) -> dict[str, int]:

@@ -17,9 +17,9 @@ from arcor2_hw.compute.task import ComputeStopped
 from arcor2_hw.compute.world import KeptFile
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.exceptions import InvalidData
-from arcor2_server import prepared as prepared_module
+from arcor2_server.collaboration.tasks import Task
 from arcor2_server.services import Services
-from arcor2_server.tasks import Task
+from arcor2_server.workspace import display_models as prepared_module
 from tests.server.rest.asking import granted, refused
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")

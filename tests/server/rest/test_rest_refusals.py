@@ -7,8 +7,8 @@ from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.compute import messages as m
 from arcor2_hw.compute.task import ComputeBusy, ComputeStopped, ComputeTimeout, NotInstalled
 from arcor2_hw.exceptions import Arcor2Error, KinematicsError
-from arcor2_server.compute_process import error_of
-from arcor2_server.rest.answers import refusal
+from arcor2_server.compute.process import error_of
+from arcor2_server.rest.responses import refusal
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,8 @@ import pytest
 
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
-from arcor2_server import type_news
-from arcor2_server.rest.naming import camelized, snaked
+from arcor2_server.object_types import notifications
+from arcor2_server.rest.field_names import camelized, snaked
 from arcor2_server.services import Services
 from tests.server.build import workplace
 from tests.server.rest.asking import granted, refused
@@ -274,11 +274,11 @@ async def test_a_series_of_uploads_is_told_once(
     async def end_of(*bodies: dict[str, Any]) -> None:
         """Send all, none of which may be told of, and wait until it is quiet."""
         before = len(told)
-        monkeypatch.setattr(type_news, "QUIET", 600)
+        monkeypatch.setattr(notifications, "QUIET", 600)
         for body in bodies:
             granted(await http.put("/object-types", json=body))
         assert len(told) == before
-        monkeypatch.setattr(type_news, "QUIET", 0.01)
+        monkeypatch.setattr(notifications, "QUIET", 0.01)
         granted(await http.put("/object-types", json=bodies[-1]))
         await asyncio.sleep(0.5)
 
@@ -289,7 +289,7 @@ async def test_a_series_of_uploads_is_told_once(
     await end_of(lamp("LampA"), lamp("LampB"), lamp("LampC"), lamp("LampB"))
     assert told == [("add", ["LampA", "LampB", "LampC"])]
 
-    monkeypatch.setattr(type_news, "QUIET", 600)
+    monkeypatch.setattr(notifications, "QUIET", 600)
     granted(await http.delete("/object-types/LampC"))
     granted(await http.put("/object-types", json=lamp("LampD")))
     granted(await http.delete("/object-types/LampD"))
@@ -298,7 +298,7 @@ async def test_a_series_of_uploads_is_told_once(
     assert told[1:] == [("remove", ["LampC"]), ("update", ["LampA"])], "LampD came and went: no news"
 
     # Who opens a scene, or asks for a list, is told before: nothing is left for the timer.
-    monkeypatch.setattr(type_news, "QUIET", 0.05)
+    monkeypatch.setattr(notifications, "QUIET", 0.05)
     granted(await http.put("/object-types", json=lamp("LampE")))
     changes = await services.types.refresh()
     assert [meta.type for meta in changes.added] == ["LampE"]

@@ -8,7 +8,7 @@ import httpx
 import pytest
 from msgspec import UNSET
 
-from arcor2_server.robot_packages import robot_packages
+from arcor2_server.object_types.robot_packages import robot_packages
 from arcor2_server.services import Services
 from tests.server.rest.asking import granted, refused
 

@@ -19,10 +19,11 @@ from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ObjectTypeSource, ParameterMeta
 from arcor2_hw.data.robot import Joint, RobotMeta, RobotType
 from arcor2_hw.exceptions import NotFound
-from arcor2_server.access import Access
-from arcor2_server.endpoint import Endpoint
-from arcor2_server.hub import Hub
-from arcor2_server.locks import Locks
+from arcor2_server.access.admission import Access
+from arcor2_server.collaboration.locks import Locks
+from arcor2_server.collaboration.users import Users
+from arcor2_server.documents import Session
+from arcor2_server.object_types.changes import Changes
 from arcor2_server.rpc import (  # noqa: F401
     action_points,
     actions,
@@ -43,12 +44,11 @@ from arcor2_server.rpc import (  # noqa: F401
 )
 from arcor2_server.rpc.registry import RequestRefused
 from arcor2_server.services import Services
-from arcor2_server.session import Session
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import Storage
-from arcor2_server.type_changes import Changes
-from arcor2_server.users import Users
-from arcor2_server.wire import EXTENSION
+from arcor2_server.websocket.endpoint import Endpoint
+from arcor2_server.websocket.hub import Hub
+from arcor2_server.websocket.transport import EXTENSION
 from tests.protocol import session
 
 

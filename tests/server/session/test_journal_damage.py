@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from arcor2_hw.data.scene import Scene, SceneObject
-from arcor2_server.session.changes import Change, Edit, Kind
-from arcor2_server.session.document import Document
-from arcor2_server.session.journal_file import JournalFile
-from arcor2_server.session.journal_records import ALL, Base, Loss, Recovered, Times
+from arcor2_server.documents.changes import Change, Edit, Kind
+from arcor2_server.documents.document import Document
+from arcor2_server.documents.journal_file import JournalFile
+from arcor2_server.documents.journal_records import ALL, Base, Loss, Recovered, Times
 
 EDITS = 40
 REBASED = 12

@@ -27,7 +27,7 @@ from arcor2_hw.data.project import (
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.exceptions import InvalidData, NotFound
-from arcor2_server.session.changes import (
+from arcor2_server.documents.changes import (
     Change,
     Item,
     Kind,
@@ -36,7 +36,7 @@ from arcor2_server.session.changes import (
     encode_changes,
     encode_items,
 )
-from arcor2_server.session.document import Document
+from arcor2_server.documents.document import Document
 
 
 def some_project(points: int = 3, actions: int = 2) -> tuple[Scene, Project]:

@@ -274,7 +274,7 @@ async def test_a_journal_of_an_earlier_format_is_taken_over(tmp_path: Path, vers
 async def test_an_undo_that_cannot_be_kept_is_taken_back(
     desk: Desk, alice: Person, work: Work, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from arcor2_server.session import journal_file
+    from arcor2_server.documents import journal_file
 
     await work.project("p")
     await alice.ask("SaveProject")

@@ -12,8 +12,8 @@ import pytest
 from msgspec.structs import replace
 
 from arcor2_hw.exceptions import StorageError
-from arcor2_server.session import journal_file
-from arcor2_server.session.changes import Kind
+from arcor2_server.documents import journal_file
+from arcor2_server.documents.changes import Kind
 from tests.server.session.desk import Desk, Person, Refused, open_desk
 
 REPOSITORY = Path(__file__).resolve().parents[3]

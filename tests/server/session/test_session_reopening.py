@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from arcor2_hw.data.geometry import Position
-from arcor2_server.session import Session, closed
+from arcor2_server.documents import Session, closed_history
 from tests.server.machine.crash_copy import copy_at_one_moment
 from tests.server.session.desk import Desk, Person, open_desk
 from tests.server.session.edits import refused, shown
@@ -224,7 +224,7 @@ async def test_a_project_that_is_deleted_takes_its_history_along(desk: Desk, ali
 async def test_the_number_of_stored_histories_is_bounded(
     desk: Desk, alice: Person, work: Work, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(closed, "CLOSED_LIMIT", 2)
+    monkeypatch.setattr(closed_history, "CLOSED_LIMIT", 2)
     first = await work.project("a")
     await alice.ask("SaveProject")
     await alice.ask("CloseProject")

@@ -27,12 +27,12 @@ from arcor2_hw.data.project import (
 from arcor2_hw.data.project_index import global_pose
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
-from arcor2_server.session.aftermath import project_after
-from arcor2_server.session.changes import Kind
-from arcor2_server.session.checks import project_problems, scene_problems
-from arcor2_server.session.document import Document
-from arcor2_server.session.logic import check_logic_item
-from arcor2_server.session.placing import changes_for_parent
+from arcor2_server.documents.changes import Kind
+from arcor2_server.documents.checks import project_problems, scene_problems
+from arcor2_server.documents.dependents import project_after
+from arcor2_server.documents.document import Document
+from arcor2_server.documents.logic import check_logic_item
+from arcor2_server.documents.reparenting import changes_for_parent
 from tests.server.session.desk import RecordedTypes
 
 RANDOM = SceneObject("rnd", "RandomActions", UNSET, [], "obj_r")

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from arcor2_server import breakpoints
-from arcor2_server.edit_news import sentence
+from arcor2_server.documents.edit_notifications import sentence
+from arcor2_server.execution import breakpoints
 from tests.server.session.desk import Desk, Person, Refused, open_desk
 from tests.server.session.edits import EDITS, make, rich_project
 from tests.server.session.work import POSE, Work

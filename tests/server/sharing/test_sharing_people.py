@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from arcor2_hw.data.role import Role
-from arcor2_server import presence, previews
+from arcor2_server.collaboration import presence, previews
 from tests.server.session.desk import Desk, Person, Refused
 from tests.server.session.work import ORIGIN, UPRIGHT, Work
 from tests.server.sharing.conftest import came, subscribed

@@ -8,8 +8,8 @@ import pytest
 
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.exceptions import StorageError
-from arcor2_server.hub import Hub
-from arcor2_server.tasks import Tasks
+from arcor2_server.collaboration.tasks import Tasks
+from arcor2_server.websocket.hub import Hub
 from tests.server.protocol.stage import Actor, happens, open_stage, until
 from tests.server.protocol.test_protocol_temporary import project
 from tests.server.session.desk import Refused

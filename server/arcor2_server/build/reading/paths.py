@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 from arcor2_hw.data.object_type import ObjectAction, find_action
-from arcor2_server.build.flow import BRANCHABLE, END_NODE, Condition
 from arcor2_server.build.frame import NOTE, Frame
 from arcor2_server.build.reading.errors import NotUnderstood, shown
 from arcor2_server.build.reading.module import Script
 from arcor2_server.build.reading.values import Values
+from arcor2_server.documents.logic_graph import BRANCHABLE, END_NODE, Condition
 
 START_NODE: Final = -2
 

@@ -22,15 +22,16 @@ from arcor2_hw.data.project import (
 )
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import InvalidProject
-from arcor2_server.build import flow, layout
+from arcor2_server.build import layout
 from arcor2_server.build.cycle import Cycle
-from arcor2_server.build.flow import END_NODE, Condition, Edge
 from arcor2_server.build.frame import Frame, TypeFacts
 from arcor2_server.build.reading import module
 from arcor2_server.build.reading.errors import NotUnderstood
 from arcor2_server.build.reading.module import Script
+from arcor2_server.build.reading.paths import START_NODE, Call, Way, Ways
 from arcor2_server.build.reading.values import PLAIN, Values, json_of, kept, of_type, plain
-from arcor2_server.build.reading.ways import START_NODE, Call, Way, Ways
+from arcor2_server.documents import logic_graph
+from arcor2_server.documents.logic_graph import END_NODE, Condition, Edge
 
 _Asked = tuple[str, object] | None
 """A condition to be compared: what it asks for, and the value."""
@@ -261,7 +262,7 @@ def _key(item: LogicItem) -> tuple[str, _Asked]:
 def _variables(frame: Frame, project: Project) -> dict[str, list[str]]:
     """Give the variables into which the script of a project puts the results of its actions, by action."""
     try:
-        cycle = Cycle(frame, flow.read(project))
+        cycle = Cycle(frame, logic_graph.read(project))
     except InvalidProject:
         return {}
     return {action.id: cycle.results[number] for number, action in enumerate(cycle.flow.actions)}
