@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Final, Protocol
 
 from arcor2_hw.exceptions import NotFound
-from arcor2_server.rpc.registry import RequestRefused
+from arcor2_server.errors import RequestRefused
 
 SCENE: Final = "SCENE"
 PROJECT: Final = "PROJECT"

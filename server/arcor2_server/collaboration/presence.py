@@ -10,9 +10,8 @@ from arcor2_hw.data.events import Event
 from arcor2_hw.data.role import Role
 from arcor2_server.collaboration.throttle import Newest
 from arcor2_server.collaboration.users import Users
-from arcor2_server.rpc.registry import RequestRefused, make_event
-from arcor2_server.websocket.client import Client
-from arcor2_server.websocket.hub import Hub, encode
+from arcor2_server.errors import RequestRefused
+from arcor2_server.events import Connection, EventHub, encode, make_event
 
 PERIOD: Final = 1 / 15
 """Seconds between two events of one user."""
@@ -21,7 +20,7 @@ PERIOD: Final = 1 / 15
 class PresenceBoard:
     """What users said last; of one who leaves it is forgotten."""
 
-    def __init__(self, hub: Hub, users: Users) -> None:
+    def __init__(self, hub: EventHub, users: Users) -> None:
         self._hub = hub
         self._users = users
         self._said: dict[str, Presence] = {}
@@ -46,7 +45,7 @@ class PresenceBoard:
                 found.append(name)
         return found
 
-    def say(self, client: Client, presence: Presence) -> None:
+    def say(self, client: Connection, presence: Presence) -> None:
         """Take what a user's client says, and tell it. RequestRefused for what cannot be sent on."""
         user = client.user
         assert user is not None

@@ -10,9 +10,7 @@ from arcor2_hw.data.editor import MovePreview, MovePreviewData
 from arcor2_server.collaboration.locks import Locks
 from arcor2_server.collaboration.throttle import Newest
 from arcor2_server.documents.changes import Change
-from arcor2_server.rpc.registry import make_event
-from arcor2_server.websocket.client import Client
-from arcor2_server.websocket.hub import Hub, encode
+from arcor2_server.events import Connection, EventHub, encode, make_event
 
 PERIOD: Final = 1 / 30
 """Seconds between two events of one item."""
@@ -24,7 +22,7 @@ NAME: Final = "MovePreview"
 class _Dragged:
     __slots__ = ("client", "ending", "locked", "user")
 
-    def __init__(self, client: Client, user: str, locked: str) -> None:
+    def __init__(self, client: Connection, user: str, locked: str) -> None:
         self.client = client
         self.user = user
         self.locked = locked
@@ -34,14 +32,14 @@ class _Dragged:
 class Previews:
     """What is dragged just now, by item."""
 
-    def __init__(self, hub: Hub, locks: Locks) -> None:
+    def __init__(self, hub: EventHub, locks: Locks) -> None:
         self._hub = hub
         self._locks = locks
         self._dragged: dict[str, _Dragged] = {}
         self._events = Newest(PERIOD, self._send)
         self._look: asyncio.TimerHandle | None = None
 
-    def show(self, client: Client, user: str, preview: MovePreview, locked: str) -> None:
+    def show(self, client: Connection, user: str, preview: MovePreview, locked: str) -> None:
         """Tell the others where an item is just now; or that it is over; `locked` is what its mover holds."""
         if preview.position is UNSET and preview.orientation is UNSET and preview.joints is UNSET:
             self._over(preview.id)

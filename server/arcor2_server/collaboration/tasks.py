@@ -13,8 +13,8 @@ from arcor2_hw.data.editor import TaskKind, TaskProgress, TaskStateData
 from arcor2_hw.data.events import Event
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_server.collaboration.throttle import Newest
-from arcor2_server.rpc.registry import make_event
-from arcor2_server.websocket.hub import Hub, encode
+from arcor2_server.events import encode, make_event
+from arcor2_server.websocket.hub import Hub
 
 PERIOD: Final = 0.1
 """Seconds between two events of one task."""

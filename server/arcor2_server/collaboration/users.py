@@ -9,10 +9,9 @@ import structlog
 from arcor2_hw.data.base import now
 from arcor2_hw.data.events import Event, LockData, NotificationData, NotificationLevel
 from arcor2_server.collaboration.locks import Locks
-from arcor2_server.rpc.registry import RequestRefused, make_event
+from arcor2_server.errors import RequestRefused
+from arcor2_server.events import Connection, EventHub, make_event
 from arcor2_server.settings import ServerSettings
-from arcor2_server.websocket.client import Client
-from arcor2_server.websocket.hub import Hub
 
 log = structlog.get_logger(__name__)
 
@@ -29,11 +28,11 @@ USERS_WITH_NOTICES: Final = 200
 class Users:
     """Names of people, each at one connection."""
 
-    def __init__(self, hub: Hub, locks: Locks, settings: ServerSettings) -> None:
+    def __init__(self, hub: EventHub, locks: Locks, settings: ServerSettings) -> None:
         self._hub = hub
         self._locks = locks
         self._timeout = settings.lock_timeout
-        self._clients: dict[str, Client] = {}
+        self._clients: dict[str, Connection] = {}
         self._releases: dict[str, asyncio.TimerHandle] = {}
         self._left: dict[str, str] = {}
         self._notices: dict[str, list[str]] = {}
@@ -41,7 +40,7 @@ class Users:
         self.on_leave: list[Callable[[str], None]] = []
         """Called with the name of who logged in, or is logged out."""
 
-    def client_of(self, user: str) -> Client | None:
+    def client_of(self, user: str) -> Connection | None:
         """Give the connection of a user."""
         return self._clients.get(user)
 
@@ -66,7 +65,7 @@ class Users:
             del self._notices[next(iter(self._notices))]
         return self._locks.release_all(user)
 
-    async def register(self, client: Client, name: str) -> list[Event]:
+    async def register(self, client: Connection, name: str) -> list[Event]:
         """Log in; gives the events that tell this connection alone who holds which locks.
 
         RequestRefused for an empty name, and for one whose other connection is alive.
@@ -102,7 +101,7 @@ class Users:
         events += [make_event("Notification", notice) for notice in notices]
         return events
 
-    def disconnected(self, client: Client) -> None:
+    def disconnected(self, client: Connection) -> None:
         """Log out the user of a connection that is gone; his locks are released after the time-out."""
         if client.user is not None and self._clients.get(client.user) is client:
             self._leave(client.user)

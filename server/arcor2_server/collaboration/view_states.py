@@ -10,10 +10,9 @@ import msgspec
 
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.editor import ViewScope, ViewState
-from arcor2_server.rpc.registry import RequestRefused, make_event
+from arcor2_server.errors import RequestRefused
+from arcor2_server.events import Connection, EventHub, encode, make_event
 from arcor2_server.storage.shared_data import SharedData
-from arcor2_server.websocket.client import Client
-from arcor2_server.websocket.hub import Hub, encode
 
 LARGEST_VALUE: Final = 64 * 1024
 LARGEST_VIEW: Final = 1024 * 1024
@@ -29,7 +28,7 @@ IN_MEMORY: Final = 64
 class ViewStates:
     """The values by whose they are (nobody: shared) and document; on disk, the ones in use in memory too."""
 
-    def __init__(self, hub: Hub, data: SharedData) -> None:
+    def __init__(self, hub: EventHub, data: SharedData) -> None:
         self._hub = hub
         self._data = data
         self._views: OrderedDict[tuple[str, str], dict[str, bytes]] = OrderedDict()
@@ -43,7 +42,9 @@ class ViewStates:
             decoded = {key: msgspec.json.decode(value) for key, value in values.items()}
             return ViewState(scope, decoded, await self._now(), document, user or UNSET)
 
-    async def change(self, scope: ViewScope, user: str, document: str, values: Mapping[str, Any], by: Client) -> int:
+    async def change(
+        self, scope: ViewScope, user: str, document: str, values: Mapping[str, Any], by: Connection
+    ) -> int:
         """Write values, None: take them away, and tell the others; gives the revision. RequestRefused, StorageError."""
         encoded = {key: _encoded(key, value) for key, value in values.items()}
         owner = _owner(scope, user)
@@ -94,7 +95,7 @@ class ViewStates:
             for document in gone:
                 self._views.pop((owner, document), None)
 
-    def _tell(self, scope: ViewScope, user: str, state: ViewState, by: Client) -> None:
+    def _tell(self, scope: ViewScope, user: str, state: ViewState, by: Connection) -> None:
         event = encode(make_event("ViewStateChanged", state))
         for client in self._hub.subscribers("ViewStateChanged"):
             concerned = scope is ViewScope.SHARED or user == client.user or user in client.follows

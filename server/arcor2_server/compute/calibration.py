@@ -14,7 +14,7 @@ from arcor2_hw.data.camera import CameraParameters, MarkerCorners
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint
 from arcor2_server.compute.process import Told
-from arcor2_server.rpc.registry import RequestRefused
+from arcor2_server.errors import RequestRefused
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services

@@ -8,9 +8,7 @@ from arcor2_hw.data.editor import HistoryChangedData, HistoryStep
 from arcor2_hw.data.events import Event
 from arcor2_server.documents.changes import Change, Edit, How, Kind
 from arcor2_server.documents.history import History
-from arcor2_server.rpc.registry import make_event
-from arcor2_server.websocket.client import Client
-from arcor2_server.websocket.hub import encode
+from arcor2_server.events import Connection, encode, make_event
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services
@@ -34,7 +32,7 @@ class EditNews:
         self._kept = services.session.revision
         services.session.on_change.append(self._changed)
 
-    def history_of(self, client: Client) -> Event:
+    def history_of(self, client: Connection) -> Event:
         """Give the event that tells a client what he could undo and redo now."""
         return self._history(client.user)
 

@@ -19,7 +19,8 @@ from arcor2_server.documents.changes import Kind
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.journal_records import Times
 from arcor2_server.documents.unsaved import Unsaved
-from arcor2_server.rpc.registry import RequestRefused, make_event
+from arcor2_server.errors import RequestRefused
+from arcor2_server.events import make_event
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services

@@ -25,7 +25,7 @@ from arcor2_server.documents.journal_records import ALL, Base, Recovered, Times
 from arcor2_server.documents.open_document import OpenDocument
 from arcor2_server.documents.renamed_actions import with_present_names
 from arcor2_server.documents.unsaved import Unsaved
-from arcor2_server.rpc.registry import RequestRefused
+from arcor2_server.errors import RequestRefused
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services

@@ -11,7 +11,7 @@ from arcor2_server.documents.checks import Types
 from arcor2_server.documents.consistency import Unsound, check_sound, title
 from arcor2_server.documents.document import Document, action_of
 from arcor2_server.documents.history import History
-from arcor2_server.rpc.registry import RequestRefused
+from arcor2_server.errors import RequestRefused
 
 
 def changes_back(edits: Iterable[Edit]) -> list[Change]:

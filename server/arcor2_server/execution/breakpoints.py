@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Final
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.editor import ProjectBreakpoints
 from arcor2_server.documents.changes import Change, Kind
-from arcor2_server.rpc.registry import RequestRefused, make_event
+from arcor2_server.errors import RequestRefused
+from arcor2_server.events import make_event
 from arcor2_server.storage.shared_data import SharedData
 
 if TYPE_CHECKING:

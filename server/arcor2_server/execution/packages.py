@@ -6,15 +6,14 @@ from typing import IO
 
 from arcor2_hw.data.events import ChangeType
 from arcor2_hw.data.package import PackageSummary
-from arcor2_server.rpc.registry import make_event
+from arcor2_server.events import EventHub, make_event
 from arcor2_server.storage.packages import Packages
-from arcor2_server.websocket.hub import Hub
 
 
 class KeptPackages(abc.ABC):
     """What may be done with packages on disk; with that which runs, nothing but to give it another name."""
 
-    def __init__(self, hub: Hub, packages: Packages) -> None:
+    def __init__(self, hub: EventHub, packages: Packages) -> None:
         self.packages = packages
         self._hub = hub
 

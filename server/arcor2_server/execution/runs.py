@@ -17,9 +17,8 @@ from arcor2_hw.data.editor import ActionOfRun, Run, RunEnd, TraceEntry
 from arcor2_hw.data.events import ActionStateAfterData, ActionStateBeforeData
 from arcor2_hw.exceptions import StorageError
 from arcor2_hw.runtime import messages as m
-from arcor2_server.rpc.registry import make_event
+from arcor2_server.events import EventHub, make_event
 from arcor2_server.storage.shared_data import SharedData
-from arcor2_server.websocket.hub import Hub
 
 log = structlog.get_logger(__name__)
 
@@ -83,7 +82,7 @@ class How(Struct, frozen=True):
 class Runs:
     """All runs by number, which grows; on disk too once `open` has read them."""
 
-    def __init__(self, hub: Hub) -> None:
+    def __init__(self, hub: EventHub) -> None:
         self._hub = hub
         self._runs: OrderedDict[int, Run] = OrderedDict()
         self._data: SharedData | None = None

@@ -23,6 +23,8 @@ from arcor2_hw.data.events import (
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.exceptions import Arcor2Error, NotFound
 from arcor2_hw.runtime import messages as m
+from arcor2_server.errors import RequestRefused
+from arcor2_server.events import make_event
 from arcor2_server.execution.packages import KeptPackages
 from arcor2_server.execution.runs import How
 from arcor2_server.hosts.devices import DeviceBoard, overlay_for
@@ -30,7 +32,6 @@ from arcor2_server.hosts.open_request import shapes_put_in
 from arcor2_server.hosts.process import CellHost
 from arcor2_server.hosts.streams import RobotStreams
 from arcor2_server.hosts.workspace_updates import calibrations_of_package, with_world
-from arcor2_server.rpc.registry import RequestRefused, make_event
 from arcor2_server.storage.package_versions import check_versions
 from arcor2_server.storage.packages import Packages
 

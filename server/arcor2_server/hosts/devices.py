@@ -15,8 +15,8 @@ from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.data.secret import HIDDEN
 from arcor2_hw.exceptions import NotFound
 from arcor2_hw.runtime.messages import DeviceChanged, HeldPart
-from arcor2_server.rpc.registry import RequestRefused, make_event
-from arcor2_server.websocket.hub import Hub
+from arcor2_server.errors import RequestRefused
+from arcor2_server.events import EventHub, make_event
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services
@@ -67,7 +67,7 @@ class DeviceBoard:
     told: called after a change of a connection was told.
     """
 
-    def __init__(self, hub: Hub, told: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, hub: EventHub, told: Callable[[], None] = lambda: None) -> None:
         self.on_obstacles_changed: list[Callable[[], None]] = []
         """Called when a collision object was enabled or disabled, or a robot gripped or released a part."""
         self._hub = hub

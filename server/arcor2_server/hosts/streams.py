@@ -5,9 +5,8 @@ from typing import Final
 
 from arcor2_hw.data.rpc import RobotEventKind
 from arcor2_hw.runtime import messages as m
-from arcor2_server.rpc.registry import RequestRefused
-from arcor2_server.websocket.client import Client
-from arcor2_server.websocket.hub import Hub
+from arcor2_server.errors import RequestRefused
+from arcor2_server.events import Connection, EventHub
 
 _KINDS: Final = {"RobotJoints": RobotEventKind.JOINTS, "RobotEef": RobotEventKind.EEF_POSE}
 
@@ -18,14 +17,14 @@ class RobotStreams:
     everybody: what comes at the streaming period goes to all, as in the protocol while a program runs.
     """
 
-    def __init__(self, hub: Hub, say: Callable[[m.ToHost], None], *, everybody: bool = False) -> None:
+    def __init__(self, hub: EventHub, say: Callable[[m.ToHost], None], *, everybody: bool = False) -> None:
         self._hub = hub
         self._say = say
         self._everybody = everybody
-        self._subscribers: dict[tuple[str, RobotEventKind], set[Client]] = {}
-        self._rates: dict[tuple[str, RobotEventKind], dict[Client, float]] = {}
+        self._subscribers: dict[tuple[str, RobotEventKind], set[Connection]] = {}
+        self._rates: dict[tuple[str, RobotEventKind], dict[Connection, float]] = {}
 
-    def subscribe(self, client: Client, robot_id: str, what: RobotEventKind, send: bool) -> None:
+    def subscribe(self, client: Connection, robot_id: str, what: RobotEventKind, send: bool) -> None:
         """Send a robot's state to a client, or no longer; RequestRefused when it was not sent."""
         clients = self._subscribers.setdefault((robot_id, what), set())
         if send:
@@ -36,7 +35,7 @@ class RobotStreams:
             clients.discard(client)
         self._tell(robot_id)
 
-    def at_rate(self, client: Client, robot_id: str, what: RobotEventKind, rate: float, send: bool) -> None:
+    def at_rate(self, client: Connection, robot_id: str, what: RobotEventKind, rate: float, send: bool) -> None:
         """Send a robot's state to a client `rate` times a second, or no longer; RequestRefused when it was not sent."""
         rates = self._rates.setdefault((robot_id, what), {})
         if send:
@@ -60,7 +59,7 @@ class RobotStreams:
         if clients:
             self._hub.stream(message.event, stream, message.encoded, clients)
 
-    def forget(self, client: Client) -> None:
+    def forget(self, client: Connection) -> None:
         """Forget a client that left."""
         for (robot_id, _), clients in list(self._subscribers.items()):
             if client in clients:

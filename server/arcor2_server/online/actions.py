@@ -13,7 +13,7 @@ from arcor2_hw.data.object_type import ObjectAction
 from arcor2_hw.data.project import Action, ActionParameter, ActionParameterType, parse_link
 from arcor2_hw.data.project_index import ProjectLookup
 from arcor2_hw.exceptions import Arcor2Error, Cancelled, InvalidData
-from arcor2_server.rpc.registry import RequestRefused
+from arcor2_server.errors import RequestRefused
 
 if TYPE_CHECKING:
     from arcor2_server.online.online_scene import OnlineCell

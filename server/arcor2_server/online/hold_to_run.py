@@ -19,9 +19,9 @@ from arcor2_hw.data.rpc import HoldHandTeachingArgs, JogRobotArgs
 from arcor2_hw.data.rpc.operation import LONGEST_LEASE_MS
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.runtime import messages as m
+from arcor2_server.errors import RequestRefused
+from arcor2_server.events import Connection, make_event
 from arcor2_server.hosts.process import CellHost
-from arcor2_server.rpc.registry import RequestRefused, make_event
-from arcor2_server.websocket.client import Client
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services
@@ -60,7 +60,7 @@ class Delay:
 class _Press:
     """One press of the button: a user holds a robot."""
 
-    def __init__(self, client: Client, user: str, kind: HoldKind, args: Held, number: int) -> None:
+    def __init__(self, client: Connection, user: str, kind: HoldKind, args: Held, number: int) -> None:
         loop = asyncio.get_running_loop()
         self.client = client
         self.user = user
@@ -94,9 +94,9 @@ class HeldRobots:
         self._moving = moving
         self._numbers = itertools.count(1)
         self._held: dict[str, _Press] = {}
-        self._spent: dict[Client, int] = {}
+        self._spent: dict[Connection, int] = {}
         """By client, the newest press that has ended: it and those before never begin again."""
-        self._delays: dict[Client, Delay] = {}
+        self._delays: dict[Connection, Delay] = {}
 
     def holder(self, robot_id: str) -> str | None:
         """Name who holds a robot, None when nobody does."""
@@ -110,7 +110,7 @@ class HeldRobots:
     # -------------------------------------------------------------------------------- leases
     async def lease(
         self,
-        client: Client,
+        client: Connection,
         user: str,
         args: Held,
         kind: HoldKind,
@@ -166,7 +166,7 @@ class HeldRobots:
 
     async def _begin(
         self,
-        client: Client,
+        client: Connection,
         user: str,
         args: Held,
         kind: HoldKind,
@@ -201,7 +201,7 @@ class HeldRobots:
         press.allowed.set_result(None)
         return press
 
-    def _require_unspent(self, client: Client, press: int) -> None:
+    def _require_unspent(self, client: Connection, press: int) -> None:
         if press <= self._spent.get(client, -1):
             raise RequestRefused("That hold has ended: let go, and press again.")
 
@@ -212,7 +212,7 @@ class HeldRobots:
             raise RequestRefused(f"{name} is locked by {writer}." if writer else f"Lock {name} before you move it.")
 
     # -------------------------------------------------------------------------------- ends
-    async def _let_go(self, client: Client, args: Held) -> None:
+    async def _let_go(self, client: Connection, args: Held) -> None:
         """End a press and return when the robot is at rest; harmless when it has ended."""
         press = self._held.get(args.robot_id)
         if press is None or press.client is not client or press.press != args.hold:
@@ -274,7 +274,7 @@ class HeldRobots:
         hub.broadcast(make_event("HandTeachingMode", data))
         hub.broadcast(make_event("Notification", NotificationData(message.error.message, NotificationLevel.WARN)))
 
-    def forget(self, client: Client) -> None:
+    def forget(self, client: Connection) -> None:
         """Let go of what a client held that is gone."""
         self._delays.pop(client, None)
         self._spent.pop(client, None)

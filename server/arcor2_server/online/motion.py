@@ -9,7 +9,8 @@ import structlog
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.events import MoveEventType
 from arcor2_hw.exceptions import Arcor2Error
-from arcor2_server.rpc.registry import RequestRefused, make_event
+from arcor2_server.errors import RequestRefused
+from arcor2_server.events import make_event
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services

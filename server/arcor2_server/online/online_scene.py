@@ -15,6 +15,8 @@ from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import Arcor2Error, ConnectionLost
 from arcor2_hw.runtime import messages as m
 from arcor2_server.collaboration.locks import PROJECT, SCENE, SERVER
+from arcor2_server.errors import RequestRefused
+from arcor2_server.events import make_event
 from arcor2_server.hosts.devices import DeviceBoard
 from arcor2_server.hosts.open_request import opening
 from arcor2_server.hosts.pool import CellHosts
@@ -24,7 +26,6 @@ from arcor2_server.hosts.workspace_updates import calibrations, with_world
 from arcor2_server.online.actions import LastStop, RunningAction
 from arcor2_server.online.hold_to_run import HeldRobots
 from arcor2_server.online.progress import SceneTask
-from arcor2_server.rpc.registry import RequestRefused, make_event
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services

@@ -14,11 +14,11 @@ from arcor2_hw.data.events import ChangeType
 from arcor2_hw.data.package import PackageStateEnum, PackageSummary
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
+from arcor2_server.events import make_event
 from arcor2_server.execution.runs import How
 from arcor2_server.rest.build import ZIP
 from arcor2_server.rest.operations import MIB, Binary, Upload, operation
 from arcor2_server.rpc import left_open
-from arcor2_server.rpc.registry import make_event
 from arcor2_server.services import Services
 from arcor2_server.storage.packages import MAX_UPLOAD
 from arcor2_server.storage.project_tables import Beside, ExecutionToken

@@ -21,8 +21,9 @@ from arcor2_server.documents.changes import Change, Kind
 from arcor2_server.documents.checks import check_name
 from arcor2_server.documents.document import OWNED, Document
 from arcor2_server.documents.reparenting import changes_for_parent, check_parent
+from arcor2_server.errors import RequestRefused
 from arcor2_server.rpc.editing import commit, drop_locks, eef_pose, optional, require_free, require_held, tell, unlock
-from arcor2_server.rpc.registry import Context, RequestRefused, rpc
+from arcor2_server.rpc.registry import Context, rpc
 
 
 def check_point_name(context: Context, name: str) -> None:

@@ -17,8 +17,9 @@ from arcor2_server.documents.checks import (
 )
 from arcor2_server.documents.document import Document, action_of
 from arcor2_server.documents.logic import check_logic_item
+from arcor2_server.errors import RequestRefused
 from arcor2_server.rpc.editing import commit, drop_locks, require_free, require_held, tell, unlock
-from arcor2_server.rpc.registry import Context, RequestRefused, rpc
+from arcor2_server.rpc.registry import Context, rpc
 
 
 def _check_name(context: Context, name: str) -> None:

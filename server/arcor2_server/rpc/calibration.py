@@ -20,10 +20,12 @@ from arcor2_hw.exceptions import Arcor2Error, InvalidData
 from arcor2_server.compute.calibration import RobotView
 from arcor2_server.compute.process import Told
 from arcor2_server.documents.changes import Kind
+from arcor2_server.errors import RequestRefused
+from arcor2_server.events import make_event
 from arcor2_server.online.motion import require_not_moving
 from arcor2_server.rpc.cameras import PICTURE_WITHIN, camera_parameters, require_camera
 from arcor2_server.rpc.editing import require_held
-from arcor2_server.rpc.registry import Context, RequestRefused, make_event, rpc
+from arcor2_server.rpc.registry import Context, rpc
 from arcor2_server.services import Services
 from arcor2_server.workspace.robot_models import model_of
 

@@ -7,7 +7,8 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.calibration import CalibrationCheck, CalibrationRecord
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.rpc import CheckCalibrationArgs, ListCalibrationsArgs, ListCalibrationsData
-from arcor2_server.rpc.registry import Context, RequestRefused, rpc
+from arcor2_server.errors import RequestRefused
+from arcor2_server.rpc.registry import Context, rpc
 from arcor2_server.services import Services
 
 

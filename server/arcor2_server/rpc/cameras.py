@@ -9,9 +9,10 @@ from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.rpc import CameraColorImageArgs, CameraColorParametersArgs
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.errors import RequestRefused
 from arcor2_server.online.online_scene import OBSERVE_WITHIN
 from arcor2_server.rpc.editing import require_held
-from arcor2_server.rpc.registry import Context, RequestRefused, rpc
+from arcor2_server.rpc.registry import Context, rpc
 from arcor2_server.services import Services
 
 PICTURE_WITHIN: Final = 15.0

@@ -10,7 +10,8 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.scene import SceneObject
 from arcor2_server.documents.changes import Change, Kind
-from arcor2_server.rpc.registry import Context, RequestRefused
+from arcor2_server.errors import RequestRefused
+from arcor2_server.rpc.registry import Context
 
 
 async def commit(context: Context, changes: Sequence[Change]) -> bool:

@@ -12,7 +12,8 @@ from arcor2_hw.data.rpc import (
 )
 from arcor2_hw.exceptions import NotFound
 from arcor2_server.documents.changes import OF_SCENE, Kind
-from arcor2_server.rpc.registry import Context, RequestRefused, rpc
+from arcor2_server.errors import RequestRefused
+from arcor2_server.rpc.registry import Context, rpc
 
 
 # ---------------------------------------------------------------------------------------------- view state

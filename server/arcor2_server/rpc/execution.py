@@ -13,10 +13,11 @@ from arcor2_hw.data.rpc import (
     UploadPackageArgs,
 )
 from arcor2_server.collaboration.locks import ACTION
+from arcor2_server.errors import RequestRefused
 from arcor2_server.execution.runs import How
 from arcor2_server.online.actions import RunningAction, execute, prepare
 from arcor2_server.rpc import left_open
-from arcor2_server.rpc.registry import Context, RequestRefused, rpc
+from arcor2_server.rpc.registry import Context, rpc
 
 
 # ------------------------------------------------------------------------------------------------ scene

@@ -15,10 +15,11 @@ from arcor2_hw.data.rpc import (
     SystemInfoData,
 )
 from arcor2_server.access.admission import TooManyAttempts
-from arcor2_server.rpc.registry import HANDLERS, Context, RequestRefused, at_once, make_event, rpc
+from arcor2_server.errors import RequestRefused
+from arcor2_server.events import encode, make_event
+from arcor2_server.rpc.registry import HANDLERS, Context, at_once, rpc
 from arcor2_server.services import Services
 from arcor2_server.websocket.client import CloseCode
-from arcor2_server.websocket.hub import encode
 
 VERSION: Final = "1.4.0"
 """The version of the ARServer whose behaviour this is; our own is `arcor2-hw --version`."""

@@ -27,9 +27,10 @@ from arcor2_server.documents.undo import (
     require_possible,
     role_for,
 )
+from arcor2_server.errors import RequestRefused
 from arcor2_server.rpc.change_events import tell_changes
 from arcor2_server.rpc.editing import drop_locks
-from arcor2_server.rpc.registry import Context, RequestRefused, rpc
+from arcor2_server.rpc.registry import Context, rpc
 
 LONGEST_LIST: Final = 20
 """Things that History names of one edit."""

@@ -7,9 +7,10 @@ import structlog
 from arcor2_hw.data.events import SceneStateEnum
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_server.documents.changes import Kind
+from arcor2_server.errors import RequestRefused
+from arcor2_server.events import make_event
 from arcor2_server.execution.runs import How
 from arcor2_server.rpc.locking import release_locks
-from arcor2_server.rpc.registry import RequestRefused, make_event
 from arcor2_server.services import Services
 
 log = structlog.get_logger(__name__)

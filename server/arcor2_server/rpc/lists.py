@@ -8,10 +8,10 @@ from msgspec import UNSET, Raw
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.rpc import IdArgs, ListProjectsData, ListScenesData
 from arcor2_hw.data.scene import Scene
+from arcor2_server.events import encode
 from arcor2_server.rpc.object_types import notice_new_types
 from arcor2_server.rpc.registry import Context, at_once, rpc
 from arcor2_server.services import Services
-from arcor2_server.websocket.hub import encode
 
 
 def _revisions(services: Services) -> tuple[int, ...]:

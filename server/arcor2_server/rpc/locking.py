@@ -18,7 +18,9 @@ from arcor2_hw.data.rpc import (
 )
 from arcor2_server.collaboration.locks import PROJECT, SCENE
 from arcor2_server.documents.changes import Kind
-from arcor2_server.rpc.registry import Context, RequestRefused, make_event, rpc
+from arcor2_server.errors import RequestRefused
+from arcor2_server.events import make_event
+from arcor2_server.rpc.registry import Context, rpc
 from arcor2_server.services import Services
 
 log = structlog.get_logger(__name__)

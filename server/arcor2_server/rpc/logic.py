@@ -13,8 +13,9 @@ from arcor2_server.documents.changes import Kind
 from arcor2_server.documents.checks import action_meta
 from arcor2_server.documents.document import Document, action_of
 from arcor2_server.documents.logic import check_logic_item
+from arcor2_server.errors import RequestRefused
 from arcor2_server.rpc.editing import commit, tell
-from arcor2_server.rpc.registry import Context, RequestRefused, rpc
+from arcor2_server.rpc.registry import Context, rpc
 
 
 def _document(context: Context) -> Document:

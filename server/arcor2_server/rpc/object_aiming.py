@@ -9,8 +9,9 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import Mesh
 from arcor2_hw.data.rpc import ObjectAimingAddPointArgs, ObjectAimingAddPointData, ObjectAimingStartArgs
 from arcor2_hw.data.scene import SceneObject
+from arcor2_server.errors import RequestRefused
 from arcor2_server.rpc.editing import eef_pose, require_held
-from arcor2_server.rpc.registry import Context, RequestRefused, rpc
+from arcor2_server.rpc.registry import Context, rpc
 from arcor2_server.rpc.scene_objects import move_object
 from arcor2_server.workspace.object_aiming import Aim
 from arcor2_server.workspace.point_registration import check_points, fit

@@ -13,10 +13,11 @@ from arcor2_hw.data.rpc import ActionParamValuesArgs, DeleteObjectTypesData, IdA
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
 from arcor2_hw.runtime.messages import TypeCode
 from arcor2_server.collaboration.locks import ADDING_OBJECT
+from arcor2_server.errors import RequestRefused
+from arcor2_server.events import encode, make_event
 from arcor2_server.object_types.changes import Changes
-from arcor2_server.rpc.registry import Context, RequestRefused, at_once, make_event, rpc
+from arcor2_server.rpc.registry import Context, at_once, rpc
 from arcor2_server.services import Services
-from arcor2_server.websocket.hub import encode
 
 
 def change_events(changes: Changes) -> list[Event]:

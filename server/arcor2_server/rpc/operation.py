@@ -21,10 +21,11 @@ from arcor2_hw.data.rpc import (
     StreamRobotArgs,
 )
 from arcor2_hw.data.rpc.operation import FASTEST_STREAM
+from arcor2_server.errors import RequestRefused
 from arcor2_server.online.motion import require_feature, require_not_moving
 from arcor2_server.online.stop_all import stop_all
 from arcor2_server.rpc.editing import optional
-from arcor2_server.rpc.registry import Context, RequestRefused, rpc
+from arcor2_server.rpc.registry import Context, rpc
 from arcor2_server.rpc.robot import require_robot_online
 
 log = structlog.get_logger(__name__)

@@ -18,8 +18,9 @@ from arcor2_hw.data.rpc import (
 )
 from arcor2_server.documents.changes import Kind
 from arcor2_server.documents.checks import check_name
+from arcor2_server.errors import RequestRefused
 from arcor2_server.rpc.editing import commit, drop_locks, eef_pose, require_free, require_held, tell
-from arcor2_server.rpc.registry import Context, RequestRefused, rpc
+from arcor2_server.rpc.registry import Context, rpc
 
 
 def _check_name(context: Context, name: str, point_id: str) -> None:

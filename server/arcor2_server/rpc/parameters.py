@@ -20,8 +20,9 @@ from arcor2_server.collaboration.locks import PROJECT
 from arcor2_server.documents.changes import Change, Kind
 from arcor2_server.documents.checks import check_project_parameter, check_setting
 from arcor2_server.documents.document import Document
+from arcor2_server.errors import RequestRefused
 from arcor2_server.rpc.editing import commit, drop_locks, hide_secrets, require_free, require_held, tell, unlock
-from arcor2_server.rpc.registry import Context, RequestRefused, rpc
+from arcor2_server.rpc.registry import Context, rpc
 
 
 @rpc("AddProjectParameter")

@@ -9,10 +9,11 @@ import structlog
 from arcor2_hw.data.geometry import Orientation, Pose
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.rpc import InverseKinematicsArgs, SetEefPerpendicularToWorldArgs
+from arcor2_server.errors import RequestRefused
 from arcor2_server.hosts.process import CellError
 from arcor2_server.online.motion import require_feature, require_ready, require_speed, take_control
 from arcor2_server.rpc.editing import optional
-from arcor2_server.rpc.registry import Context, RequestRefused, rpc
+from arcor2_server.rpc.registry import Context, rpc
 from arcor2_server.rpc.robot import begin_motion, pose_motion, require_robot_online, solve_inverse
 
 log = structlog.get_logger(__name__)

@@ -24,9 +24,10 @@ from arcor2_server.collaboration.locks import PROJECT
 from arcor2_server.documents.changes import Kind
 from arcor2_server.documents.checks import project_problems
 from arcor2_server.documents.renamed_actions import with_present_names
+from arcor2_server.errors import RequestRefused
 from arcor2_server.rpc.editing import commit, opening_allowed, require_held, require_name_free, require_no_program
 from arcor2_server.rpc.object_types import notice_new_types
-from arcor2_server.rpc.registry import Context, RequestRefused, rpc
+from arcor2_server.rpc.registry import Context, rpc
 from arcor2_server.rpc.scene import save_open_scene
 
 _BARE = BareProject.__struct_fields__

@@ -7,43 +7,14 @@ from typing import TYPE_CHECKING, Any, Final
 from msgspec import Raw
 
 from arcor2_hw.data.base import UNSET
-from arcor2_hw.data.events import EVENTS, ChangeType, Event
+from arcor2_hw.data.events import ChangeType, Event
 from arcor2_hw.data.rpc import RPCS
-from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.errors import NotRegistered
+from arcor2_server.events import make_event
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services
     from arcor2_server.websocket.client import Client
-
-
-class RequestRefused(Arcor2Error):
-    """A request that cannot be granted; the text is the answer's message.
-
-    `data` goes into the answer (only DeleteScene and DeleteObjectTypes answer data with result=false).
-    """
-
-    code = "request_refused"
-
-    def __init__(self, message: str, data: Any = UNSET) -> None:
-        super().__init__(message)
-        self.data = data
-
-
-class NotRegistered(RequestRefused):
-    """The request needs a registered user."""
-
-    code = "not_registered"
-
-
-def make_event(name: str, data: Any = UNSET, change: ChangeType | None = None, parent: str | None = None) -> Event:
-    """Make an event of the protocol; KeyError for a name that is none."""
-    declared = EVENTS[name]
-    return Event(
-        declared.name,
-        UNSET if change is None else change,
-        UNSET if parent is None else parent,
-        data,
-    )
 
 
 class Context:

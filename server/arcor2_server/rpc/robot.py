@@ -39,6 +39,7 @@ from arcor2_hw.data.rpc import (
 )
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import NotInControl
+from arcor2_server.errors import RequestRefused
 from arcor2_server.hosts.process import CellError
 from arcor2_server.online.motion import (
     Told,
@@ -51,7 +52,7 @@ from arcor2_server.online.motion import (
 )
 from arcor2_server.online.online_scene import OnlineCell
 from arcor2_server.rpc.editing import optional
-from arcor2_server.rpc.registry import Context, RequestRefused, rpc
+from arcor2_server.rpc.registry import Context, rpc
 from arcor2_server.workspace import kinematics
 from arcor2_server.workspace.robot_models import model_of_type
 

@@ -17,9 +17,10 @@ from arcor2_hw.data.scene import BareScene, Scene
 from arcor2_server.collaboration.locks import SCENE
 from arcor2_server.documents.changes import Kind
 from arcor2_server.documents.dependents import after_saving, forget_unused_types, uses_object
+from arcor2_server.errors import RequestRefused
 from arcor2_server.rpc.editing import commit, opening_allowed, require_held, require_name_free, unlock
 from arcor2_server.rpc.object_types import notice_new_types
-from arcor2_server.rpc.registry import Context, RequestRefused, rpc
+from arcor2_server.rpc.registry import Context, rpc
 
 _BARE = BareScene.__struct_fields__
 

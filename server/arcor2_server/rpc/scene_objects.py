@@ -25,6 +25,7 @@ from arcor2_server.collaboration.locks import ADDING_OBJECT, SCENE
 from arcor2_server.documents.changes import Kind
 from arcor2_server.documents.checks import check_name, object_problems, settings_problems
 from arcor2_server.documents.dependents import VIRTUAL, uses_object
+from arcor2_server.errors import RequestRefused
 from arcor2_server.rpc.editing import (
     commit,
     drop_locks,
@@ -36,7 +37,7 @@ from arcor2_server.rpc.editing import (
     unlock,
 )
 from arcor2_server.rpc.object_types import require_mesh
-from arcor2_server.rpc.registry import Context, RequestRefused, rpc
+from arcor2_server.rpc.registry import Context, rpc
 
 
 @rpc("AddObjectToScene")

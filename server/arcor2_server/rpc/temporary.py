@@ -14,9 +14,11 @@ from arcor2_hw.data.rpc import TemporaryPackageArgs
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_server.documents.checks import project_problems
 from arcor2_server.documents.renamed_actions import with_present_names
+from arcor2_server.errors import RequestRefused
+from arcor2_server.events import make_event
 from arcor2_server.execution.runs import How
 from arcor2_server.rpc.execution import how
-from arcor2_server.rpc.registry import Context, RequestRefused, make_event, rpc
+from arcor2_server.rpc.registry import Context, rpc
 from arcor2_server.services import Services
 
 log = structlog.get_logger(__name__)

@@ -8,11 +8,11 @@ import structlog
 
 from arcor2_hw.data.base import now
 from arcor2_hw.data.events import Event, NotificationData, NotificationLevel
+from arcor2_server.events import make_event
 from arcor2_server.files import aside, write_private
-from arcor2_server.rpc.registry import make_event
 
 if TYPE_CHECKING:
-    from arcor2_server.websocket.hub import Hub
+    from arcor2_server.events import EventHub
 
 log = structlog.get_logger(__name__)
 
@@ -23,7 +23,7 @@ FILE: Final = "damage.json"
 class DataDamage:
     """Notices about damaged files. They reach every client of this run, and of later runs until one has got them."""
 
-    def __init__(self, data_dir: Path, hub: "Hub") -> None:
+    def __init__(self, data_dir: Path, hub: "EventHub") -> None:
         self._path = data_dir / FILE
         self._hub = hub
         self._notices: list[str] = []

@@ -18,11 +18,12 @@ from arcor2_hw.data.rpc import RPCS, Request, Response, Rpc
 from arcor2_hw.data.texts import SHORTEST, check_texts
 from arcor2_hw.exceptions import Arcor2Error, StorageError, TextTooLong
 from arcor2_server.access.admission import AccessRefused, address_of
+from arcor2_server.errors import RequestRefused
+from arcor2_server.events import encode
 from arcor2_server.log import audit
-from arcor2_server.rpc.registry import AT_ONCE, HANDLERS, Context, Handler, RequestRefused
+from arcor2_server.rpc.registry import AT_ONCE, HANDLERS, Context, Handler
 from arcor2_server.services import Services
 from arcor2_server.websocket.client import Client, CloseCode
-from arcor2_server.websocket.hub import encode
 from arcor2_server.websocket.transport import EXTENSION, WireProtocol
 
 log = structlog.get_logger(__name__)

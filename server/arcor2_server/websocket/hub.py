@@ -1,14 +1,11 @@
 """The connected clients: events to all of them, or to one."""
 
 from collections.abc import Callable
-
-import msgspec
+from collections.abc import Set as AbstractSet
 
 from arcor2_hw.data.events import EVENTS, Event, MainScreen, ShowMainScreenData
-from arcor2_server.rpc.registry import make_event
+from arcor2_server.events import Connection, encode, make_event
 from arcor2_server.websocket.client import Client
-
-encode = msgspec.json.Encoder().encode
 
 
 class Hub:
@@ -16,9 +13,9 @@ class Hub:
 
     def __init__(self) -> None:
         self.clients: set[Client] = set()
-        self._only: dict[Client, frozenset[str]] = {}
-        self._subscribers: dict[str, set[Client]] = {}
-        self.on_leave: list[Callable[[Client], None]] = []
+        self._only: dict[Connection, frozenset[str]] = {}
+        self._subscribers: dict[str, set[Connection]] = {}
+        self.on_leave: list[Callable[[Connection], None]] = []
         self.main_screen = make_event("ShowMainScreen", ShowMainScreenData(MainScreen.SCENES_LIST))
         """What a client sees that connects while nothing is open: the last ShowMainScreen, without `highlight`."""
 
@@ -37,7 +34,7 @@ class Hub:
         for forget in self.on_leave:
             forget(client)
 
-    def subscribe(self, client: Client, names: set[str], send: bool) -> None:
+    def subscribe(self, client: Connection, names: set[str], send: bool) -> None:
         """Send additional events to a client, or no longer."""
         for name in names:
             subscribers = self._subscribers.setdefault(name, set())
@@ -46,14 +43,14 @@ class Hub:
             else:
                 subscribers.discard(client)
 
-    def broadcast(self, event: Event, *, besides: Client | None = None) -> None:
+    def broadcast(self, event: Event, *, besides: Connection | None = None) -> None:
         """Send an event to all whose role may see it, but not to `besides`; an additional one to subscribers."""
         if isinstance(event.data, ShowMainScreenData):
             self.main_screen = make_event(event.event, ShowMainScreenData(event.data.what))
         if self.clients:
             self.broadcast_encoded(event.event, encode(event), besides=besides)
 
-    def broadcast_encoded(self, name: str, message: bytes, *, besides: Client | None = None) -> None:
+    def broadcast_encoded(self, name: str, message: bytes, *, besides: Connection | None = None) -> None:
         """Send an event that is encoded already (it comes so from the cell host)."""
         declared = EVENTS[name]
         least = declared.role
@@ -62,23 +59,23 @@ class Hub:
             if client is not besides and client.role >= least:
                 client.put(message)
 
-    def _hearing(self, name: str, clients: set[Client]) -> tuple[Client, ...]:
+    def _hearing(self, name: str, clients: AbstractSet[Connection]) -> tuple[Connection, ...]:
         if not self._only:
             return tuple(clients)
         return tuple(client for client in clients if name in self._only.get(client, (name,)))
 
-    def subscribers(self, name: str) -> tuple[Client, ...]:
+    def subscribers(self, name: str) -> tuple[Connection, ...]:
         """Give the clients that are sent an additional event."""
         least = EVENTS[name].role
         hearing = self._hearing(name, self._subscribers.get(name, set()) & self.clients)
         return tuple(client for client in hearing if client.role >= least)
 
-    def send(self, client: Client, event: Event) -> None:
+    def send(self, client: Connection, event: Event) -> None:
         """Send an event to one client."""
         if client.role >= EVENTS[event.event].role:
             client.put(encode(event))
 
-    def stream(self, name: str, key: str, message: bytes, clients: "set[Client] | None" = None) -> None:
+    def stream(self, name: str, key: str, message: bytes, clients: AbstractSet[Connection] | None = None) -> None:
         """Send the newest message of a stream (event `name` of e.g. robot `key`) to `clients`, None: to all.
 
         An older message of the same stream that still waits for a client is replaced.
@@ -89,7 +86,7 @@ class Hub:
             if client.role >= least:
                 client.put_newest(stream, message)
 
-    def stream_to_subscribers(self, name: str, key: str, message: bytes, *, besides: Client | None = None) -> None:
+    def stream_to_subscribers(self, name: str, key: str, message: bytes, *, besides: Connection | None = None) -> None:
         """Send the newest message of an additional event about `key` to who subscribed, as `stream` does."""
         stream = f"{name}/{key}"
         for client in self.subscribers(name):

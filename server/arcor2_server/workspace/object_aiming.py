@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import RobotArg
-from arcor2_server.rpc.registry import RequestRefused
+from arcor2_server.errors import RequestRefused
 
 if TYPE_CHECKING:
     from arcor2_server.documents.document import Document

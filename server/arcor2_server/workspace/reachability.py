@@ -18,7 +18,7 @@ from arcor2_hw.data.project_index import global_pose
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error, NotFound
-from arcor2_server.rpc.registry import make_event
+from arcor2_server.events import make_event
 from arcor2_server.workspace.robot_models import model_of
 from arcor2_server.workspace.scene_collisions import in_names, robot_model, robots, things
 from arcor2_server.workspace.stopped_robots import PERIOD, StandingArms

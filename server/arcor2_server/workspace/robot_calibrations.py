@@ -22,8 +22,8 @@ from arcor2_hw.data.events import NotificationData, NotificationLevel
 from arcor2_hw.data.robot import KinematicCalibration
 from arcor2_hw.data.scene import SceneObject, SceneObjectOverride
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, StorageError
+from arcor2_server.events import make_event
 from arcor2_server.files import write_private
-from arcor2_server.rpc.registry import make_event
 from arcor2_server.workspace.robot_models import model_of_type, settings_of
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.scene import SceneObject, SceneObjectOverride
 from arcor2_hw.exceptions import NotFound
-from arcor2_server.rpc.registry import RequestRefused
+from arcor2_server.errors import RequestRefused
 
 if TYPE_CHECKING:
     from arcor2_server.services import Services

@@ -26,9 +26,10 @@ from arcor2_hw.data.rpc import BuildProjectArgs, BuildProjectData
 from arcor2_hw.exceptions import InvalidPackage, InvalidProject, NotFound, StorageError
 from arcor2_server.build import package
 from arcor2_server.build.service import BuildService, Ingredients, files_of
+from arcor2_server.errors import RequestRefused
 from arcor2_server.object_types.registry import PackageType
 from arcor2_server.rpc.build import build_project
-from arcor2_server.rpc.registry import Context, RequestRefused
+from arcor2_server.rpc.registry import Context
 from arcor2_server.storage import Storage, package_versions
 from tests.server.build import hub, workplace
 from tests.server.build.conftest import STOCK

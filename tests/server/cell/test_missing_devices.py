@@ -13,9 +13,9 @@ from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.project import Action, ActionPoint, Flow, Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.errors import RequestRefused
 from arcor2_server.rpc import general as _general  # noqa: F401 - for its handlers
 from arcor2_server.rpc import operation as _operation  # noqa: F401 - for its handlers
-from arcor2_server.rpc.registry import RequestRefused
 from tests.runtime.conftest import scene_object
 
 from .conftest import PATIENCE, Recorder, Server, action, robot_meta, serving

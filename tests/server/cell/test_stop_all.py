@@ -13,8 +13,8 @@ from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.project import Action, ActionPoint, Flow, Project
 from arcor2_hw.data.rpc import StopAllData, StopKind
 from arcor2_hw.data.scene import Scene, SceneObject
+from arcor2_server.errors import RequestRefused
 from arcor2_server.rpc import operation as _operation  # noqa: F401 - for its handlers
-from arcor2_server.rpc.registry import RequestRefused
 from tests.runtime.conftest import Package, scene_object
 
 from .conftest import Server, action, serving

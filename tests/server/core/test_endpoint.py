@@ -13,7 +13,8 @@ from litestar.datastructures import Address
 
 from arcor2_hw.exceptions import DeviceTimeout
 from arcor2_server.app import running_services
-from arcor2_server.rpc.registry import AT_ONCE, HANDLERS, Context, Handler, RequestRefused
+from arcor2_server.errors import RequestRefused
+from arcor2_server.rpc.registry import AT_ONCE, HANDLERS, Context, Handler
 from arcor2_server.services import Services
 from arcor2_server.settings import ServerSettings
 from arcor2_server.websocket.endpoint import Endpoint

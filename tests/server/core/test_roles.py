@@ -11,8 +11,9 @@ from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import RPCS
 from arcor2_server.app import create_app, running_services
 from arcor2_server.cli.role_table import page
+from arcor2_server.events import make_event
 from arcor2_server.rest.responses import ROLE
-from arcor2_server.rpc.registry import HANDLERS, make_event
+from arcor2_server.rpc.registry import HANDLERS
 from arcor2_server.settings import ServerSettings
 from arcor2_server.websocket.client import Client, Wire
 from arcor2_server.websocket.hub import Hub

@@ -23,6 +23,7 @@ from arcor2_server.access.admission import Access
 from arcor2_server.collaboration.locks import Locks
 from arcor2_server.collaboration.users import Users
 from arcor2_server.documents import Session
+from arcor2_server.errors import RequestRefused
 from arcor2_server.object_types.changes import Changes
 from arcor2_server.rpc import (  # noqa: F401
     action_points,
@@ -42,7 +43,6 @@ from arcor2_server.rpc import (  # noqa: F401
     scene,
     scene_objects,
 )
-from arcor2_server.rpc.registry import RequestRefused
 from arcor2_server.services import Services
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import Storage

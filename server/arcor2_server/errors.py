@@ -1,0 +1,27 @@
+"""Errors with which the server refuses a request."""
+
+from typing import Any
+
+from arcor2_hw.data.base import UNSET
+from arcor2_hw.exceptions import Arcor2Error
+
+
+class RequestRefused(Arcor2Error):
+    """The server cannot grant a request; the text becomes the message of the answer.
+
+    Args:
+        message: what is wrong and what to do about it.
+        data: the data of the answer. Only DeleteScene and DeleteObjectTypes return data with result=false.
+    """
+
+    code = "request_refused"
+
+    def __init__(self, message: str, data: Any = UNSET) -> None:
+        super().__init__(message)
+        self.data = data
+
+
+class NotRegistered(RequestRefused):
+    """The request needs a registered user."""
+
+    code = "not_registered"
