@@ -28,7 +28,34 @@ from arcor2_server.rest import routes
 from arcor2_server.rest.responses import ROLE, http_refusal
 
 # Imported for their handlers.
-from arcor2_server.rpc import (
+from arcor2_server.rpc import (  # noqa: F401
+    action_points,
+    actions,
+    build,
+    calibration,
+    calibration_records,
+    cameras,
+    copying,
+    editor,
+    execution,
+    general,
+    history,
+    joints,
+    lists,
+    locking,
+    logic,
+    object_aiming,
+    object_types,
+    operation,
+    orientations,
+    parameters,
+    perpendicular,
+    project,
+    reachability,
+    robot,
+    runs,
+    scene,
+    scene_objects,
     temporary,
 )
 from arcor2_server.services import Services
