@@ -5,11 +5,12 @@ from pathlib import Path
 from typing import Final
 
 import arcor2_drivers
+from arcor2_hw.collision.description import RobotSource, StoredFile, WorldBody, WorldItem, WorldRobot
 from arcor2_hw.compute import kinematics_tasks as t
-from arcor2_hw.compute.world import Body, BoxShape, KeptFile, RobotModel, StandingRobot, Thing
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import Box
 from arcor2_hw.data.robot import Joint
+from arcor2_hw.kinematics import primitives
 from arcor2_server.compute.workers import Compute
 from arcor2_server.workspace.collisions import Placed, first_hit
 from benchmarks.figures import Figure, Report, median, percentile
@@ -42,7 +43,7 @@ def lines() -> Figure:
 
 async def questions() -> list[Figure]:
     """Time the start of a worker with its first answer, one question, and one after one of many bodies moved."""
-    model = RobotModel(KeptFile(str(UR5E), "ur5e"))
+    model = RobotSource(StoredFile(str(UR5E), "ur5e"))
     compute = Compute(idle=60.0)
     try:
         began = time.perf_counter()
@@ -50,7 +51,7 @@ async def questions() -> list[Figure]:
         start = 1e3 * (time.perf_counter() - began)
         joints = [Joint(joint.name, 0.3) for joint in described.joints]
         question, world = [], []
-        things: dict[str, Thing] = {f"b{n}": box(n) for n in range(BODIES)}
+        things: dict[str, WorldItem] = {f"b{n}": box(n) for n in range(BODIES)}
         check = t.CheckLines([t.Line(Position(-1, 0, 0), Position(11, 9, 9))])
         await compute.run(check, world=things)
         for number in range(ROUNDS):
@@ -72,11 +73,11 @@ async def questions() -> list[Figure]:
 
 async def reachability() -> Figure:
     """Time 1,000 points in three orientations each, asked in pieces as the server does."""
-    robot = StandingRobot("arm", RobotModel(KeptFile(str(UR5E), "ur5e")))
+    robot = WorldRobot("arm", RobotSource(StoredFile(str(UR5E), "ur5e")))
     turns = [Orientation(1, 0, 0, 0), Orientation(0, 0.5**0.5, 0, 0.5**0.5), Orientation(0.5**0.5, 0, 0, 0.5**0.5)]
     points = [Position(0.12 * (n % 10) - 0.6, 0.12 * (n // 10 % 10) - 0.6, 0.1 * (n // 100)) for n in range(1000)]
     poses = [Pose(point, turn) for point in points for turn in turns]
-    world: dict[str, Thing] = {"arm": robot} | {f"b{n}": box(n, 2.0) for n in range(20)}
+    world: dict[str, WorldItem] = {"arm": robot} | {f"b{n}": box(n, 2.0) for n in range(20)}
     compute = Compute(idle=60.0)
     try:
         await compute.run(t.JudgePoses("arm", "tcp", poses[:1]), world=world)
@@ -89,7 +90,7 @@ async def reachability() -> Figure:
     return Figure("computing_reach_3000_s", taken, len(poses))
 
 
-def box(number: int, aside: float = 0.0) -> Body:
+def box(number: int, aside: float = 0.0) -> WorldBody:
     """Give one of a grid of boxes."""
     place = Position(number % 10 + 3.0, number // 10 % 10 + aside, number // 100)
-    return Body(f"b{number}", BoxShape((0.2, 0.2, 0.2)), Pose(place))
+    return WorldBody(f"b{number}", primitives.Box(0.2, 0.2, 0.2), Pose(place))

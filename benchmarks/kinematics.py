@@ -13,13 +13,13 @@ from typing import Final
 import numpy as np
 
 import arcor2_drivers
+from arcor2_hw.collision.world import CollisionWorld
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.kinematics.errors import OutOfReach
 from arcor2_hw.kinematics.inverse import InverseKinematics
 from arcor2_hw.kinematics.model import RobotModel
-from arcor2_hw.kinematics.reach import Reach, Reachability
 from arcor2_hw.kinematics.shapes import Array, Box
-from arcor2_hw.kinematics.world import CollisionWorld
+from arcor2_hw.planning.reachability import Reach, Reachability
 from benchmarks import planning, safe_moves
 from benchmarks.figures import Figure, Report, median, percentile
 

@@ -11,8 +11,8 @@ from typing import Final
 import numpy as np
 import trimesh
 
+from arcor2_hw.collision.description import StoredFile
 from arcor2_hw.compute.preparing_tasks import PrepareAsset
-from arcor2_hw.compute.world import KeptFile
 from arcor2_server.app import running_services
 from arcor2_server.compute.workers import Compute
 from arcor2_server.settings import ServerSettings
@@ -60,7 +60,7 @@ async def preparing(folder: Path) -> list[Figure]:
     """Time the making, by a worker that runs."""
     content, size, triangles = robot()
     (folder / "arm.zip").write_bytes(content)
-    task = PrepareAsset(KeptFile(str(folder / "arm.zip"), "arm.zip"))
+    task = PrepareAsset(StoredFile(str(folder / "arm.zip"), "arm.zip"))
     compute = Compute(idle=60.0)
     taken = []
     try:

@@ -13,13 +13,13 @@ from typing import Final
 
 import numpy as np
 
+from arcor2_hw.collision.sweep import Sweep
+from arcor2_hw.collision.world import CollisionWorld
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.exceptions import KinematicsError
 from arcor2_hw.kinematics.model import RobotModel
-from arcor2_hw.kinematics.planning import Planner
 from arcor2_hw.kinematics.shapes import Array, Box
-from arcor2_hw.kinematics.sweep import Sweep
-from arcor2_hw.kinematics.world import CollisionWorld
+from arcor2_hw.planning.planner import Planner
 from benchmarks.figures import Figure, median, percentile
 
 PLANS: Final = 20

@@ -16,8 +16,8 @@ from arcor2_hw.calibration.camera_results import (
 )
 from arcor2_hw.calibration.layout import CharucoBoard, Layout, MarkerDictionary
 from arcor2_hw.calibration.results import RobotPose, TouchedFrame, TouchedOrientation, TouchedTip
+from arcor2_hw.collision.description import RobotSource
 from arcor2_hw.compute.task import Room, Task
-from arcor2_hw.compute.world import RobotModel
 from arcor2_hw.data.camera import CameraParameters, MarkerCorners
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import Joint
@@ -78,7 +78,7 @@ class FindRobotPose(Task[RobotPose], frozen=True):
     within: ClassVar = 60.0
     what: ClassVar = "the pose of a robot"
 
-    robot: RobotModel
+    robot: RobotSource
     joints: list[Joint]
     depth: list[bytes]
     parameters: CameraParameters

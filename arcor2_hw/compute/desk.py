@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import msgspec
 
-from arcor2_hw.compute.world import RobotModel, Thing
+from arcor2_hw.collision.description import RobotSource, WorldItem
 
 if TYPE_CHECKING:
-    from arcor2_hw.compute.standing_world import StandingWorld
+    from arcor2_hw.compute.world_replica import WorldReplica
     from arcor2_hw.kinematics import model
 
 MODELS: Final = 16
@@ -26,11 +26,11 @@ class Desk:
     def __init__(self, progress: Callable[[float, str], None]) -> None:
         self.progress = progress
         self._models: OrderedDict[bytes, model.RobotModel] = OrderedDict()
-        self._changes: dict[str, list[tuple[Sequence[Thing], Sequence[str]]]] = {}
-        self._worlds: dict[str, StandingWorld] = {}
+        self._changes: dict[str, list[tuple[Sequence[WorldItem], Sequence[str]]]] = {}
+        self._worlds: dict[str, WorldReplica] = {}
         self.place = ""
 
-    def change(self, place: str, put: Sequence[Thing], remove: Sequence[str]) -> None:
+    def change(self, place: str, put: Sequence[WorldItem], remove: Sequence[str]) -> None:
         """Change a world; nothing is read of it before a computation needs it."""
         self._changes.setdefault(place, []).append((put, remove))
 
@@ -39,19 +39,19 @@ class Desk:
         self._changes.pop(place, None)
         self._worlds.pop(place, None)
 
-    def world(self) -> "StandingWorld":
+    def world(self) -> "WorldReplica":
         """Give the world of this place as it is now. Raises ModelError, BadMesh ... for what of it cannot be used."""
-        from arcor2_hw.compute.standing_world import StandingWorld
+        from arcor2_hw.compute.world_replica import WorldReplica
 
         world = self._worlds.get(self.place)
         if world is None:
-            world = self._worlds[self.place] = StandingWorld(self.robot)
+            world = self._worlds[self.place] = WorldReplica(self.robot)
         for put, remove in self._changes.pop(self.place, []):
             world.change(put, remove)
         world.settle()
         return world
 
-    def robot(self, wanted: RobotModel) -> "model.RobotModel":
+    def robot(self, wanted: RobotSource) -> "model.RobotModel":
         """Give a robot's model as it stands in itself, read once. Raises ModelError and its kinds.
 
         With a calibration: also where that is one of another arm.

@@ -8,8 +8,8 @@ from typing import ClassVar
 
 from msgspec import field
 
+from arcor2_hw.collision.description import RobotSource, StoredFile
 from arcor2_hw.compute.task import Room, Task
-from arcor2_hw.compute.world import KeptFile, RobotModel
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.editor import Reach
 from arcor2_hw.data.geometry import Pose, Position
@@ -29,7 +29,7 @@ class JointRange(Data, frozen=True):
     velocity: float | Unset = UNSET
 
 
-class RobotDescription(Data, frozen=True):
+class ModelDescription(Data, frozen=True):
     """What a model says. triangles: of what it looks like."""
 
     name: str
@@ -39,15 +39,15 @@ class RobotDescription(Data, frozen=True):
     triangles: int
 
 
-class DescribeRobot(Task[RobotDescription], frozen=True):
+class DescribeRobot(Task[ModelDescription], frozen=True):
     """What a model is of. Fails for one that cannot be used."""
 
-    gives: ClassVar = RobotDescription
+    gives: ClassVar = ModelDescription
     runs: ClassVar = f"{_JOBS}:description"
     room: ClassVar = Room.KINEMATICS
     what: ClassVar = "the model of a robot"
 
-    model: RobotModel
+    model: RobotSource
 
 
 class SolveForward(Task[Pose], frozen=True):
@@ -58,7 +58,7 @@ class SolveForward(Task[Pose], frozen=True):
     room: ClassVar = Room.KINEMATICS
     what: ClassVar = "forward kinematics"
 
-    model: RobotModel
+    model: RobotSource
     end_effector: str
     joints: list[Joint]
 
@@ -149,7 +149,7 @@ class PlaceInLink(Task[Pose], frozen=True):
     room: ClassVar = Room.KINEMATICS
     what: ClassVar = "where a held object is"
 
-    model: RobotModel
+    model: RobotSource
     joints: list[Joint]
     link: str
     pose: Pose
@@ -171,7 +171,7 @@ class ReadMesh(Task[MeshFacts], frozen=True):
     within: ClassVar = 30.0
     what: ClassVar = "a mesh"
 
-    file: KeptFile
+    file: StoredFile
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
 

@@ -10,8 +10,8 @@ import msgspec
 from msgspec import Struct
 
 from arcor2_hw import framing
+from arcor2_hw.collision.description import WorldItem
 from arcor2_hw.compute.tasks import AnyTask
-from arcor2_hw.compute.world import Thing
 
 MAX_MESSAGE: Final = 512 * 1024 * 1024
 """Bytes; the pictures of an intrinsic calibration, or of a hand-eye one, come together."""
@@ -37,7 +37,7 @@ class ChangeWorld(Struct, frozen=True, tag=True):
     """
 
     place: str
-    put: list[Thing]
+    put: list[WorldItem]
     remove: list[str]
 
 

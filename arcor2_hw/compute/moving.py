@@ -3,22 +3,22 @@
 import math
 from typing import TYPE_CHECKING
 
+from arcor2_hw.collision.description import MeshShape
 from arcor2_hw.compute import kinematics_tasks as t
 from arcor2_hw.compute.desk import Desk
-from arcor2_hw.compute.world import MeshShape
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.editor import Reach
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint
 
 if TYPE_CHECKING:
+    from arcor2_hw.collision.world import CollisionWorld
     from arcor2_hw.kinematics.model import RobotModel
     from arcor2_hw.kinematics.shapes import Array
-    from arcor2_hw.kinematics.world import CollisionWorld
 
 
 # ------------------------------------------------------------------------------------------------ one robot
-def description(task: t.DescribeRobot, desk: Desk) -> t.RobotDescription:
+def description(task: t.DescribeRobot, desk: Desk) -> t.ModelDescription:
     """Give what a model says."""
     from arcor2_hw.kinematics.shapes import triangles_of
 
@@ -29,7 +29,7 @@ def description(task: t.DescribeRobot, desk: Desk) -> t.RobotDescription:
     ]
     triangles = sum(len(triangles_of(part.shape).triangles) for part in model.visual or model.collision)
     links = list(model.description.links)
-    return t.RobotDescription(model.name, joints, list(model.end_effectors), links, triangles)
+    return t.ModelDescription(model.name, joints, list(model.end_effectors), links, triangles)
 
 
 def _finite(value: float) -> float | Unset:
@@ -54,14 +54,14 @@ def inverse(task: t.SolveInverse, desk: Desk) -> list[Joint]:
     """Give joints of the chain to an end effector."""
     import numpy as np
 
-    from arcor2_hw.kinematics.inverse import blocked_in
+    from arcor2_hw.collision.world import collision_check
 
     world = desk.world()
     standing = world.collisions.robot(task.robot)
     solver = world.inverse(task.robot, named_end_effector(standing.model, task.end_effector))
     arm = solver.arm
     others = standing.q if task.start is None else standing.model.values(task.start, standing.q)
-    blocked = blocked_in(world.collisions, task.robot, arm, others) if task.avoid_collisions else None
+    blocked = collision_check(world.collisions, task.robot, arm, others) if task.avoid_collisions else None
     target = np.linalg.inv(standing.base) @ task.pose.matrix()
     seed = arm.of(others) if task.start is not None else None
     return arm.named(solver.solve(target, seed, blocked))
@@ -127,7 +127,7 @@ def placed_in_link(task: t.PlaceInLink, desk: Desk) -> Pose:
 
 def mesh_facts(task: t.ReadMesh, _: Desk) -> t.MeshFacts:
     """Give how large a mesh is."""
-    from arcor2_hw.compute.standing_world import mesh_of
+    from arcor2_hw.compute.world_replica import mesh_of
 
     mesh = mesh_of(MeshShape(task.file, task.scale))
     size = mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)

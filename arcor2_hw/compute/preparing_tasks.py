@@ -4,8 +4,8 @@ from typing import ClassVar, Final
 
 from msgspec import field
 
+from arcor2_hw.collision.description import StoredFile
 from arcor2_hw.compute.task import Room, Task
-from arcor2_hw.compute.world import KeptFile
 from arcor2_hw.data.base import Data
 
 MAKER: Final = 1
@@ -33,7 +33,7 @@ class PrepareAsset(Task[Prepared], frozen=True):
     within: ClassVar = 120.0
     what: ClassVar = "a mesh for the editor"
 
-    file: KeptFile
+    file: StoredFile
 
 
 PreparingTask = PrepareAsset

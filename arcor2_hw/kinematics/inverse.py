@@ -8,7 +8,7 @@ same question has the same answer.
 
 import itertools
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 import pinocchio as pin
@@ -18,11 +18,8 @@ from arcor2_hw.kinematics.closed_form import NEARLY, SphericalWrist, ThreeParall
 from arcor2_hw.kinematics.errors import OnlyInCollision, OutOfReach
 from arcor2_hw.kinematics.shapes import Array
 
-if TYPE_CHECKING:
-    from arcor2_hw.kinematics.world import CollisionWorld
-
-Blocked = Callable[[Array], str]
-"""Says what joint values (the arm's) are in collision with; empty when they are free."""
+CollisionCheck = Callable[[Array], str]
+"""Function from joint values of the arm to the first contact as text, empty when there is none."""
 
 STARTS: Final = 40
 """At most; an arm with few joints has no more than so many minima to be caught in."""
@@ -42,20 +39,6 @@ _PROGRESS: Final = 0.9
 """Rounds after which at most this share of the error has to be left."""
 _STEP: Final = 0.7
 """rad, or m, that a joint goes in one round at most."""
-
-
-def blocked_in(world: "CollisionWorld", robot: str, arm: Arm, others: Array | None = None) -> Blocked:
-    """Make a question to a collision world of it; `others` are the model's joints that the arm does not move."""
-    standing = world.robot(robot)
-
-    def blocked(q: Array) -> str:
-        whole = arm.whole(q, standing.q if others is None else others)
-        if world.is_free(robot, whole):
-            return ""
-        found = world.contacts(robot, whole)
-        return str(found[0]) if found else "something"
-
-    return blocked
 
 
 class InverseKinematics:
@@ -85,7 +68,7 @@ class InverseKinematics:
         return self._form is not None
 
     # -------------------------------------------------------------------------------- answers
-    def solve(self, target: Array, seed: Array | None = None, blocked: Blocked | None = None) -> Array:
+    def solve(self, target: Array, seed: Array | None = None, check: CollisionCheck | None = None) -> Array:
         """Give joints for a pose, of those that are free the nearest to `seed` (the middle of the joints if None).
 
         Raises OutOfReach, or OnlyInCollision naming the pair that the nearest of them is in.
@@ -93,7 +76,7 @@ class InverseKinematics:
         near = self._checked(target, seed)
         hit = ""
         for q in self._nearest_first(target, near):
-            reason = blocked(q) if blocked is not None else ""
+            reason = check(q) if check is not None else ""
             if not reason:
                 return q
             hit = hit or reason
@@ -103,7 +86,7 @@ class InverseKinematics:
         raise OutOfReach(f"{self.arm.model.name} cannot reach the pose.", f"at {at} in its root's frame")
 
     def solutions(
-        self, target: Array, seed: Array | None = None, blocked: Blocked | None = None, *, turns: bool = False
+        self, target: Array, seed: Array | None = None, check: CollisionCheck | None = None, *, turns: bool = False
     ) -> list[Array]:
         """Give all distinct joints found for a pose, nearest to `seed` first; none when it is out of reach.
 
@@ -111,7 +94,7 @@ class InverseKinematics:
         joints than it needs there is a continuum: what comes then is a sample of it.
         """
         near = self._checked(target, seed)
-        found = [q for q in self._nearest_first(target, near, everything=True) if not (blocked and blocked(q))]
+        found = [q for q in self._nearest_first(target, near, everything=True) if not (check and check(q))]
         if turns:
             found = [other for q in found for other in self._all_turns(q)]
         return sorted(found, key=lambda q: float(np.sum((q - near) ** 2)))

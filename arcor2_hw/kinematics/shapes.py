@@ -1,13 +1,34 @@
-"""Shapes of bodies, around their own origin, m: for collision (coal), for rays, and as triangles for pictures."""
+"""Shapes of bodies, in m, around their own origin: coal geometries for collision checks, triangles for display."""
 
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 
 from arcor2_hw.data import object_type
 from arcor2_hw.kinematics.errors import BadMesh, ZeroLength
+from arcor2_hw.kinematics.primitives import Box, Capsule, Cylinder, Sphere, primitive_of
+
+__all__ = [
+    "Array",
+    "Box",
+    "Capsule",
+    "Cylinder",
+    "Hull",
+    "MeshUse",
+    "Shape",
+    "Sphere",
+    "TriangleMesh",
+    "Triangles",
+    "check",
+    "coal_geometry",
+    "extent",
+    "hull_of",
+    "of_model",
+    "triangles_of",
+]
 
 Array = npt.NDArray[np.float64]
 Triangles = npt.NDArray[np.int64]
@@ -17,41 +38,9 @@ _SIDES: Final = 24
 _TINY: Final = 1e-9
 
 
-@dataclass(frozen=True)
-class Box:
-    """A box; edges in m."""
-
-    x: float
-    y: float
-    z: float
-
-
-@dataclass(frozen=True)
-class Cylinder:
-    """A cylinder along z, m."""
-
-    radius: float
-    length: float
-
-
-@dataclass(frozen=True)
-class Capsule:
-    """A cylinder along z with half balls beyond both ends; `length` is that of the cylinder, m."""
-
-    radius: float
-    length: float
-
-
-@dataclass(frozen=True)
-class Sphere:
-    """A ball, m."""
-
-    radius: float
-
-
 @dataclass(frozen=True, eq=False)
 class Hull:
-    """A convex body: vertices (n, 3) in m and triangles (m, 3) that wind counter-clockwise seen from outside."""
+    """Convex hull: vertices (n, 3) in m, triangles (m, 3) that wind counter-clockwise seen from outside."""
 
     vertices: Array
     triangles: Triangles
@@ -59,7 +48,7 @@ class Hull:
 
 @dataclass(frozen=True, eq=False)
 class TriangleMesh:
-    """A surface of triangles, (n, 3) in m and (m, 3). It has no inside: what is enclosed by it touches nothing."""
+    """Triangle surface: vertices (n, 3) in m, triangles (m, 3). A body enclosed by it is not in contact with it."""
 
     vertices: Array
     triangles: Triangles
@@ -69,16 +58,28 @@ Shape = Box | Cylinder | Capsule | Sphere | Hull | TriangleMesh
 
 
 def check(shape: Shape, what: str) -> None:
-    """Raise ZeroLength, naming `what`, for a size that is not a finite number above zero."""
+    """Require finite sizes above zero.
+
+    Args:
+        shape: The shape to check.
+        what: Name of the shape in the error message.
+
+    Raises:
+        ZeroLength: A size is not a finite number above zero.
+    """
     if isinstance(shape, Hull | TriangleMesh):
         return
-    for name, value in vars(shape).items():
+    for name, value in msgspec.structs.asdict(shape).items():
         if not (np.isfinite(value) and value > _TINY) and not (isinstance(shape, Capsule) and name == "length"):
             raise ZeroLength(f"{what}: {name} of a {type(shape).__name__.lower()} must be above zero, not {value!r}.")
 
 
 def hull_of(vertices: Array, what: str) -> Hull:
-    """Give the convex hull of points (n, 3). Raises BadMesh, naming `what`, when they lie in one plane."""
+    """Compute the convex hull of points (n, 3).
+
+    Raises:
+        BadMesh: All points are in one plane; the message names `what`.
+    """
     from scipy.spatial import ConvexHull, QhullError
 
     try:
@@ -96,25 +97,28 @@ def hull_of(vertices: Array, what: str) -> Hull:
 
 
 def of_model(model: object_type.Models, mesh: TriangleMesh | None = None, use: MeshUse = "hull") -> Shape:
-    """Give the shape of a collision model of the protocol; a Mesh needs the `mesh` that was read of its asset.
+    """Return the shape of a collision model of the protocol.
 
-    Raises BadMesh when that is missing, or flat while its hull is asked for.
+    Args:
+        model: The collision model.
+        mesh: The mesh read from the model's asset; required for a Mesh.
+        use: Whether a mesh is used as it is or as its convex hull.
+
+    Raises:
+        BadMesh: The mesh is missing, or it is flat and its hull is wanted.
     """
-    match model:
-        case object_type.Box():
-            return Box(model.size_x, model.size_y, model.size_z)
-        case object_type.Cylinder():
-            return Cylinder(model.radius, model.height)
-        case object_type.Sphere():
-            return Sphere(model.radius)
-        case object_type.Mesh():
-            if mesh is None:
-                raise BadMesh(f"The mesh {model.asset_id} of {model.id} was not read.")
-            return mesh if use == "exact" else hull_of(mesh.vertices, f"The mesh {model.asset_id}")
+    if not isinstance(model, object_type.Mesh):
+        return primitive_of(model)
+    if mesh is None:
+        raise BadMesh(f"The mesh {model.asset_id} of {model.id} was not read.")
+    return mesh if use == "exact" else hull_of(mesh.vertices, f"The mesh {model.asset_id}")
 
 
 def triangles_of(shape: Shape) -> TriangleMesh:
-    """Give a shape as triangles that wind counter-clockwise seen from outside; round ones have 24 sides."""
+    """Return the surface of a shape as triangles that wind counter-clockwise seen from outside.
+
+    Cylinders and capsules get 24 sides.
+    """
     import trimesh
 
     made: Any
@@ -136,7 +140,7 @@ def triangles_of(shape: Shape) -> TriangleMesh:
 
 
 def extent(shape: Shape) -> Array:
-    """Give lower and upper corner of the box around a shape, shape (2, 3), m."""
+    """Return the lower and upper corner (2, 3) of the axis-aligned bounding box of a shape, m."""
     match shape:
         case Box():
             half = np.array((shape.x, shape.y, shape.z)) / 2.0
@@ -152,7 +156,7 @@ def extent(shape: Shape) -> Array:
 
 
 def coal_geometry(shape: Shape) -> Any:
-    """Give coal's geometry of a shape; primitives stay primitives, hulls are convex, meshes trees of triangles."""
+    """Return coal's geometry of a shape: a primitive, a convex hull, or a tree of triangles for a mesh."""
     import coal
 
     match shape:

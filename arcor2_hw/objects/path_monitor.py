@@ -8,13 +8,13 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from arcor2_hw.exceptions import Arcor2Error, Cancelled, PathBlocked, Refused
+from arcor2_hw.objects.obstacle_snapshot import ObstacleSnapshot, Others, build_world
 from arcor2_hw.objects.robot import Robot
-from arcor2_hw.objects.snapshot import Others, Snapshot, build_world
 
 if TYPE_CHECKING:
+    from arcor2_hw.collision.world import CollisionWorld, Contact
     from arcor2_hw.kinematics.arm import Arm
     from arcor2_hw.kinematics.shapes import Array
-    from arcor2_hw.kinematics.world import CollisionWorld, Contact
     from arcor2_hw.objects.robot_tools import RobotTools
 
 PERIOD: Final = 0.04
@@ -41,7 +41,7 @@ class PlannedPath(NamedTuple):
     tools: "RobotTools"
     arm: "Arm"
     points: "list[Array]"
-    around: Snapshot
+    around: ObstacleSnapshot
     margin: float
 
 
@@ -52,7 +52,7 @@ class PathMonitor:
     planning counts. On leaving, PathBlocked names the obstacle, and tells whether the robot came to a stop before it.
     """
 
-    def __init__(self, robot: Robot, path: PlannedPath, look: Callable[[Others], Snapshot]) -> None:
+    def __init__(self, robot: Robot, path: PlannedPath, look: Callable[[Others], ObstacleSnapshot]) -> None:
         self._robot, self._path, self._look = robot, path, look
         self._over = threading.Event()
         self._stopping = threading.Lock()
@@ -96,7 +96,7 @@ class PathMonitor:
             if self._over.wait(PERIOD):
                 return
 
-    def _snapshot(self, before: Snapshot) -> Snapshot:
+    def _snapshot(self, before: ObstacleSnapshot) -> ObstacleSnapshot:
         """Return the present surroundings; a robot that does not answer stays where it was."""
         if self._others is None:
             try:
@@ -108,9 +108,9 @@ class PathMonitor:
             others = self._others
         return self._look(others).settled(before)
 
-    def _first_contact(self, now: Snapshot) -> "Contact | None":
-        from arcor2_hw.kinematics.sweep import Sweep
-        from arcor2_hw.kinematics.world import Contact
+    def _first_contact(self, now: ObstacleSnapshot) -> "Contact | None":
+        from arcor2_hw.collision.sweep import Sweep
+        from arcor2_hw.collision.world import Contact
 
         path, name = self._path, self._robot.name
         around = now.changed_since(path.around, name)

@@ -14,18 +14,18 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import Models
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import Arcor2Error, KinematicsError, NotFound, Refused
+from arcor2_hw.objects.obstacle_snapshot import JOINT_TOLERANCE, ObstacleSnapshot, Others, build_world
 from arcor2_hw.objects.path_monitor import PathMonitor, PlannedPath
 from arcor2_hw.objects.robot import Robot
 from arcor2_hw.objects.robot_tools import RobotTools, package_of, settings_of
-from arcor2_hw.objects.snapshot import JOINT_TOLERANCE, Others, Snapshot, build_world
-from arcor2_hw.objects.surroundings import HeldPart, Holder, Obstacle
+from arcor2_hw.objects.surroundings import Attachment, HeldPart, Obstacle
 
 if TYPE_CHECKING:
+    from arcor2_hw.collision.sweep import Sweep
+    from arcor2_hw.collision.world import CollisionWorld
     from arcor2_hw.kinematics.arm import Arm
     from arcor2_hw.kinematics.shapes import Array
-    from arcor2_hw.kinematics.sweep import Sweep
-    from arcor2_hw.kinematics.timing import Timed
-    from arcor2_hw.kinematics.world import CollisionWorld
+    from arcor2_hw.planning.timing import Timed
 
 MARGIN: Final = 0.005
 """m by which a way keeps away from what is around, half of the resolution: so nothing is missed between two checks.
@@ -108,10 +108,10 @@ class SafeMoves:
         and no watchdog is fed.
         """
         try:
-            from arcor2_hw.kinematics import planning  # noqa: F401
+            from arcor2_hw.planning import planner  # noqa: F401
 
             tool = _tool_of(self._robot)
-            alone = Snapshot({} if tool is None else {tool.name: tool}, {})
+            alone = ObstacleSnapshot({} if tool is None else {tool.name: tool}, {})
             build_world(self._robot, self._tools(), [], alone, 0.0)
         except (ImportError, Arcor2Error) as error:
             log.info("%s: no safe moves: %s", self._robot.name, error)
@@ -146,10 +146,10 @@ class SafeMoves:
             arm, target = tools.arm(end_effector), self._target(pose)
             if not avoid_collisions:
                 return arm.named(tools.inverse(end_effector).solve(target, arm.values(near)))
-            from arcor2_hw.kinematics.inverse import blocked_in
+            from arcor2_hw.collision.world import collision_check
 
-            def solved(world: "CollisionWorld", _: Snapshot) -> list[Joint]:
-                blocked = blocked_in(world, self._robot.name, arm)
+            def solved(world: "CollisionWorld", _: ObstacleSnapshot) -> list[Joint]:
+                blocked = collision_check(world, self._robot.name, arm)
                 return arm.named(tools.inverse(end_effector).solve(target, arm.values(near), blocked))
 
             return self._with_margin(near, solved)
@@ -174,7 +174,7 @@ class SafeMoves:
             if not safe:
                 return self._way(arm, [arm.values(now), arm.values(goal)], speed)
 
-            def planned(world: "CollisionWorld", around: Snapshot) -> Way:
+            def planned(world: "CollisionWorld", around: ObstacleSnapshot) -> Way:
                 planner = self._planner(world, arm)
                 way = planner.to_joints(arm.values(now), arm.values(goal), within=WITHIN, stopped=stopped)
                 return self._way(arm, way, speed, around, world.margin)
@@ -199,7 +199,7 @@ class SafeMoves:
             if not safe:
                 return self._way(arm, [start, tools.inverse(end_effector).solve(target, start)], speed)
 
-            def planned(world: "CollisionWorld", around: Snapshot) -> Way:
+            def planned(world: "CollisionWorld", around: ObstacleSnapshot) -> Way:
                 way = self._planner(world, arm).to_pose(start, target, within=WITHIN, stopped=stopped)
                 return self._way(arm, way, speed, around, world.margin)
 
@@ -214,12 +214,12 @@ class SafeMoves:
         """
         with self._named():
             from arcor2_hw.kinematics.errors import StartInCollision
-            from arcor2_hw.kinematics.paths import require_free, straight_line
+            from arcor2_hw.planning.paths import require_free, straight_line
 
             arm = self._tools().arm(end_effector)
             way = straight_line(arm, arm.values(now), self._target(pose), self._robot.name)
 
-            def checked(world: "CollisionWorld", around: Snapshot) -> Way:
+            def checked(world: "CollisionWorld", around: ObstacleSnapshot) -> Way:
                 sweep = self._sweep(world, arm)
                 if world.margin and not (sweep.is_free(way[0]) and sweep.is_free(way[-1])):
                     raise StartInCollision
@@ -266,8 +266,8 @@ class SafeMoves:
         obstacle = next((each for each in self._robot.surroundings.obstacles() if each.name == name), None)
         if obstacle is None:
             raise NotFound(f"{self._robot.name} cannot hold {name}: it is no collision object of the scene")
-        if obstacle.holder is not None:
-            raise Refused(f"{self._robot.name} cannot hold {name}: {obstacle.holder.robot} holds it")
+        if obstacle.attachment is not None:
+            raise Refused(f"{self._robot.name} cannot hold {name}: {obstacle.attachment.robot} holds it")
         self._robot.hold_part(HeldPart(name, link, self._link_pose(link, joints).inverted() * obstacle.pose))
 
     def release(self, name: str, joints: Sequence[Joint]) -> Pose:
@@ -289,7 +289,7 @@ class SafeMoves:
         arm: "Arm",
         points: "list[Array]",
         speed: float,
-        around: Snapshot | None = None,
+        around: ObstacleSnapshot | None = None,
         margin: float = 0.0,
         *,
         line: bool = False,
@@ -297,7 +297,7 @@ class SafeMoves:
         """Return a way through points; `around` is what it was checked against, None for an unsafe one."""
 
         def timed(tcp_speed: float | None) -> "Timed":
-            from arcor2_hw.kinematics.timing import MotionLimits, led, with_stops
+            from arcor2_hw.planning.timing import MotionLimits, led, with_stops
 
             limits = MotionLimits.of(arm, speed)
             if not line:
@@ -312,16 +312,16 @@ class SafeMoves:
         return Way([arm.named(q) for q in points], speed, line, timed, planned)
 
     def _planner(self, world: "CollisionWorld", arm: "Arm") -> Any:
-        from arcor2_hw.kinematics.planning import Planner
+        from arcor2_hw.planning.planner import Planner
 
         return Planner(self._sweep(world, arm), self._robot.name)
 
     def _sweep(self, world: "CollisionWorld", arm: "Arm") -> "Sweep":
-        from arcor2_hw.kinematics.sweep import Sweep
+        from arcor2_hw.collision.sweep import Sweep
 
         return Sweep(world, self._robot.name, arm, RESOLUTION)
 
-    def _with_margin(self, now: Sequence[Joint], ask: "Callable[[CollisionWorld, Snapshot], T]") -> T:
+    def _with_margin(self, now: Sequence[Joint], ask: "Callable[[CollisionWorld, ObstacleSnapshot], T]") -> T:
         """Ask with the margin; where the start or the goal is too near to something for that, without."""
         from arcor2_hw.kinematics.errors import GoalInCollision, OnlyInCollision, StartInCollision
 
@@ -331,12 +331,12 @@ class SafeMoves:
         except (GoalInCollision, OnlyInCollision, StartInCollision):
             return ask(build_world(self._robot, tools, now, around, 0.0), around)
 
-    def _snapshot(self) -> Snapshot:
+    def _snapshot(self) -> ObstacleSnapshot:
         return self._look(self._tools(), self._robot.surroundings.robots())
 
-    def _look(self, tools: RobotTools, others: Others) -> Snapshot:
+    def _look(self, tools: RobotTools, others: Others) -> ObstacleSnapshot:
         with_model = [(other, joints) for other, joints in others if tools.other(other) is not None]
-        return Snapshot.take(self._robot, with_model, _tool_of)
+        return ObstacleSnapshot.take(self._robot, with_model, _tool_of)
 
     def _q(self, joints: Sequence[Joint]) -> "Array":
         model = self._tools().model
@@ -379,4 +379,4 @@ def _tool_of(robot: Robot) -> Obstacle | None:
     tool = moves.tool() if isinstance(moves, SafeMoves) else None
     if tool is None:
         return None
-    return Obstacle(f"tool of {robot.name}", tool.shape, tool.in_link, Holder(robot.name, tool.link))
+    return Obstacle(f"tool of {robot.name}", tool.shape, tool.in_link, Attachment(robot.name, tool.link))

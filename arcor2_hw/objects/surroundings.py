@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
+from arcor2_hw.collision.description import Attachment, Obstacle
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import Models
@@ -11,13 +12,7 @@ from arcor2_hw.data.robot import Joint, KinematicCalibration
 if TYPE_CHECKING:
     from arcor2_hw.objects.robot import Robot
 
-
-class Holder(Data, frozen=True):
-    """Who holds something: a robot by its name, one of its links. It may touch the links `touching`, too."""
-
-    robot: str
-    link: str
-    touching: tuple[str, ...] = ()
+__all__ = ["Attachment", "HeldPart", "Nothing", "Obstacle", "Surroundings"]
 
 
 class HeldPart(Data, frozen=True):
@@ -34,20 +29,6 @@ class HeldPart(Data, frozen=True):
     link: str
     in_link: Pose
     model: Models | None = None
-
-
-class Obstacle(Data, frozen=True):
-    """A collision model that counts now, and where it stands in the world. name: of its object.
-
-    holder: who holds it; then the pose is in the frame of that link. scale, file: of a mesh that has no asset here.
-    """
-
-    name: str
-    model: Models
-    pose: Pose
-    holder: Holder | None = None
-    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    file: Path | None = None
 
 
 class Surroundings(Protocol):

@@ -7,7 +7,7 @@ from typing import Final
 from arcor2_hw.data.robot import Joint, KinematicCalibration
 from arcor2_hw.exceptions import Arcor2Error, Refused
 from arcor2_hw.objects import CollisionObject, Robot
-from arcor2_hw.objects.surroundings import Holder, Obstacle
+from arcor2_hw.objects.surroundings import Attachment, Obstacle
 from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.messages import PutIn
 from arcor2_hw.runtime.told import Told
@@ -76,5 +76,5 @@ class SceneSurroundings:
 
 
 def _put_in(body: PutIn, name: str, robot: str | None) -> Obstacle:
-    holder = None if robot is None else Holder(robot, body.link, tuple(body.touching))
+    holder = None if robot is None else Attachment(robot, body.link, tuple(body.touching))
     return Obstacle(name, body.model.model(), body.pose, holder, body.scale, Path(body.file) if body.file else None)

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 import trimesh
 
+from arcor2_hw.collision.description import StoredFile
 from arcor2_hw.compute import preparing, reducing
 from arcor2_hw.compute.desk import Desk
 from arcor2_hw.compute.preparing import prepared
 from arcor2_hw.compute.preparing_tasks import PrepareAsset, Prepared
-from arcor2_hw.compute.world import KeptFile
 from arcor2_hw.kinematics.errors import BadMesh, ModelError, UnsafeDescription
 from arcor2_hw.kinematics.meshes import Surface, linear_of
 
@@ -61,7 +61,7 @@ class Glb:
 def prepare(tmp_path: Path, content: bytes | str, name: str) -> tuple[Prepared, list[str]]:
     told: list[str] = []
     (tmp_path / "content").write_bytes(content if isinstance(content, bytes) else content.encode())
-    task = PrepareAsset(KeptFile(str(tmp_path / "content"), name))
+    task = PrepareAsset(StoredFile(str(tmp_path / "content"), name))
     return prepared(task, Desk(lambda share, text: told.append(f"{share:.1f} {text}"))), told
 
 
@@ -272,7 +272,7 @@ def test_what_cannot_be_shown_is_refused_by_name(
 
 def test_a_mesh_that_is_gone_is_named(tmp_path: Path) -> None:
     with pytest.raises(BadMesh, match=r"gone\.stl cannot be read"):
-        prepared(PrepareAsset(KeptFile(str(tmp_path / "none"), "gone.stl")), Desk(lambda *_: None))
+        prepared(PrepareAsset(StoredFile(str(tmp_path / "none"), "gone.stl")), Desk(lambda *_: None))
 
 
 def test_the_same_is_made_the_same(tmp_path: Path) -> None:

@@ -12,34 +12,32 @@ import pytest
 import pytest_asyncio
 
 import arcor2_drivers.universal_robots
+from arcor2_hw.collision.description import (
+    Attachment,
+    MeshShape,
+    RobotSource,
+    StoredFile,
+    WorldBody,
+    WorldItem,
+    WorldRobot,
+)
 from arcor2_hw.compute import kinematics_tasks as t
 from arcor2_hw.compute.task import ComputeStopped, Room
-from arcor2_hw.compute.world import (
-    Body,
-    BoxShape,
-    CylinderShape,
-    Holder,
-    KeptFile,
-    MeshShape,
-    RobotModel,
-    SphereShape,
-    StandingRobot,
-    Thing,
-)
 from arcor2_hw.data.editor import Reach
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import InvalidData, KinematicsError, NotFound
+from arcor2_hw.kinematics.primitives import Box, Cylinder, Sphere
 from arcor2_server.compute.workers import Compute
 
-UR5E = KeptFile(str(Path(arcor2_drivers.universal_robots.__path__[0]) / "urdf" / "ur5e"), "ur5e")
+UR5E = StoredFile(str(Path(arcor2_drivers.universal_robots.__path__[0]) / "urdf" / "ur5e"), "ur5e")
 DOWN = Orientation(1, 0, 0, 0)
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def compute() -> AsyncIterator[Compute]:
     made = Compute(idle=60.0)
-    await made.run(t.DescribeRobot(RobotModel(UR5E)))
+    await made.run(t.DescribeRobot(RobotSource(UR5E)))
     yield made
     await made.close()
 
@@ -47,20 +45,20 @@ async def compute() -> AsyncIterator[Compute]:
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 
 
-def robot(base: Pose | None = None, joints: list[Joint] | None = None) -> StandingRobot:
-    return StandingRobot("arm", RobotModel(UR5E, base or Pose()), joints or [])
+def robot(base: Pose | None = None, joints: list[Joint] | None = None) -> WorldRobot:
+    return WorldRobot("arm", RobotSource(UR5E, base or Pose()), joints or [])
 
 
-def world(*things: Thing) -> dict[str, Thing]:
+def world(*things: WorldItem) -> dict[str, WorldItem]:
     return {thing.id: thing for thing in things}
 
 
-def box(key: str, x: float, y: float, z: float, *size: float, holder: Holder | None = None) -> Body:
-    return Body(key, BoxShape((size[0], size[1], size[2])), Pose(Position(x, y, z)), holder)
+def box(key: str, x: float, y: float, z: float, *size: float, attachment: Attachment | None = None) -> WorldBody:
+    return WorldBody(key, Box(size[0], size[1], size[2]), Pose(Position(x, y, z)), attachment)
 
 
 async def forward(compute: Compute, joints: list[Joint], base: Pose | None = None) -> Pose:
-    return await compute.run(t.SolveForward(RobotModel(UR5E, base or Pose()), "tcp", joints))
+    return await compute.run(t.SolveForward(RobotSource(UR5E, base or Pose()), "tcp", joints))
 
 
 # ------------------------------------------------------------------------------------------------ robots
@@ -91,21 +89,21 @@ async def test_what_cannot_be_reached_says_why(compute: Compute) -> None:
     await compute.run(t.SolveInverse("arm", "tcp", target, avoid_collisions=False), world=world(robot(), around))
     # The name of the only end effector may be the driver's own.
     joints = await joints_of(compute)
-    assert await compute.run(t.SolveForward(RobotModel(UR5E), "gripper", joints)) == await forward(compute, joints)
+    assert await compute.run(t.SolveForward(RobotSource(UR5E), "gripper", joints)) == await forward(compute, joints)
 
 
 async def joints_of(compute: Compute) -> list[Joint]:
-    found = await compute.run(t.DescribeRobot(RobotModel(UR5E)))
+    found = await compute.run(t.DescribeRobot(RobotSource(UR5E)))
     return [Joint(joint.name, 0.1) for joint in found.joints]
 
 
 async def test_a_model_is_described(compute: Compute) -> None:
-    found = await compute.run(t.DescribeRobot(RobotModel(UR5E)))
+    found = await compute.run(t.DescribeRobot(RobotSource(UR5E)))
     assert (found.name, len(found.joints), found.end_effectors) == ("ur5e", 6, ["tcp"])
     assert all(joint.lower == -joint.upper for joint in found.joints[3:])  # type: ignore[operator]
     assert found.triangles > 100
     longer = await compute.run(
-        t.SolveForward(RobotModel(UR5E, settings={"tcp_z": 0.1}), "tcp", [Joint(j.name, 0.0) for j in found.joints])
+        t.SolveForward(RobotSource(UR5E, settings={"tcp_z": 0.1}), "tcp", [Joint(j.name, 0.0) for j in found.joints])
     )
     short = await forward(compute, [Joint(j.name, 0.0) for j in found.joints])
     assert longer.position.distance_to(short.position) == pytest.approx(0.1)
@@ -134,12 +132,12 @@ async def test_a_model_that_cannot_be_used_says_what_is_wrong(
 ) -> None:
     path = tmp_path / "content"
     path.write_bytes(content)
-    model = RobotModel(KeptFile(str(path), name))
+    model = RobotSource(StoredFile(str(path), name))
     with pytest.raises(InvalidData, match=words) as raised:
         await compute.run(t.DescribeRobot(model))
     assert raised.value.code == code
     with pytest.raises(InvalidData, match=words):
-        await compute.run(t.JudgePoses("arm", "tcp", [Pose()]), world=world(StandingRobot("arm", model)))
+        await compute.run(t.JudgePoses("arm", "tcp", [Pose()]), world=world(WorldRobot("arm", model)))
 
 
 # ------------------------------------------------------------------------------------------------ reachability
@@ -148,7 +146,7 @@ async def test_reachability_follows_what_changes(compute: Compute) -> None:
     judge = t.JudgePoses("arm", "tcp", poses)
     crate = box("crate", 0.4, 0.2, 0.3, 0.2, 0.2, 0.2)
 
-    async def reach(*things: Thing) -> list[Reach]:
+    async def reach(*things: WorldItem) -> list[Reach]:
         return [each.reach for each in await compute.run(judge, world=world(*things))]
 
     free, far = Reach.REACHABLE, Reach.OUT_OF_REACH
@@ -195,7 +193,7 @@ PYRAMID = b"""solid pyramid
 ) + b"endsolid pyramid\n"  # fmt: skip
 
 
-async def line(compute: Compute, *things: Thing, ignore: tuple[str, ...] = ()) -> str | None:
+async def line(compute: Compute, *things: WorldItem, ignore: tuple[str, ...] = ()) -> str | None:
     check = t.CheckLines([t.Line(Position(-2, 0.2, 0.2), Position(2, 0.2, 0.2))], ignore=list(ignore))
     (hit,) = await compute.run(check, world=world(*things))
     return None if hit is None else hit.id
@@ -204,42 +202,42 @@ async def line(compute: Compute, *things: Thing, ignore: tuple[str, ...] = ()) -
 async def test_lines_meet_what_stands_there(compute: Compute, tmp_path: Path) -> None:
     stl = tmp_path / "content"
     stl.write_bytes(PYRAMID)
-    mesh = Body("tent", MeshShape(KeptFile(str(stl), "tent.stl")), Pose())
-    ball = Body("ball", SphereShape(0.3), Pose(Position(-1.2, 0.2, 0.2)))
-    can = Body("can", CylinderShape(0.1, 1.0), Pose(Position(-1.8, 0.2, 0.2)))
+    mesh = WorldBody("tent", MeshShape(StoredFile(str(stl), "tent.stl")), Pose())
+    ball = WorldBody("ball", Sphere(0.3), Pose(Position(-1.2, 0.2, 0.2)))
+    can = WorldBody("can", Cylinder(0.1, 1.0), Pose(Position(-1.8, 0.2, 0.2)))
     assert await line(compute) is None
     assert await line(compute, mesh) == "tent"
     assert await line(compute, mesh, ball) == "ball"
     assert await line(compute, mesh, ball, can) == "can"
     assert await line(compute, mesh, ball, can, ignore=("can", "ball")) == "tent"
     assert await line(compute, ball, ignore=("ball",)) is None
-    small = Body("tent", MeshShape(KeptFile(str(stl), "tent.stl"), (0.1, 0.1, 0.1)), Pose())
+    small = WorldBody("tent", MeshShape(StoredFile(str(stl), "tent.stl"), (0.1, 0.1, 0.1)), Pose())
     assert await line(compute, small) is None
-    facts = await compute.run(t.ReadMesh(KeptFile(str(stl), "tent.stl"), (2.0, 1.0, 1.0)))
+    facts = await compute.run(t.ReadMesh(StoredFile(str(stl), "tent.stl"), (2.0, 1.0, 1.0)))
     assert (facts.triangles, facts.size) == (4, (2.0, 1.0, 1.0))
 
 
 async def test_a_mesh_that_cannot_be_used_is_named_until_it_goes(compute: Compute, tmp_path: Path) -> None:
     bad = tmp_path / "content"
     bad.write_bytes(PYRAMID.replace(b"vertex 1 0 0", b"vertex nan 0 0"))
-    tent = Body("tent", MeshShape(KeptFile(str(bad), "tent.stl")), Pose())
+    tent = WorldBody("tent", MeshShape(StoredFile(str(bad), "tent.stl")), Pose())
     for _ in range(2):
         with pytest.raises(InvalidData, match=r"tent\.stl") as raised:
             await line(compute, tent)
         assert raised.value.code == "bad_mesh"
     assert await line(compute) is None
     with pytest.raises(InvalidData, match=r"gone\.stl"):
-        await line(compute, Body("gone", MeshShape(KeptFile(str(tmp_path / "gone"), "gone.stl")), Pose()))
+        await line(compute, WorldBody("gone", MeshShape(StoredFile(str(tmp_path / "gone"), "gone.stl")), Pose()))
 
 
 async def test_what_is_held_moves_along(compute: Compute) -> None:
     names = [joint.name for joint in await joints_of(compute)]
     joints = [Joint(name, value) for name, value in zip(names, (0.3, -1.2, 1.0, -1.4, -1.57, 0), strict=True)]
     at = await forward(compute, joints)
-    model = RobotModel(UR5E)
+    model = RobotSource(UR5E)
     part = Pose(at.position + Position(0, 0, -0.1))
     in_link = await compute.run(t.PlaceInLink(model, joints, "tcp", part))
-    held = Body("part", BoxShape((0.05, 0.05, 0.05)), in_link, Holder("arm", "tcp"))
+    held = WorldBody("part", Box(0.05, 0.05, 0.05), in_link, Attachment("arm", "tcp"))
 
     async def met(joints: list[Joint]) -> str | None:
         where = (await forward(compute, joints)) * in_link
@@ -252,7 +250,7 @@ async def test_what_is_held_moves_along(compute: Compute) -> None:
     moved = [Joint(joint.name, joint.value + 0.4) for joint in joints]
     assert await met(moved) == "part"
     # The robot is made anew with another tool: what it holds is in the same place of the same link.
-    longer = StandingRobot("arm", RobotModel(UR5E, settings={"tcp_z": 0.2}), joints)
+    longer = WorldRobot("arm", RobotSource(UR5E, settings={"tcp_z": 0.2}), joints)
     check = t.CheckLines([t.Line(part.position + Position(0, 0.04, 0), part.position)], ignore=["arm"])
     assert await compute.run(check, world=world(longer, held)) == [None]
     assert await met(joints) == "part"
@@ -296,8 +294,8 @@ async def test_a_mesh_of_two_gigabytes_is_refused_unread(compute: Compute, tmp_p
     with huge.open("wb") as file:
         file.truncate(2 * 1024**3)  # sparse: it takes no room
     with pytest.raises(InvalidData, match=r"huge\.stl") as raised:
-        await compute.run(t.ReadMesh(KeptFile(str(huge), "huge.stl")))
+        await compute.run(t.ReadMesh(StoredFile(str(huge), "huge.stl")))
     assert raised.value.code == "bad_mesh"
     with pytest.raises(InvalidData, match=r"huge\.zip") as raised:
-        await compute.run(t.DescribeRobot(RobotModel(KeptFile(str(huge), "huge.zip"))))
+        await compute.run(t.DescribeRobot(RobotSource(StoredFile(str(huge), "huge.zip"))))
     assert raised.value.code == "unsafe_description"

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
+from arcor2_hw.collision.world import CollisionWorld
 from arcor2_hw.data import object_type
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.robot import Joint, KinematicCalibration
 from arcor2_hw.kinematics.model import RobotModel
 from arcor2_hw.kinematics.shapes import Box
-from arcor2_hw.kinematics.world import CollisionWorld
 from arcor2_hw.objects import Robot
 from arcor2_hw.objects.surroundings import Obstacle
 

@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 from arcor2_drivers.dobot_magician import kinematics as dobot_kinematics
 from arcor2_drivers.two_axis_robot import kinematics as two_axis_kinematics
 from arcor2_fakes.ur.kinematics import Chain
+from arcor2_hw.collision.world import CollisionWorld, collision_check
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.kinematics.arm import Arm
 from arcor2_hw.kinematics.dh import DhRow, calibrated
 from arcor2_hw.kinematics.errors import OnlyInCollision, OutOfReach
-from arcor2_hw.kinematics.inverse import InverseKinematics, blocked_in
+from arcor2_hw.kinematics.inverse import InverseKinematics
 from arcor2_hw.kinematics.model import RobotModel
 from arcor2_hw.kinematics.shapes import Array, Sphere
-from arcor2_hw.kinematics.world import CollisionWorld
 from tests.kinematics.kin_robots import DOBOT, TWO_AXIS, joint, links, six_axes, ur, urdf
 from tests.kinematics.test_kin_model import rows_of
 
@@ -304,7 +304,7 @@ def test_collisions_are_avoided_by_another_configuration_and_named_when_they_can
     target = arm.forward(q)
     world = CollisionWorld()
     world.add_robot("arm", ur(), Pose())
-    inverse, blocked = InverseKinematics(arm), blocked_in(world, "arm", arm)
+    inverse, blocked = InverseKinematics(arm), collision_check(world, "arm", arm)
     assert blocked(q) == ""
     assert np.allclose(inverse.solve(target, q, blocked), q, atol=1e-6)
     elbow = ur().link_poses(q)["forearm_link"]

@@ -5,15 +5,15 @@ import itertools
 import numpy as np
 import pytest
 
+from arcor2_hw.collision.sweep import Sweep
+from arcor2_hw.collision.world import CollisionWorld
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.exceptions import InvalidData
 from arcor2_hw.kinematics.errors import MotionInCollision, NoStraightLine, OutOfReach
 from arcor2_hw.kinematics.model import RobotModel
-from arcor2_hw.kinematics.paths import OFF_LINE, OFF_TURN, between, free_line, rounded, straight_line
 from arcor2_hw.kinematics.shapes import Array, Box
-from arcor2_hw.kinematics.sweep import Sweep
-from arcor2_hw.kinematics.timing import MotionLimits, Timed, led, point_to_point, smooth, with_stops
-from arcor2_hw.kinematics.world import CollisionWorld
+from arcor2_hw.planning.paths import OFF_LINE, OFF_TURN, between, free_line, rounded, straight_line
+from arcor2_hw.planning.timing import MotionLimits, Timed, led, point_to_point, smooth, with_stops
 from tests.kinematics import kin_robots
 
 READY = np.array((0.0, -1.57, 1.57, -1.57, -1.57, 0.0))

@@ -6,14 +6,14 @@ import time
 import numpy as np
 import pytest
 
+from arcor2_hw.collision.sweep import Sweep, levers
+from arcor2_hw.collision.world import CollisionWorld
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.exceptions import Cancelled, InvalidData
 from arcor2_hw.kinematics.errors import GoalInCollision, NoPath, OnlyInCollision, OutOfReach, StartInCollision
 from arcor2_hw.kinematics.model import RobotModel
-from arcor2_hw.kinematics.planning import Planner
 from arcor2_hw.kinematics.shapes import Array, Box, Sphere
-from arcor2_hw.kinematics.sweep import Sweep, levers
-from arcor2_hw.kinematics.world import CollisionWorld
+from arcor2_hw.planning.planner import Planner
 from tests.kinematics import kin_robots
 
 READY = np.array((0.0, -1.57, 1.57, -1.57, -1.57, 0.0))

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from arcor2_hw.collision.world import CollisionWorld
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.kinematics.model import RobotModel
-from arcor2_hw.kinematics.reach import Judgement, Reach, Reachability
 from arcor2_hw.kinematics.shapes import Box, Sphere
-from arcor2_hw.kinematics.world import CollisionWorld
+from arcor2_hw.planning.reachability import Judgement, Reach, Reachability
 from tests.kinematics.kin_robots import DOBOT, UR, ur
 
 DOWN = Orientation(1.0, 0.0, 0.0, 0.0)

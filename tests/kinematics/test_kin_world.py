@@ -9,6 +9,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from arcor2_hw.collision.world import CollisionWorld
 from arcor2_hw.data import object_type
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.exceptions import Conflict, InvalidData, NotFound
@@ -27,7 +28,6 @@ from arcor2_hw.kinematics.shapes import (
     of_model,
     triangles_of,
 )
-from arcor2_hw.kinematics.world import CollisionWorld
 from tests.kinematics.kin_robots import UR, joint, links, ur, urdf
 
 HOME = np.array((0.0, -1.2, 1.4, -1.8, -1.5, 0.0))

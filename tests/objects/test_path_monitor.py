@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from arcor2_hw.collision.world import CollisionWorld
 from arcor2_hw.data import object_type
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.exceptions import Cancelled, PathBlocked
 from arcor2_hw.kinematics.model import RobotModel
 from arcor2_hw.kinematics.shapes import Box
-from arcor2_hw.kinematics.world import CollisionWorld
 from arcor2_hw.objects.path_monitor import rest_of
 from arcor2_hw.objects.surroundings import HeldPart, Obstacle
 

@@ -12,13 +12,13 @@ import pytest
 
 from arcor2_hw.analysis.library import Library
 from arcor2_hw.analysis.source import SourceFile
+from arcor2_hw.collision.world import CollisionWorld
 from arcor2_hw.data import object_type
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import Cancelled, InvalidData, NotFound, OutOfRange, Refused
 from arcor2_hw.kinematics.model import RobotModel
 from arcor2_hw.kinematics.shapes import Box
-from arcor2_hw.kinematics.world import CollisionWorld
 from arcor2_hw.objects import safe_moves
 from arcor2_hw.objects.surroundings import Obstacle
 
@@ -201,8 +201,8 @@ def test_what_it_holds_goes_with_it_and_is_led_past(folder: Path, arm: Any, arou
     world.set_joints("arm", values(arm.now))
     assert world.pose("rod").position.distance_to(rod.position) < 0.01
     seen = second.safe_moves._snapshot().obstacles["rod"]
-    assert seen.holder is not None
-    assert seen.holder.robot == "plain"
+    assert seen.attachment is not None
+    assert seen.attachment.robot == "plain"
     # Let go, it is where it was let go.
     at = arm.safe_moves.release("rod", arm.now)
     assert at.position.distance_to(rod.position) < 0.01

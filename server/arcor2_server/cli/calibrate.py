@@ -13,8 +13,8 @@ from arcor2_hw.calibration.camera_results import CameraPose, HandEyeSample, Intr
 from arcor2_hw.calibration.configuration import read_configuration
 from arcor2_hw.calibration.layout import CharucoBoard, Layout
 from arcor2_hw.calibration.results import RobotPose, TouchedOrientation
+from arcor2_hw.collision.description import RobotSource, StoredFile
 from arcor2_hw.compute import calibration_tasks as t
-from arcor2_hw.compute.world import KeptFile, RobotModel
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Orientation, Pose, Position
@@ -143,7 +143,7 @@ def robot(
     """
 
     async def work() -> None:
-        described = RobotModel(KeptFile(str(model.absolute()), model.name), read_as(assumed, Pose))
+        described = RobotSource(StoredFile(str(model.absolute()), model.name), read_as(assumed, Pose))
         found = await compute(
             t.FindRobotPose(
                 described,

@@ -7,8 +7,8 @@ from msgspec.structs import replace
 from arcor2_hw.calibration.camera_results import CameraPose
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.calibration.results import RobotPose
+from arcor2_hw.collision.description import RobotSource
 from arcor2_hw.compute.calibration_tasks import FindCameraPose, FindMarkers, FindRobotPose
-from arcor2_hw.compute.world import RobotModel
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.camera import CameraParameters, MarkerCorners
 from arcor2_hw.data.geometry import Pose
@@ -56,7 +56,7 @@ class Calibration(Protocol):
         """Give the corners of every marker in the picture."""
 
     async def robot(
-        self, model: RobotModel, view: RobotView, depth: list[bytes], *, told: Told | None = None
+        self, model: RobotSource, view: RobotView, depth: list[bytes], *, told: Told | None = None
     ) -> RobotPose:
         """Give where a robot stands in the world, from depth pictures (16 bit, mm)."""
 
@@ -100,7 +100,7 @@ class CalibrationService:
         return await self._services.compute.run(FindMarkers(picture, parameters, dictionary))
 
     async def robot(
-        self, model: RobotModel, view: RobotView, depth: list[bytes], *, told: Told | None = None
+        self, model: RobotSource, view: RobotView, depth: list[bytes], *, told: Told | None = None
     ) -> RobotPose:
         """Give where a robot stands in the world."""
         placed = replace(model, base=view.robot_pose)

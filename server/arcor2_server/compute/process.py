@@ -15,9 +15,9 @@ import structlog
 
 from arcor2_hw import exceptions
 from arcor2_hw.calibration.refusals import CalibrationRefused
+from arcor2_hw.collision.description import WorldDescription, WorldItem
 from arcor2_hw.compute import messages as m
 from arcor2_hw.compute.task import ComputeStopped, ComputeTimeout, NotInstalled, Room, Task
-from arcor2_hw.compute.world import Thing, World
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.framing import PREFIX_SIZE
 
@@ -51,7 +51,7 @@ class ComputeProcess:
         self.process = process
         self._reader = reader
         self._writer = writer
-        self._told: dict[str, dict[str, Thing]] = {}
+        self._told: dict[str, dict[str, WorldItem]] = {}
         """The worlds as this process knows them, the one that was asked of last at the end."""
         self._lines: deque[str] = deque(maxlen=LINES)
         self._output = asyncio.create_task(self._read_output(), name=f"output of compute worker {process.pid}")
@@ -89,7 +89,9 @@ class ComputeProcess:
         """Tell whether the process can be asked."""
         return self.process.returncode is None and not self._reader.at_eof() and not self._writer.is_closing()
 
-    async def ask(self, task: Task[Any], within: float, world: World | None, told: Told | None, place: str = "") -> Any:
+    async def ask(
+        self, task: Task[Any], within: float, world: WorldDescription | None, told: Told | None, place: str = ""
+    ) -> Any:
         """Give the answer. Raises what the computation raises; ComputeStopped, ComputeTimeout when there is none."""
         try:
             async with asyncio.timeout(within + START_WITHIN):
@@ -108,7 +110,7 @@ class ComputeProcess:
             raise error_of(message)
         return msgspec.msgpack.decode(message.value, type=task.gives)
 
-    async def _send_world(self, world: World, place: str) -> None:
+    async def _send_world(self, world: WorldDescription, place: str) -> None:
         """Tell the process what changed since it was told last."""
         known = self._told.pop(place, {})
         put = [body for key, body in world.items() if (old := known.get(key)) is not body and old != body]

@@ -7,8 +7,8 @@ from typing import Any, Final, TypeVar
 
 import structlog
 
+from arcor2_hw.collision.description import WorldDescription
 from arcor2_hw.compute.task import ComputeBusy, ComputeStopped, Room, Task
-from arcor2_hw.compute.world import World
 from arcor2_server.compute.process import ComputeProcess, Told
 
 log = structlog.get_logger(__name__)
@@ -22,7 +22,7 @@ MOST_WAITING: Final = 1000
 class _Question:
     task: Task[Any]
     within: float
-    world: World | None
+    world: WorldDescription | None
     told: Told | None
     place: str = ""
     answer: asyncio.Future[Any] = field(default_factory=lambda: asyncio.get_running_loop().create_future())
@@ -132,7 +132,7 @@ class Compute:
         task: Task[R],
         *,
         within: float | None = None,
-        world: World | None = None,
+        world: WorldDescription | None = None,
         place: str = "",
         told: Told | None = None,
         background: bool = False,

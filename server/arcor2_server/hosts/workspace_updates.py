@@ -67,9 +67,9 @@ def _documents(data: Path) -> tuple[Scene, Project]:
 
 
 def _body(services: "Services", placed: Placed) -> m.PutIn:
-    model, holder = placed.model, placed.holder
+    model, holder = placed.model, placed.attachment
     file = ""
     if isinstance(model, Mesh) and services.assets.exists(model.asset_id):
         file = str(services.assets.file(model.asset_id))
-    held = ("", "", []) if holder is None else (holder.robot, holder.link, holder.touching)
+    held = ("", "", []) if holder is None else (holder.robot, holder.link, list(holder.touching))
     return m.PutIn(model.id, ObjectModel.of(model), placed.pose, placed.scale, file, *held)

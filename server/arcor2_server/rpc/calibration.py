@@ -8,7 +8,7 @@ import structlog
 from msgspec.structs import replace
 
 from arcor2_hw.calibration.records import CalibrationInput, CalibrationKind, CalibrationRecord
-from arcor2_hw.compute.world import RobotModel
+from arcor2_hw.collision.description import RobotSource
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.camera import CameraParameters, EstimatedPose, MarkerCorners
 from arcor2_hw.data.editor import TaskKind
@@ -164,7 +164,7 @@ async def _seen(
     robot: SceneObject,
     camera: SceneObject,
     parameters: CameraParameters,
-    model: RobotModel,
+    model: RobotSource,
     told: Told,
 ) -> Outcome:
     """Take a depth picture and find the robot in it."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import msgspec
 
-from arcor2_hw.compute.world import Holder
+from arcor2_hw.collision.description import Attachment
 from arcor2_hw.data.base import Data, Unset
 from arcor2_hw.data.events import PackageInfoData
 from arcor2_hw.data.geometry import Pose, Position
@@ -29,12 +29,12 @@ class Placed(Data, frozen=True):
     model: Models
     pose: Pose
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    holder: Holder | None = None
+    attachment: Attachment | None = None
 
     @property
     def simple(self) -> bool:
         """Tell whether lines are checked against it here: it stands by itself, and is no mesh."""
-        return self.holder is None and not isinstance(self.model, Mesh)
+        return self.attachment is None and not isinstance(self.model, Mesh)
 
 
 class CollisionWorld:
@@ -124,7 +124,7 @@ def _standing(services: "Services") -> Iterator[tuple[str, Placed]]:
 
 
 def _held(placed: Placed, robot: str, part: HeldPart) -> Placed:
-    return Placed(placed.model, part.pose, placed.scale, Holder(robot, part.link))
+    return Placed(placed.model, part.pose, placed.scale, Attachment(robot, part.link))
 
 
 @functools.lru_cache(maxsize=1)

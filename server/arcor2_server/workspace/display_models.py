@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Final
 
 import structlog
 
+from arcor2_hw.collision.description import StoredFile
 from arcor2_hw.compute.preparing_tasks import MAKER, PrepareAsset, Prepared
-from arcor2_hw.compute.world import KeptFile
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, StorageError
@@ -92,7 +92,7 @@ class PreparedAssets:
             done.exception()  # who asked may have gone
 
     async def _make(self, kept: str, key: str, name: str) -> Shown:
-        task = PrepareAsset(KeptFile(str(self._services.assets.file(key)), name))
+        task = PrepareAsset(StoredFile(str(self._services.assets.file(key)), name))
         try:
             with _told(self._services, name) as told:
                 made = await self._services.compute.run(task, told=told)

@@ -2,8 +2,8 @@
 
 from typing import TYPE_CHECKING
 
+from arcor2_hw.collision.description import WorldRobot
 from arcor2_hw.compute.kinematics_tasks import SolveForward, SolveInverse
-from arcor2_hw.compute.world import StandingRobot
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint
@@ -34,7 +34,7 @@ async def inverse(services: "Services", robot: SceneObject, args: InverseKinemat
     effector = _end_effector(args.end_effector_id, args.arm_id)
     task = SolveInverse(robot.id, effector, args.pose, start, args.avoid_collisions)
     if not args.avoid_collisions:
-        return await services.compute.run(task, world={robot.id: StandingRobot(robot.id, model)})
+        return await services.compute.run(task, world={robot.id: WorldRobot(robot.id, model)})
     others = [one for one in robots(services) if one.id != robot.id]
     joints = {one.id: await present_joints(services, one) for one in others}
     # Others whose joints are not known are not known to stand anywhere.

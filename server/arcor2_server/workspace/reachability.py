@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import structlog
 
+from arcor2_hw.collision.description import RobotSource, WorldItem
 from arcor2_hw.compute.kinematics_tasks import DescribeRobot, Judged, JudgeJoints, JudgePoses
 from arcor2_hw.compute.task import ComputeStopped
-from arcor2_hw.compute.world import RobotModel, Thing
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.editor import Reach, ReachabilityData, ReachOfItem
 from arcor2_hw.data.geometry import Pose
@@ -52,7 +52,7 @@ class _Row:
     end_effector: str
     arm: str | Unset = UNSET
     targets: dict[str, Target] = field(default_factory=dict)
-    world: Mapping[str, Thing] = field(default_factory=dict)
+    world: Mapping[str, WorldItem] = field(default_factory=dict)
     judged: dict[str, ReachOfItem] = field(default_factory=dict)
 
 
@@ -228,7 +228,7 @@ class ReachabilityBoard:
             return str(error)
         return ""
 
-    async def _rows_of(self, robot: SceneObject, model: RobotModel) -> None:
+    async def _rows_of(self, robot: SceneObject, model: RobotSource) -> None:
         """Bring the rows of a robot up to date with the end effectors of its model."""
         services = self._services
         key = repr((model.urdf, sorted(model.settings.items(), key=str))).encode()

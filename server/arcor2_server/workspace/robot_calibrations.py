@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Final
 import msgspec
 import structlog
 
+from arcor2_hw.collision.description import RobotSource
 from arcor2_hw.compute.kinematics_tasks import DescribeRobot
-from arcor2_hw.compute.world import RobotModel
 from arcor2_hw.data.base import Data, Timestamp, now
 from arcor2_hw.data.device import Connection
 from arcor2_hw.data.events import NotificationData, NotificationLevel
@@ -193,7 +193,7 @@ class ArmCalibrations:
         settings = settings_of(self._services, robot)
         try:
             await self._services.compute.run(
-                DescribeRobot(RobotModel(file, settings=settings, calibration=calibration))
+                DescribeRobot(RobotSource(file, settings=settings, calibration=calibration))
             )
         except InvalidData as error:
             return str(error)

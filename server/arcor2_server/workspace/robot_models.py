@@ -6,7 +6,7 @@ from urllib.parse import unquote, urlsplit
 
 import msgspec
 
-from arcor2_hw.compute.world import KeptFile, RobotModel
+from arcor2_hw.collision.description import RobotSource, StoredFile
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.scene import SceneObject, SceneObjectOverride
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 _ASSET: Final = re.compile(r"/assets/([^/]+)/data/?$")
 
 
-def model_of_type(services: "Services", type_name: str) -> KeptFile | None:
+def model_of_type(services: "Services", type_name: str) -> StoredFile | None:
     """Give the file of a robot type's model, None when it has none."""
     name = services.types.robot_meta(type_name).urdf_package_filename
     if isinstance(name, Unset):
         return None
-    return KeptFile(str(services.assets.file(name)), name) if services.assets.exists(name) else None
+    return StoredFile(str(services.assets.file(name)), name) if services.assets.exists(name) else None
 
 
-def model_of(services: "Services", robot: SceneObject, why: str) -> RobotModel:
+def model_of(services: "Services", robot: SceneObject, why: str) -> RobotSource:
     """Give the model of a robot of the open scene, where it stands, with its settings.
 
     RequestRefused for a robot without a model; `why` says what it is needed for.
@@ -37,7 +37,7 @@ def model_of(services: "Services", robot: SceneObject, why: str) -> RobotModel:
         raise RequestRefused(f"{robot.name} has no model (URDF) {why}.")
     base = Pose() if isinstance(robot.pose, Unset) else robot.pose
     calibration = services.arm_calibrations.in_force(robot)
-    return RobotModel(file, base, settings_of(services, robot), robot.name, calibration)
+    return RobotSource(file, base, settings_of(services, robot), robot.name, calibration)
 
 
 def settings_of(
@@ -60,7 +60,7 @@ def settings_of(
     return found
 
 
-def model_of_uri(services: "Services", uri: str) -> RobotModel:
+def model_of_uri(services: "Services", uri: str) -> RobotSource:
     """Give the model in the asset that a URI names, by its id or its address here.
 
     Nothing is fetched from elsewhere: NotFound.
@@ -69,5 +69,5 @@ def model_of_uri(services: "Services", uri: str) -> RobotModel:
     found = _ASSET.search(path)
     for name in (uri, unquote(found[1]) if found else unquote(path.rsplit("/", 1)[-1])):
         if services.assets.exists(name):
-            return RobotModel(KeptFile(str(services.assets.file(name)), name))
+            return RobotSource(StoredFile(str(services.assets.file(name)), name))
     raise NotFound(f"There is no asset {uri!r}, which the robot's model should be.")

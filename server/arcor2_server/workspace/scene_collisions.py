@@ -3,14 +3,24 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from arcor2_hw.collision.description import (
+    Attachment,
+    MeshShape,
+    RobotSource,
+    Shape,
+    StoredFile,
+    WorldBody,
+    WorldItem,
+    WorldRobot,
+)
 from arcor2_hw.compute.kinematics_tasks import CheckLines, Line, PlaceInLink
-from arcor2_hw.compute.world import Body, Holder, KeptFile, MeshShape, RobotModel, Shape, StandingRobot, Thing, shape_of
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import Mesh
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error, Conflict
+from arcor2_hw.kinematics.primitives import primitive_of
 from arcor2_server.workspace.collisions import Hit, Placed, first_hit
 from arcor2_server.workspace.robot_models import model_of_type, settings_of
 
@@ -22,19 +32,19 @@ Joints = Mapping[str, list[Joint]]
 
 
 # ------------------------------------------------------------------------------------------------ bodies
-def kept_mesh(services: "Services", asset_id: str) -> KeptFile:
+def kept_mesh(services: "Services", asset_id: str) -> StoredFile:
     """Give the file of a mesh; one that is gone has no path, and is named by who tries to read it."""
     path = str(services.assets.file(asset_id)) if services.assets.exists(asset_id) else "/nonexistent"
-    return KeptFile(path, asset_id)
+    return StoredFile(path, asset_id)
 
 
-def body_of(services: "Services", key: str, placed: Placed) -> Body:
+def body_of(services: "Services", key: str, placed: Placed) -> WorldBody:
     """Give a placed model as the worker is told of it."""
     model = placed.model
     shape: Shape = (
-        MeshShape(kept_mesh(services, model.asset_id), placed.scale) if isinstance(model, Mesh) else shape_of(model)
+        MeshShape(kept_mesh(services, model.asset_id), placed.scale) if isinstance(model, Mesh) else primitive_of(model)
     )
-    return Body(key, shape, placed.pose, placed.holder)
+    return WorldBody(key, shape, placed.pose, placed.attachment)
 
 
 def standing(services: "Services") -> dict[str, Placed]:
@@ -62,14 +72,14 @@ def robots(services: "Services") -> list[SceneObject]:
     ]
 
 
-def robot_model(services: "Services", robot: SceneObject) -> RobotModel | None:
+def robot_model(services: "Services", robot: SceneObject) -> RobotSource | None:
     """Give a robot's model where it stands, None when it has none."""
     file = model_of_type(services, robot.type)
     if file is None:
         return None
     base = Pose() if isinstance(robot.pose, Unset) else robot.pose
     calibration = services.arm_calibrations.in_force(robot)
-    return RobotModel(file, base, settings_of(services, robot), calibration=calibration)
+    return RobotSource(file, base, settings_of(services, robot), calibration=calibration)
 
 
 async def present_joints(services: "Services", robot: SceneObject) -> list[Joint]:
@@ -85,19 +95,19 @@ async def present_joints(services: "Services", robot: SceneObject) -> list[Joint
         return []
 
 
-def things(services: "Services", chosen: list[SceneObject], joints: Joints | None = None) -> dict[str, Thing]:
+def things(services: "Services", chosen: list[SceneObject], joints: Joints | None = None) -> dict[str, WorldItem]:
     """Give the world of the open scene with the robots that are chosen, and what these hold.
 
     joints: of those robots; one without stands in its middle position. Of what other robots hold nothing is said.
     """
     present = joints or {}
-    found: dict[str, Thing] = {}
+    found: dict[str, WorldItem] = {}
     for robot in chosen:
         model = robot_model(services, robot)
         if model is not None:
-            found[robot.id] = StandingRobot(robot.id, model, present.get(robot.id, []))
+            found[robot.id] = WorldRobot(robot.id, model, present.get(robot.id, []))
     for key, placed in standing(services).items():
-        if key not in found and (placed.holder is None or placed.holder.robot in found):
+        if key not in found and (placed.attachment is None or placed.attachment.robot in found):
             found[key] = body_of(services, key, placed)
     return found
 
@@ -125,10 +135,10 @@ async def hit(services: "Services", start: Position, end: Position) -> Hit | Non
     rest = {key: one for key, one in placed.items() if not one.simple}
     if not rest:
         return found
-    holders = {one.holder.robot for one in rest.values() if one.holder is not None}
+    holders = {one.attachment.robot for one in rest.values() if one.attachment is not None}
     chosen = [robot for robot in robots(services) if robot.id in holders]
     joints = {robot.id: await present_joints(services, robot) for robot in chosen}
-    world: dict[str, Thing] = {
+    world: dict[str, WorldItem] = {
         key: thing for key, thing in things(services, chosen, joints).items() if key in rest or key in holders
     }
     task = CheckLines([Line(start, end)], inflation, sorted(holders))
@@ -145,19 +155,19 @@ async def attach(services: "Services", key: str, robot: SceneObject, link: str) 
     NotFound; Conflict when it is held, when the robot has no model, or its joints are not known.
     """
     placed = services.collisions.given(key)
-    if placed.holder is not None:
+    if placed.attachment is not None:
         raise Conflict(f"{key} is held already.")
     in_link = await _in_link(services, robot, link, placed.pose)
-    services.collisions.put(Placed(placed.model, in_link, placed.scale, Holder(robot.id, link)))
+    services.collisions.put(Placed(placed.model, in_link, placed.scale, Attachment(robot.id, link)))
 
 
 async def detach(services: "Services", key: str) -> Pose:
     """Let go of a model, which stays where it is now; gives where. NotFound; Conflict as `attach`."""
     placed = services.collisions.given(key)
-    if placed.holder is None:
+    if placed.attachment is None:
         raise Conflict(f"{key} is not held.")
-    robot = services.cell.robot(placed.holder.robot)
-    link_from_world = await _in_link(services, robot, placed.holder.link, Pose())
+    robot = services.cell.robot(placed.attachment.robot)
+    link_from_world = await _in_link(services, robot, placed.attachment.link, Pose())
     pose = link_from_world.inverted() * placed.pose
     services.collisions.put(Placed(placed.model, pose, placed.scale))
     return pose

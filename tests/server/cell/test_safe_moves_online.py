@@ -8,7 +8,7 @@ import pytest
 import trimesh
 from msgspec.structs import replace
 
-from arcor2_hw.compute.world import Holder
+from arcor2_hw.collision.description import Attachment
 from arcor2_hw.data import object_type
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import ObjectTypeMeta
@@ -93,8 +93,8 @@ async def with_arm_alone(server: Server) -> None:
     await server.open(Scene("scene", id="scn_1", objects=[placed("arm", "Arm", Pose())]))
 
 
-def box(key: str, at: Position, x: float, y: float, z: float, holder: Holder | None = None) -> Placed:
-    return Placed(object_type.Box(key, x, y, z), Pose(at), holder=holder)
+def box(key: str, at: Position, x: float, y: float, z: float, attachment: Attachment | None = None) -> Placed:
+    return Placed(object_type.Box(key, x, y, z), Pose(at), attachment=attachment)
 
 
 async def line(server: Server, to: Position) -> str:
@@ -122,7 +122,7 @@ async def test_what_was_put_in_or_is_held_counts_online_and_in_programs(server: 
         assert "crate" in await line(server, beside)
         world.remove("crate")
         assert await line(server, beside) == ""
-        world.put(box("rod", Position(0.0, 0.0, 0.16), 0.03, 0.03, 0.3, Holder(OBJ, "tcp")))
+        world.put(box("rod", Position(0.0, 0.0, 0.16), 0.03, 0.03, 0.3, Attachment(OBJ, "tcp")))
         met = await line(server, beside)
         assert "rod" in met
         assert "table" in met
@@ -133,7 +133,7 @@ async def test_what_was_put_in_or_is_held_counts_online_and_in_programs(server: 
 
         # A program meets what was there before it, and what comes while it runs.
         world.put(box("table", beside + Position(0.0, 0.0, -0.2), 0.1, 0.1, 0.02))
-        world.put(box("rod", Position(0.0, 0.0, 0.16), 0.03, 0.03, 0.3, Holder(OBJ, "tcp")))
+        world.put(box("rod", Position(0.0, 0.0, 0.16), 0.03, 0.03, 0.3, Attachment(OBJ, "tcp")))
         write(server)
         await server.ask("RunPackage", {"id": "pkg_1"})
         met = (await server.client.event("ProjectException"))["message"]

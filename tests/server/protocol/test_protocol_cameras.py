@@ -15,7 +15,7 @@ from arcor2_hw.calibration.configuration import CalibrationConfiguration
 from arcor2_hw.calibration.layout import Marker
 from arcor2_hw.calibration.records import CalibrationKind, CalibrationRecord
 from arcor2_hw.calibration.results import Grade, RobotPose
-from arcor2_hw.compute.world import RobotModel
+from arcor2_hw.collision.description import RobotSource
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.camera import CameraParameters, Corner, MarkerCorners
 from arcor2_hw.data.geometry import Orientation, Pose, Position
@@ -72,7 +72,7 @@ class Service:
         return [MarkerCorners(10, [Corner(1, 2), Corner(3, 2), Corner(3, 4), Corner(1, 4)])]
 
     async def robot(
-        self, model: RobotModel, view: RobotView, depth: list[bytes], *, told: Told | None = None
+        self, model: RobotSource, view: RobotView, depth: list[bytes], *, told: Told | None = None
     ) -> RobotPose:
         if told is not None:
             told(0.5, "looking for the robot")

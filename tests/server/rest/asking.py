@@ -6,9 +6,9 @@ from typing import Any
 
 import httpx
 
+from arcor2_hw.collision.description import StoredFile
 from arcor2_hw.compute.calibration_tasks import FrameByPoints
 from arcor2_hw.compute.kinematics_tasks import ReadMesh
-from arcor2_hw.compute.world import KeptFile
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.app import create_app
 from arcor2_server.services import Services
@@ -27,7 +27,7 @@ async def start_workers(services: Services) -> None:
     with contextlib.suppress(InvalidData):
         await services.compute.run(FrameByPoints([], []))
     with contextlib.suppress(InvalidData):
-        await services.compute.run(ReadMesh(KeptFile("/nonexistent", "none.stl")))
+        await services.compute.run(ReadMesh(StoredFile("/nonexistent", "none.stl")))
 
 
 def granted(answer: httpx.Response) -> Any:

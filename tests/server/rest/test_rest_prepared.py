@@ -12,9 +12,9 @@ import pytest
 import pytest_asyncio
 import trimesh
 
+from arcor2_hw.collision.description import StoredFile
 from arcor2_hw.compute.preparing_tasks import MAKER, PrepareAsset
 from arcor2_hw.compute.task import ComputeStopped
-from arcor2_hw.compute.world import KeptFile
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.collaboration.tasks import Task
@@ -33,7 +33,7 @@ SHOWN = "/api/assets/{}/shown"
 async def worker(services: Services) -> None:
     """The worker for meshes is up before the tests."""
     with contextlib.suppress(InvalidData):
-        await services.compute.run(PrepareAsset(KeptFile("/nonexistent", "none.stl")))
+        await services.compute.run(PrepareAsset(StoredFile("/nonexistent", "none.stl")))
 
 
 @pytest.fixture

@@ -9,12 +9,12 @@ from typing import Final
 
 import numpy as np
 
+from arcor2_hw.collision.sweep import Sweep
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.kinematics.arm import NEAR_SINGULAR, Arm
 from arcor2_hw.kinematics.errors import MotionInCollision, NoStraightLine
 from arcor2_hw.kinematics.inverse import InverseKinematics
 from arcor2_hw.kinematics.shapes import Array
-from arcor2_hw.kinematics.sweep import Sweep
 
 OFF_LINE: Final = 0.0005
 """m that the end effector may be beside its line between two waypoints."""

@@ -8,12 +8,12 @@ from typing import Final
 
 import numpy as np
 
+from arcor2_hw.collision.world import CollisionWorld
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.kinematics.arm import NEAR_SINGULAR, Arm
 from arcor2_hw.kinematics.inverse import InverseKinematics
 from arcor2_hw.kinematics.shapes import Array
-from arcor2_hw.kinematics.world import CollisionWorld
 
 KEPT: Final = 20_000
 """Poses whose answers are kept."""

@@ -13,11 +13,11 @@ from typing import Final
 
 import numpy as np
 
+from arcor2_hw.collision.sweep import Sweep
 from arcor2_hw.exceptions import Cancelled, InvalidData
 from arcor2_hw.kinematics.errors import GoalInCollision, NoPath, OnlyInCollision, StartInCollision
 from arcor2_hw.kinematics.inverse import InverseKinematics
 from arcor2_hw.kinematics.shapes import Array
-from arcor2_hw.kinematics.sweep import Sweep
 
 WITHIN: Final = 2.0
 """s that a plan may take."""

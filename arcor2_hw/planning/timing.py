@@ -13,8 +13,8 @@ from ruckig import Trajectory as RuckigTrajectory
 
 from arcor2_hw.exceptions import InvalidData
 from arcor2_hw.kinematics.arm import Arm
-from arcor2_hw.kinematics.paths import rounded
 from arcor2_hw.kinematics.shapes import Array
+from arcor2_hw.planning.paths import rounded
 
 RAMP: Final = 0.4
 """s in which a joint gets to its maximum velocity, where nothing else is known: a URDF states no accelerations."""

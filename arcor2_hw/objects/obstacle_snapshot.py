@@ -13,12 +13,12 @@ from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import Refused
 from arcor2_hw.objects.robot import Robot
-from arcor2_hw.objects.surroundings import Holder, Obstacle
+from arcor2_hw.objects.surroundings import Attachment, Obstacle
 
 if TYPE_CHECKING:
+    from arcor2_hw.collision.world import CollisionWorld
     from arcor2_hw.kinematics.model import RobotModel
     from arcor2_hw.kinematics.shapes import Shape
-    from arcor2_hw.kinematics.world import CollisionWorld
     from arcor2_hw.objects.robot_tools import RobotTools
 
 JOINT_TOLERANCE: Final = 0.01
@@ -29,17 +29,17 @@ Others = list[tuple[Robot, list[Joint]]]
 
 
 @dataclasses.dataclass(frozen=True)
-class Snapshot:
+class ObstacleSnapshot:
     """Obstacles by name and other robots by name with their joint values, at one moment.
 
-    Tools of robots and parts that robots hold are obstacles with a holder.
+    Tools of robots and parts that robots hold are obstacles with a attachment.
     """
 
     obstacles: dict[str, Obstacle]
     robots: dict[str, tuple[Robot, list[Joint]]]
 
     @classmethod
-    def take(cls, robot: Robot, others: Others, tool: Callable[[Robot], Obstacle | None]) -> "Snapshot":
+    def take(cls, robot: Robot, others: Others, tool: Callable[[Robot], Obstacle | None]) -> "ObstacleSnapshot":
         """Take a snapshot of the surroundings of a robot.
 
         Args:
@@ -53,42 +53,44 @@ class Snapshot:
             if (attached := tool(each)) is not None:
                 obstacles[attached.name] = attached
             for part in each.parts.values():
-                holder, known = Holder(each.name, part.link), obstacles.get(part.name)
+                attachment, known = Attachment(each.name, part.link), obstacles.get(part.name)
                 if part.model is not None:
-                    obstacles[part.name] = Obstacle(part.name, part.model, part.in_link, holder)
+                    obstacles[part.name] = Obstacle(part.name, part.model, part.in_link, attachment)
                 elif known is not None:
-                    obstacles[part.name] = replace(known, pose=part.in_link, holder=holder)
+                    obstacles[part.name] = replace(known, pose=part.in_link, attachment=attachment)
         robots = {other.name: (other, [Joint(joint.name, joint.value) for joint in joints]) for other, joints in others}
         return cls(obstacles, robots)
 
-    def settled(self, before: "Snapshot") -> "Snapshot":
+    def settled(self, before: "ObstacleSnapshot") -> "ObstacleSnapshot":
         """Return this snapshot with the joint values of `before` for robots that have not moved since."""
         robots = dict(self.robots)
         for name, (robot, joints) in self.robots.items():
             known = before.robots.get(name)
             if known is not None and not _differ(known[1], joints):
                 robots[name] = robot, known[1]
-        return Snapshot(self.obstacles, robots)
+        return ObstacleSnapshot(self.obstacles, robots)
 
-    def changed_since(self, before: "Snapshot", robot: str) -> "Snapshot":
+    def changed_since(self, before: "ObstacleSnapshot", robot: str) -> "ObstacleSnapshot":
         """Return the part of this snapshot that `robot` could newly collide with, and what it holds itself.
 
         That is what appeared or moved since `before`. When the robot holds something new, it is everything.
         """
         obstacles = {name: one for name, one in self.obstacles.items() if before.obstacles.get(name) != one}
-        if any(one.holder is not None and one.holder.robot == robot for one in obstacles.values()):
+        if any(one.attachment is not None and one.attachment.robot == robot for one in obstacles.values()):
             return self
         robots = {name: one for name, one in self.robots.items() if before.robots.get(name) != one}
         if not obstacles and not robots:
-            return Snapshot({}, {})
+            return ObstacleSnapshot({}, {})
         carriers = {robot, *robots}
         obstacles |= {
-            name: one for name, one in self.obstacles.items() if one.holder is not None and one.holder.robot in carriers
+            name: one
+            for name, one in self.obstacles.items()
+            if one.attachment is not None and one.attachment.robot in carriers
         }
         for one in obstacles.values():
-            if one.holder is not None and one.holder.robot in self.robots:
-                robots[one.holder.robot] = self.robots[one.holder.robot]
-        return Snapshot(obstacles, robots)
+            if one.attachment is not None and one.attachment.robot in self.robots:
+                robots[one.attachment.robot] = self.robots[one.attachment.robot]
+        return ObstacleSnapshot(obstacles, robots)
 
     @property
     def empty(self) -> bool:
@@ -97,14 +99,14 @@ class Snapshot:
 
 
 def build_world(
-    robot: Robot, tools: "RobotTools", now: Sequence[Joint], around: Snapshot, margin: float
+    robot: Robot, tools: "RobotTools", now: Sequence[Joint], around: ObstacleSnapshot, margin: float
 ) -> "CollisionWorld":
     """Return the collision world of a robot with joint values `now` and a margin in m.
 
     Raises:
-        Refused: Joint values of another robot, a mesh or the holder of a part are unknown.
+        Refused: Joint values of another robot, a mesh or the attachment of a part are unknown.
     """
-    from arcor2_hw.kinematics.world import CollisionWorld
+    from arcor2_hw.collision.world import CollisionWorld
 
     world = CollisionWorld(margin=margin)
     world.add_robot(robot.name, tools.model, robot.pose, tools.model.values(now, tools.model.neutral()))
@@ -115,22 +117,22 @@ def build_world(
             world.add_robot(other.name, model, other.pose, model.values(joints, model.neutral()))
     for obstacle in around.obstacles.values():
         shape = tools.shape(obstacle)
-        if obstacle.holder is None:
+        if obstacle.attachment is None:
             world.put(obstacle.name, shape, obstacle.pose)
         else:
-            _attach(world, obstacle.name, shape, obstacle.holder, obstacle.pose)
+            _attach(world, obstacle.name, shape, obstacle.attachment, obstacle.pose)
     return world
 
 
-def _attach(world: "CollisionWorld", name: str, shape: "Shape", holder: Holder, in_link: Pose) -> None:
-    if holder.robot not in world.robots:
-        raise Refused(f"The position of {holder.robot}, which holds {name}, is unknown.")
-    standing = world.robot(holder.robot)
+def _attach(world: "CollisionWorld", name: str, shape: "Shape", attachment: Attachment, in_link: Pose) -> None:
+    if attachment.robot not in world.robots:
+        raise Refused(f"The position of {attachment.robot}, which holds {name}, is unknown.")
+    standing = world.robot(attachment.robot)
     frames = standing.link_frames(standing.q)
-    if holder.link not in frames:
-        raise Refused(f"{name} is held by {holder.link}, which is no link of {holder.robot}")
-    world.put(name, shape, Pose.from_matrix(frames[holder.link]) * in_link)
-    world.attach(name, holder.robot, holder.link, touching=holder.touching)
+    if attachment.link not in frames:
+        raise Refused(f"{name} is held by {attachment.link}, which is no link of {attachment.robot}")
+    world.put(name, shape, Pose.from_matrix(frames[attachment.link]) * in_link)
+    world.attach(name, attachment.robot, attachment.link, touching=attachment.touching)
 
 
 def _require_all_joints(robot: Robot, model: "RobotModel", joints: Sequence[Joint]) -> None:

@@ -5,37 +5,34 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
 
-from arcor2_hw.compute.world import (
-    Body,
-    BoxShape,
-    CylinderShape,
+from arcor2_hw.collision.description import (
     MeshShape,
-    RobotModel,
-    SphereShape,
-    StandingRobot,
-    Thing,
+    RobotSource,
+    WorldBody,
+    WorldItem,
+    WorldRobot,
 )
+from arcor2_hw.collision.world import CollisionWorld
 from arcor2_hw.exceptions import Arcor2Error, NotFound
 from arcor2_hw.kinematics import model, shapes
 from arcor2_hw.kinematics.errors import BadMesh
 from arcor2_hw.kinematics.inverse import InverseKinematics
 from arcor2_hw.kinematics.meshes import read_mesh
-from arcor2_hw.kinematics.reach import Reachability
 from arcor2_hw.kinematics.source import MAX_MESH
-from arcor2_hw.kinematics.world import CollisionWorld
+from arcor2_hw.planning.reachability import Reachability
 
 MESHES: Final = 64
 """Meshes that are kept, those that were used last."""
 
 
-class StandingWorld:
+class WorldReplica:
     """`collisions` is the world itself; `settle` brings it to what `change` told."""
 
-    def __init__(self, load: Callable[[RobotModel], model.RobotModel]) -> None:
+    def __init__(self, load: Callable[[RobotSource], model.RobotModel]) -> None:
         self.collisions = CollisionWorld()
         self._load = load
-        self._things: dict[str, Thing] = {}
-        self._placed: dict[str, Thing] = {}
+        self._things: dict[str, WorldItem] = {}
+        self._placed: dict[str, WorldItem] = {}
         """What stands in `collisions`."""
         self._waiting: dict[str, None] = {}
         """Ids of what changed since, in their order."""
@@ -44,7 +41,7 @@ class StandingWorld:
         self._reach: dict[tuple[str, str], Reachability] = {}
         self._inverse: dict[tuple[str, str], InverseKinematics] = {}
 
-    def change(self, put: Sequence[Thing], remove: Sequence[str]) -> None:
+    def change(self, put: Sequence[WorldItem], remove: Sequence[str]) -> None:
         """Note what came, went or changed."""
         for key in remove:
             self._things.pop(key, None)
@@ -73,42 +70,42 @@ class StandingWorld:
         thing = self._things.get(key)
         if thing is None:
             return 0
-        return 1 if isinstance(thing, StandingRobot) else 2 if thing.holder is None else 3
+        return 1 if isinstance(thing, WorldRobot) else 2 if thing.attachment is None else 3
 
     def _let_go(self, waiting: Sequence[str]) -> list[str]:
         """Give the ids of what has to be held anew, since its robot is made anew or goes."""
         gone = {
             key
             for key in waiting
-            if isinstance(old := self._placed.get(key), StandingRobot) and not _same_robot(old, self._things.get(key))
+            if isinstance(old := self._placed.get(key), WorldRobot) and not _same_robot(old, self._things.get(key))
         }
         return [
             key
             for key, thing in self._things.items()
-            if isinstance(thing, Body)
-            and thing.holder is not None
+            if isinstance(thing, WorldBody)
+            and thing.attachment is not None
             and key not in waiting
-            and (thing.holder.robot in gone or (key in self._unusable and thing.holder.robot in waiting))
+            and (thing.attachment.robot in gone or (key in self._unusable and thing.attachment.robot in waiting))
         ]
 
     # -------------------------------------------------------------------------------- one thing
-    def _put(self, key: str, thing: Thing | None) -> None:
+    def _put(self, key: str, thing: WorldItem | None) -> None:
         old = self._placed.get(key)
         match thing:
             case None:
                 self._drop(key)
                 return
-            case StandingRobot():
+            case WorldRobot():
                 if not _same_robot(old, thing):
                     self._drop(key)
                 self._stand(thing, key in self._placed)
-            case Body():
-                if isinstance(old, StandingRobot):
+            case WorldBody():
+                if isinstance(old, WorldRobot):
                     self._drop(key)
-                self._place(thing, old if isinstance(old, Body) else None)
+                self._place(thing, old if isinstance(old, WorldBody) else None)
         self._placed[key] = thing
 
-    def _stand(self, robot: StandingRobot, stands: bool) -> None:
+    def _stand(self, robot: WorldRobot, stands: bool) -> None:
         world = self.collisions
         if not stands:
             world.add_robot(robot.id, self._load(robot.model), robot.model.base)
@@ -118,26 +115,28 @@ class StandingWorld:
         if robot.joints:
             world.set_joints(robot.id, standing.model.values(robot.joints, standing.q))
 
-    def _place(self, body: Body, old: Body | None) -> None:
+    def _place(self, body: WorldBody, old: WorldBody | None) -> None:
         world, pose = self.collisions, body.pose
-        if body.holder is not None:
-            if body.holder.robot not in world.robots:
-                raise NotFound(f"{body.id} is held by {body.holder.robot}, which is not there.")
-            standing = world.robot(body.holder.robot)
+        if body.attachment is not None:
+            if body.attachment.robot not in world.robots:
+                raise NotFound(f"{body.id} is attached to {body.attachment.robot}, which is not in the world.")
+            standing = world.robot(body.attachment.robot)
             frames = standing.link_frames(standing.q)
-            if body.holder.link not in frames:
-                raise NotFound(f"{body.id} is held by {body.holder.link}, which is no link of {body.holder.robot}.")
-            pose = type(pose).from_matrix(frames[body.holder.link] @ pose.matrix())
+            if body.attachment.link not in frames:
+                raise NotFound(
+                    f"{body.id} is held by {body.attachment.link}, which is no link of {body.attachment.robot}."
+                )
+            pose = type(pose).from_matrix(frames[body.attachment.link] @ pose.matrix())
         if old is not None and old.shape == body.shape:
             world.move(body.id, pose)
         else:
             world.put(body.id, self._shape(body), pose)
-        if body.holder is not None:
-            world.attach(body.id, body.holder.robot, body.holder.link, touching=body.holder.touching)
+        if body.attachment is not None:
+            world.attach(body.id, body.attachment.robot, body.attachment.link, touching=body.attachment.touching)
 
     def _drop(self, key: str) -> None:
         old = self._placed.pop(key, None)
-        if isinstance(old, StandingRobot):
+        if isinstance(old, WorldRobot):
             self.collisions.remove_robot(key)
             for kept in (self._reach, self._inverse):
                 for pair in [pair for pair in kept if pair[0] == key]:
@@ -146,16 +145,8 @@ class StandingWorld:
             self.collisions.delete(key)
 
     # -------------------------------------------------------------------------------- shapes
-    def _shape(self, body: Body) -> shapes.Shape:
-        match body.shape:
-            case BoxShape(size):
-                return shapes.Box(*size)
-            case SphereShape(radius):
-                return shapes.Sphere(radius)
-            case CylinderShape(radius, height):
-                return shapes.Cylinder(radius, height)
-            case MeshShape():
-                return self.mesh(body.shape)
+    def _shape(self, body: WorldBody) -> shapes.Shape:
+        return self.mesh(body.shape) if isinstance(body.shape, MeshShape) else body.shape
 
     def mesh(self, shape: MeshShape) -> shapes.TriangleMesh:
         """Give a mesh, read once. Raises BadMesh naming it."""
@@ -196,9 +187,9 @@ def mesh_of(shape: MeshShape) -> shapes.TriangleMesh:
     return read_mesh(content, shape.file.name, shape.scale)
 
 
-def _same_robot(old: Thing | None, new: Thing | None) -> bool:
+def _same_robot(old: WorldItem | None, new: WorldItem | None) -> bool:
     """Tell whether a robot is the same but for where it stands and its joints."""
-    if not isinstance(old, StandingRobot) or not isinstance(new, StandingRobot):
+    if not isinstance(old, WorldRobot) or not isinstance(new, WorldRobot):
         return False
     one, other = old.model, new.model
     return (one.urdf, one.settings, one.calibration) == (other.urdf, other.settings, other.calibration)

@@ -8,11 +8,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from arcor2_hw.collision.robot import CollisionRobot
+from arcor2_hw.collision.world import CollisionWorld
 from arcor2_hw.exceptions import InvalidData
 from arcor2_hw.kinematics.arm import Arm
 from arcor2_hw.kinematics.shapes import Array
-from arcor2_hw.kinematics.standing import StandingRobot
-from arcor2_hw.kinematics.world import CollisionWorld
 
 RESOLUTION: Final = 0.01
 """m that no point of the robot, nor of what it holds, travels farther between two configurations that are looked at.
@@ -35,7 +35,7 @@ class Sweep:
 
     The robot's other joints, other robots and all bodies stand as they do when this is made. What the robot holds is
     part of it. levers: m (per m where prismatic) that a point of the robot travels at most per unit of each joint.
-    checks: configurations that were looked at. Not safe for two threads at once.
+    checks: configurations checked. Not safe for two threads at once.
     """
 
     def __init__(self, world: CollisionWorld, robot: str, arm: Arm, resolution: float = RESOLUTION) -> None:
@@ -59,10 +59,8 @@ class Sweep:
 
     def hit(self, q: Array) -> str:
         """Give what joint values are in collision with, empty when they are free."""
-        if self.is_free(q):
-            return ""
-        found = self.world.contacts(self.robot, self._whole(q))
-        return str(found[0]) if found else "something"
+        self.checks += 1
+        return self.world.first_contact(self.robot, self._whole(q))
 
     def is_free_between(self, a: Array, b: Array, resolution: float | None = None) -> bool:
         """Tell whether nothing is in the way from `a`, which is taken for free, to `b`; `b` is looked at too.
@@ -161,7 +159,7 @@ def _far_apart(count: int) -> tuple[int, ...]:
     return tuple(order)
 
 
-def levers(robot: StandingRobot) -> Array:
+def levers(robot: CollisionRobot) -> Array:
     """Give for each joint of the model the m that a point of the robot travels at most per rad, or per m.
 
     A bound for all joint values within the limits: the lengths from the joint's axis to the farthest part behind it,
@@ -185,7 +183,7 @@ def levers(robot: StandingRobot) -> Array:
     return np.asarray(np.abs(factors).T @ bounds[1:])
 
 
-def _slides(robot: StandingRobot) -> list[float | None]:
+def _slides(robot: CollisionRobot) -> list[float | None]:
     """Give for each body of Pinocchio's model how far it slides from its place at most, m; None where it turns."""
     found: list[float | None] = [None]
     joints = {joint.name: joint for joint in robot.model.description.joints}

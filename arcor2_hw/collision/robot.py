@@ -18,7 +18,7 @@ _ALWAYS: Final = 0.95
 
 
 @dataclass(eq=False)
-class Held:
+class AttachedBody:
     """A body that a link carries: its shape, where it is in the link, and the links it may touch."""
 
     name: str
@@ -29,19 +29,19 @@ class Held:
 
 
 @dataclass(eq=False)
-class Part:
+class RobotPart:
     """A shape of a link, or a held body: its name, the body of Pinocchio's model it sits on, its frame there."""
 
     name: str
     link: str
-    held: Held | None
+    held: AttachedBody | None
     body: int
     origin: Array
     geometry: Any
     object: Any
 
 
-class StandingRobot:
+class CollisionRobot:
     """One robot of a world. q: its present joint values, in the model's order. parts: shapes and what is held.
 
     manager, obstacle: coal's, of the parts that move with the joints, and of all of them, as they were posed last.
@@ -56,7 +56,7 @@ class StandingRobot:
         self.margin = margin
         self.model = model
         self.q = np.array(q, dtype=np.float64)
-        self.held: dict[str, Held] = {}
+        self.held: dict[str, AttachedBody] = {}
         self.revision = 0
         self._touching: frozenset[frozenset[str]] | None = None
         self.place(base)
@@ -70,7 +70,7 @@ class StandingRobot:
     def rebuild(self) -> None:
         """Make the shapes anew, after something was taken or put down."""
         self.revision += 1
-        self.parts: list[Part] = []
+        self.parts: list[RobotPart] = []
         for each in self.model.collision:
             body, frame = self.tree.bodies[each.link]
             self._add(each.name, each.link, None, body, frame @ each.origin, each.shape)
@@ -98,9 +98,9 @@ class StandingRobot:
         self.obstacle.setup()
         self._posed: tuple[bytes, float, bool] | None = None
 
-    def _add(self, name: str, link: str, held: Held | None, body: int, origin: Array, shape: Shape) -> None:
+    def _add(self, name: str, link: str, held: AttachedBody | None, body: int, origin: Array, shape: Shape) -> None:
         geometry = coal_geometry(shape)
-        self.parts.append(Part(name, link, held, body, origin, geometry, coal.CollisionObject(geometry)))
+        self.parts.append(RobotPart(name, link, held, body, origin, geometry, coal.CollisionObject(geometry)))
 
     # -------------------------------------------------------------------------------- moving
     def pose(self, q: Array, everything: bool = False, more: float = 0.0) -> None:

@@ -12,13 +12,15 @@ from typing import Any
 import coal
 import numpy as np
 
+from arcor2_hw.collision import rays
+from arcor2_hw.collision.robot import CollisionRobot, RobotPart
+from arcor2_hw.collision.world_state import PlacedBody, WorldState, corners
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.geometry import Position
 from arcor2_hw.exceptions import InvalidData
-from arcor2_hw.kinematics import rays
-from arcor2_hw.kinematics.contents import Body, Contents, corners
+from arcor2_hw.kinematics.arm import Arm
+from arcor2_hw.kinematics.inverse import CollisionCheck
 from arcor2_hw.kinematics.shapes import Array, Shape
-from arcor2_hw.kinematics.standing import Part, StandingRobot
 
 
 class Contact(Data, frozen=True):
@@ -50,8 +52,8 @@ class RayHit(Data, frozen=True):
     point: Position
 
 
-class CollisionWorld(Contents):
-    """Bodies by id and robots by id, see `Contents`, and the questions to them."""
+class CollisionWorld(WorldState):
+    """Bodies by id and robots by id, see `WorldState`, and the questions to them."""
 
     # -------------------------------------------------------------------------------- collisions
     def is_free(self, robot: str, q: Array) -> bool:
@@ -100,7 +102,14 @@ class CollisionWorld(Contents):
         found.sort(key=lambda each: each.first not in mine.held)
         return list({(each.first, each.second): each for each in found}.values())
 
-    def _contacts_with(self, mine: StandingRobot, bodies: Iterable[Body], margin: float) -> Iterator[Contact]:
+    def first_contact(self, robot: str, q: Array) -> str:
+        """Return the first contact of a robot in joint values as text, empty when there is none."""
+        if self.is_free(robot, q):
+            return ""
+        found = self.contacts(robot, q)
+        return str(found[0]) if found else "an obstacle"
+
+    def _contacts_with(self, mine: CollisionRobot, bodies: Iterable[PlacedBody], margin: float) -> Iterator[Contact]:
         """Give contacts of a robot that is posed already with bodies."""
         every = list(bodies)
         boxes = np.array([body.box for body in every]).reshape(-1, 2, 3)
@@ -114,7 +123,7 @@ class CollisionWorld(Contents):
                 if (depth := _depth(part.object, body.object, margin)) is not None:
                     yield Contact(_name(mine, part), body.name, depth)
 
-    def _contacts_between(self, mine: StandingRobot, other: StandingRobot, margin: float) -> Iterator[Contact]:
+    def _contacts_between(self, mine: CollisionRobot, other: CollisionRobot, margin: float) -> Iterator[Contact]:
         """Give contacts of what moves of a robot with another robot; both are posed already."""
         for number in mine.moving:
             part = mine.parts[number]
@@ -159,7 +168,7 @@ class CollisionWorld(Contents):
                 best = Clearance(distance, _name(mine, part), name, *points)
         return best
 
-    def _nearby(self, mine: StandingRobot) -> Iterator[tuple[float, Part, Any, str]]:
+    def _nearby(self, mine: CollisionRobot) -> Iterator[tuple[float, RobotPart, Any, str]]:
         """Give parts of a robot with what may not touch them, and a bound below which their distance cannot be."""
         bodies, boxes = self.all_boxes()
         for number in mine.moving:
@@ -221,19 +230,36 @@ class CollisionWorld(Contents):
                 if held.name not in ignore:
                     yield held.name, held.shape, frames[held.link] @ held.in_link
 
-    def _may_touch(self, part: Part, robot: str, names: tuple[str, ...]) -> bool:
+    def _may_touch(self, part: RobotPart, robot: str, names: tuple[str, ...]) -> bool:
         if not self._allowed:
             return False
         mine = (part.name,) if part.held is not None else (robot, f"{robot}/{part.link}")
         return any(other in self._allowed.get(one, ()) for one in mine for other in names)
 
 
-def _gap(one: Part, two: Part) -> float:
+def collision_check(world: CollisionWorld, robot: str, arm: Arm, others: Array | None = None) -> CollisionCheck:
+    """Return a function that checks joint values of an arm for collisions.
+
+    Args:
+        world: The collision world.
+        robot: Name of the robot in it.
+        arm: The arm whose joint values are checked.
+        others: Joint values of the whole model, for the joints that the arm does not move; default: present ones.
+    """
+    placed = world.robot(robot)
+
+    def check(q: Array) -> str:
+        return world.first_contact(robot, arm.whole(q, placed.q if others is None else others))
+
+    return check
+
+
+def _gap(one: RobotPart, two: RobotPart) -> float:
     (low, high), (their_low, their_high) = corners(one.object), corners(two.object)
     return float(np.linalg.norm(np.maximum(0.0, np.maximum(their_low - high, low - their_high))))
 
 
-def _name(robot: StandingRobot, part: Part) -> str:
+def _name(robot: CollisionRobot, part: RobotPart) -> str:
     return part.name if part.held is not None else f"{robot.name}/{part.link}"
 
 

@@ -8,13 +8,13 @@ from typing import Any, Final, NamedTuple
 import coal
 import numpy as np
 
+from arcor2_hw.collision.robot import AttachedBody, CollisionRobot
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.exceptions import Conflict, InvalidData, NotFound
 from arcor2_hw.kinematics.model import RobotModel
 from arcor2_hw.kinematics.shapes import Array, Shape, check, coal_geometry
-from arcor2_hw.kinematics.standing import Held, StandingRobot
 
-KEPT_CHANGES: Final = 4096
+MAX_CHANGES: Final = 4096
 
 
 class Change(NamedTuple):
@@ -26,7 +26,7 @@ class Change(NamedTuple):
 
 
 @dataclass(eq=False)
-class Body:
+class PlacedBody:
     """A body that nobody holds: its shape, pose (4, 4), box (2, 3) and what coal has of it."""
 
     name: str
@@ -37,7 +37,7 @@ class Body:
     geometry: Any
 
 
-class Contents:
+class WorldState:
     """Bodies by id and robots by id; `margin`, m, is how far from its surroundings a robot has to be to be free.
 
     revision: grows with every change. changes: the newest of them.
@@ -48,14 +48,14 @@ class Contents:
             raise InvalidData(f"The margin must be 0 to 1 m, not {margin!r}.")
         self.margin = margin
         self.revision = 0
-        self.changes: collections.deque[Change] = collections.deque(maxlen=KEPT_CHANGES)
-        self.robots: dict[str, StandingRobot] = {}
-        self._bodies: dict[str, Body] = {}
+        self.changes: collections.deque[Change] = collections.deque(maxlen=MAX_CHANGES)
+        self.robots: dict[str, CollisionRobot] = {}
+        self._bodies: dict[str, PlacedBody] = {}
         self._held: dict[str, str] = {}
         self._allowed: dict[str, set[str]] = {}
         self._manager: Any = coal.DynamicAABBTreeCollisionManager()
-        self._apart: dict[str, Body] = {}
-        self._boxes: tuple[list[Body], Array] | None = None
+        self._apart: dict[str, PlacedBody] = {}
+        self._boxes: tuple[list[PlacedBody], Array] | None = None
 
     # -------------------------------------------------------------------------------- bodies
     def put(self, name: str, shape: Shape, pose: Pose) -> None:
@@ -119,7 +119,7 @@ class Contents:
             return Pose.from_matrix(robot.link_frames(robot.q)[held.link] @ held.in_link)
         return Pose.from_matrix(self._body(name).pose)
 
-    def _body(self, name: str) -> Body:
+    def _body(self, name: str) -> PlacedBody:
         try:
             return self._bodies[name]
         except KeyError:
@@ -127,7 +127,7 @@ class Contents:
 
     def _insert(self, name: str, shape: Shape, pose: Array) -> None:
         geometry = coal_geometry(shape)
-        body = Body(name, shape, pose, coal.CollisionObject(geometry), np.zeros((2, 3)), geometry)
+        body = PlacedBody(name, shape, pose, coal.CollisionObject(geometry), np.zeros((2, 3)), geometry)
         _place(body, pose)
         self._bodies[name] = body
         if self._allowed.get(name):
@@ -138,7 +138,7 @@ class Contents:
         self._changed(np.array((body.box, body.box)), name)
 
     # -------------------------------------------------------------------------------- robots
-    def add_robot(self, name: str, model: RobotModel, base: Pose, q: Array | None = None) -> StandingRobot:
+    def add_robot(self, name: str, model: RobotModel, base: Pose, q: Array | None = None) -> CollisionRobot:
         """Let a robot stand in the world, its root at `base`, in joint values of the model's order (neutral if None).
 
         Raises Conflict when the id is taken, InvalidData.
@@ -146,7 +146,7 @@ class Contents:
         if name in self.robots or name in self._bodies or name in self._held:
             raise Conflict(f"There is something called {name} already.")
         given = model.neutral() if q is None else q
-        robot = StandingRobot(name, model, _matrix(base, name), _joints(model, given), self.margin)
+        robot = CollisionRobot(name, model, _matrix(base, name), _joints(model, given), self.margin)
         self.robots[name] = robot
         self._robot_changed(robot, None)
         return robot
@@ -160,7 +160,7 @@ class Contents:
         del self.robots[name]
         self._changed(np.array((before, before)), name)
 
-    def robot(self, name: str) -> StandingRobot:
+    def robot(self, name: str) -> CollisionRobot:
         """Give a robot. Raises NotFound."""
         try:
             return self.robots[name]
@@ -196,7 +196,7 @@ class Contents:
             raise NotFound(f"{holder.model.name} has no link {link!r}.")
         in_link = np.linalg.inv(holder.link_frames(holder.q)[link]) @ body.pose
         self.delete(name)
-        holder.held[name] = Held(name, body.shape, link, in_link, frozenset(touching))
+        holder.held[name] = AttachedBody(name, body.shape, link, in_link, frozenset(touching))
         self._held[name] = robot
         before = self._robot_box(holder)
         holder.rebuild()
@@ -244,11 +244,11 @@ class Contents:
         box = np.array((boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)))
         self.changes.append(Change(self.revision, box, name))
 
-    def _robot_changed(self, robot: StandingRobot, before: Array | None) -> None:
+    def _robot_changed(self, robot: CollisionRobot, before: Array | None) -> None:
         box = self._robot_box(robot)
         self._changed(np.array((box if before is None else before, box)), robot.name)
 
-    def _robot_box(self, robot: StandingRobot) -> Array:
+    def _robot_box(self, robot: CollisionRobot) -> Array:
         """Give the corners of the box around a robot as it stands, and what it holds."""
         robot.pose(robot.q, everything=True)
         boxes = np.array([corners(part.object) for part in robot.parts]).reshape(-1, 2, 3)
@@ -256,7 +256,7 @@ class Contents:
             return np.array((robot.base[:3, 3], robot.base[:3, 3]))
         return np.array((boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)))
 
-    def all_boxes(self) -> tuple[list[Body], Array]:
+    def all_boxes(self) -> tuple[list[PlacedBody], Array]:
         """Give all bodies that nobody holds, and the boxes around them, (n, 2, 3)."""
         if self._boxes is None:
             bodies = list(self._bodies.values())
@@ -277,7 +277,7 @@ def _joints(model: RobotModel, q: Array) -> Array:
     return given
 
 
-def _place(body: Body, pose: Array) -> None:
+def _place(body: PlacedBody, pose: Array) -> None:
     body.pose = pose
     body.object.setTranslation(pose[:3, 3])
     body.object.setRotation(np.ascontiguousarray(pose[:3, :3]))
