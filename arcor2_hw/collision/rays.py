@@ -1,4 +1,4 @@
-"""Where a straight line enters a shape, computed exactly; all in the frame of the shape."""
+"""Intersections of straight lines with shapes, computed exactly in the frame of the shape."""
 
 import math
 from typing import Final
@@ -23,11 +23,17 @@ _Span = tuple[float, float]
 
 
 def entry(shape: Shape, start: Array, way: Array, inflation: float = 0.0) -> float | None:
-    """Give at which share of `way` (3) a line from `start` (3) enters a shape; 0 when it starts inside, None: never.
+    """Return the position along a line, 0 to 1, at which it enters a shape: 0 when it starts inside, None when it does
+    not.
 
-    Edges, heights and radii are larger by `inflation`, m, as the protocol's are; the planes of a hull stand out by half
-    of it. A mesh is met where
-    a triangle comes within half of `inflation`.
+    Edges, heights and radii are enlarged by `inflation`, as the protocol demands; the planes of a hull are moved out by
+    half of it; a mesh is met where a triangle is nearer than half of it.
+
+    Args:
+        shape: The shape.
+        start: Start of the line, (3).
+        way: Vector from start to end, (3).
+        inflation: Length added to sizes, m.
     """
     a, d = start.tolist(), way.tolist()
     half = inflation / 2.0
@@ -49,7 +55,7 @@ def entry(shape: Shape, start: Array, way: Array, inflation: float = 0.0) -> flo
 
 
 def _common(spans: list[_Span | None]) -> float | None:
-    """Give where all spans, and the line itself, have begun, if they have not ended there."""
+    """Return the beginning of the intersection of all spans with the line, None when it is empty."""
     low, high = 0.0, 1.0
     for span in spans:
         if span is None:
@@ -90,19 +96,19 @@ def _hull(shape: Hull, start: Array, way: Array, half: float) -> float | None:
     lengths = np.linalg.norm(normals, axis=1)
     real = lengths > _TINY
     normals = normals[real] / lengths[real, None]
-    room = ((first[real] - start) * normals).sum(axis=1) + half  # to each plane, positive inside
+    inside = ((first[real] - start) * normals).sum(axis=1) + half  # distance to each plane, positive inside
     closing = normals @ way
     parallel = np.abs(closing) < _TINY
-    if (room[parallel] < 0.0).any():
+    if (inside[parallel] < 0.0).any():
         return None
-    at = room[~parallel] / closing[~parallel]
+    at = inside[~parallel] / closing[~parallel]
     entering = closing[~parallel] < 0.0
     low, high = max(0.0, at[entering].max(initial=0.0)), min(1.0, at[~entering].min(initial=1.0))
     return float(low) if low <= high else None
 
 
 def _mesh(shape: TriangleMesh, start: Array, way: Array, half: float) -> float | None:
-    """Give the nearest triangle met (T. Möller, B. Trumbore, Journal of Graphics Tools 2 (1997) 21)."""
+    """Return the entry into the nearest triangle (T. Möller, B. Trumbore, Journal of Graphics Tools 2 (1997) 21)."""
     first, second, third = (shape.vertices[shape.triangles[:, corner]] for corner in range(3))
     u, v = second - first, third - first
     p = np.cross(way, v)
@@ -120,7 +126,7 @@ def _mesh(shape: TriangleMesh, start: Array, way: Array, half: float) -> float |
 
 
 def _touched(shape: TriangleMesh, start: Array, way: Array, half: float, found: float | None) -> float | None:
-    """Give where a line as thick as twice `half` first touches a mesh, at most `found`."""
+    """Return where a line of radius `half` first touches a mesh, at most `found`."""
     import coal
 
     length = float(np.linalg.norm(way))

@@ -1,4 +1,4 @@
-"""A robot that stands in a collision world: its shapes and what it holds, moved and checked as one."""
+"""A robot in a collision world: its shapes and attached bodies."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -14,12 +14,20 @@ from arcor2_hw.kinematics.tree import Tree
 
 _SAMPLES: Final = 100
 _ALWAYS: Final = 0.95
-"""Share of random configurations in which two links touch that then count as built into each other."""
+"""Share of random configurations in contact from which two links count as overlapping by design."""
 
 
 @dataclass(eq=False)
 class AttachedBody:
-    """A body that a link carries: its shape, where it is in the link, and the links it may touch."""
+    """A body attached to a link.
+
+    Attributes:
+        name: Name of the body.
+        shape: Shape.
+        link: The link that it moves with.
+        in_link: Pose in the frame of the link, (4, 4).
+        touching: Further links that it may touch.
+    """
 
     name: str
     shape: Shape
@@ -30,7 +38,17 @@ class AttachedBody:
 
 @dataclass(eq=False)
 class RobotPart:
-    """A shape of a link, or a held body: its name, the body of Pinocchio's model it sits on, its frame there."""
+    """A shape of a link, or an attached body.
+
+    Attributes:
+        name: Name of the shape or body.
+        link: The link that it moves with.
+        held: The attached body, None for a shape of the link itself.
+        body: Number of the moving body in Pinocchio's model; 0 does not move.
+        origin: Pose in the frame of that body, (4, 4).
+        geometry: coal's geometry.
+        object: coal's collision object.
+    """
 
     name: str
     link: str
@@ -42,13 +60,17 @@ class RobotPart:
 
 
 class CollisionRobot:
-    """One robot of a world. q: its present joint values, in the model's order. parts: shapes and what is held.
+    """One robot of a collision world. Not safe for use by two threads at once.
 
-    manager, obstacle: coal's, of the parts that move with the joints, and of all of them, as they were posed last.
-    margin: m by which the world's bodies have to be away to count as free. revision: grows when what is asked of the
-    robot may have another answer in the same joints: it stands elsewhere, holds something else, may touch something.
-
-    Not safe for two threads at once.
+    Attributes:
+        q: Present joint values, in the model's order.
+        parts: Shapes of the links, then attached bodies.
+        manager: coal's manager of the parts that move with the joints.
+        obstacle: coal's manager of all parts.
+        margin: Distance to the bodies of the world below which a configuration is in collision, m.
+        revision: Grows whenever the same joint values may be judged differently: the base was moved, a body was
+            attached
+            or detached, an allowed contact changed.
     """
 
     def __init__(self, name: str, model: RobotModel, base: Array, q: Array, margin: float = 0.0) -> None:
@@ -62,13 +84,13 @@ class CollisionRobot:
         self.place(base)
 
     def place(self, base: Array) -> None:
-        """Let the root stand elsewhere, (4, 4) in the world."""
+        """Move the root link to `base`, (4, 4) in the world."""
         self.base = np.array(base, dtype=np.float64)
         self.tree = Tree(self.model.description, self.base)
         self.rebuild()
 
     def rebuild(self) -> None:
-        """Make the shapes anew, after something was taken or put down."""
+        """Recreate the collision objects, after a body was attached or detached."""
         self.revision += 1
         self.parts: list[RobotPart] = []
         for each in self.model.collision:
@@ -86,7 +108,7 @@ class CollisionRobot:
         for one, two in self.pairs:
             self._geometry.addCollisionPair(pin.CollisionPair(one, two))
         self._data = pin.GeometryData(self._geometry)
-        # What does not move with the joints is no question of a configuration.
+        # Parts that do not move with the joints are not checked per configuration.
         self.moving = [number for number, part in enumerate(self.parts) if part.body]
         self.manager: Any = coal.DynamicAABBTreeCollisionManager()
         for number in self.moving:
@@ -104,9 +126,12 @@ class CollisionRobot:
 
     # -------------------------------------------------------------------------------- moving
     def pose(self, q: Array, everything: bool = False, more: float = 0.0) -> None:
-        """Put the parts where joint values lead, their boxes wider by the margin and `more`.
+        """Move the collision objects to joint values.
 
-        `everything`: those at rest too.
+        Args:
+            q: Joint values, in the model's order.
+            everything: Also move the parts that do not depend on joints.
+            more: Distance by which bounding boxes are enlarged in addition to the margin, m.
         """
         margin = self.margin + more
         posed = self._posed
@@ -127,19 +152,19 @@ class CollisionRobot:
         self._posed = q.tobytes(), margin, everything
 
     def box(self, q: Array) -> Array:
-        """Give the corners (2, 3) of the box around what moves, in joint values."""
+        """Return the bounding box (2, 3) of the moving parts at joint values."""
         self.pose(q)
         corners = [(box.min_, box.max_) for box in (self.parts[number].object.getAABB() for number in self.moving)]
         every = np.array(corners).reshape(-1, 2, 3)
         return np.array((every[:, 0].min(axis=0, initial=np.inf), every[:, 1].max(axis=0, initial=-np.inf)))
 
     def link_frames(self, q: Array) -> dict[str, Array]:
-        """Give the links' frames in the world, (4, 4)."""
+        """Return the frame of each link in the world, (4, 4)."""
         return self.tree.frames(q)
 
     # -------------------------------------------------------------------------------- itself
     def hits_itself(self, q: Array) -> bool:
-        """Tell whether the robot, or what it holds, is in collision with itself."""
+        """Return whether the robot and its attached bodies collide with each other."""
         return bool(
             pin.computeCollisions(
                 self.tree.model, self.tree.data, self._geometry, self._data, self.tree.expand(q), True
@@ -166,14 +191,14 @@ class CollisionRobot:
         return pair in self.model.description.touching or pair in self._built_into_each_other()
 
     def _follows(self, body: int, link: str) -> bool:
-        """Tell whether a body is moved by the joints behind a link: fingers hold what the hand carries."""
+        """Return whether a body is moved by joints behind a link, as fingers are by those of a hand."""
         at, _ = self.tree.bodies[link]
         while body > at:
             body = self.tree.model.parents[body]
         return body == at != 0
 
     def _built_into_each_other(self) -> frozenset[frozenset[str]]:
-        """Give the links whose shapes touch in nearly all configurations, so that they overlap by design."""
+        """Return pairs of links whose shapes touch in nearly all configurations, so that they overlap by design."""
         if self._touching is None:
             known = self.model.touching
             if known is None:

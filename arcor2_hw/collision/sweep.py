@@ -1,4 +1,4 @@
-"""Whether an arm may move from joint values to others, all joints in proportion, at a stated resolution."""
+"""Collision checks along motions of an arm, in which all joints move in proportion."""
 
 import functools
 import itertools
@@ -15,27 +15,37 @@ from arcor2_hw.kinematics.arm import Arm
 from arcor2_hw.kinematics.shapes import Array
 
 RESOLUTION: Final = 0.01
-"""m that no point of the robot, nor of what it holds, travels farther between two configurations that are looked at.
-So what is missed is an overlap of less than half of it; nothing is when the world's margin is half of it."""
+"""Maximum travel of any point of the robot, or of an attached body, between two checked configurations, m.
+
+Overlaps of less than half of it can be missed. None is missed when the margin of the world is half of it.
+"""
 FARTHEST: Final = 0.08
-"""m, the most that a motion is taken in one piece when it is looked whether everything is farther away."""
+"""Maximum travel covered by one check with an enlarged margin, m."""
 MOST_CHECKS: Final = 200_000
-"""Configurations of one motion."""
+"""Maximum number of checks of one motion."""
 
 
 class Hit(NamedTuple):
-    """That a motion is in collision: at which share of it, and what with what."""
+    """The first collision along a motion.
+
+    Attributes:
+        share: Position along the motion, 0 to 1.
+        what: The two things in contact, as text.
+    """
 
     share: float
     what: str
 
 
 class Sweep:
-    """Asks a collision world about motions of one arm of a robot in it. Joint values are the arm's.
+    """Checks motions of one arm of a robot in a collision world. Joint values are those of the arm.
 
-    The robot's other joints, other robots and all bodies stand as they do when this is made. What the robot holds is
-    part of it. levers: m (per m where prismatic) that a point of the robot travels at most per unit of each joint.
-    checks: configurations checked. Not safe for two threads at once.
+    The other joints of the robot, other robots and all bodies are taken as they are when the sweep is created. Bodies
+    attached to the robot are checked too. Not safe for use by two threads at once.
+
+    Attributes:
+        levers: Maximum travel of any point of the robot per unit of each joint, m per rad or m per m.
+        checks: Number of configurations checked so far.
     """
 
     def __init__(self, world: CollisionWorld, robot: str, arm: Arm, resolution: float = RESOLUTION) -> None:
@@ -49,23 +59,28 @@ class Sweep:
         self._levels = int(np.log2(FARTHEST / resolution)) if resolution < FARTHEST else 0
 
     def travel(self, a: Array, b: Array) -> float:
-        """Give a bound, m, on how far any point of the robot travels from `a` to `b`."""
+        """Return an upper bound of the travel of any point of the robot from `a` to `b`, m."""
         return float(self.levers @ np.abs(b - a))
 
     def is_free(self, q: Array) -> bool:
-        """Tell whether joint values are in collision with nothing."""
+        """Return whether joint values are free of collision."""
         self.checks += 1
         return self.world.is_free(self.robot, self._whole(q))
 
     def hit(self, q: Array) -> str:
-        """Give what joint values are in collision with, empty when they are free."""
+        """Return the first contact at joint values as text, empty when there is none."""
         self.checks += 1
         return self.world.first_contact(self.robot, self._whole(q))
 
     def is_free_between(self, a: Array, b: Array, resolution: float | None = None) -> bool:
-        """Tell whether nothing is in the way from `a`, which is taken for free, to `b`; `b` is looked at too.
+        """Return whether the motion from `a` to `b` is free of collision. `a` itself is taken to be free.
 
-        Looked at where points of the robot are `resolution` apart, no nearer: quick, to say no. None: see `proves`.
+        Args:
+            a: Joint values at the start.
+            b: Joint values at the end; they are checked too.
+            resolution: Travel between two checked configurations, m. A coarse value finds most collisions quickly.
+                None:
+                a coarse check first, then `proves`.
         """
         if resolution is None:
             return self.is_free_between(a, b, 8.0 * self.resolution) and self.proves(a, b)
@@ -74,10 +89,11 @@ class Sweep:
         return all(self.is_free(a + number / count * way) for number in _far_apart(count))
 
     def proves(self, a: Array, b: Array) -> bool:
-        """Tell whether nothing is in the way from `a` to `b`, in the resolution.
+        """Return whether the motion from `a` to `b` is free of collision at the full resolution.
 
-        Where everything around is farther from the robot than its points travel there is nothing to look for. Its own
-        links, which are always near each other, are looked at everywhere.
+        Where the surroundings are farther away than the robot travels, no configuration between is checked. The links
+        of
+        the robot are always near each other, so self-collision is checked at every step.
         """
         way, count = b - a, self._count(a, b, self.resolution)
         standing = self._standing
@@ -105,7 +121,7 @@ class Sweep:
         return math.ceil(count / (1 << self._levels))
 
     def _first_near(self, a: Array, way: Array, order: Iterable[int], chunks: int) -> float | None:
-        """Return the first share, in the order of chunks, at which something is too near, or None."""
+        """Return the first position, in the given order of chunks, that is too near something, or None."""
         for number in order:
             share = self._near(a, way, (number - 0.5) / chunks, 0.5 / chunks, self._levels)
             if share is not None:
@@ -127,7 +143,7 @@ class Sweep:
         return self._q
 
     def first_hit(self, waypoints: Sequence[Array]) -> Hit | None:
-        """Give what is met first on the way through waypoints, at which share of its travel; None when it is free."""
+        """Return the first collision along a path through waypoints, None when there is none."""
         lengths = [self.travel(a, b) for a, b in itertools.pairwise(waypoints)]
         whole, done = sum(lengths), 0.0
         if what := self.hit(waypoints[0]):
@@ -144,14 +160,15 @@ class Sweep:
         count = max(1, math.ceil(self.travel(a, b) / resolution - 1e-9))
         if count > MOST_CHECKS:
             raise InvalidData(
-                f"A motion of {self.arm.model.name} needs {count} checks; at most {MOST_CHECKS} are made."
+                f"A motion of {self.arm.model.name} needs {count} collision checks, but at most {MOST_CHECKS} "
+                "are allowed."
             )
         return count
 
 
 @functools.lru_cache(maxsize=4096)
 def _far_apart(count: int) -> tuple[int, ...]:
-    """Give 1 to `count`, the last first, then always halfway between: what is in the way is found sooner so."""
+    """Return 1 to `count`: the last first, then always halfway between. Collisions are found sooner in this order."""
     order, step = [count], 1 << (count - 1).bit_length()
     while step > 1:
         order += range(step // 2, count, step)
@@ -160,10 +177,10 @@ def _far_apart(count: int) -> tuple[int, ...]:
 
 
 def levers(robot: CollisionRobot) -> Array:
-    """Give for each joint of the model the m that a point of the robot travels at most per rad, or per m.
+    """Return for each joint of the model an upper bound of the travel of any point of the robot per rad, or per m.
 
-    A bound for all joint values within the limits: the lengths from the joint's axis to the farthest part behind it,
-    stretched out.
+    The bound holds for all joint values within the limits: it adds up the distances from the joint axis to the
+    farthest part behind it, as if the arm was stretched out.
     """
     tree = robot.tree
     parents, placements = list(tree.model.parents), tree.model.jointPlacements
@@ -178,13 +195,15 @@ def levers(robot: CollisionRobot) -> Array:
         bounds[body] = 1.0 if slides[body] is not None else reach[body]
         beyond = float(np.linalg.norm(placements[body].translation)) + reach[body] + (slides[body] or 0.0)
         reach[parents[body]] = max(reach[parents[body]], beyond)
-    # A joint moves all that mimic it.
+    # A joint moves all joints that mimic it.
     factors = tree.coupling
     return np.asarray(np.abs(factors).T @ bounds[1:])
 
 
 def _slides(robot: CollisionRobot) -> list[float | None]:
-    """Give for each body of Pinocchio's model how far it slides from its place at most, m; None where it turns."""
+    """Return for each body of Pinocchio's model the maximum displacement of its prismatic joint, m; None for a revolute
+    one.
+    """
     found: list[float | None] = [None]
     joints = {joint.name: joint for joint in robot.model.description.joints}
     for name in list(robot.tree.model.names)[1:]:

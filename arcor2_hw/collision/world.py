@@ -1,9 +1,8 @@
-"""The collision world: bodies, robots and what these hold; what is in collision, how far apart, what a line meets.
+"""The collision world: contacts, clearances and rays among bodies, robots and attached bodies.
 
-Poses are in the world. Names: of a body its id, of a robot's link "robot/link". A robot's links that do not move with
-its joints are how it is mounted, and no question of a configuration: they are in collision with nothing around. A body
-that encloses something without touching it has an inside unless it is an exact mesh, which is but a surface.
-Nothing here is safe for two threads at once.
+Poses are in the world. A body is named by its id, a link of a robot by "robot/link". Links that do not move with the
+joints are part of the mounting: they are never checked for contacts. A body that encloses another one without touching
+it is in contact with it, unless it is an exact mesh, which is only a surface. Not safe for use by two threads at once.
 """
 
 from collections.abc import Iterable, Iterator
@@ -24,7 +23,7 @@ from arcor2_hw.kinematics.shapes import Array, Shape
 
 
 class Contact(Data, frozen=True):
-    """Two things that are in collision, by name; depth: how deep, m, as far as it is known."""
+    """Two things in contact, by name, and the penetration depth in m as far as it is known."""
 
     first: str
     second: str
@@ -35,7 +34,7 @@ class Contact(Data, frozen=True):
 
 
 class Clearance(Data, frozen=True):
-    """The nearest two things and their distance, m, negative when they are in collision; the points nearest by."""
+    """The nearest two things and their distance in m, negative when in contact, with the nearest points."""
 
     distance: float
     first: str
@@ -45,7 +44,7 @@ class Clearance(Data, frozen=True):
 
 
 class RayHit(Data, frozen=True):
-    """What a line meets first: its name, at which share of the line, and the point."""
+    """The first thing that a line meets: its name, the position along the line (0 to 1), and the point."""
 
     name: str
     share: float
@@ -53,18 +52,25 @@ class RayHit(Data, frozen=True):
 
 
 class CollisionWorld(WorldState):
-    """Bodies by id and robots by id, see `WorldState`, and the questions to them."""
+    """Bodies and robots by id (see `WorldState`), and the questions asked about them."""
 
     # -------------------------------------------------------------------------------- collisions
     def is_free(self, robot: str, q: Array) -> bool:
-        """Tell whether a robot in joint values (model's order), with what it holds, is in collision with nothing.
+        """Return whether a robot at joint values, with its attached bodies, is free of collision.
 
-        Its other joints, other robots and the bodies are taken as they are now. Raises NotFound.
+        Its other joints, other robots and the bodies are taken as they are at present.
+
+        Args:
+            robot: Id of the robot.
+            q: Joint values, in the model's order.
+
+        Raises:
+            NotFound: There is no such robot.
         """
         return not self.robot(robot).hits_itself(q) and self.is_free_around(robot, q)
 
     def is_free_around(self, robot: str, q: Array, more: float = 0.0) -> bool:
-        """Tell whether a robot, with what it holds, is `more` m farther than the margin from all that is around it."""
+        """Return whether a robot is farther than the margin plus `more` (m) from everything around it."""
         mine = self.robot(robot)
         mine.pose(q, more=more)
         margin = self.margin + more
@@ -83,9 +89,12 @@ class CollisionWorld(WorldState):
         return True
 
     def contacts(self, robot: str, q: Array) -> list[Contact]:
-        """Return all contacts of a robot in joint values and of the parts that it holds, those of parts first.
+        """Return all contacts of a robot at joint values, those of its attached bodies first.
 
-        A part at a pose of the end effector collides in every configuration that reaches it. Raises NotFound.
+        An attached body at the end effector collides in every configuration that reaches a pose, so it is named first.
+
+        Raises:
+            NotFound: There is no such robot.
         """
         mine = self.robot(robot)
         mine.pose(q, everything=True)
@@ -103,14 +112,14 @@ class CollisionWorld(WorldState):
         return list({(each.first, each.second): each for each in found}.values())
 
     def first_contact(self, robot: str, q: Array) -> str:
-        """Return the first contact of a robot in joint values as text, empty when there is none."""
+        """Return the first contact of a robot at joint values as text, empty when there is none."""
         if self.is_free(robot, q):
             return ""
         found = self.contacts(robot, q)
         return str(found[0]) if found else "an obstacle"
 
     def _contacts_with(self, mine: CollisionRobot, bodies: Iterable[PlacedBody], margin: float) -> Iterator[Contact]:
-        """Give contacts of a robot that is posed already with bodies."""
+        """Yield contacts of a robot, whose objects are already placed, with bodies."""
         every = list(bodies)
         boxes = np.array([body.box for body in every]).reshape(-1, 2, 3)
         for number in mine.moving:
@@ -124,7 +133,7 @@ class CollisionWorld(WorldState):
                     yield Contact(_name(mine, part), body.name, depth)
 
     def _contacts_between(self, mine: CollisionRobot, other: CollisionRobot, margin: float) -> Iterator[Contact]:
-        """Give contacts of what moves of a robot with another robot; both are posed already."""
+        """Yield contacts of the moving parts of a robot with another robot; objects of both are already placed."""
         for number in mine.moving:
             part = mine.parts[number]
             low, high = corners(part.object)
@@ -147,9 +156,17 @@ class CollisionWorld(WorldState):
 
     # -------------------------------------------------------------------------------- distances and lines
     def clearance(self, robot: str, q: Array, within: float = np.inf) -> Clearance | None:
-        """Give the nearest pair of a robot in joint values and what is around it, None when none is `within` m.
+        """Return the nearest pair of a robot and its surroundings, None when no pair is nearer than `within`.
 
-        Of the robot itself those links count that may not touch. Raises NotFound.
+        Links count as surroundings of each other where contact between them is not allowed.
+
+        Args:
+            robot: Id of the robot.
+            q: Joint values, in the model's order.
+            within: Maximum distance, m.
+
+        Raises:
+            NotFound: There is no such robot.
         """
         mine = self.robot(robot)
         mine.pose(q, everything=True)
@@ -169,7 +186,7 @@ class CollisionWorld(WorldState):
         return best
 
     def _nearby(self, mine: CollisionRobot) -> Iterator[tuple[float, RobotPart, Any, str]]:
-        """Give parts of a robot with what may not touch them, and a bound below which their distance cannot be."""
+        """Yield pairs that may not touch, each with a lower bound of their distance."""
         bodies, boxes = self.all_boxes()
         for number in mine.moving:
             part = mine.parts[number]
@@ -196,14 +213,21 @@ class CollisionWorld(WorldState):
                         yield _gap(part, their), part, their.object, _name(other, their)
 
     def ray(self, start: Position, end: Position, ignore: Iterable[str] = (), inflation: float = 0.0) -> RayHit | None:
-        """Give what a straight line meets first, None when it is free. Robots stand as they are now.
+        """Return the first thing that a straight line meets, None when the line is free. Robots are at their present
+        joints.
 
-        `ignore`: ids of bodies and robots that are no obstacle; what such a robot holds still is one. `inflation`:
-        sizes count as larger by so much, m. Raises InvalidData for numbers that are not finite.
+        Args:
+            start: Start of the line.
+            end: End of the line.
+            ignore: Ids of bodies and robots to ignore; bodies attached to such a robot still count.
+            inflation: Length added to all sizes, m.
+
+        Raises:
+            InvalidData: A coordinate is not finite.
         """
         a, b = np.array([*start]), np.array([*end])
         if not (np.isfinite(a).all() and np.isfinite(b).all()):
-            raise InvalidData("A line needs two points that are somewhere.")
+            raise InvalidData("The start and the end of a line need finite coordinates.")
         left_out = set(ignore)
         best: tuple[float, str] | None = None
         for name, shape, pose in self._obstacles(a, b, inflation, left_out):
@@ -264,7 +288,7 @@ def _name(robot: CollisionRobot, part: RobotPart) -> str:
 
 
 def _depth(one: Any, other: Any, margin: float) -> float | None:
-    """Give how deep two things are in each other, zero when they are only too near; None when they are free."""
+    """Return the penetration depth of two objects: 0 when only the margin is violated, None when they are free."""
     request, result = coal.CollisionRequest(), coal.CollisionResult()
     request.security_margin = margin
     if not coal.collide(one, other, request, result):

@@ -1,4 +1,4 @@
-"""What is in a collision world: bodies, robots and what these hold, who may touch whom, and what changed when."""
+"""The content of a collision world: bodies, robots, attached bodies, allowed contacts, and recent changes."""
 
 import collections
 from collections.abc import Iterable
@@ -18,7 +18,13 @@ MAX_CHANGES: Final = 4096
 
 
 class Change(NamedTuple):
-    """That something came, went or moved: where it was and is, lower and upper corner (2, 3); whose it is."""
+    """A change of a world.
+
+    Attributes:
+        revision: Revision of the world after the change.
+        box: Bounding box (2, 3) of the changed object before and after the change.
+        name: Name of the body or robot.
+    """
 
     revision: int
     box: Array
@@ -27,7 +33,16 @@ class Change(NamedTuple):
 
 @dataclass(eq=False)
 class PlacedBody:
-    """A body that nobody holds: its shape, pose (4, 4), box (2, 3) and what coal has of it."""
+    """A body that is not attached.
+
+    Attributes:
+        name: Name of the body.
+        shape: Shape.
+        pose: Pose in the world, (4, 4).
+        object: coal's collision object.
+        box: Bounding box, (2, 3).
+        geometry: coal's geometry.
+    """
 
     name: str
     shape: Shape
@@ -38,9 +53,12 @@ class PlacedBody:
 
 
 class WorldState:
-    """Bodies by id and robots by id; `margin`, m, is how far from its surroundings a robot has to be to be free.
+    """Bodies by id and robots by id.
 
-    revision: grows with every change. changes: the newest of them.
+    Attributes:
+        margin: Distance between a robot and its surroundings below which it is in collision, m.
+        revision: Grows with every change.
+        changes: Recent changes, at most MAX_CHANGES.
     """
 
     def __init__(self, margin: float = 0.0) -> None:
@@ -59,9 +77,15 @@ class WorldState:
 
     # -------------------------------------------------------------------------------- bodies
     def put(self, name: str, shape: Shape, pose: Pose) -> None:
-        """Put a body in, in place of one of that id. Raises Conflict for a robot's id, ZeroLength, InvalidData."""
+        """Add a body, replacing one of the same id.
+
+        Raises:
+            Conflict: The id is that of a robot.
+            ZeroLength: A size of the shape is not above zero.
+            InvalidData: The pose is not finite.
+        """
         if name in self.robots:
-            raise Conflict(f"{name} is a robot.")
+            raise Conflict(f"Body {name} cannot be added: a robot has that id.")
         check(shape, name)
         placed = _matrix(pose, name)
         if name in self._held or name in self._bodies:
@@ -69,7 +93,12 @@ class WorldState:
         self._insert(name, shape, placed)
 
     def move(self, name: str, pose: Pose) -> None:
-        """Put a body elsewhere; one that is held is let go. Raises NotFound, InvalidData."""
+        """Move a body; an attached one is detached.
+
+        Raises:
+            NotFound: There is no such body.
+            InvalidData: The pose is not finite.
+        """
         placed = _matrix(pose, name)
         if name in self._held:
             shape = self.robots[self._held[name]].held[name].shape
@@ -84,7 +113,11 @@ class WorldState:
         self._changed(np.array((before, body.box)), name)
 
     def delete(self, name: str) -> None:
-        """Take a body out, also one that is held. Raises NotFound."""
+        """Remove a body, attached or not.
+
+        Raises:
+            NotFound: There is no such body.
+        """
         if name in self._held:
             robot = self.robots[self._held.pop(name)]
             del robot.held[name]
@@ -98,7 +131,7 @@ class WorldState:
         self._changed(np.array((body.box, body.box)), name)
 
     def clear(self) -> None:
-        """Take everything out, robots too."""
+        """Remove all bodies and robots."""
         for name in [*self._bodies, *self._held]:
             self.delete(name)
         for name in list(self.robots):
@@ -108,11 +141,15 @@ class WorldState:
         self._manager.setup()
 
     def ids(self) -> list[str]:
-        """Give the ids of all bodies, those that are held too."""
+        """Return the sorted ids of all bodies, including attached ones."""
         return sorted([*self._bodies, *self._held])
 
     def pose(self, name: str) -> Pose:
-        """Give where a body is now; one that is held moves with its robot. Raises NotFound."""
+        """Return the present pose of a body; an attached body moves with its robot.
+
+        Raises:
+            NotFound: There is no such body.
+        """
         if name in self._held:
             robot = self.robots[self._held[name]]
             held = robot.held[name]
@@ -139,12 +176,20 @@ class WorldState:
 
     # -------------------------------------------------------------------------------- robots
     def add_robot(self, name: str, model: RobotModel, base: Pose, q: Array | None = None) -> CollisionRobot:
-        """Let a robot stand in the world, its root at `base`, in joint values of the model's order (neutral if None).
+        """Add a robot.
 
-        Raises Conflict when the id is taken, InvalidData.
+        Args:
+            name: Id of the robot.
+            model: Its model.
+            base: Pose of the root link in the world.
+            q: Joint values in the model's order; default: the neutral configuration.
+
+        Raises:
+            Conflict: The id is taken.
+            InvalidData: The pose or a joint value is not finite.
         """
         if name in self.robots or name in self._bodies or name in self._held:
-            raise Conflict(f"There is something called {name} already.")
+            raise Conflict(f"Robot {name} cannot be added: the id is taken.")
         given = model.neutral() if q is None else q
         robot = CollisionRobot(name, model, _matrix(base, name), _joints(model, given), self.margin)
         self.robots[name] = robot
@@ -152,7 +197,11 @@ class WorldState:
         return robot
 
     def remove_robot(self, name: str) -> None:
-        """Take a robot out; what it held stays where it is. Raises NotFound."""
+        """Remove a robot; bodies attached to it stay at their present poses.
+
+        Raises:
+            NotFound: There is no such robot.
+        """
         robot = self.robot(name)
         for held in list(robot.held):
             self.detach(held)
@@ -161,21 +210,35 @@ class WorldState:
         self._changed(np.array((before, before)), name)
 
     def robot(self, name: str) -> CollisionRobot:
-        """Give a robot. Raises NotFound."""
+        """Return a robot.
+
+        Raises:
+            NotFound: There is no such robot.
+        """
         try:
             return self.robots[name]
         except KeyError:
             raise NotFound(f"There is no robot {name!r}.") from None
 
     def move_robot(self, name: str, base: Pose) -> None:
-        """Let a robot stand elsewhere, with what it holds. Raises NotFound, InvalidData."""
+        """Move the base of a robot, with everything attached to it.
+
+        Raises:
+            NotFound: There is no such robot.
+            InvalidData: The pose is not finite.
+        """
         robot = self.robot(name)
         before = self._robot_box(robot)
         robot.place(_matrix(base, name))
         self._robot_changed(robot, before)
 
     def set_joints(self, name: str, q: Array) -> None:
-        """Take note of a robot's present joint values, in the model's order. Raises NotFound, InvalidData."""
+        """Set the present joint values of a robot, in the model's order.
+
+        Raises:
+            NotFound: There is no such robot.
+            InvalidData: A value is missing or not finite.
+        """
         robot = self.robot(name)
         given = _joints(robot.model, q)
         if not np.array_equal(given, robot.q):
@@ -184,13 +247,21 @@ class WorldState:
             self._robot_changed(robot, before)
 
     def attach(self, name: str, robot: str, link: str, *, touching: Iterable[str] = ()) -> None:
-        """Let a link of a robot hold a body from where both are now on: it moves with it, and may touch that link.
+        """Attach a body to a link at their present poses. It moves with the link and may touch it.
 
-        `touching` names more links that it may touch. Raises NotFound, Conflict when it is held already.
+        Args:
+            name: Id of the body.
+            robot: Id of the robot.
+            link: Link of the robot.
+            touching: Further links that the body may touch.
+
+        Raises:
+            NotFound: There is no such body, robot or link.
+            Conflict: The body is attached already.
         """
         holder = self.robot(robot)
         if name in self._held:
-            raise Conflict(f"{name} is held by {self._held[name]}.")
+            raise Conflict(f"{name} cannot be attached to {robot}: it is attached to {self._held[name]}.")
         body = self._body(name)
         if link not in holder.model.description.links:
             raise NotFound(f"{holder.model.name} has no link {link!r}.")
@@ -203,16 +274,20 @@ class WorldState:
         self._robot_changed(holder, before)
 
     def detach(self, name: str) -> Pose:
-        """Let go of a body, which stays where it is now; gives where. Raises NotFound."""
+        """Detach a body and return its pose, which stays as it is.
+
+        Raises:
+            NotFound: The body is not attached.
+        """
         if name not in self._held:
-            raise NotFound(f"{name!r} is not held.")
+            raise NotFound(f"{name!r} is not attached to a robot.")
         pose = self.pose(name)
         self.move(name, pose)
         return pose
 
     # -------------------------------------------------------------------------------- who may touch
     def allow(self, one: str, other: str, allowed: bool = True) -> None:
-        """Let two things touch, or no longer: bodies, robots, or links as "robot/link"."""
+        """Allow or forbid contact between two bodies, robots, or links ("robot/link")."""
         for first, second in ((one, other), (other, one)):
             partners = self._allowed.setdefault(first, set())
             partners.add(second) if allowed else partners.discard(second)
@@ -233,7 +308,7 @@ class WorldState:
 
     # -------------------------------------------------------------------------------- inside
     def changed_since(self, revision: int) -> list[Change] | None:
-        """Give what changed after a revision; None when that is no longer known."""
+        """Return the changes after a revision, None when they are no longer recorded."""
         if revision < self.revision - len(self.changes):
             return None
         return [change for change in self.changes if change.revision > revision]
@@ -249,7 +324,7 @@ class WorldState:
         self._changed(np.array((box if before is None else before, box)), robot.name)
 
     def _robot_box(self, robot: CollisionRobot) -> Array:
-        """Give the corners of the box around a robot as it stands, and what it holds."""
+        """Return the bounding box of a robot and its attached bodies at the present joint values."""
         robot.pose(robot.q, everything=True)
         boxes = np.array([corners(part.object) for part in robot.parts]).reshape(-1, 2, 3)
         if not len(boxes):
@@ -257,7 +332,7 @@ class WorldState:
         return np.array((boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)))
 
     def all_boxes(self) -> tuple[list[PlacedBody], Array]:
-        """Give all bodies that nobody holds, and the boxes around them, (n, 2, 3)."""
+        """Return all bodies that are not attached, and their bounding boxes (n, 2, 3)."""
         if self._boxes is None:
             bodies = list(self._bodies.values())
             self._boxes = bodies, np.array([body.box for body in bodies]).reshape(-1, 2, 3)
@@ -286,6 +361,6 @@ def _place(body: PlacedBody, pose: Array) -> None:
 
 
 def corners(placed: Any) -> tuple[Array, Array]:
-    """Give lower and upper corner of the box around one of coal's objects."""
+    """Return the lower and upper corner of the bounding box of one of coal's objects."""
     box = placed.getAABB()
     return np.array(box.min_), np.array(box.max_)

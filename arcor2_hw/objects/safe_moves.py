@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from arcor2_hw.collision.world import CollisionWorld
     from arcor2_hw.kinematics.arm import Arm
     from arcor2_hw.kinematics.shapes import Array
-    from arcor2_hw.planning.timing import Timed
+    from arcor2_hw.planning.timing import Trajectory
 
 MARGIN: Final = 0.005
 """m by which a way keeps away from what is around, half of the resolution: so nothing is missed between two checks.
@@ -54,7 +54,7 @@ class Way:
     waypoints: list[list[Joint]]
     speed: float
     line: bool
-    _timed: "Callable[[float | None], Timed]" = dataclasses.field(repr=False)
+    _timed: "Callable[[float | None], Trajectory]" = dataclasses.field(repr=False)
     _planned: PlannedPath | None = dataclasses.field(default=None, repr=False)
 
     def require_begin(self, name: str, now: Sequence[Joint]) -> None:
@@ -64,8 +64,8 @@ class Way:
             if abs(present[joint.name] - joint.value) > JOINT_TOLERANCE:
                 raise Refused(f"{name} was moved while its way was planned")
 
-    def timed(self, tcp_speed: float | None = None) -> "Timed":
-        """Give joint values and velocities by time, for a controller that is led by these: see `Timed.sampled`.
+    def timed(self, tcp_speed: float | None = None) -> "Trajectory":
+        """Give joint values and velocities by time, for a controller that is led by these: see `Trajectory.sampled`.
 
         The limits are those of the URDF, times `speed`. A line is passed through at `tcp_speed` m/s at most (None: as
         fast as the joints can); at the waypoints of other ways the robot stands, as nothing beside them was looked at.
@@ -296,8 +296,8 @@ class SafeMoves:
     ) -> Way:
         """Return a way through points; `around` is what it was checked against, None for an unsafe one."""
 
-        def timed(tcp_speed: float | None) -> "Timed":
-            from arcor2_hw.planning.timing import MotionLimits, led, with_stops
+        def timed(tcp_speed: float | None) -> "Trajectory":
+            from arcor2_hw.planning.timing import MotionLimits, along_line, with_stops
 
             limits = MotionLimits.of(arm, speed)
             if not line:
@@ -306,7 +306,7 @@ class SafeMoves:
             first = arm.pose(begin).position
             lengths = [first.distance_to(arm.pose(q).position) for q in points]
             fastest = 100.0 if tcp_speed is None else tcp_speed
-            return led(points, limits, lengths, fastest, TCP_RAMP * fastest)
+            return along_line(points, limits, lengths, fastest, TCP_RAMP * fastest)
 
         planned = None if around is None else PlannedPath(self._tools(), arm, points, around, margin)
         return Way([arm.named(q) for q in points], speed, line, timed, planned)

@@ -1,6 +1,6 @@
-"""Ways through joint values: the straight line of an end effector, corners rounded where there is room.
+"""Geometric paths: straight lines of an end effector, and rounded corners.
 
-A way is a list of waypoints, the arm's joint values, straight in joint space between: all joints in proportion.
+A path is a list of waypoints, joint values of the arm. Between two of them all joints move in proportion.
 """
 
 import itertools
@@ -17,22 +17,22 @@ from arcor2_hw.kinematics.inverse import InverseKinematics
 from arcor2_hw.kinematics.shapes import Array
 
 OFF_LINE: Final = 0.0005
-"""m that the end effector may be beside its line between two waypoints."""
+"""Maximum distance of the end effector from its line between two waypoints, m."""
 OFF_TURN: Final = 0.005
-"""rad that its orientation may be beside the one that it should have there."""
+"""Maximum deviation of the orientation from its interpolation between two waypoints, rad."""
 PIECE: Final = 0.05
-"""m of a line that is taken at once at most; it is cut where that is too much."""
+"""Length of a line between two waypoints before it is subdivided where needed, m."""
 TURN: Final = 0.2
-"""rad of a turn, likewise."""
+"""Rotation between two waypoints before it is subdivided where needed, rad."""
 _HALVINGS: Final = 10
 _ROUNDED: Final = 0.4
-"""Share of the shorter segment at a corner that is given to its rounding at most."""
+"""Maximum share of the shorter segment at a corner that is used for rounding."""
 _CORNER_POINTS: Final = 8
 _TRIES: Final = 4
 
 
 def between(a: Pose, b: Pose, share: float) -> Pose:
-    """Give the pose at a share of the way from `a` to `b`: position in a line, turning about one axis."""
+    """Return the pose at a share (0 to 1) of the line from `a` to `b`, with a rotation about one axis."""
     turn = (a.orientation.inverted() * b.orientation).rotation_vector()
     rotated = a.orientation * Orientation.from_rotation_vector(*(share * part for part in turn))
     start, way = a.position, b.position - a.position
@@ -40,11 +40,19 @@ def between(a: Pose, b: Pose, share: float) -> Pose:
 
 
 def straight_line(arm: Arm, start: Array, target: Array, name: str = "") -> list[Array]:
-    """Give waypoints that lead the end effector from where `start` has it in a straight line to a pose.
+    """Compute waypoints that move the end effector in a straight line.
 
-    `target` is (4, 4) in the model's root frame. Between waypoints the end effector is within OFF_LINE and OFF_TURN of
-    the line. Raises OutOfReach for the pose itself; NoStraightLine, saying where it breaks and what of: reach, a limit,
-    a singularity.
+    Between waypoints the end effector stays within OFF_LINE and OFF_TURN of the line.
+
+    Args:
+        arm: The arm.
+        start: Joint values at the start.
+        target: Pose at the end, (4, 4), in the frame of the model's root link.
+        name: Name of the robot in messages.
+
+    Raises:
+        OutOfReach: The target is out of reach.
+        NoStraightLine: The line is interrupted; the message says where, and whether by reach, a limit or a singularity.
     """
     return _Line(arm, start, Pose.from_matrix(target), name or arm.model.name).waypoints(start)
 
@@ -55,7 +63,7 @@ class _Line:
         self._from, self._to = arm.pose(start), target
         self._length = self._from.position.distance_to(target.position)
         self._turns = int(np.count_nonzero(arm.rows >= 3)) == 3
-        if not self._turns:  # some turn does not matter, and comes as it may
+        if not self._turns:  # a rotation is not commanded: it follows from the position
             self._from = Pose(self._from.position, target.orientation)
 
     def waypoints(self, start: Array) -> list[Array]:
@@ -71,13 +79,13 @@ class _Line:
         return way
 
     def _piece(self, q: Array, here: float, there: float, halvings: int) -> list[Array]:
-        """Give the waypoints behind `q`, which is at the share `here`, to the share `there`."""
+        """Return the waypoints after `q`, which is at the share `here`, up to the share `there`."""
         pose = between(self._from, self._to, there)
         after = next(self._inverse.candidates(pose.matrix(), q), None)
         if after is not None and self._keeps((q + after) / 2.0, (here + there) / 2.0):
             return [after]
         if halvings == 0:
-            raise NoStraightLine(self._why(q, there, after), f"at {there:.3f} of the way")
+            raise NoStraightLine(self._why(q, there, after), f"at {there:.3f} of the path")
         middle = (here + there) / 2.0
         first = self._piece(q, here, middle, halvings - 1)
         return first + self._piece(first[-1], middle, there, halvings - 1)
@@ -98,9 +106,18 @@ class _Line:
 
 
 def free_line(sweep: Sweep, start: Array, target: Array, name: str = "") -> list[Array]:
-    """Give the waypoints of a straight line that meets nothing.
+    """Compute waypoints of a straight line that is free of collision.
 
-    Raises as `straight_line`, and MotionInCollision naming what with what, and where.
+    Args:
+        sweep: Collision checks of the arm.
+        start: Joint values at the start.
+        target: Pose at the end, (4, 4), in the frame of the model's root link.
+        name: Name of the robot in messages.
+
+    Raises:
+        OutOfReach: The target is out of reach.
+        NoStraightLine: The line is interrupted.
+        MotionInCollision: The line meets an obstacle; the message names both parts and the place.
     """
     name = name or sweep.arm.model.name
     way = straight_line(sweep.arm, start, target, name)
@@ -109,7 +126,11 @@ def free_line(sweep: Sweep, start: Array, target: Array, name: str = "") -> list
 
 
 def require_free(sweep: Sweep, way: Sequence[Array], name: str) -> None:
-    """Raise MotionInCollision, naming what with what and where, unless the waypoints of a line meet nothing."""
+    """Require that a path is free of collision.
+
+    Raises:
+        MotionInCollision: It meets an obstacle; the message names both parts and the place.
+    """
     if (hit := sweep.first_hit(way)) is not None:
         length = float(np.linalg.norm(sweep.arm.forward(way[-1])[:3, 3] - sweep.arm.forward(way[0])[:3, 3]))
         where = f"{hit.share * length:.3f} m on its way"
@@ -120,10 +141,17 @@ def require_free(sweep: Sweep, way: Sequence[Array], name: str) -> None:
 def rounded(
     way: Sequence[Array], scale: Array, is_free: Callable[[Array, Array], bool] | None = None
 ) -> list[list[Array]]:
-    """Round the corners of a way, as much as is free; gives pieces, between which the arm has to stand.
+    """Round the corners of a path where that is free of collision.
 
-    Corners become arcs of a parabola, within the triangle of a corner's neighbourhood. `scale`: by how much joint
-    values count when lengths are compared. `is_free` is asked for each little step of an arc; None: all is.
+    Corners become parabolic arcs inside the triangle of the corner and its neighbours.
+
+    Args:
+        way: Waypoints.
+        scale: Weight of each joint when lengths are compared.
+        is_free: Returns whether a short motion is free; None: every motion is.
+
+    Returns:
+        Pieces of the path. The arm has to stop between two pieces.
     """
     pieces: list[list[Array]] = [[way[0]]]
     for before, corner, after in zip(way, way[1:], way[2:], strict=False):

@@ -1,9 +1,9 @@
-"""A way for an arm through what stands around it: RRT-Connect, shortened, then checked at the full resolution.
+"""Collision-free paths of an arm: RRT-Connect, shortened, then checked at the full resolution.
 
-J. J. Kuffner, S. M. LaValle: RRT-Connect: an efficient approach to single-query path planning (ICRA 2000). It is
-written here because the bindings of OMPL can neither be seeded per plan nor free what a plan took
-(docs/decisions/0012-planning-of-our-own.md).
-The same question with the same seed has the same answer, unless the time runs out. A plan is exact, or it is refused.
+J. J. Kuffner, S. M. LaValle: RRT-Connect: an efficient approach to single-query path planning (ICRA 2000). OMPL is not
+used because its bindings can neither be seeded per plan nor free the memory of a plan
+(docs/decisions/0012-planning-of-our-own.md). The same question with the same seed has the same answer, unless time
+runs out.
 """
 
 import itertools
@@ -20,28 +20,32 @@ from arcor2_hw.kinematics.inverse import InverseKinematics
 from arcor2_hw.kinematics.shapes import Array
 
 WITHIN: Final = 2.0
-"""s that a plan may take."""
+"""Maximum time of planning, s."""
 COARSE: Final = 8.0
-"""How much coarser than the resolution ways are looked at while they are searched for and shortened."""
+"""Factor between the resolution of the search and the resolution of the final check."""
 STEP: Final = 1.5
-"""m, in joint values times their levers, that a tree grows by at once."""
+"""Maximum step of a tree, in joint values times their levers, m."""
 BESIDE: Final = np.pi
-"""rad beyond start and goals within which it is searched first; a turn away there is seldom a way."""
+"""Range of joint values beyond start and goals that is searched first, rad; longer detours are rarely useful."""
 MOST_GOALS: Final = 8
 SHORTCUTS: Final = 60
 IDLE: Final = 15
-"""Shortcuts in a row that lead to nothing, after which no more are tried."""
+"""Number of failed shortcuts in a row after which shortening ends."""
 BEYOND: Final = 0.05
-"""rad, or m, that a joint may stand beyond its limit: a real one rests a little off, and has to get back."""
+"""Distance by which a joint may be beyond its limit at the start, rad or m: a real joint can be slightly beyond it."""
 _GIVEN: Final = 1e-9
 
 Stopped = Callable[[], bool]
 
 
 class Planner:
-    """Plans motions of the arm of a `Sweep`. Joint values are the arm's, targets (4, 4) in the model's root frame.
+    """Plans motions of the arm of a `Sweep`. Not safe for use by two threads at once.
 
-    name: of the robot in messages. Not safe for two threads at once.
+    Joint values are those of the arm; targets are (4, 4), in the frame of the model's root link.
+
+    Args:
+        sweep: Collision checks of the arm.
+        name: Name of the robot in messages.
     """
 
     def __init__(self, sweep: Sweep, name: str = "") -> None:
@@ -52,14 +56,29 @@ class Planner:
     def to_pose(
         self, start: Array, target: Array, *, within: float = WITHIN, seed: int = 0, stopped: Stopped | None = None
     ) -> list[Array]:
-        """Give waypoints from `start` to a pose, straight in joint space between; of the ways found a short one.
+        """Plan a path to a pose, to whichever joint values give a short one.
 
-        Raises OutOfReach, OnlyInCollision naming a pair, StartInCollision, NoPath, Cancelled once `stopped`.
+        Args:
+            start: Joint values at the start.
+            target: Pose, (4, 4).
+            within: Maximum time, s.
+            seed: Seed of the random numbers.
+            stopped: Returns whether planning is to be cancelled.
+
+        Returns:
+            Waypoints, straight in joint space between.
+
+        Raises:
+            OutOfReach: The pose is out of reach.
+            OnlyInCollision: All joint values that reach the pose are in collision; the message names a contact.
+            StartInCollision: The start is in collision.
+            NoPath: No path was found in time.
+            Cancelled: `stopped` returned true.
         """
         inverse = InverseKinematics(self.arm)
         found = inverse.solutions(target, start)
         if not found:
-            inverse.solve(target, start)  # raises, saying why
+            inverse.solve(target, start)  # raises with the reason
         hits = [(q, self.sweep.hit(q)) for q in found]
         goals = [q for q, hit in hits if not hit]
         if not goals:
@@ -70,9 +89,24 @@ class Planner:
     def to_joints(
         self, start: Array, goal: Array, *, within: float = WITHIN, seed: int = 0, stopped: Stopped | None = None
     ) -> list[Array]:
-        """Give waypoints from `start` to joint values.
+        """Plan a path to joint values.
 
-        Raises InvalidData beyond a limit, GoalInCollision naming a pair, StartInCollision, NoPath, Cancelled.
+        Args:
+            start: Joint values at the start.
+            goal: Joint values at the end.
+            within: Maximum time, s.
+            seed: Seed of the random numbers.
+            stopped: Returns whether planning is to be cancelled.
+
+        Returns:
+            Waypoints, straight in joint space between.
+
+        Raises:
+            InvalidData: A joint is beyond its limit.
+            GoalInCollision: The goal is in collision; the message names the contact.
+            StartInCollision: The start is in collision.
+            NoPath: No path was found in time.
+            Cancelled: `stopped` returned true.
         """
         self._check(goal, "to", 1e-4)
         if hit := self.sweep.hit(goal):
@@ -88,7 +122,7 @@ class Planner:
         seed: int = 0,
         stopped: Stopped | None = None,
     ) -> list[Array]:
-        """Give waypoints from `start` to one of `goals`, which are free; raises as `to_joints`."""
+        """Plan a path to the nearest possible of several collision-free goals; see `to_joints`."""
         self._check(start, "from", BEYOND)
         if hit := self.sweep.hit(start):
             raise StartInCollision(f"{self.name} is in collision where it stands: {hit}.")
@@ -102,7 +136,7 @@ class Planner:
             if way is None:
                 break
             way = search.shortened(way, resolution)
-            way[0], way[-1] = start, _nearest(goals, way[-1])  # as they were given, not as rounding has them
+            way[0], way[-1] = start, _nearest(goals, way[-1])  # exactly as given, without rounding
             if all(self.sweep.is_free_between(a, b) for a, b in itertools.pairwise(way)):
                 return way
         between = self.sweep.first_hit([start, goals[0]])
@@ -118,7 +152,7 @@ class Planner:
             raise InvalidData(f"{self.name} cannot move {which} there: {names} would be beyond the limits.")
 
     def _length(self, way: Sequence[Array]) -> float:
-        """Give the length of a way in joint values times their levers, m."""
+        """Return the length of a path in joint values times their levers, m."""
         return float(sum(np.linalg.norm((b - a) * self._scale) for a, b in itertools.pairwise(way)))
 
 
@@ -127,7 +161,7 @@ def _nearest(given: Sequence[Array], q: Array) -> Array:
 
 
 class _Tree:
-    """Configurations, scaled, each with the one that it was reached from."""
+    """Tree of configurations, scaled by the levers, each with its parent."""
 
     def __init__(self, roots: Array) -> None:
         self.size = len(roots)
@@ -156,7 +190,7 @@ class _Tree:
 
 
 class _Search:
-    """One plan: two trees that grow towards each other, in joint values times their levers."""
+    """One search: two trees that grow towards each other, in joint values times their levers."""
 
     def __init__(
         self,
@@ -173,7 +207,7 @@ class _Search:
         self._start, self._goals = start * self._scale, np.array(goals) * self._scale
         arm, ends = planner.arm, np.array([start, *goals])
         slides = np.array(arm.prismatic)
-        # A sliding joint, or a turning one of less than two turns, is searched along all of its range.
+        # A prismatic joint, or a revolute one with a range below two turns, is searched in its whole range.
         far = np.where(slides, np.inf, BESIDE)
         lower = np.maximum(arm.lower, ends.min(axis=0) - far)
         upper = np.minimum(arm.upper, ends.max(axis=0) + far)
@@ -181,7 +215,7 @@ class _Search:
 
     def _over(self) -> bool:
         if self._stopped is not None and self._stopped():
-            raise Cancelled(f"planning for {self._planner.name} was stopped")
+            raise Cancelled(f"Planning for {self._planner.name} was cancelled.")
         return time.monotonic() > self._deadline
 
     def _free(self, a: Array, b: Array, resolution: float) -> bool:
@@ -189,7 +223,7 @@ class _Search:
 
     # -------------------------------------------------------------------------------- searching
     def way(self, resolution: float) -> list[Array] | None:
-        """Give waypoints from the start to a goal, None when the time is over."""
+        """Return waypoints from the start to a goal, None when time ran out."""
         forth, back = _Tree(self._start[None]), _Tree(self._goals)
         grown, other = forth, back
         while not self._over():
@@ -205,12 +239,12 @@ class _Search:
         return None
 
     def _grow(self, tree: _Tree, target: Array, resolution: float) -> int | None:
-        """Add one step towards `target`; gives the node, None when something is in the way."""
+        """Add one step towards `target` and return its node, None when the step is not free."""
         near = tree.nearest(target)
         return self._step(tree, near, target, resolution)
 
     def _connect(self, tree: _Tree, target: Array, resolution: float) -> int | None:
-        """Add steps as far as they go; gives the node at `target`, None when it is not got to."""
+        """Add steps until `target` is reached and return its node, None when it is not reached."""
         node: int | None = tree.nearest(target)
         while node is not None:
             if float(np.abs(tree.points[node] - target).max()) < _GIVEN:
@@ -231,7 +265,7 @@ class _Search:
 
     # -------------------------------------------------------------------------------- shortening
     def shortened(self, way: list[Array], resolution: float) -> list[Array]:
-        """Give a shorter way: straight between random places where that is free, without needless waypoints."""
+        """Shorten a path by straight segments between random points, and drop waypoints that are not needed."""
         points = [q * self._scale for q in way]
         points = self._without_needless(points, resolution)
         idle = 0
@@ -256,7 +290,7 @@ class _Search:
         return [point / self._scale for point in self._without_needless(points, resolution)]
 
     def _without_needless(self, points: list[Array], resolution: float) -> list[Array]:
-        """Leave out waypoints without which the way is still free, as many at once as can be."""
+        """Drop waypoints without which the path is still free, as many at once as possible."""
         kept = [points[0]]
         at = 0
         while at < len(points) - 1:

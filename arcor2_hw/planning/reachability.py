@@ -1,4 +1,4 @@
-"""Which poses an arm reaches: for many at once, and anew only where something changed that matters."""
+"""Reachability of poses by an arm: many at once, with a cache that is invalidated only near what changed."""
 
 import collections
 import enum
@@ -16,11 +16,11 @@ from arcor2_hw.kinematics.inverse import InverseKinematics
 from arcor2_hw.kinematics.shapes import Array
 
 KEPT: Final = 20_000
-"""Poses whose answers are kept."""
+"""Maximum number of cached poses."""
 
 
 _State = tuple[int, bytes]
-"""What a robot is and holds, and how those of its joints stand that the arm does not move."""
+"""Revision of the robot, and the values of its joints that the arm does not move."""
 
 
 class Reach(enum.StrEnum):
@@ -33,7 +33,13 @@ class Reach(enum.StrEnum):
 
 
 class Judgement(Data, frozen=True):
-    """How an arm reaches a pose, in which joints (the arm's), and why not better: a sentence, empty when it is well."""
+    """The result for one pose.
+
+    Attributes:
+        reach: How the arm reaches the pose.
+        joints: Joint values of the arm, empty when it is out of reach.
+        reason: Why it is not reachable without reservation: a sentence, or empty.
+    """
 
     reach: Reach
     joints: tuple[float, ...] = ()
@@ -42,7 +48,15 @@ class Judgement(Data, frozen=True):
 
 @dataclass(eq=False, slots=True)
 class _Candidate:
-    """Joints that reach a pose: the arm's, the model's, why not these rather than others, the box around the arm."""
+    """Joint values that reach a pose.
+
+    Attributes:
+        q: Joint values of the arm.
+        whole: Joint values of the model.
+        reservation: Why other joint values would be better; None before that is known, empty when there is no reason.
+        box: Bounding box of the arm, (2, 3).
+        state: State of the robot for which the box holds.
+    """
 
     q: Array
     whole: Array
@@ -52,7 +66,7 @@ class _Candidate:
 
 
 class _Candidates:
-    """Joints that reach a pose, found one after the other as they are asked for, and kept."""
+    """Joint values that reach a pose, computed when they are first needed."""
 
     def __init__(self, found: Iterator[_Candidate]) -> None:
         self._coming = found
@@ -76,12 +90,15 @@ class _Kept:
 
 
 class Reachability:
-    """Judges poses for one arm of a robot of a collision world.
+    """Judges poses for one arm of a robot in a collision world. Not safe for use by two threads at once.
 
-    Answers are kept by pose. A change of the world asks the question anew only for those answers whose configurations
-    come near to what changed, and even then joints are not searched for again. Not safe for two threads at once.
+    Results are cached by pose. After a change of the world only those results are checked again whose configurations
+    are
+    near the change; inverse kinematics is never solved again for them.
 
-    computed, checked: how often joints were searched for, and how often collisions were looked for, to see that.
+    Attributes:
+        computed: Number of poses for which inverse kinematics was solved.
+        checked: Number of poses that were checked for collisions.
     """
 
     def __init__(self, world: CollisionWorld, robot: str, arm: Arm) -> None:
@@ -95,18 +112,18 @@ class Reachability:
         self.checked = 0
 
     def judge(self, poses: Iterable[Pose]) -> list[Judgement]:
-        """Tell for each pose in the world how the arm reaches it."""
+        """Return for each pose in the world how the arm reaches it."""
         if not np.array_equal(self._base, self._standing.base):
             self._kept.clear()
             self._stand()
         self._near_what = {}
-        # What the robot is and holds, and how its other joints stand, is part of every answer.
+        # The state of the robot, and its other joints, are part of the key of every result.
         others = np.delete(self._standing.q, self.arm.indices)
         state = (self._standing.revision, others.tobytes())
         return [self._judged(pose, state) for pose in poses]
 
     def forget(self) -> None:
-        """Forget all answers."""
+        """Clear the cache."""
         self._kept.clear()
 
     def _stand(self) -> None:
@@ -133,7 +150,7 @@ class Reachability:
         return kept.judgement
 
     def _touched(self, kept: _Kept) -> bool:
-        """Tell whether something changed near the configurations that an answer rests on."""
+        """Return whether something changed near the configurations of a result."""
         if kept.revision == self._world.revision or kept.box is None:
             return False
         if kept.revision not in self._near_what:
@@ -144,7 +161,7 @@ class Reachability:
         return bool(((boxes[:, 0] <= kept.box[1]) & (boxes[:, 1] >= kept.box[0])).all(axis=1).any())
 
     def _changes_since(self, revision: int) -> Array | None:
-        """Give the boxes (n, 2, 3) around what changed, None when that is no longer known."""
+        """Return the bounding boxes (n, 2, 3) of changes after a revision, None when they are no longer recorded."""
         changes = self._world.changed_since(revision)
         if changes is None:
             return None
@@ -155,7 +172,7 @@ class Reachability:
             yield _Candidate(q, q)
 
     def _looked_at(self, kept: _Kept, state: _State) -> tuple[Judgement, Array | None]:
-        """Judge, and give the box around the configurations that were looked at; None: no collision matters."""
+        """Judge a pose; also return the bounding box of the configurations checked; None: no collision matters."""
         second: Judgement | None = None
         hit: Judgement | None = None
         boxes: list[Array] = []
@@ -179,7 +196,7 @@ class Reachability:
 
     def _collision(self, whole: Array) -> str:
         found = self._world.contacts(self._name, whole)
-        return f"It is reached only in collision: {found[0] if found else 'too close to something'}."
+        return f"Reached only in collision: {found[0] if found else 'too close to an obstacle'}."
 
     def _reservation(self, q: Array) -> str:
         if near := self.arm.near_limits(q):
@@ -191,8 +208,8 @@ class Reachability:
     def _why_not(self, target: Array) -> str:
         distance = float(np.linalg.norm(target[:3, 3] - self.arm.centre))
         if distance > self.arm.reach:
-            return f"It is {distance:.2f} m from the robot, which reaches {self.arm.reach:.2f} m at most."
-        return "The robot does not reach it with this orientation."
+            return f"The pose is {distance:.2f} m from the robot, which reaches at most {self.arm.reach:.2f} m."
+        return "The robot does not reach the pose with this orientation."
 
 
 def _around(boxes: list[Array]) -> Array:

@@ -1,4 +1,4 @@
-"""When an arm is where on a way: point to point (ruckig) and along many waypoints (toppra), within limits."""
+"""Trajectories: point to point (ruckig) and along waypoints (toppra), within limits of velocity and acceleration."""
 
 import bisect
 import itertools
@@ -17,18 +17,24 @@ from arcor2_hw.kinematics.shapes import Array
 from arcor2_hw.planning.paths import rounded
 
 RAMP: Final = 0.4
-"""s in which a joint gets to its maximum velocity, where nothing else is known: a URDF states no accelerations."""
+"""Time in which a joint reaches its maximum velocity, s. A URDF states no accelerations."""
 JERK_RAMP: Final = 0.1
-"""s in which it gets to its maximum acceleration."""
+"""Time in which a joint reaches its maximum acceleration, s."""
 FASTEST: Final = 10.0
-"""rad/s, or m/s, for a joint without a velocity limit."""
+"""Velocity of a joint without a velocity limit, rad/s or m/s."""
 _STANDS: Final = 1e-7
 _KNOTS: Final = 3
 
 
 @dataclass(frozen=True, eq=False)
 class MotionLimits:
-    """The most that joints may do: velocity, acceleration, jerk, each (n), per s, s² and s³, above zero."""
+    """Maxima of joints, each an array (n) of values above zero.
+
+    Attributes:
+        velocity: rad/s or m/s.
+        acceleration: rad/s² or m/s².
+        jerk: rad/s³ or m/s³.
+    """
 
     velocity: Array
     acceleration: Array
@@ -37,19 +43,32 @@ class MotionLimits:
     def __post_init__(self) -> None:
         for name, values in vars(self).items():
             if values.shape != self.velocity.shape or not (np.isfinite(values) & (values > 0.0)).all():
-                raise InvalidData(f"Each joint needs a {name} above zero.")
+                raise InvalidData(f"The {name} of each joint must be above zero.")
 
     @classmethod
     def of(cls, arm: Arm, speed: float = 1.0, ramp: float = RAMP) -> "MotionLimits":
-        """Give those of an arm: a fraction of its velocities, which it gets to in `ramp` s from rest."""
+        """Return the limits of an arm.
+
+        Args:
+            arm: The arm.
+            speed: Fraction of its maximum velocities, above 0, at most 1.
+            ramp: Time from standstill to the maximum velocity, s.
+
+        Raises:
+            InvalidData: `speed` is out of range.
+        """
         if not 0.0 < speed <= 1.0:
-            raise InvalidData(f"speed must be above 0, and at most 1, not {speed!r}.")
+            raise InvalidData(f"speed must be above 0 and at most 1, not {speed!r}.")
         most = np.where(np.isfinite(arm.velocity) & (arm.velocity > 0.0), arm.velocity, FASTEST)
         return cls(most * speed, most / ramp, most / (ramp * JERK_RAMP))
 
 
-class Timed:
-    """Joint values by time: `duration` s, and `at`. Made by `point_to_point`, `with_stops`, `smooth`, `led`."""
+class Trajectory:
+    """Joint values over time, created by `point_to_point`, `with_stops`, `smooth` or `along_line`.
+
+    Attributes:
+        duration: Duration, s.
+    """
 
     def __init__(self, pieces: Sequence[tuple[float, Callable[[float], tuple[Array, Array]]]]) -> None:
         self._pieces = [piece for _, piece in pieces]
@@ -58,26 +77,26 @@ class Timed:
         self.duration = float(sum(self._lengths))
 
     def at(self, time: float) -> tuple[Array, Array]:
-        """Give joint values and velocities after `time` s; before the begin and after the end it stands."""
+        """Return joint values and velocities at a time in s; outside the trajectory, those at standstill."""
         time = min(max(time, 0.0), self.duration)
         number = max(0, bisect.bisect_right(self._begins, time) - 1)
         return self._pieces[number](min(time - self._begins[number], self._lengths[number]))
 
     def sampled(self, period: float) -> list[tuple[float, Array, Array]]:
-        """Give time, joint values and velocities every `period` s, and at the end."""
+        """Return time, joint values and velocities every `period` s and at the end."""
         times = [*np.arange(0.0, self.duration, period), self.duration]
         return [(float(time), *self.at(float(time))) for time in times]
 
 
 # ------------------------------------------------------------------------------------------------ point to point
-def point_to_point(start: Array, goal: Array, limits: MotionLimits) -> Timed:
-    """Go from rest to rest, all joints in proportion, as fast as limits allow; jerks are limited too."""
-    return Timed([_segment(start, goal, limits)])
+def point_to_point(start: Array, goal: Array, limits: MotionLimits) -> Trajectory:
+    """Return a trajectory from standstill to standstill, all joints in proportion, limited in jerk."""
+    return Trajectory([_segment(start, goal, limits)])
 
 
-def with_stops(way: Sequence[Array], limits: MotionLimits) -> Timed:
-    """Go through waypoints and stand at each: exactly the way, straight in joint space."""
-    return Timed([_segment(a, b, limits) for a, b in itertools.pairwise(way)])
+def with_stops(way: Sequence[Array], limits: MotionLimits) -> Trajectory:
+    """Return a trajectory that stops at each waypoint, so that it follows the path exactly."""
+    return Trajectory([_segment(a, b, limits) for a, b in itertools.pairwise(way)])
 
 
 def _segment(start: Array, goal: Array, limits: MotionLimits) -> tuple[float, Callable[[float], tuple[Array, Array]]]:
@@ -86,7 +105,7 @@ def _segment(start: Array, goal: Array, limits: MotionLimits) -> tuple[float, Ca
     moving = size > _STANDS
     if not moving.any():
         return 0.0, lambda _: (goal, np.zeros_like(goal))
-    # One number is led from 0 to 1, within what the joint that is slowest for it allows: so none leaves the line.
+    # One parameter goes from 0 to 1 within the limits of the slowest joint, so that no joint leaves the straight line.
     given = InputParameter(1)
     given.current_position, given.target_position = [0.0], [1.0]
     given.max_velocity = [float(np.min(limits.velocity[moving] / size[moving]))]
@@ -109,15 +128,20 @@ def smooth(
     way: Sequence[Array],
     limits: MotionLimits,
     is_free: Callable[[Array, Array], bool] | None = None,
-) -> Timed:
-    """Go through waypoints without standing, corners rounded as much as is free; it stands where nothing is.
+) -> Trajectory:
+    """Return a trajectory through waypoints that rounds corners where that is free, and stops where it is not.
 
-    What is driven is looked at once more with `is_free`; when that says no, the arm goes with stops instead.
+    The result is checked again with `is_free`; if it is not free, the arm stops at each waypoint instead.
+
+    Args:
+        way: Waypoints.
+        limits: Limits of the joints.
+        is_free: Returns whether a short motion is free; None: every motion is.
     """
     if len(way) < 3:
         return with_stops(way, limits)
     pieces = rounded(way, 1.0 / limits.velocity, is_free)
-    timed = Timed([_along(_with_knots(piece), limits) for piece in pieces])
+    timed = Trajectory([_along(_with_knots(piece), limits) for piece in pieces])
     if is_free is not None:
         count = max(2, math.ceil(timed.duration / 0.02))
         driven = [timed.at(time)[0] for time in np.linspace(0.0, timed.duration, count)]
@@ -126,16 +150,24 @@ def smooth(
     return timed
 
 
-def led(
+def along_line(
     way: Sequence[Array], limits: MotionLimits, lengths: Sequence[float], speed: float, acceleration: float
-) -> Timed:
-    """Go along near waypoints, those of a line, whose end effector is at `lengths` m of its way at each.
+) -> Trajectory:
+    """Return a trajectory along closely spaced waypoints of a line.
 
-    speed, acceleration: the most of the end effector along it, m/s and m/s².
+    Args:
+        way: Waypoints.
+        limits: Limits of the joints.
+        lengths: Distance of the end effector along the line at each waypoint, m.
+        speed: Maximum speed of the end effector along the line, m/s.
+        acceleration: Maximum acceleration of the end effector along the line, m/s².
+
+    Raises:
+        InvalidData: The numbers of waypoints and lengths differ, or speed or acceleration is not above zero.
     """
     if len(lengths) != len(way) or not (speed > 0.0 and acceleration > 0.0):
-        raise InvalidData("A line needs the length at each waypoint, a speed and an acceleration above zero.")
-    # How far the end effector has come is one joint more, with limits of its own.
+        raise InvalidData("A line needs a length at each waypoint, and a speed and an acceleration above zero.")
+    # The distance along the line is treated as one more joint with limits of its own.
     longer = [np.append(q, length) for q, length in zip(way, lengths, strict=True)]
     velocity, ramp = np.append(limits.velocity, speed), np.append(limits.acceleration, acceleration)
     duration, at = _along(longer, MotionLimits(velocity, ramp, ramp))
@@ -144,11 +176,11 @@ def led(
         q, rate = at(time)
         return q[:-1], rate[:-1]
 
-    return Timed([(duration, without)])
+    return Trajectory([(duration, without)])
 
 
 def _with_knots(piece: Sequence[Array]) -> list[Array]:
-    """Put points on the longer segments, so that a spline through all of them stays on these."""
+    """Add points on longer segments, so that a spline through all points stays close to the segments."""
     lengths = [float(np.linalg.norm(b - a)) for a, b in itertools.pairwise(piece)]
     short = min((length for length in lengths if length > _STANDS), default=1.0)
     found = [piece[0]]
@@ -162,7 +194,7 @@ def _with_knots(piece: Sequence[Array]) -> list[Array]:
 
 
 def _along(way: Sequence[Array], limits: MotionLimits) -> tuple[float, Callable[[float], tuple[Array, Array]]]:
-    """Go along a smooth way from rest to rest as fast as velocities and accelerations allow."""
+    """Return the fastest motion along a smooth path from standstill to standstill within the limits."""
     import toppra
     from toppra import algorithm, constraint
 
@@ -185,7 +217,7 @@ def _along(way: Sequence[Array], limits: MotionLimits) -> tuple[float, Callable[
     )
     found: Any = solver.compute_trajectory(0.0, 0.0)
     if found is None:
-        raise InvalidData("No motion within the limits was found along the way.")
+        raise InvalidData("No motion within the limits was found along the path.")
 
     def where(time: float) -> tuple[Array, Array]:
         return np.asarray(found(time), dtype=np.float64), np.asarray(found(time, 1), dtype=np.float64)

@@ -13,7 +13,7 @@ from arcor2_hw.kinematics.errors import MotionInCollision, NoStraightLine, OutOf
 from arcor2_hw.kinematics.model import RobotModel
 from arcor2_hw.kinematics.shapes import Array, Box
 from arcor2_hw.planning.paths import OFF_LINE, OFF_TURN, between, free_line, rounded, straight_line
-from arcor2_hw.planning.timing import MotionLimits, Timed, led, point_to_point, smooth, with_stops
+from arcor2_hw.planning.timing import MotionLimits, Trajectory, along_line, point_to_point, smooth, with_stops
 from tests.kinematics import kin_robots
 
 READY = np.array((0.0, -1.57, 1.57, -1.57, -1.57, 0.0))
@@ -100,7 +100,7 @@ def test_a_line_into_something_is_refused_and_told_where() -> None:
 
 
 # ------------------------------------------------------------------------------------------------ timing
-def rates(timed: Timed, period: float = 0.002) -> tuple[Array, Array, Array]:
+def rates(timed: Trajectory, period: float = 0.002) -> tuple[Array, Array, Array]:
     """Give values, and velocities and accelerations by differences."""
     q = np.array([values for _, values, _ in timed.sampled(period)][:-1])
     v = np.diff(q, axis=0) / period
@@ -174,7 +174,7 @@ def test_a_line_is_led_at_the_speed_of_the_tip() -> None:
     there = moved(here, 0.1, 0.25, 0.0)
     way = straight_line(arm, READY, there.matrix())
     lengths = [here.position.distance_to(arm.pose(q).position) for q in way]
-    timed = led(way, MotionLimits.of(arm), lengths, 0.1, 0.5)
+    timed = along_line(way, MotionLimits.of(arm), lengths, 0.1, 0.5)
     period = 0.01
     at = np.array([[*arm.pose(values).position] for _, values, _ in timed.sampled(period)][:-1])
     speed = np.linalg.norm(np.diff(at, axis=0), axis=1) / period
@@ -193,4 +193,4 @@ def test_limits_that_make_no_sense_are_refused() -> None:
     with pytest.raises(InvalidData, match="acceleration"):
         MotionLimits(np.ones(2), np.array((1.0, 0.0)), np.ones(2))
     with pytest.raises(InvalidData):
-        led([READY, READY + 0.1], MotionLimits.of(arm), [0.0], 0.1, 0.5)
+        along_line([READY, READY + 0.1], MotionLimits.of(arm), [0.0], 0.1, 0.5)
