@@ -12,7 +12,7 @@ import numpy as np
 import trimesh
 
 from arcor2_hw.collision.description import StoredFile
-from arcor2_hw.compute.preparing_tasks import PrepareAsset
+from arcor2_hw.compute.mesh_tasks import PrepareAsset
 from arcor2_server.app import running_services
 from arcor2_server.compute.workers import Compute
 from arcor2_server.settings import ServerSettings

@@ -1,4 +1,4 @@
-"""What the calibration worker is asked. Imports no numerics: the server knows it."""
+"""Tasks of the calibration worker. Imports no numerics, so that the server can use it."""
 
 from typing import ClassVar
 
@@ -17,21 +17,21 @@ from arcor2_hw.calibration.camera_results import (
 from arcor2_hw.calibration.layout import CharucoBoard, Layout, MarkerDictionary
 from arcor2_hw.calibration.results import RobotPose, TouchedFrame, TouchedOrientation, TouchedTip
 from arcor2_hw.collision.description import RobotSource
-from arcor2_hw.compute.task import Room, Task
+from arcor2_hw.compute.task import Task, WorkerKind
 from arcor2_hw.data.camera import CameraParameters, MarkerCorners
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import Joint
 
-_JOBS = "arcor2_hw.compute.calibrating"
+_FUNCTIONS = "arcor2_hw.compute.calibration_functions"
 
 
 class FindCameraPose(Task[CameraPose], frozen=True):
-    """Where a camera stands, from pictures of markers and boards."""
+    """Find the pose of a camera from images of markers and boards."""
 
-    gives: ClassVar = CameraPose
-    runs: ClassVar = f"{_JOBS}:camera_pose"
-    room: ClassVar = Room.CALIBRATION
-    what: ClassVar = "the pose of a camera"
+    result_type: ClassVar = CameraPose
+    function: ClassVar = f"{_FUNCTIONS}:camera_pose"
+    worker: ClassVar = WorkerKind.CALIBRATION
+    label: ClassVar = "the pose of a camera"
 
     pictures: list[bytes]
     parameters: CameraParameters
@@ -40,12 +40,12 @@ class FindCameraPose(Task[CameraPose], frozen=True):
 
 
 class DrawCameraPose(Task[bytes], frozen=True):
-    """Where the markers should be with a camera's pose, drawn onto the picture: PNG."""
+    """Draw the expected markers for a camera pose onto an image; the result is a PNG file."""
 
-    gives: ClassVar = bytes
-    runs: ClassVar = f"{_JOBS}:drawn_camera_pose"
-    room: ClassVar = Room.CALIBRATION
-    what: ClassVar = "the picture of a camera's pose"
+    result_type: ClassVar = bytes
+    function: ClassVar = f"{_FUNCTIONS}:drawn_camera_pose"
+    worker: ClassVar = WorkerKind.CALIBRATION
+    label: ClassVar = "the picture of a camera's pose"
 
     picture: bytes
     parameters: CameraParameters
@@ -54,12 +54,12 @@ class DrawCameraPose(Task[bytes], frozen=True):
 
 
 class FindMarkers(Task[list[MarkerCorners]], frozen=True):
-    """The corners of the markers in a picture."""
+    """Find the corners of the markers in an image."""
 
-    gives: ClassVar = list[MarkerCorners]
-    runs: ClassVar = f"{_JOBS}:marker_corners"
-    room: ClassVar = Room.CALIBRATION
-    what: ClassVar = "the corners of markers"
+    result_type: ClassVar = list[MarkerCorners]
+    function: ClassVar = f"{_FUNCTIONS}:marker_corners"
+    worker: ClassVar = WorkerKind.CALIBRATION
+    label: ClassVar = "the corners of markers"
 
     picture: bytes
     parameters: CameraParameters
@@ -67,16 +67,23 @@ class FindMarkers(Task[list[MarkerCorners]], frozen=True):
 
 
 class FindRobotPose(Task[RobotPose], frozen=True):
-    """Where a robot stands, from depth pictures (PNG, 16 bit, mm). robot.base: where it is assumed to stand.
+    """Find the pose of a robot from depth images.
 
-    within (m), angle_within (rad): by how much that may be off.
+    Attributes:
+        robot: Model of the robot; its base is the assumed pose.
+        joints: Joint values in the images.
+        depth: Depth images, PNG, 16 bit, mm.
+        parameters: Camera parameters.
+        camera_pose: Pose of the camera in the world.
+        distance: Maximum position error of the assumed pose, m.
+        angle: Maximum orientation error of the assumed pose, rad.
     """
 
-    gives: ClassVar = RobotPose
-    runs: ClassVar = "arcor2_hw.compute.robots:robot_pose"
-    room: ClassVar = Room.CALIBRATION
-    within: ClassVar = 60.0
-    what: ClassVar = "the pose of a robot"
+    result_type: ClassVar = RobotPose
+    function: ClassVar = "arcor2_hw.compute.calibration_functions:robot_pose"
+    worker: ClassVar = WorkerKind.CALIBRATION
+    timeout: ClassVar = 60.0
+    label: ClassVar = "the pose of a robot"
 
     robot: RobotSource
     joints: list[Joint]
@@ -88,13 +95,13 @@ class FindRobotPose(Task[RobotPose], frozen=True):
 
 
 class FindHandEye(Task[HandEye], frozen=True):
-    """Where a camera sits on a robot's flange, or beside the robot."""
+    """Find the pose of a camera on a robot's flange, or next to the robot."""
 
-    gives: ClassVar = HandEye
-    runs: ClassVar = f"{_JOBS}:hand_eye"
-    room: ClassVar = Room.CALIBRATION
-    within: ClassVar = 120.0
-    what: ClassVar = "a hand-eye calibration"
+    result_type: ClassVar = HandEye
+    function: ClassVar = f"{_FUNCTIONS}:hand_eye"
+    worker: ClassVar = WorkerKind.CALIBRATION
+    timeout: ClassVar = 120.0
+    label: ClassVar = "a hand-eye calibration"
 
     samples: list[HandEyeSample]
     parameters: CameraParameters
@@ -104,13 +111,13 @@ class FindHandEye(Task[HandEye], frozen=True):
 
 
 class FindIntrinsics(Task[Intrinsics], frozen=True):
-    """A camera's intrinsics, from pictures of a ChArUco board."""
+    """Find the intrinsic parameters of a camera from images of a ChArUco board."""
 
-    gives: ClassVar = Intrinsics
-    runs: ClassVar = f"{_JOBS}:intrinsics"
-    room: ClassVar = Room.CALIBRATION
-    within: ClassVar = 120.0
-    what: ClassVar = "the intrinsics of a camera"
+    result_type: ClassVar = Intrinsics
+    function: ClassVar = f"{_FUNCTIONS}:intrinsics"
+    worker: ClassVar = WorkerKind.CALIBRATION
+    timeout: ClassVar = 120.0
+    label: ClassVar = "the intrinsics of a camera"
 
     pictures: list[bytes]
     board: CharucoBoard
@@ -119,12 +126,12 @@ class FindIntrinsics(Task[Intrinsics], frozen=True):
 
 # ------------------------------------------------------------------------------------------------ by touch
 class FrameByAxes(Task[TouchedFrame], frozen=True):
-    """A frame from its origin, a point on +x, and points in its xy plane on the side of +y."""
+    """Compute a frame from its origin, a point on +x, and points in the xy plane on the side of +y."""
 
-    gives: ClassVar = TouchedFrame
-    runs: ClassVar = f"{_JOBS}:frame_by_axes"
-    room: ClassVar = Room.CALIBRATION
-    what: ClassVar = "a frame by touch"
+    result_type: ClassVar = TouchedFrame
+    function: ClassVar = f"{_FUNCTIONS}:frame_by_axes"
+    worker: ClassVar = WorkerKind.CALIBRATION
+    label: ClassVar = "a frame by touch"
 
     origin: Position
     on_x: Position
@@ -132,47 +139,47 @@ class FrameByAxes(Task[TouchedFrame], frozen=True):
 
 
 class FrameByPoints(Task[TouchedFrame], frozen=True):
-    """A frame in which points are known, from where they were touched, in the same order."""
+    """Compute a frame from points known in it and the same points as touched, in the same order."""
 
-    gives: ClassVar = TouchedFrame
-    runs: ClassVar = f"{_JOBS}:frame_by_points"
-    room: ClassVar = Room.CALIBRATION
-    what: ClassVar = "a frame by touch"
+    result_type: ClassVar = TouchedFrame
+    function: ClassVar = f"{_FUNCTIONS}:frame_by_points"
+    worker: ClassVar = WorkerKind.CALIBRATION
+    label: ClassVar = "a frame by touch"
 
     known: list[Position]
     touched: list[Position]
 
 
 class TipByTouches(Task[TouchedTip], frozen=True):
-    """The tip of a tool, from poses of the flange with the tip on one point."""
+    """Compute the tip of a tool from flange poses with the tip on one point."""
 
-    gives: ClassVar = TouchedTip
-    runs: ClassVar = f"{_JOBS}:tip_by_touches"
-    room: ClassVar = Room.CALIBRATION
-    what: ClassVar = "the tip of a tool"
+    result_type: ClassVar = TouchedTip
+    function: ClassVar = f"{_FUNCTIONS}:tip_by_touches"
+    worker: ClassVar = WorkerKind.CALIBRATION
+    label: ClassVar = "the tip of a tool"
 
     flange: list[Pose]
 
 
 class OrientationByAlignment(Task[TouchedOrientation], frozen=True):
-    """A tool's orientation, from orientations of the flange with the tool's axes along a reference's."""
+    """Compute the orientation of a tool from flange orientations with the tool aligned with a reference frame."""
 
-    gives: ClassVar = TouchedOrientation
-    runs: ClassVar = f"{_JOBS}:orientation_by_alignment"
-    room: ClassVar = Room.CALIBRATION
-    what: ClassVar = "the orientation of a tool"
+    result_type: ClassVar = TouchedOrientation
+    function: ClassVar = f"{_FUNCTIONS}:orientation_by_alignment"
+    worker: ClassVar = WorkerKind.CALIBRATION
+    label: ClassVar = "the orientation of a tool"
 
     flange: list[Orientation]
     reference: Orientation = field(default_factory=Orientation)
 
 
 class OrientationByPoints(Task[TouchedOrientation], frozen=True):
-    """A tool's orientation, from moving its tip along its +z and to its +x side."""
+    """Compute the orientation of a tool from motions of its tip along +z and to its +x side."""
 
-    gives: ClassVar = TouchedOrientation
-    runs: ClassVar = f"{_JOBS}:orientation_by_points"
-    room: ClassVar = Room.CALIBRATION
-    what: ClassVar = "the orientation of a tool"
+    result_type: ClassVar = TouchedOrientation
+    function: ClassVar = f"{_FUNCTIONS}:orientation_by_points"
+    worker: ClassVar = WorkerKind.CALIBRATION
+    label: ClassVar = "the orientation of a tool"
 
     flange: Orientation
     tip: Position

@@ -1,7 +1,7 @@
-"""Writes binary glTF (Khronos glTF 2.0): meshes with normals and colours, and what else a client has to know.
+"""Binary glTF files (Khronos glTF 2.0): meshes with normals and colours, and extra data.
 
-Vertices are in our frames, z up; the root node turns them, so that other programs show them upright. Normals are of one
-byte per axis, which the extension KHR_mesh_quantization allows.
+Vertices are in our frames, z up. The root node rotates them to y up, as other programs expect. Normals have one byte
+per axis, which the extension KHR_mesh_quantization allows.
 """
 
 import json
@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 if TYPE_CHECKING:
-    from arcor2_hw.compute.reducing import Drawn
+    from arcor2_hw.compute.simplification import DisplayMesh
 
 _FLOAT, _BYTE, _UINT16, _UINT32 = 5126, 5120, 5123, 5125
 _VERTICES, _INDICES = 34962, 34963
 _Y_UP: Final = (-0.7071067811865476, 0.0, 0.0, 0.7071067811865476)
-"""A quarter turn about x: from z up to y up."""
+"""Rotation by -90° about x: from z up to y up, quaternion x, y, z, w."""
 
 
-def written(meshes: Mapping[str, "Drawn"], extras: Mapping[str, Any]) -> bytes:
-    """Give a file with a mesh of each name, and `extras` of the whole; the same is written the same."""
+def encode_glb(meshes: Mapping[str, "DisplayMesh"], extras: Mapping[str, Any]) -> bytes:
+    """Return a file with one node and mesh per name, and `extras` of the scene. Equal input gives equal bytes."""
     content = _Content()
     told: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": "ARCOR2-HW"},
@@ -45,7 +45,7 @@ def written(meshes: Mapping[str, "Drawn"], extras: Mapping[str, Any]) -> bytes:
 
 
 class _Content:
-    """The binary part, and what is said of it."""
+    """The binary chunk and its descriptions."""
 
     def __init__(self) -> None:
         self.data = bytearray()
@@ -59,11 +59,11 @@ class _Content:
             "accessors": self._accessors,
         }
 
-    def primitive(self, mesh: "Drawn") -> dict[str, Any]:
+    def primitive(self, mesh: "DisplayMesh") -> dict[str, Any]:
         positions = np.ascontiguousarray(mesh.positions, dtype="<f4")
         bounds = {"min": positions.min(axis=0).tolist(), "max": positions.max(axis=0).tolist()}
         attributes = {"POSITION": self._add(positions, _FLOAT, "VEC3", _VERTICES, **bounds)}
-        padded = np.zeros((len(mesh.normals), 4), dtype=np.int8)  # a vertex begins at a multiple of four bytes
+        padded = np.zeros((len(mesh.normals), 4), dtype=np.int8)  # vertices are aligned to four bytes
         padded[:, :3] = mesh.normals
         attributes["NORMAL"] = self._add(padded, _BYTE, "VEC3", _VERTICES, stride=4, normalized=True)
         if mesh.colours is not None:

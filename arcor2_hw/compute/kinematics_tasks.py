@@ -1,7 +1,7 @@
-"""What the kinematics worker is asked. Imports no numerics: the server knows it.
+"""Tasks of the kinematics worker. Imports no numerics, so that the server can use it.
 
-Poses are in the world. Tasks that name a robot by its id need it, and what stands around it, in the world that is told
-with them; others bring the robot's model along.
+Poses are in the world. A task that names a robot by its id needs that robot, and everything around it, in the world
+description sent with the task. Other tasks contain the source of the robot's model.
 """
 
 from typing import ClassVar
@@ -9,18 +9,18 @@ from typing import ClassVar
 from msgspec import field
 
 from arcor2_hw.collision.description import RobotSource, StoredFile
-from arcor2_hw.compute.task import Room, Task
+from arcor2_hw.compute.task import Task, WorkerKind
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.editor import Reach
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.robot import Joint
 
-_JOBS = "arcor2_hw.compute.moving"
+_FUNCTIONS = "arcor2_hw.compute.kinematics_functions"
 
 
 # ------------------------------------------------------------------------------------------------ one robot
 class JointRange(Data, frozen=True):
-    """A joint with its limits (rad or m, left out where there is none) and its maximum velocity (per s)."""
+    """A joint with its limits in rad or m, unset where there is none, and its maximum velocity per s."""
 
     name: str
     prismatic: bool
@@ -30,7 +30,15 @@ class JointRange(Data, frozen=True):
 
 
 class ModelDescription(Data, frozen=True):
-    """What a model says. triangles: of what it looks like."""
+    """The content of a robot model.
+
+    Attributes:
+        name: Name of the robot in the URDF.
+        joints: Joints that take values.
+        end_effectors: Links that are end effectors.
+        links: All links.
+        triangles: Number of triangles of the visual meshes.
+    """
 
     name: str
     joints: list[JointRange]
@@ -40,23 +48,23 @@ class ModelDescription(Data, frozen=True):
 
 
 class DescribeRobot(Task[ModelDescription], frozen=True):
-    """What a model is of. Fails for one that cannot be used."""
+    """Describe a robot model. Fails for a model that cannot be used."""
 
-    gives: ClassVar = ModelDescription
-    runs: ClassVar = f"{_JOBS}:description"
-    room: ClassVar = Room.KINEMATICS
-    what: ClassVar = "the model of a robot"
+    result_type: ClassVar = ModelDescription
+    function: ClassVar = f"{_FUNCTIONS}:description"
+    worker: ClassVar = WorkerKind.KINEMATICS
+    label: ClassVar = "the model of a robot"
 
     model: RobotSource
 
 
 class SolveForward(Task[Pose], frozen=True):
-    """Where an end effector is with joints."""
+    """Compute the pose of an end effector for joint values."""
 
-    gives: ClassVar = Pose
-    runs: ClassVar = f"{_JOBS}:forward"
-    room: ClassVar = Room.KINEMATICS
-    what: ClassVar = "forward kinematics"
+    result_type: ClassVar = Pose
+    function: ClassVar = f"{_FUNCTIONS}:forward"
+    worker: ClassVar = WorkerKind.KINEMATICS
+    label: ClassVar = "forward kinematics"
 
     model: RobotSource
     end_effector: str
@@ -64,12 +72,12 @@ class SolveForward(Task[Pose], frozen=True):
 
 
 class SolveInverse(Task[list[Joint]], frozen=True):
-    """Joints with which an end effector is at a pose, nearest to `start`; free of collision if that is asked."""
+    """Compute joint values for a pose, nearest to `start`, free of collision if wanted."""
 
-    gives: ClassVar = list[Joint]
-    runs: ClassVar = f"{_JOBS}:inverse"
-    room: ClassVar = Room.KINEMATICS
-    what: ClassVar = "inverse kinematics"
+    result_type: ClassVar = list[Joint]
+    function: ClassVar = f"{_FUNCTIONS}:inverse"
+    worker: ClassVar = WorkerKind.KINEMATICS
+    label: ClassVar = "inverse kinematics"
 
     robot: str
     end_effector: str
@@ -80,20 +88,20 @@ class SolveInverse(Task[list[Joint]], frozen=True):
 
 # ------------------------------------------------------------------------------------------------ reachability
 class Judged(Data, frozen=True):
-    """Whether an end effector gets somewhere; reason: why not, or not well, a sentence."""
+    """Whether an end effector reaches a pose; `reason` is a sentence when it does not, or only with reservation."""
 
     reach: Reach
     reason: str = ""
 
 
 class JudgePoses(Task[list[Judged]], frozen=True):
-    """How an end effector gets to each of these poses; what was asked before is worked out anew only if need be."""
+    """Judge how an end effector reaches poses. Results are cached in the world of the task."""
 
-    gives: ClassVar = list[Judged]
-    runs: ClassVar = f"{_JOBS}:judged_poses"
-    room: ClassVar = Room.KINEMATICS
-    within: ClassVar = 20.0
-    what: ClassVar = "reachability"
+    result_type: ClassVar = list[Judged]
+    function: ClassVar = f"{_FUNCTIONS}:judged_poses"
+    worker: ClassVar = WorkerKind.KINEMATICS
+    timeout: ClassVar = 20.0
+    label: ClassVar = "reachability"
 
     robot: str
     end_effector: str
@@ -101,13 +109,13 @@ class JudgePoses(Task[list[Judged]], frozen=True):
 
 
 class JudgeJoints(Task[list[Judged]], frozen=True):
-    """Whether a robot may stand with each of these joints."""
+    """Judge whether a robot may be in joint configurations."""
 
-    gives: ClassVar = list[Judged]
-    runs: ClassVar = f"{_JOBS}:judged_joints"
-    room: ClassVar = Room.KINEMATICS
-    within: ClassVar = 20.0
-    what: ClassVar = "reachability of joints"
+    result_type: ClassVar = list[Judged]
+    function: ClassVar = f"{_FUNCTIONS}:judged_joints"
+    worker: ClassVar = WorkerKind.KINEMATICS
+    timeout: ClassVar = 20.0
+    label: ClassVar = "reachability of joints"
 
     robot: str
     joints: list[list[Joint]]
@@ -115,26 +123,32 @@ class JudgeJoints(Task[list[Judged]], frozen=True):
 
 # ------------------------------------------------------------------------------------------------ the world
 class Line(Data, frozen=True):
-    """A straight line; m."""
+    """A straight line, m."""
 
     start: Position
     end: Position
 
 
 class LineHit(Data, frozen=True):
-    """What a line meets first: its id, that of a robot with the link, and at which share of the line."""
+    """The first thing that a line meets: its id, or "robot/link", and the position along the line (0 to 1)."""
 
     id: str
     share: float
 
 
 class CheckLines(Task[list[LineHit | None]], frozen=True):
-    """What each line meets first. inflation: sizes count as larger by so much, m. ignore: ids that are no obstacle."""
+    """Find the first thing that each line meets.
 
-    gives: ClassVar = list[LineHit | None]
-    runs: ClassVar = f"{_JOBS}:checked_lines"
-    room: ClassVar = Room.KINEMATICS
-    what: ClassVar = "the safety of a line"
+    Attributes:
+        lines: The lines.
+        inflation: Length added to all sizes, m.
+        ignore: Ids of bodies and robots to ignore.
+    """
+
+    result_type: ClassVar = list[LineHit | None]
+    function: ClassVar = f"{_FUNCTIONS}:checked_lines"
+    worker: ClassVar = WorkerKind.KINEMATICS
+    label: ClassVar = "the safety of a line"
 
     lines: list[Line]
     inflation: float = 0.0
@@ -142,12 +156,12 @@ class CheckLines(Task[list[LineHit | None]], frozen=True):
 
 
 class PlaceInLink(Task[Pose], frozen=True):
-    """Where a pose in the world is in the frame of a robot's link, as the robot stands now."""
+    """Convert a pose in the world to the frame of a robot's link at joint values."""
 
-    gives: ClassVar = Pose
-    runs: ClassVar = f"{_JOBS}:placed_in_link"
-    room: ClassVar = Room.KINEMATICS
-    what: ClassVar = "where a held object is"
+    result_type: ClassVar = Pose
+    function: ClassVar = f"{_FUNCTIONS}:placed_in_link"
+    worker: ClassVar = WorkerKind.KINEMATICS
+    label: ClassVar = "where a held object is"
 
     model: RobotSource
     joints: list[Joint]
@@ -156,20 +170,20 @@ class PlaceInLink(Task[Pose], frozen=True):
 
 
 class MeshFacts(Data, frozen=True):
-    """How large a mesh is: triangles, and the edges of the box around it, m."""
+    """Number of triangles of a mesh, and the edges of its bounding box, m."""
 
     triangles: int
     size: tuple[float, float, float]
 
 
 class ReadMesh(Task[MeshFacts], frozen=True):
-    """How large a mesh is. Fails for one that cannot be used."""
+    """Measure a mesh. Fails for a mesh that cannot be used."""
 
-    gives: ClassVar = MeshFacts
-    runs: ClassVar = f"{_JOBS}:mesh_facts"
-    room: ClassVar = Room.KINEMATICS
-    within: ClassVar = 30.0
-    what: ClassVar = "a mesh"
+    result_type: ClassVar = MeshFacts
+    function: ClassVar = f"{_FUNCTIONS}:mesh_facts"
+    worker: ClassVar = WorkerKind.KINEMATICS
+    timeout: ClassVar = 30.0
+    label: ClassVar = "a mesh"
 
     file: StoredFile
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)

@@ -1,7 +1,7 @@
-"""What server and compute worker say to each other: a tagged union per direction, framed, msgpack.
+"""Messages between server and compute worker: a tagged union per direction, msgpack, with a length prefix.
 
-The server asks one thing at a time. What the worker knows of the world it was told by messages before; a worker that
-was started anew knows nothing, and is told again.
+The server sends one task at a time. World descriptions are sent as changes; a new worker process gets all of them
+again.
 """
 
 from typing import Any, Final
@@ -14,13 +14,16 @@ from arcor2_hw.collision.description import WorldItem
 from arcor2_hw.compute.tasks import AnyTask
 
 MAX_MESSAGE: Final = 512 * 1024 * 1024
-"""Bytes; the pictures of an intrinsic calibration, or of a hand-eye one, come together."""
+"""Maximum size of a message, bytes. The images of a camera calibration are sent together."""
 
 
 class Work(Struct, frozen=True, tag=True):
-    """Compute something. within: seconds, after which the worker ends itself. Answer: Done or Failed.
+    """Run a task. The answer is Done or Failed.
 
-    place: the name of the world in which it is asked, where it needs one.
+    Attributes:
+        task: The task.
+        within: Time limit in s, after which the worker ends itself.
+        place: Name of the world in which it runs, if it needs one.
     """
 
     task: AnyTask
@@ -29,11 +32,16 @@ class Work(Struct, frozen=True, tag=True):
 
 
 class ChangeWorld(Struct, frozen=True, tag=True):
-    """Take things out, and put others in, in place of those of the same ids. One that cannot be used fails the Works
-    that need the world, until it goes.
+    """Change a world: remove items, and add items, replacing those of the same id.
 
-    place: the name of the world. What is kept of a world is worth keeping while the same things stand in it, so
-    questions about different things have worlds of their own.
+    An item that cannot be used fails every task in this world until it is removed. Caches belong to a world, so
+    questions
+    about different sets of items use worlds of their own.
+
+    Attributes:
+        place: Name of the world.
+        put: Items to add or replace.
+        remove: Ids of items to remove.
     """
 
     place: str
@@ -42,7 +50,7 @@ class ChangeWorld(Struct, frozen=True, tag=True):
 
 
 class ForgetWorld(Struct, frozen=True, tag=True):
-    """Drop a world, and what is kept of it."""
+    """Drop a world and its caches."""
 
     place: str
 
@@ -51,13 +59,20 @@ ToWorker = Work | ChangeWorld | ForgetWorld
 
 
 class Done(Struct, frozen=True, tag=True):
-    """The answer, in msgpack."""
+    """The result, in msgpack."""
 
     value: bytes
 
 
 class Failed(Struct, frozen=True, tag=True):
-    """An error. codes: of its class and those that it derives from, the nearest first; reason: where it has one."""
+    """An error.
+
+    Attributes:
+        codes: Codes of its class and of the base classes, most specific first.
+        message: Message for the user.
+        detail: Detail for the technician.
+        reason: Reason, where the error has one.
+    """
 
     codes: list[str]
     message: str
@@ -66,7 +81,7 @@ class Failed(Struct, frozen=True, tag=True):
 
 
 class Progress(Struct, frozen=True, tag=True):
-    """How far the computation is: 0..1, and what it does."""
+    """Progress of the present task: share (0 to 1) and activity."""
 
     share: float
     message: str
@@ -81,16 +96,24 @@ encode_value = _encoder.encode
 
 
 def encode(message: ToWorker | FromWorker) -> bytearray:
-    """Give a message with its length in front; ValueError for one that is too long."""
+    """Return a message with its length prefix.
+
+    Raises:
+        ValueError: The message is longer than MAX_MESSAGE.
+    """
     buffer = bytearray(framing.PREFIX_SIZE)
-    _encoder.encode_into(message, buffer, framing.PREFIX_SIZE)  # pictures are large: they are copied but once
+    _encoder.encode_into(message, buffer, framing.PREFIX_SIZE)  # images are large, so they are copied only once
     size = len(buffer) - framing.PREFIX_SIZE
     if size > MAX_MESSAGE:
-        raise ValueError(f"a message of {size} bytes is longer than {MAX_MESSAGE}")
+        raise ValueError(f"a message of {size} bytes is longer than the maximum of {MAX_MESSAGE}")
     buffer[: framing.PREFIX_SIZE] = framing.prefix(size)
     return buffer
 
 
 def body_length(prefix: bytes) -> int:
-    """Read the length prefix; ValueError beyond MAX_MESSAGE."""
+    """Read the length prefix.
+
+    Raises:
+        ValueError: The length exceeds MAX_MESSAGE.
+    """
     return framing.body_length(prefix, MAX_MESSAGE)

@@ -1,4 +1,4 @@
-"""What every question to the compute worker declares."""
+"""Base class of all tasks of the compute workers, and their errors."""
 
 import enum
 from typing import Any, ClassVar, Final, Generic, TypeVar
@@ -10,11 +10,11 @@ from arcor2_hw.exceptions import Arcor2Error
 R = TypeVar("R")
 
 MAX_PICTURE: Final = 64 * 1024 * 1024
-"""Bytes of one picture's file."""
+"""Maximum size of one image file, bytes."""
 
 
-class Room(enum.StrEnum):
-    """Which worker does it. One process each: a calibration of seconds delays no kinematics of a millisecond."""
+class WorkerKind(enum.StrEnum):
+    """Kinds of compute worker. Each has a process of its own, so that slow calibrations do not delay kinematics."""
 
     KINEMATICS = "kinematics"
     CALIBRATION = "calibration"
@@ -22,38 +22,42 @@ class Room(enum.StrEnum):
 
 
 class Task(Struct, Generic[R], frozen=True, tag=True):
-    """A question; its answer is of the type R.
+    """A question to a compute worker. Its answer has the type R.
 
-    Class data: gives: R for msgspec. runs: "module:function" that takes the task and a Desk, and gives an R. room:
-    where. within: seconds that it may take. what: what it is, as it stands in a sentence.
+    Class Attributes:
+        result_type: R, for decoding.
+        function: "module:function". The function takes the task and a WorkerState, and returns an R.
+        worker: The kind of worker that runs it.
+        timeout: Maximum time, s.
+        label: The task in messages, such as "forward kinematics".
     """
 
-    gives: ClassVar[Any]
-    runs: ClassVar[str]
-    room: ClassVar[Room]
-    within: ClassVar[float] = 10.0
-    what: ClassVar[str]
+    result_type: ClassVar[Any]
+    function: ClassVar[str]
+    worker: ClassVar[WorkerKind]
+    timeout: ClassVar[float] = 10.0
+    label: ClassVar[str]
 
 
 class ComputeStopped(Arcor2Error):
-    """The compute worker ended in the middle of a computation; a new one is started for the next."""
+    """The compute worker ended during a computation. A new one is started for the next task."""
 
     code = "compute_stopped"
 
 
 class ComputeTimeout(Arcor2Error):
-    """A computation took longer than it may."""
+    """A computation exceeded its time limit."""
 
     code = "compute_timeout"
 
 
 class ComputeBusy(Arcor2Error):
-    """Too many computations wait already."""
+    """Too many computations are waiting."""
 
     code = "compute_busy"
 
 
 class NotInstalled(Arcor2Error):
-    """What computes this is not installed here."""
+    """A library that the computation needs is not installed."""
 
     code = "not_installed"

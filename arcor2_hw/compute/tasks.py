@@ -1,7 +1,7 @@
-"""Everything that can be asked of the compute workers. Imports no numerics."""
+"""All tasks of the compute workers. Imports no numerics."""
 
 from arcor2_hw.compute.calibration_tasks import CalibrationTask
 from arcor2_hw.compute.kinematics_tasks import KinematicsTask
-from arcor2_hw.compute.preparing_tasks import PreparingTask
+from arcor2_hw.compute.mesh_tasks import MeshTask
 
-AnyTask = CalibrationTask | KinematicsTask | PreparingTask
+AnyTask = CalibrationTask | KinematicsTask | MeshTask

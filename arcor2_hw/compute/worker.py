@@ -1,4 +1,4 @@
-"""The process: takes one message after the other, computes, answers. It keeps nothing that could not be told again."""
+"""The worker process: it reads a message, computes, answers. All of its state can be sent again by the server."""
 
 import argparse
 import contextlib
@@ -15,30 +15,30 @@ from typing import Any, Final
 import msgspec
 
 from arcor2_hw.compute import messages as m
-from arcor2_hw.compute.desk import Desk
 from arcor2_hw.compute.task import NotInstalled, Task
+from arcor2_hw.compute.worker_state import WorkerState
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
 from arcor2_hw.framing import PREFIX_SIZE
 
 NICENESS: Final = 5
-"""Devices, and the server, go first."""
+"""Scheduling priority below that of devices and the server."""
 LATE: Final = 1.0
-"""Seconds beyond what a computation may take after which the process is ended by the kernel, whatever it does."""
+"""Time after the limit of a computation at which the kernel ends the process, s."""
 MAX_ANSWER: Final = 128 * 1024 * 1024
-"""Bytes of one answer."""
+"""Maximum size of an answer, bytes."""
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Serve the socket of this number until it is closed."""
+    """Serve the socket with the given file descriptor until it is closed."""
     parser = argparse.ArgumentParser(prog="arcor2_hw.compute")
     parser.add_argument("--fd", type=int, required=True)
-    # A library that crashes leaves a trace on standard error, and no core file.
+    # A crash in a library leaves a stack trace on standard error, but no core file.
     faulthandler.enable()
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     with contextlib.suppress(OSError):
         os.nice(NICENESS)
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the server, which ends this process
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is handled by the server, which ends this process
     with socket.socket(fileno=parser.parse_args(arguments).fd) as sock:
         sock.setblocking(True)
         serve(sock)
@@ -46,31 +46,31 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def serve(sock: socket.socket) -> None:
-    """Answer what comes until the socket is closed."""
+    """Answer messages until the socket is closed."""
 
     def say(message: m.FromWorker) -> None:
         sock.sendall(m.encode(message))
 
-    desk = Desk(lambda share, text: say(m.Progress(share, text)))
+    state = WorkerState(lambda share, text: say(m.Progress(share, text)))
     with contextlib.suppress(OSError):
         for message in _messages(sock):
             match message:
                 case m.ChangeWorld():
-                    desk.change(message.place, message.put, message.remove)
+                    state.change(message.place, message.put, message.remove)
                 case m.ForgetWorld():
-                    desk.forget(message.place)
+                    state.forget(message.place)
                 case m.Work():
-                    desk.place = message.place
-                    say(_answer(message, desk))
+                    state.place = message.place
+                    say(_answer(message, state))
 
 
-def _answer(work: m.Work, desk: Desk) -> m.Done | m.Failed:
-    # Not a handler but the default of the signal: it ends the process also inside a library that never returns.
+def _answer(work: m.Work, state: WorkerState) -> m.Done | m.Failed:
+    # The default action of the signal ends the process even inside a library call that never returns.
     signal.setitimer(signal.ITIMER_REAL, work.within + LATE)
     try:
-        value = m.encode_value(function_of(work.task)(work.task, desk))
+        value = m.encode_value(function_of(work.task)(work.task, state))
         if len(value) > MAX_ANSWER:
-            raise InvalidData(f"What was asked has an answer of {len(value)} bytes; {MAX_ANSWER} are sent.")
+            raise InvalidData(f"The answer is larger than allowed: {len(value)} bytes, at most {MAX_ANSWER}.")
         return m.Done(value)
     except Arcor2Error as error:
         return failed(error)
@@ -79,27 +79,31 @@ def _answer(work: m.Work, desk: Desk) -> m.Done | m.Failed:
             raise
         return failed(
             NotInstalled(
-                f"{error.name} is not installed: install arcor2-hw with the extras vision and kinematics.", str(error)
+                f"{error.name} is not installed. Install arcor2-hw with the extras vision and kinematics.", str(error)
             )
         )
     except MemoryError:
-        return failed(InvalidData("There is not enough memory for this."))
+        return failed(InvalidData("There is not enough memory for this computation."))
     except Exception as error:  # noqa: BLE001 - whatever a library raises is told to who asked
         sys.excepthook(type(error), error, error.__traceback__)
-        return m.Failed(["compute", "error"], "An error inside the computation: see the server's log.", repr(error))
+        return m.Failed(
+            ["compute", "error"],
+            "The computation failed with an internal error. See the log of the server.",
+            repr(error),
+        )
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
 
 
-def function_of(task: Task[Any]) -> Callable[[Any, Desk], Any]:
-    """Give what computes a task; what it needs is imported only now."""
-    module, _, name = task.runs.partition(":")
-    function: Callable[[Any, Desk], Any] = getattr(importlib.import_module(module), name)
+def function_of(task: Task[Any]) -> Callable[[Any, WorkerState], Any]:
+    """Import and return the function of a task."""
+    module, _, name = task.function.partition(":")
+    function: Callable[[Any, WorkerState], Any] = getattr(importlib.import_module(module), name)
     return function
 
 
 def failed(error: Arcor2Error) -> m.Failed:
-    """Give an error as it crosses the process border."""
+    """Return an error as a message."""
     codes = [kind.code for kind in type(error).__mro__ if issubclass(kind, Arcor2Error)]
     return m.Failed(list(dict.fromkeys(codes)), str(error), error.detail, str(getattr(error, "reason", "")))
 
@@ -112,11 +116,11 @@ def _messages(sock: socket.socket) -> Iterator[m.ToWorker]:
         try:
             yield m.decode_to_worker(body)
         except msgspec.MsgspecError as error:
-            raise SystemExit(f"the server sent what is no message: {error}") from None
+            raise SystemExit(f"the server sent an invalid message: {error}") from None
 
 
 def _exactly(sock: socket.socket, size: int) -> bytearray | None:
-    """Read so many bytes; None when the socket is closed before."""
+    """Read exactly `size` bytes, None when the socket is closed before."""
     buffer = bytearray(size)
     view, got = memoryview(buffer), 0
     while got < size:

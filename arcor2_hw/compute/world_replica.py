@@ -1,4 +1,4 @@
-"""The collision world in the worker, kept as it is told: only what changed is read and placed anew."""
+"""The worker's copy of a world description as a CollisionWorld; only changed items are loaded and placed again."""
 
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
@@ -22,27 +22,31 @@ from arcor2_hw.kinematics.source import MAX_MESH
 from arcor2_hw.planning.reachability import Reachability
 
 MESHES: Final = 64
-"""Meshes that are kept, those that were used last."""
+"""Maximum number of cached meshes; the least recently used is dropped."""
 
 
 class WorldReplica:
-    """`collisions` is the world itself; `settle` brings it to what `change` told."""
+    """A CollisionWorld that follows a world description.
+
+    Attributes:
+        collisions: The collision world, up to date after `apply_changes`.
+    """
 
     def __init__(self, load: Callable[[RobotSource], model.RobotModel]) -> None:
         self.collisions = CollisionWorld()
         self._load = load
         self._things: dict[str, WorldItem] = {}
         self._placed: dict[str, WorldItem] = {}
-        """What stands in `collisions`."""
+        """Items in `collisions`."""
         self._waiting: dict[str, None] = {}
-        """Ids of what changed since, in their order."""
+        """Ids of items changed since, in order."""
         self._unusable: dict[str, Arcor2Error] = {}
         self._meshes: OrderedDict[tuple[str, tuple[float, float, float]], shapes.TriangleMesh] = OrderedDict()
         self._reach: dict[tuple[str, str], Reachability] = {}
         self._inverse: dict[tuple[str, str], InverseKinematics] = {}
 
     def change(self, put: Sequence[WorldItem], remove: Sequence[str]) -> None:
-        """Note what came, went or changed."""
+        """Record changes of the description."""
         for key in remove:
             self._things.pop(key, None)
             self._waiting[key] = None
@@ -50,8 +54,12 @@ class WorldReplica:
             self._things[thing.id] = thing
             self._waiting[thing.id] = None
 
-    def settle(self) -> None:
-        """Bring the world to what it should be. Raises the error of what cannot be used, each time until it goes."""
+    def apply_changes(self) -> None:
+        """Apply recorded changes to the collision world.
+
+        Raises:
+            Arcor2Error: An item cannot be used. The error is raised again at every call until the item is removed.
+        """
         waiting, self._waiting = list(self._waiting), {}
         again = self._let_go(waiting)
         for key in sorted([*waiting, *again], key=self._order):
@@ -66,14 +74,14 @@ class WorldReplica:
             raise next(iter(self._unusable.values()))
 
     def _order(self, key: str) -> int:
-        """Robots come first, then what stands by itself, then what they hold; what goes, before all."""
+        """Return the order of processing: removals, robots, bodies, attached bodies."""
         thing = self._things.get(key)
         if thing is None:
             return 0
         return 1 if isinstance(thing, WorldRobot) else 2 if thing.attachment is None else 3
 
     def _let_go(self, waiting: Sequence[str]) -> list[str]:
-        """Give the ids of what has to be held anew, since its robot is made anew or goes."""
+        """Return the ids of bodies to attach again, because their robot is replaced or removed."""
         gone = {
             key
             for key in waiting
@@ -124,7 +132,7 @@ class WorldReplica:
             frames = standing.link_frames(standing.q)
             if body.attachment.link not in frames:
                 raise NotFound(
-                    f"{body.id} is held by {body.attachment.link}, which is no link of {body.attachment.robot}."
+                    f"{body.id} is attached to {body.attachment.link}, which is no link of {body.attachment.robot}."
                 )
             pose = type(pose).from_matrix(frames[body.attachment.link] @ pose.matrix())
         if old is not None and old.shape == body.shape:
@@ -149,7 +157,11 @@ class WorldReplica:
         return self.mesh(body.shape) if isinstance(body.shape, MeshShape) else body.shape
 
     def mesh(self, shape: MeshShape) -> shapes.TriangleMesh:
-        """Give a mesh, read once. Raises BadMesh naming it."""
+        """Return a mesh, read once.
+
+        Raises:
+            BadMesh: The mesh cannot be used; the message names it.
+        """
         key = (shape.file.path, shape.scale)
         found = self._meshes.pop(key, None)
         if found is None:
@@ -161,7 +173,11 @@ class WorldReplica:
 
     # -------------------------------------------------------------------------------- what is kept of robots
     def reachability(self, robot: str, end_effector: str) -> Reachability:
-        """Give what judges poses of an end effector. NotFound."""
+        """Return the reachability of an end effector, with its cache.
+
+        Raises:
+            NotFound: There is no such robot or end effector.
+        """
         key = (robot, end_effector)
         if key not in self._reach:
             arm = self.collisions.robot(robot).model.arm(end_effector)
@@ -169,7 +185,11 @@ class WorldReplica:
         return self._reach[key]
 
     def inverse(self, robot: str, end_effector: str) -> InverseKinematics:
-        """Give what solves for an end effector. NotFound."""
+        """Return the inverse kinematics of an end effector.
+
+        Raises:
+            NotFound: There is no such robot or end effector.
+        """
         key = (robot, end_effector)
         if key not in self._inverse:
             self._inverse[key] = InverseKinematics(self.collisions.robot(robot).model.arm(end_effector))
@@ -177,7 +197,11 @@ class WorldReplica:
 
 
 def mesh_of(shape: MeshShape) -> shapes.TriangleMesh:
-    """Read a mesh. Raises BadMesh naming it."""
+    """Read a mesh.
+
+    Raises:
+        BadMesh: The mesh cannot be used; the message names it.
+    """
     path = Path(shape.file.path)
     try:
         with path.open("rb") as file:
@@ -188,7 +212,7 @@ def mesh_of(shape: MeshShape) -> shapes.TriangleMesh:
 
 
 def _same_robot(old: WorldItem | None, new: WorldItem | None) -> bool:
-    """Tell whether a robot is the same but for where it stands and its joints."""
+    """Return whether two items are the same robot, except for its base pose and joints."""
     if not isinstance(old, WorldRobot) or not isinstance(new, WorldRobot):
         return False
     one, other = old.model, new.model

@@ -13,10 +13,10 @@ import pytest
 import trimesh
 
 from arcor2_hw.collision.description import StoredFile
-from arcor2_hw.compute import preparing, reducing
-from arcor2_hw.compute.desk import Desk
-from arcor2_hw.compute.preparing import prepared
-from arcor2_hw.compute.preparing_tasks import PrepareAsset, Prepared
+from arcor2_hw.compute import mesh_functions, simplification
+from arcor2_hw.compute.mesh_functions import prepared
+from arcor2_hw.compute.mesh_tasks import PrepareAsset, PreparedAsset
+from arcor2_hw.compute.worker_state import WorkerState
 from arcor2_hw.kinematics.errors import BadMesh, ModelError, UnsafeDescription
 from arcor2_hw.kinematics.meshes import Surface, linear_of
 
@@ -58,11 +58,11 @@ class Glb:
         return values / np.iinfo(kind).max if accessor.get("normalized") else values
 
 
-def prepare(tmp_path: Path, content: bytes | str, name: str) -> tuple[Prepared, list[str]]:
+def prepare(tmp_path: Path, content: bytes | str, name: str) -> tuple[PreparedAsset, list[str]]:
     told: list[str] = []
     (tmp_path / "content").write_bytes(content if isinstance(content, bytes) else content.encode())
     task = PrepareAsset(StoredFile(str(tmp_path / "content"), name))
-    return prepared(task, Desk(lambda share, text: told.append(f"{share:.1f} {text}"))), told
+    return prepared(task, WorkerState(lambda share, text: told.append(f"{share:.1f} {text}"))), told
 
 
 def exported(mesh: trimesh.Trimesh, kind: str) -> bytes:
@@ -108,7 +108,9 @@ def test_a_cylinder_is_round_at_its_side_and_flat_at_its_ends(tmp_path: Path) ->
 
 
 def test_a_small_thing_has_fewer_triangles_than_a_large_one() -> None:
-    sizes = [reducing.budget(np.array(((0.0, 0.0, 0.0), (size, 0.0, 0.0)))) for size in (0.01, 0.1, 0.25, 0.5, 3.0)]
+    sizes = [
+        simplification.budget(np.array(((0.0, 0.0, 0.0), (size, 0.0, 0.0)))) for size in (0.01, 0.1, 0.25, 0.5, 3.0)
+    ]
     assert sizes == [4_000, 8_000, 20_000, 40_000, 40_000]
 
 
@@ -161,7 +163,9 @@ def test_triangles_of_two_colours_meet_in_an_edge_of_colour_without_a_gap() -> N
     left = grid.triangles_center[:, 0] < 0
     vertices = grid.vertices[grid.faces].reshape(-1, 3)
     colours = np.repeat(np.where(left[:, None], (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)), 3, axis=0).astype(np.float32)
-    drawn = reducing.drawn(reducing.reduced(Surface(vertices, np.arange(len(vertices)).reshape(-1, 3), colours), 10**6))
+    drawn = simplification.with_normals(
+        simplification.simplified(Surface(vertices, np.arange(len(vertices)).reshape(-1, 3), colours), 10**6)
+    )
     assert drawn.colours is not None
     assert {tuple(each) for each in drawn.colours.tolist()} == {(65535, 0, 0, 65535), (0, 0, 65535, 65535)}
     of_triangle = drawn.colours[drawn.triangles]
@@ -223,7 +227,7 @@ def test_a_robot_has_its_description_and_a_mesh_for_each_file_that_it_shows(tmp_
 
 
 def test_the_meshes_of_a_robot_share_one_budget(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(preparing, "MOST_OF_ROBOT", 20_000)
+    monkeypatch.setattr(mesh_functions, "MOST_OF_ROBOT", 20_000)
     names = [f"m{number}" for number in range(4)]
     links = "".join(
         f'<link name="{name}"><visual><geometry><mesh filename="{name}.stl"/></geometry></visual></link>'
@@ -254,11 +258,11 @@ def test_a_robot_of_plain_shapes_needs_no_mesh_and_no_library_that_reads_them(
         (b"solid nothing", "part.stl", BadMesh, "part.stl"),
         (b"", "part.stl", BadMesh, "part.stl"),
         (b"anything", "part.step", BadMesh, "part.step is of no kind that is known"),
-        (b"v 0 0 0\nv 0 0 0\nv 1 1 1\nf 1 2 3\n", "line.obj", BadMesh, "line.obj has only triangles without extent"),
+        (b"v 0 0 0\nv 0 0 0\nv 1 1 1\nf 1 2 3\n", "line.obj", BadMesh, "mesh line.obj have zero area"),
         (b"PK\3\4 but no archive", "arm.zip", ModelError, "arm.zip is no zip"),
         (packed(a_dot_txt="x"), "arm.zip", ModelError, r"arm.zip has no file \.urdf"),
         (b"<robot><link</robot>", "arm.urdf", ModelError, "arm.urdf is no XML"),
-        (b"<sdf><robot/></sdf>", "arm.urdf", ModelError, "describes no robot but a sdf"),
+        (b"<sdf><robot/></sdf>", "arm.urdf", ModelError, "describes a sdf, not a robot"),
         (b'<!DOCTYPE r [<!ENTITY a "a">]><robot/>', "arm.urdf", UnsafeDescription, "document type"),
         (packed(r_dot_urdf='<robot name="r"/>', **{"..__out": "x"}), "arm.zip", UnsafeDescription, "outside"),
     ],
@@ -272,7 +276,7 @@ def test_what_cannot_be_shown_is_refused_by_name(
 
 def test_a_mesh_that_is_gone_is_named(tmp_path: Path) -> None:
     with pytest.raises(BadMesh, match=r"gone\.stl cannot be read"):
-        prepared(PrepareAsset(StoredFile(str(tmp_path / "none"), "gone.stl")), Desk(lambda *_: None))
+        prepared(PrepareAsset(StoredFile(str(tmp_path / "none"), "gone.stl")), WorkerState(lambda *_: None))
 
 
 def test_the_same_is_made_the_same(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from arcor2_hw.calibration.refusals import CalibrationRefused
 from arcor2_hw.compute import calibration_tasks as t
 from arcor2_hw.compute import messages as m
 from arcor2_hw.compute import task as task_module
-from arcor2_hw.compute.task import ComputeBusy, ComputeStopped, ComputeTimeout, Room
+from arcor2_hw.compute.task import ComputeBusy, ComputeStopped, ComputeTimeout, WorkerKind
 from arcor2_hw.compute.tasks import AnyTask
 from arcor2_hw.compute.worker import function_of
 from arcor2_hw.data.camera import CameraParameters
@@ -49,21 +49,21 @@ async def until(condition: object, patience: float = 20.0) -> None:
 
 
 async def test_started_on_first_use_and_asked_again(compute: Compute) -> None:
-    assert compute.pid(Room.CALIBRATION) is None
+    assert compute.pid(WorkerKind.CALIBRATION) is None
     assert (await compute.run(question())).pose.position.x == pytest.approx(0.25)
-    pid = compute.pid(Room.CALIBRATION)
+    pid = compute.pid(WorkerKind.CALIBRATION)
     assert (await compute.run(question(0.5))).pose.position.x == pytest.approx(0.5)
-    assert compute.pid(Room.CALIBRATION) == pid
-    assert compute.pid(Room.KINEMATICS) is None
+    assert compute.pid(WorkerKind.CALIBRATION) == pid
+    assert compute.pid(WorkerKind.KINEMATICS) is None
 
 
 async def test_ends_when_idle_and_comes_back() -> None:
     compute = Compute(idle=0.2)
     try:
         await compute.run(question())
-        pid = compute.pid(Room.CALIBRATION)
+        pid = compute.pid(WorkerKind.CALIBRATION)
         assert pid is not None
-        await until(lambda: compute.pid(Room.CALIBRATION) is None)
+        await until(lambda: compute.pid(WorkerKind.CALIBRATION) is None)
         await until(lambda: not psutil.pid_exists(pid))
         assert (await compute.run(question(0.5))).pose.position.x == pytest.approx(0.5)
     finally:
@@ -72,7 +72,7 @@ async def test_ends_when_idle_and_comes_back() -> None:
 
 async def test_killed_in_the_middle_costs_one_computation(compute: Compute) -> None:
     await compute.run(question())
-    pid = compute.pid(Room.CALIBRATION)
+    pid = compute.pid(WorkerKind.CALIBRATION)
     assert pid is not None
     os.kill(pid, signal.SIGSTOP)  # it will be in the middle of whatever comes
     hit = asyncio.create_task(compute.run(question(1.0)))
@@ -83,21 +83,21 @@ async def test_killed_in_the_middle_costs_one_computation(compute: Compute) -> N
         await hit
     assert str(pid) in raised.value.detail
     assert [(await each).pose.position.x for each in waiting] == pytest.approx([2.0, 3.0])
-    assert compute.pid(Room.CALIBRATION) not in (None, pid)
+    assert compute.pid(WorkerKind.CALIBRATION) not in (None, pid)
 
 
 async def test_killed_while_it_has_nothing_to_do_is_nobodys_trouble(compute: Compute) -> None:
     await compute.run(question())
-    pid = compute.pid(Room.CALIBRATION)
+    pid = compute.pid(WorkerKind.CALIBRATION)
     assert pid is not None
     os.kill(pid, signal.SIGKILL)
-    await until(lambda: compute.pid(Room.CALIBRATION) is None)
+    await until(lambda: compute.pid(WorkerKind.CALIBRATION) is None)
     assert (await compute.run(question(0.5))).pose.position.x == pytest.approx(0.5)
 
 
 async def test_a_stopped_process_is_given_up(compute: Compute, monkeypatch: pytest.MonkeyPatch) -> None:
     await compute.run(question())
-    pid = compute.pid(Room.CALIBRATION)
+    pid = compute.pid(WorkerKind.CALIBRATION)
     assert pid is not None
     monkeypatch.setattr(process, "START_WITHIN", 0.3)
     os.kill(pid, signal.SIGSTOP)
@@ -105,7 +105,7 @@ async def test_a_stopped_process_is_given_up(compute: Compute, monkeypatch: pyte
         await compute.run(question(), within=0.1)
     monkeypatch.undo()
     assert (await compute.run(question(0.5))).pose.position.x == pytest.approx(0.5)
-    assert compute.pid(Room.CALIBRATION) != pid
+    assert compute.pid(WorkerKind.CALIBRATION) != pid
 
 
 ENDLESS = """
@@ -146,7 +146,7 @@ async def test_one_that_talks_nonsense_is_ended(compute: Compute, monkeypatch: p
 
 async def test_who_goes_away_leaves_the_others_their_turn(compute: Compute) -> None:
     await compute.run(question())
-    pid = compute.pid(Room.CALIBRATION)
+    pid = compute.pid(WorkerKind.CALIBRATION)
     assert pid is not None
     os.kill(pid, signal.SIGSTOP)
     asked = [asyncio.create_task(compute.run(question(float(each)))) for each in range(3)]
@@ -156,12 +156,12 @@ async def test_who_goes_away_leaves_the_others_their_turn(compute: Compute) -> N
     await asyncio.gather(*asked[:2], return_exceptions=True)
     os.kill(pid, signal.SIGCONT)
     assert (await asked[2]).pose.position.x == pytest.approx(2.0)
-    assert compute.pid(Room.CALIBRATION) == pid
+    assert compute.pid(WorkerKind.CALIBRATION) == pid
 
 
 async def test_what_is_in_the_background_waits_for_all_others(compute: Compute) -> None:
     await compute.run(question())
-    pid = compute.pid(Room.CALIBRATION)
+    pid = compute.pid(WorkerKind.CALIBRATION)
     assert pid is not None
     os.kill(pid, signal.SIGSTOP)
     order: list[str] = []
@@ -236,7 +236,7 @@ async def test_large_pictures_do_not_stop_the_server(compute: Compute) -> None:
 async def test_closing_ends_it_whatever_it_does() -> None:
     compute = Compute(idle=60.0)
     await compute.run(question())
-    pid = compute.pid(Room.CALIBRATION)
+    pid = compute.pid(WorkerKind.CALIBRATION)
     assert pid is not None
     os.kill(pid, signal.SIGSTOP)
     asked = [asyncio.create_task(compute.run(question())) for _ in range(2)]
@@ -253,7 +253,7 @@ async def test_closing_ends_it_whatever_it_does() -> None:
 
 
 async def test_one_whose_server_is_gone_goes_too() -> None:
-    process = await ComputeProcess.start(Room.CALIBRATION)
+    process = await ComputeProcess.start(WorkerKind.CALIBRATION)
     try:
         await process.ask(question(), 10.0, None, None)
         process._writer.transport.abort()  # as when the server was killed
@@ -270,5 +270,5 @@ def test_tasks_name_what_they_are_and_who_runs_them() -> None:
     for kind in kinds:
         assert issubclass(kind, task_module.Task)
         assert callable(function_of(kind)), kind
-        assert isinstance(kind.what, str)
-        assert kind.within > 0
+        assert isinstance(kind.label, str)
+        assert kind.timeout > 0

@@ -22,7 +22,7 @@ from arcor2_hw.collision.description import (
     WorldRobot,
 )
 from arcor2_hw.compute import kinematics_tasks as t
-from arcor2_hw.compute.task import ComputeStopped, Room
+from arcor2_hw.compute.task import ComputeStopped, WorkerKind
 from arcor2_hw.data.editor import Reach
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import Joint
@@ -264,7 +264,7 @@ async def test_a_worker_that_is_started_anew_is_told_again() -> None:
     compute = Compute(idle=60.0)
     crate = box("crate", 0, 0.2, 0.2, 0.2, 0.2, 0.2)
     assert await line(compute, crate, robot(Pose(Position(0, 3, 0)))) == "crate"
-    pid = compute.pid(Room.KINEMATICS)
+    pid = compute.pid(WorkerKind.KINEMATICS)
     assert pid is not None
     os.kill(pid, signal.SIGSTOP)
     asked = asyncio.create_task(line(compute, crate))
@@ -273,7 +273,7 @@ async def test_a_worker_that_is_started_anew_is_told_again() -> None:
     with pytest.raises(ComputeStopped, match="the safety of a line"):
         await asked
     assert await line(compute, crate) == "crate"
-    assert compute.pid(Room.KINEMATICS) not in (None, pid)
+    assert compute.pid(WorkerKind.KINEMATICS) not in (None, pid)
     await compute.close()
 
 

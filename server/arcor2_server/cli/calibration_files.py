@@ -85,7 +85,7 @@ async def compute(task: Task[R]) -> R:
     server_logging.set_up("error")
     worker = Compute(idle=60.0)
     try:
-        with progress(task.what) as told:
+        with progress(task.label) as told:
             return await worker.run(task, told=told)
     finally:
         await worker.close()

@@ -17,7 +17,7 @@ from arcor2_hw import exceptions
 from arcor2_hw.calibration.refusals import CalibrationRefused
 from arcor2_hw.collision.description import WorldDescription, WorldItem
 from arcor2_hw.compute import messages as m
-from arcor2_hw.compute.task import ComputeStopped, ComputeTimeout, NotInstalled, Room, Task
+from arcor2_hw.compute.task import ComputeStopped, ComputeTimeout, NotInstalled, Task, WorkerKind
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.framing import PREFIX_SIZE
 
@@ -57,7 +57,7 @@ class ComputeProcess:
         self._output = asyncio.create_task(self._read_output(), name=f"output of compute worker {process.pid}")
 
     @classmethod
-    async def start(cls, room: Room, environment: Mapping[str, str] = os.environ) -> "ComputeProcess":
+    async def start(cls, kind: WorkerKind, environment: Mapping[str, str] = os.environ) -> "ComputeProcess":
         """Start a process. OSError when that cannot be done."""
         ours, theirs = socket.socketpair()
         try:
@@ -81,7 +81,7 @@ class ComputeProcess:
             raise
         finally:
             theirs.close()
-        log.info("compute worker started", room=room.value, pid=process.pid)
+        log.info("compute worker started", kind=kind.value, pid=process.pid)
         return cls(process, reader, writer)
 
     @property
@@ -108,7 +108,7 @@ class ComputeProcess:
             raise await self._why(task, within, error) from error
         if isinstance(message, m.Failed):
             raise error_of(message)
-        return msgspec.msgpack.decode(message.value, type=task.gives)
+        return msgspec.msgpack.decode(message.value, type=task.result_type)
 
     async def _send_world(self, world: WorldDescription, place: str) -> None:
         """Tell the process what changed since it was told last."""
@@ -144,7 +144,7 @@ class ComputeProcess:
         if code == -signal.SIGALRM:
             return ComputeTimeout(_too_long(task, within), detail)
         how = f"by {signal.Signals(-code).name}" if -code in list(signal.Signals) else f"with status {code}"
-        return ComputeStopped(f"The compute worker ended {how} while it worked on {task.what}.", detail)
+        return ComputeStopped(f"The compute worker ended {how} while it worked on {task.label}.", detail)
 
     # -------------------------------------------------------------------------------- ending
     async def close(self) -> None:
@@ -184,7 +184,7 @@ class ComputeProcess:
 
 
 def _too_long(task: Task[Any], within: float) -> str:
-    what = task.what[:1].upper() + task.what[1:]
+    what = task.label[:1].upper() + task.label[1:]
     return f"{what} took longer than {within:g} s, and was given up."
 
 

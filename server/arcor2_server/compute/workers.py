@@ -1,4 +1,4 @@
-"""What computes outside the server: one worker process per room, started on first use, ended when idle."""
+"""What computes outside the server: one worker process per kind, started on first use, ended when idle."""
 
 import asyncio
 from collections import deque
@@ -8,7 +8,7 @@ from typing import Any, Final, TypeVar
 import structlog
 
 from arcor2_hw.collision.description import WorldDescription
-from arcor2_hw.compute.task import ComputeBusy, ComputeStopped, Room, Task
+from arcor2_hw.compute.task import ComputeBusy, ComputeStopped, Task, WorkerKind
 from arcor2_server.compute.process import ComputeProcess, Told
 
 log = structlog.get_logger(__name__)
@@ -29,10 +29,10 @@ class _Question:
 
 
 class _Worker:
-    """The questions to one room, in the order in which they came; those in the background only while no other waits."""
+    """The tasks for one kind of worker, in order; background tasks run only while no other task waits."""
 
-    def __init__(self, room: Room, idle: float) -> None:
-        self.room = room
+    def __init__(self, kind: WorkerKind, idle: float) -> None:
+        self.kind = kind
         self.process: ComputeProcess | None = None
         self._idle = idle
         self._waiting: tuple[deque[_Question], deque[_Question]] = (deque(), deque())
@@ -45,11 +45,11 @@ class _Worker:
         """Let a question wait; ComputeBusy."""
         queue = self._waiting[background]
         if len(queue) >= MOST_WAITING:
-            raise ComputeBusy(f"{len(queue)} computations wait already: {question.task.what} is not begun.")
+            raise ComputeBusy(f"{len(queue)} computations wait already: {question.task.label} is not begun.")
         queue.append(question)
         self._wake.set()
         if self._serving is None:
-            self._serving = asyncio.create_task(self._serve(), name=f"compute worker {self.room.value}")
+            self._serving = asyncio.create_task(self._serve(), name=f"compute worker {self.kind.value}")
             self._tasks.add(self._serving)
             self._serving.add_done_callback(self._tasks.discard)
 
@@ -106,7 +106,7 @@ class _Worker:
             gone, self.process = self.process, None
             await gone.close()
         if self.process is None:
-            self.process = await ComputeProcess.start(self.room)
+            self.process = await ComputeProcess.start(self.kind)
         return self.process
 
 
@@ -119,12 +119,12 @@ class Compute:
     """Asks the workers. A crash costs the one computation that it happened in."""
 
     def __init__(self, idle: float) -> None:
-        self._workers = {room: _Worker(room, idle) for room in Room}
+        self._workers = {kind: _Worker(kind, idle) for kind in WorkerKind}
         self._closed = False
 
-    def pid(self, room: Room) -> int | None:
-        """Give the process that is there for a room, None while there is none."""
-        process = self._workers[room].process
+    def pid(self, kind: WorkerKind) -> int | None:
+        """Give the process id of a kind of worker, None while it is not running."""
+        process = self._workers[kind].process
         return None if process is None or not process.alive else process.process.pid
 
     async def run(
@@ -147,8 +147,8 @@ class Compute:
         """
         if self._closed:
             raise ComputeStopped("The server is ending.")
-        question = _Question(task, task.within if within is None else within, world, told, place)
-        self._workers[task.room].put(question, background=background)
+        question = _Question(task, task.timeout if within is None else within, world, told, place)
+        self._workers[task.worker].put(question, background=background)
         answer: R = await question.answer
         return answer
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final
 import structlog
 
 from arcor2_hw.collision.description import StoredFile
-from arcor2_hw.compute.preparing_tasks import MAKER, PrepareAsset, Prepared
+from arcor2_hw.compute.mesh_tasks import CONVERSION, PrepareAsset, PreparedAsset
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, StorageError
@@ -66,7 +66,7 @@ class PreparedAssets:
         asset = self._services.assets.info(key)
         name = _named(asset)
         # The ending of the name may say what it is.
-        kept = f"{asset.digest}.{MAKER}{Path(name).suffix.lower() if Path(name).suffix[1:].isalnum() else ''}"
+        kept = f"{asset.digest}.{CONVERSION}{Path(name).suffix.lower() if Path(name).suffix[1:].isalnum() else ''}"
         if (found := await asyncio.to_thread(self._find, kept)) is not None:
             return found
         if (refusal := self._refusals.get((kept, name))) is not None:
@@ -120,7 +120,7 @@ class PreparedAssets:
             return None
         return Shown(f'"{kept}"', plain, packed if packed.is_file() else None)
 
-    def _keep(self, kept: str, made: Prepared) -> Shown:
+    def _keep(self, kept: str, made: PreparedAsset) -> Shown:
         self._directory.mkdir(parents=True, exist_ok=True)
         self._make_room(len(made.content))
         packed = gzip.compress(made.content, _GZIP_LEVEL, mtime=0)
@@ -136,7 +136,7 @@ class PreparedAssets:
         """Drop what other makers made, and what was asked for longest ago where there is too much."""
         files = []
         for file in self._directory.iterdir():
-            if file.name.split(".")[1:2] != [str(MAKER)]:
+            if file.name.split(".")[1:2] != [str(CONVERSION)]:
                 file.unlink(missing_ok=True)
             elif file.suffix == ".glb":
                 files.append((file.stat().st_mtime, file.stat().st_size, file))
@@ -156,7 +156,7 @@ def _named(asset: Asset) -> str:
 
 def _write(place: Path, content: bytes) -> None:
     """Put a file in its place in one step. It is not flushed: half a file is never named, and a lost one made anew."""
-    descriptor, name = tempfile.mkstemp(dir=place.parent, prefix=f"half.{MAKER}.")
+    descriptor, name = tempfile.mkstemp(dir=place.parent, prefix=f"half.{CONVERSION}.")
     try:
         with os.fdopen(descriptor, "wb") as file:
             file.write(content)

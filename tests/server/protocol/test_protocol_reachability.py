@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from arcor2_hw.compute.kinematics_tasks import DescribeRobot
-from arcor2_hw.compute.task import Room
+from arcor2_hw.compute.task import WorkerKind
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import Box, ObjectModel, ObjectTypeSource
@@ -276,16 +276,16 @@ async def test_it_ends_with_the_document_and_survives_the_worker(tmp_path: Path)
         await bob.ask("SubscribeEvents", events=["ReachabilityChanged"])
         await until(lambda: told(bob) == {near: "reachable"})
         compute, board = stage.services.compute, stage.services.reachability
-        pid = compute.pid(Room.KINEMATICS)
+        pid = compute.pid(WorkerKind.KINEMATICS)
         assert pid is not None
         bob.take()
         os.kill(pid, signal.SIGSTOP)
         await move(alice, near_point, 2.5, 0, 0)
-        await until(lambda: compute._workers[Room.KINEMATICS].process is not None and not board._idle.is_set())
+        await until(lambda: compute._workers[WorkerKind.KINEMATICS].process is not None and not board._idle.is_set())
         os.kill(pid, signal.SIGKILL)
         await until(lambda: told(bob) == {near: "out_of_reach"})
 
-        pid = compute.pid(Room.KINEMATICS)
+        pid = compute.pid(WorkerKind.KINEMATICS)
         assert pid is not None
         os.kill(pid, signal.SIGSTOP)
         await move(alice, near_point, 0.4, 0.2, 0.3)

@@ -13,7 +13,7 @@ import pytest_asyncio
 import trimesh
 
 from arcor2_hw.collision.description import StoredFile
-from arcor2_hw.compute.preparing_tasks import MAKER, PrepareAsset
+from arcor2_hw.compute.mesh_tasks import CONVERSION, PrepareAsset
 from arcor2_hw.compute.task import ComputeStopped
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.exceptions import InvalidData
@@ -164,7 +164,7 @@ async def test_what_older_makers_made_and_what_nobody_asks_for_goes(
     folder: Path = services.settings.prepared_dir
     await put(http, "first.stl", no_digest(BALL, b"first"))
     first = await services.prepared.get("first.stl")
-    old = folder / f"{'0' * 64}.{MAKER - 1}.stl.glb"
+    old = folder / f"{'0' * 64}.{CONVERSION - 1}.stl.glb"
     old.write_bytes(b"glTF")
     os.utime(first.plain, (1, 1))
     kept = {file for file in folder.glob("*.glb") if file not in (first.plain, old)}

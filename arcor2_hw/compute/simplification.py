@@ -1,4 +1,4 @@
-"""Fewer triangles of the same looks: corners joined, surfaces simplified by their quadric error, normals made."""
+"""Mesh simplification for display: vertices merged, surfaces simplified by quadric error, normals computed."""
 
 from typing import Final, NamedTuple
 
@@ -9,23 +9,28 @@ from arcor2_hw.kinematics.meshes import Surface, linear_of
 from arcor2_hw.kinematics.shapes import Array, Triangles
 
 MOST: Final = 40_000
-"""Triangles of one mesh of half a metre or more; of a smaller one as many fewer as it is smaller."""
+"""Maximum number of triangles of a mesh of 0.5 m or more; smaller meshes get proportionally fewer."""
 FEWEST: Final = 4_000
-"""Triangles that a mesh of any size may have."""
+"""Number of triangles that a mesh of any size may have."""
 _FULL_SIZE: Final = 0.5
-"""m, from corner to corner of the box around it."""
+"""Diagonal of the bounding box of a mesh that gets MOST triangles, m."""
 CREASE: Final = np.cos(np.radians(40.0))
-"""Triangles that meet at less than this angle look like one round surface."""
+"""Cosine of the angle between triangles below which they are shaded as one smooth surface."""
 _CAREFUL: Final = 3.0
 _HASTY: Final = 7.0
-"""How much is put up with to come to fewer triangles: of the former shapes are better, the latter always gets there."""
+"""Aggressiveness of the simplification: the first keeps shapes better, the second always reaches the target."""
 _MANY: Final = 48
-"""Triangles around one vertex beyond which it is an end of something, as of a cone or a disc: no round surface."""
+"""Number of triangles around one vertex above which it is shaded flat, as the tip of a cone or the centre of a disc."""
 
 
-class Drawn(NamedTuple):
-    """What a graphics card draws: positions (n, 3) in m, normals (n, 3) in 127ths, colours (n, 4) linear in 65535ths
-    or None, triangles (m, 3).
+class DisplayMesh(NamedTuple):
+    """A mesh for a graphics card.
+
+    Attributes:
+        positions: (n, 3), m.
+        normals: (n, 3), in units of 1/127.
+        colours: (n, 4), linear, in units of 1/65535, or None.
+        triangles: (m, 3).
     """
 
     positions: NDArray[np.float32]
@@ -35,15 +40,15 @@ class Drawn(NamedTuple):
 
 
 def budget(vertices: Array) -> int:
-    """Give how many triangles a mesh may have for its size."""
+    """Return the maximum number of triangles of a mesh of this size."""
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     return max(FEWEST, min(MOST, round(MOST * size / _FULL_SIZE)))
 
 
-def reduced(surface: Surface, most: int) -> Surface:
-    """Give a surface with its corners joined, and with some `most` triangles where it has more.
+def simplified(surface: Surface, most: int) -> Surface:
+    """Return a surface with merged vertices and about `most` triangles at most.
 
-    Empty where all that it has is without extent.
+    The result is empty when all triangles have zero area.
     """
     vertices, triangles, colours = _joined(surface)
     if len(triangles) > most:
@@ -54,10 +59,10 @@ def reduced(surface: Surface, most: int) -> Surface:
 
 
 def _joined(surface: Surface) -> Surface:
-    """Let triangles that meet share their vertices, where the colour is the same on both sides."""
+    """Merge vertices at the same place that have the same colour."""
     used, inverse = np.unique(surface.triangles, return_inverse=True)
     triangles = inverse.reshape(-1, 3)
-    told = np.ascontiguousarray(surface.vertices[used], dtype=np.float32) + np.float32(0.0)  # no minus zeros
+    told = np.ascontiguousarray(surface.vertices[used], dtype=np.float32) + np.float32(0.0)  # no negative zeros
     if surface.colours is not None:
         told = np.hstack((told, np.round(surface.colours[used] * 255.0).astype(np.float32)))
     rows = np.ascontiguousarray(told).view(f"V{told.shape[1] * 4}").ravel()
@@ -72,7 +77,7 @@ def _joined(surface: Surface) -> Surface:
 def _simplified(surface: Surface, most: int) -> Surface:
     import fast_simplification
 
-    # Around the middle, and of size 1: what simplifies is told of no units.
+    # Centred and scaled to size 1, because the library works without units.
     middle, size = surface.vertices.mean(axis=0), float(np.ptp(surface.vertices, axis=0).max())
     points = np.ascontiguousarray((surface.vertices - middle) / size)
     faces = np.ascontiguousarray(surface.triangles, dtype=np.int32)
@@ -94,8 +99,8 @@ def _simplified(surface: Surface, most: int) -> Surface:
 
 
 # ------------------------------------------------------------------------------------------------ normals
-def drawn(surface: Surface) -> Drawn:
-    """Give a surface with normals: round where triangles meet at small angles, with edges where they do not."""
+def with_normals(surface: Surface) -> DisplayMesh:
+    """Return a surface with normals: smooth where triangles meet at small angles, with edges elsewhere."""
     normals = np.round(_corner_normals(surface.vertices, surface.triangles) * 127.0).astype(np.int8)
     corners = surface.triangles.ravel()
     key = (corners.astype(np.int64) << 24) | (normals.astype(np.int64) & 0xFF) @ np.array((1 << 16, 1 << 8, 1))
@@ -105,13 +110,13 @@ def drawn(surface: Surface) -> Drawn:
     if surface.colours is not None:
         colours = np.full((len(at), 4), 65535, dtype=np.uint16)
         colours[:, :3] = np.round(linear_of(surface.colours[at]) * 65535.0)
-    return Drawn(
+    return DisplayMesh(
         surface.vertices[at].astype(np.float32), normals[first], colours, index.reshape(-1, 3).astype(np.uint32)
     )
 
 
 def _corner_normals(vertices: Array, triangles: Triangles) -> Array:
-    """Give the normal at each corner of each triangle, (3 m, 3): of the triangles around, by area, up to a crease."""
+    """Return the normal at each corner of each triangle, (3 m, 3): area-weighted mean up to a crease."""
     corners = vertices[triangles]
     weighted = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     unit = weighted / np.linalg.norm(weighted, axis=1, keepdims=True)
@@ -119,7 +124,7 @@ def _corner_normals(vertices: Array, triangles: Triangles) -> Array:
     counts = np.bincount(triangles.ravel())
     counts = counts[counts > 0]
     starts = np.cumsum(counts) - counts
-    # Corners in the order of their vertices, each with all corners of the same vertex.
+    # Corners ordered by vertex, each with all corners of the same vertex.
     around = np.repeat(np.where(counts > _MANY, 1, counts), counts)
     begins = np.where(np.repeat(counts > _MANY, counts), np.arange(len(order)), np.repeat(starts, counts))
     one = np.repeat(np.arange(len(order)), around)

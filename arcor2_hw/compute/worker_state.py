@@ -1,4 +1,4 @@
-"""What a worker has at hand: robots' models that were read, and the collision world that it was told of."""
+"""State of a compute worker between tasks: robot models and collision worlds."""
 
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
@@ -14,13 +14,15 @@ if TYPE_CHECKING:
     from arcor2_hw.kinematics import model
 
 MODELS: Final = 16
-"""Models of robots that are kept, those that were used last."""
+"""Maximum number of cached robot models; the least recently used is dropped."""
 
 
-class Desk:
-    """Kept from one computation to the next. progress(share, message): tells how far the present one is.
+class WorkerState:
+    """What a worker keeps from one task to the next.
 
-    place: the name of the world of the present computation.
+    Attributes:
+        progress: Function (share, message) that reports the progress of the present task.
+        place: Name of the world of the present task.
     """
 
     def __init__(self, progress: Callable[[float, str], None]) -> None:
@@ -31,7 +33,7 @@ class Desk:
         self.place = ""
 
     def change(self, place: str, put: Sequence[WorldItem], remove: Sequence[str]) -> None:
-        """Change a world; nothing is read of it before a computation needs it."""
+        """Record a change of a world. It is applied when a task needs the world."""
         self._changes.setdefault(place, []).append((put, remove))
 
     def forget(self, place: str) -> None:
@@ -40,7 +42,12 @@ class Desk:
         self._worlds.pop(place, None)
 
     def world(self) -> "WorldReplica":
-        """Give the world of this place as it is now. Raises ModelError, BadMesh ... for what of it cannot be used."""
+        """Return the world of the present task.
+
+        Raises:
+            Arcor2Error: An item of the world cannot be used, such as a broken mesh (BadMesh) or robot model
+                (ModelError).
+        """
         from arcor2_hw.compute.world_replica import WorldReplica
 
         world = self._worlds.get(self.place)
@@ -48,13 +55,14 @@ class Desk:
             world = self._worlds[self.place] = WorldReplica(self.robot)
         for put, remove in self._changes.pop(self.place, []):
             world.change(put, remove)
-        world.settle()
+        world.apply_changes()
         return world
 
     def robot(self, wanted: RobotSource) -> "model.RobotModel":
-        """Give a robot's model as it stands in itself, read once. Raises ModelError and its kinds.
+        """Return a robot model with its root link at the origin. It is loaded once.
 
-        With a calibration: also where that is one of another arm.
+        Raises:
+            ModelError: The model cannot be used, or the calibration belongs to another kind of robot.
         """
         from arcor2_hw.kinematics.dh import of_very_arm
         from arcor2_hw.kinematics.model import RobotModel as Model

@@ -1,11 +1,11 @@
-"""What the kinematics worker does for each task; Pinocchio and coal are imported by the functions that need them."""
+"""Functions of the kinematics worker, one for each task. Each imports Pinocchio and coal where it needs them."""
 
 import math
 from typing import TYPE_CHECKING
 
 from arcor2_hw.collision.description import MeshShape
 from arcor2_hw.compute import kinematics_tasks as t
-from arcor2_hw.compute.desk import Desk
+from arcor2_hw.compute.worker_state import WorkerState
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.editor import Reach
 from arcor2_hw.data.geometry import Pose
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 
 # ------------------------------------------------------------------------------------------------ one robot
-def description(task: t.DescribeRobot, desk: Desk) -> t.ModelDescription:
-    """Give what a model says."""
+def description(task: t.DescribeRobot, state: WorkerState) -> t.ModelDescription:
+    """Describe a robot model."""
     from arcor2_hw.kinematics.shapes import triangles_of
 
-    model = desk.robot(task.model)
+    model = state.robot(task.model)
     joints = [
         t.JointRange(joint.name, joint.kind == "prismatic", *map(_finite, (joint.lower, joint.upper, joint.velocity)))
         for joint in model.joints
@@ -36,27 +36,27 @@ def _finite(value: float) -> float | Unset:
     return float(value) if math.isfinite(value) else UNSET
 
 
-def forward(task: t.SolveForward, desk: Desk) -> Pose:
-    """Give the pose of an end effector in the world."""
-    model = desk.robot(task.model)
+def forward(task: t.SolveForward, state: WorkerState) -> Pose:
+    """Compute the pose of an end effector in the world."""
+    model = state.robot(task.model)
     arm = model.arm(named_end_effector(model, task.end_effector))
     return task.model.base * arm.pose(arm.values(task.joints))
 
 
 def named_end_effector(model: "RobotModel", name: str) -> str:
-    """Give the link of an end effector: that of its name, or, where a model has but one, that one."""
+    """Return the link of an end effector: the link of that name, or the only end effector of the model."""
     if name not in model.description.links and len(model.end_effectors) == 1:
         return next(iter(model.end_effectors))
     return name
 
 
-def inverse(task: t.SolveInverse, desk: Desk) -> list[Joint]:
-    """Give joints of the chain to an end effector."""
+def inverse(task: t.SolveInverse, state: WorkerState) -> list[Joint]:
+    """Compute joint values of the chain to an end effector."""
     import numpy as np
 
     from arcor2_hw.collision.world import collision_check
 
-    world = desk.world()
+    world = state.world()
     standing = world.collisions.robot(task.robot)
     solver = world.inverse(task.robot, named_end_effector(standing.model, task.end_effector))
     arm = solver.arm
@@ -68,17 +68,17 @@ def inverse(task: t.SolveInverse, desk: Desk) -> list[Joint]:
 
 
 # ------------------------------------------------------------------------------------------------ reachability
-def judged_poses(task: t.JudgePoses, desk: Desk) -> list[t.Judged]:
-    """Judge poses."""
-    world = desk.world()
+def judged_poses(task: t.JudgePoses, state: WorkerState) -> list[t.Judged]:
+    """Judge how an end effector reaches poses."""
+    world = state.world()
     model = world.collisions.robot(task.robot).model
     found = world.reachability(task.robot, named_end_effector(model, task.end_effector)).judge(task.poses)
     return [t.Judged(Reach(each.reach.value), each.reason) for each in found]
 
 
-def judged_joints(task: t.JudgeJoints, desk: Desk) -> list[t.Judged]:
-    """Judge joints."""
-    collisions = desk.world().collisions
+def judged_joints(task: t.JudgeJoints, state: WorkerState) -> list[t.Judged]:
+    """Judge joint configurations."""
+    collisions = state.world().collisions
     model = collisions.robot(task.robot).model
     return [_judged(collisions, task.robot, model, joints) for joints in task.joints]
 
@@ -94,10 +94,10 @@ def _judged(collisions: "CollisionWorld", robot: str, model: "RobotModel", joint
         if not joint.lower - 1e-6 <= q[column] <= joint.upper + 1e-6:
             return t.Judged(Reach.OUT_OF_REACH, f"The joint {joint.name} is beyond its limits.")
     if contacts := collisions.contacts(robot, q):
-        return t.Judged(Reach.IN_COLLISION, f"There it is in collision: {contacts[0]}.")
+        return t.Judged(Reach.IN_COLLISION, f"In collision: {contacts[0]}.")
     near = [name for end_effector in model.end_effectors for name in _near(model, end_effector, q)]
     if near:
-        return t.Judged(Reach.NEAR_LIMIT, f"{', '.join(dict.fromkeys(near))}: near a limit.")
+        return t.Judged(Reach.NEAR_LIMIT, f"Near a limit: {', '.join(dict.fromkeys(near))}.")
     return t.Judged(Reach.REACHABLE)
 
 
@@ -107,26 +107,26 @@ def _near(model: "RobotModel", end_effector: str, q: "Array") -> list[str]:
 
 
 # ------------------------------------------------------------------------------------------------ the world
-def checked_lines(task: t.CheckLines, desk: Desk) -> list[t.LineHit | None]:
-    """Give what lines meet first."""
-    collisions = desk.world().collisions
+def checked_lines(task: t.CheckLines, state: WorkerState) -> list[t.LineHit | None]:
+    """Find the first thing that each line meets."""
+    collisions = state.world().collisions
     hits = [collisions.ray(line.start, line.end, task.ignore, task.inflation) for line in task.lines]
     return [None if hit is None else t.LineHit(hit.name, hit.share) for hit in hits]
 
 
-def placed_in_link(task: t.PlaceInLink, desk: Desk) -> Pose:
-    """Give a pose in the frame of a link."""
+def placed_in_link(task: t.PlaceInLink, state: WorkerState) -> Pose:
+    """Convert a pose in the world to the frame of a link."""
     from arcor2_hw.exceptions import NotFound
 
-    model = desk.robot(task.model)
+    model = state.robot(task.model)
     frames = model.link_poses(model.values(task.joints))
     if task.link not in frames:
-        raise NotFound(f"{model.name} has no link {task.link!r}; there are {', '.join(frames)}.")
+        raise NotFound(f"{model.name} has no link {task.link!r}. Its links: {', '.join(frames)}.")
     return (task.model.base * Pose.from_matrix(frames[task.link])).inverted() * task.pose
 
 
-def mesh_facts(task: t.ReadMesh, _: Desk) -> t.MeshFacts:
-    """Give how large a mesh is."""
+def mesh_facts(task: t.ReadMesh, _: WorkerState) -> t.MeshFacts:
+    """Measure a mesh."""
     from arcor2_hw.compute.world_replica import mesh_of
 
     mesh = mesh_of(MeshShape(task.file, task.scale))
