@@ -1,1 +1,1 @@
-"""Calibration: pure functions from pictures, depth and touched points to poses, each with a residual and a verdict."""
+"""Calibration: pure functions from images, depth and touched points to poses, each with a residual and a verdict."""

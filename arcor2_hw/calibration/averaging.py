@@ -1,4 +1,4 @@
-"""The paper's way to a camera's pose: one per marker, averaged with distance and angle as weights."""
+"""The averaging method for the pose of a camera: one pose per marker, weighted by distance and angle."""
 
 import math
 from collections.abc import Sequence
@@ -14,11 +14,11 @@ from arcor2_hw.calibration.rigid import inverted, mean_rotation, motion
 from arcor2_hw.exceptions import InvalidData
 
 _FLAT: float = 2.0
-"""rad, angle between the camera's axis and a marker's z up to which the marker has no weight (protocol, section 15)."""
+"""Angle between the camera's axis and a marker's z up to which the marker has no weight, rad (protocol, section 15)."""
 
 
 def weight_of(camera_from_origin: Array, each: Seen, options: PoseOptions) -> float:
-    """Give a marker's weight, 0..1, by its distance and by how much it faces the camera (protocol, section 15)."""
+    """Return the weight of a marker, 0 to 1, by its distance and its angle to the camera (protocol, section 15)."""
     middle = camera_from_origin[:3, :3] @ each.middle + camera_from_origin[:3, 3]
     distance = float(np.linalg.norm(middle))
     near = 1.0 - (distance - options.min_distance) / (options.max_distance - options.min_distance)
@@ -28,10 +28,11 @@ def weight_of(camera_from_origin: Array, each: Seen, options: PoseOptions) -> fl
 
 
 def averaged(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOptions) -> Found:
-    """Find a pose per marker and average them.
+    """Find a pose for each marker and average the poses.
 
-    Raises CalibrationRefused: no marker's pose is certain (that of the first is told), or two contradict each other.
-    InvalidData: all weights are zero.
+    Raises:
+        CalibrationRefused: No marker has an unambiguous pose, or two markers contradict each other.
+        InvalidData: All weights are zero.
     """
     deviations = intrinsics_deviations(lens, options)
     refusal: CalibrationRefused | None = None
@@ -54,7 +55,7 @@ def averaged(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOption
         assert refusal is not None
         raise refusal
     if sum(weights) <= 0:
-        raise InvalidData("No marker is near enough, or faces the camera enough, to count: all weights are zero.")
+        raise InvalidData("All markers have a weight of zero. Move the camera nearer, or tilt it towards the markers.")
     share = np.array(weights) / sum(weights)
     stacked = np.stack(poses)
     pose = motion(mean_rotation(stacked[:, :3, :3], share), share @ stacked[:, :3, 3])
@@ -64,12 +65,14 @@ def averaged(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOption
     everything = PoseProblem(lens, seen, hints, deviations)
     errors = everything.errors(inverted(pose), everything.unchanged)
     if errors is None:
-        raise CalibrationRefused("The markers' poses contradict each other.", reason=Reason.IMPLAUSIBLE)
+        raise CalibrationRefused(
+            "The poses of the markers contradict each other. Check the configured poses.", reason=Reason.IMPLAUSIBLE
+        )
     for each, left in zip(seen, errors, strict=True):
         residual = float(np.sqrt(np.mean(np.sum(left**2, axis=1))))
         if residual > 10 * options.largest_residual and each.key not in left_out:
             raise CalibrationRefused(
-                f"{each.name.capitalize()} contradicts the others: it does not stand where it is said to.",
+                f"{each.name.capitalize()} contradicts the others. Check its configured pose.",
                 f"residual {residual:.0f} px",
                 Reason.IMPLAUSIBLE,
             )

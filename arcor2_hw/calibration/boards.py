@@ -1,4 +1,4 @@
-"""ChArUco boards: their points, what is seen of them, and what is wrong with how one is described."""
+"""ChArUco boards: their corners, detection and measurement, and validation of their descriptions."""
 
 import math
 from dataclasses import replace
@@ -16,30 +16,38 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.exceptions import Conflict, InvalidData
 
 CORNER_DEVIATION: Final = 0.05
-"""px, of a corner between squares as it is measured."""
+"""Standard deviation of a measured corner between squares, px."""
 _MARGIN: Final = 8
-"""px around a board that are looked at."""
+"""Margin around a board that is processed, px."""
 _EDGE_FLOOR: Final = 0.03
-"""px, by which a board's corner may be off beside what its edges' scatter says."""
+"""Standard deviation of a corner of a board in addition to the scatter of its edges, px."""
 LARGEST_BOARD: Final = 64
-"""Columns and rows."""
+"""Maximum number of columns and rows."""
 FEWEST_CORNERS: Final = 6
-"""Below that many a board does not count as seen."""
+"""Number of corners below which a board counts as not detected."""
 
 
 def board_of(board: CharucoBoard) -> cv2.aruco.CharucoBoard:
-    """Give OpenCV's board. Raises InvalidData for one that cannot be."""
+    """Return OpenCV's board.
+
+    Raises:
+        InvalidData: The description is invalid.
+    """
     if not (2 <= board.columns <= LARGEST_BOARD and 2 <= board.rows <= LARGEST_BOARD):
-        raise InvalidData(f"a board of {board.columns} × {board.rows} squares: 2 to {LARGEST_BOARD} are possible")
+        raise InvalidData(
+            f"a board of {board.columns} × {board.rows} squares: columns and rows must be 2 to {LARGEST_BOARD}"
+        )
     if board.columns * board.rows < 6:
         raise InvalidData(f"a board of {board.columns} × {board.rows} squares has too few corners")
     if not (math.isfinite(board.square) and 0 < board.marker < board.square):
-        raise InvalidData(f"a board's marker ({board.marker} m) has to be smaller than its square ({board.square} m)")
+        raise InvalidData(
+            f"the marker of a board ({board.marker} m) must be smaller than its square ({board.square} m)"
+        )
     last = board.first_id + board.columns * board.rows // 2 - 1
     size = dictionary_size(board.dictionary)
     if board.first_id < 0 or last >= size:
         raise InvalidData(
-            f"the board's markers {board.first_id} to {last} are not all in {board.dictionary} (0 to {size - 1})"
+            f"the markers {board.first_id} to {last} of the board are not all in {board.dictionary} (0 to {size - 1})"
         )
     check_pose(board.pose, "the board's pose")
     numbers = np.arange(board.first_id, last + 1)
@@ -50,7 +58,7 @@ def board_of(board: CharucoBoard) -> cv2.aruco.CharucoBoard:
 
 
 def board_points(board: CharucoBoard, made: cv2.aruco.CharucoBoard) -> Array:
-    """Give the corners between squares in the board's frame (origin in its middle, y up, z out of it), n × 3, m."""
+    """Return the corners between squares in the frame of the board (origin in the middle, y up, z out), (n, 3), m."""
     points = np.asarray(made.getChessboardCorners(), dtype=np.float64)
     middle = np.array([board.columns, board.rows]) * board.square / 2
     return np.column_stack((points[:, 0] - middle[0], middle[1] - points[:, 1], np.zeros(len(points))))
@@ -59,7 +67,7 @@ def board_points(board: CharucoBoard, made: cv2.aruco.CharucoBoard) -> Array:
 def seen_of_board(
     grey: Grey, board: CharucoBoard, made: cv2.aruco.CharucoBoard, found: list[tuple[int, Array]]
 ) -> tuple[Array, Array]:
-    """Give the points of a board that are seen (n × 3, in its frame) and where (n × 2, px), from markers found."""
+    """Return the corners of a board that are detected, (n, 3) in its frame, and their pixels, (n, 2)."""
     last = board.first_id + board.columns * board.rows // 2 - 1
     own = [(number, corners) for number, corners in found if board.first_id <= number <= last]
     nothing = np.zeros((0, 3)), np.zeros((0, 2))
@@ -73,7 +81,7 @@ def seen_of_board(
     if ids is None or len(ids) < FEWEST_CORNERS:
         return nothing
     points = board_points(board, made)[np.ravel(ids)]
-    # Corners on one line allow any rotation about it.
+    # Corners on one line do not determine a rotation.
     if np.linalg.svd(points[:, :2] - points[:, :2].mean(axis=0), compute_uv=False)[1] < 0.5 * board.square:
         return nothing
     return points, np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
@@ -82,10 +90,12 @@ def seen_of_board(
 def measured_board(
     grey: Grey, lens: Lens, board: CharucoBoard, made: cv2.aruco.CharucoBoard, found: list[tuple[int, Array]]
 ) -> tuple[Measured, Array] | None:
-    """Measure a board by the edges of its squares, as if it were one large marker.
+    """Measure a board by the edges of its squares, as if it was one large marker.
 
-    Gives its outermost corners between squares, and where they are in its frame (4 × 3, m); None when too few of its
-    markers were found, or its edges are not where they should be.
+    Returns:
+        The outermost corners between squares and their positions in the frame of the board, (4, 3), m. None when too
+        few
+        of its markers are detected, or its edges are not where they should be.
     """
     last = board.first_id + board.columns * board.rows // 2 - 1
     own = [(number, corners) for number, corners in found if board.first_id <= number <= last]
@@ -113,16 +123,19 @@ def measured_board(
     result = measure(np.asarray(light, dtype=np.float32), (left, top), lens, chart, board.first_id, start)
     if result is None:
         return None
-    # The border of a marker is as near to an edge as the margin is wide, and draws at it in a small or blurred picture.
+    # The border of a marker is as near to an edge as the margin is wide; in a small or blurred image it shifts the
+    # edge.
     covariance = np.linalg.inv(result.information) + _EDGE_FLOOR**2 * np.eye(8)
     known = replace(result, information=np.asarray(np.linalg.inv(covariance), dtype=np.float64))
     return known, np.column_stack((chart.corners * unit, np.zeros(4)))
 
 
 def _chart(board: CharucoBoard, white: Array) -> Chart:
-    """Give the edges between squares, in widths of the margin around its markers, from its middle (x right, y up).
+    """Return the edges between squares, in units of the margin around markers, from the middle (x right, y up).
 
-    white: middles of the squares with markers, m, from the upper left corner (x right, y down).
+    Args:
+        board: The board.
+        white: Middles of the squares with markers, from the upper left corner (x right, y down), m.
     """
     side = 2 * board.square / (board.square - board.marker)
     light = np.zeros((board.rows, board.columns), dtype=bool)
@@ -152,7 +165,12 @@ def _chart(board: CharucoBoard, white: Array) -> Chart:
 
 
 def check_layout(layout: Layout) -> None:
-    """Raise InvalidData or Conflict for a layout that cannot be: the error names the marker."""
+    """Require a valid layout.
+
+    Raises:
+        InvalidData: A marker is invalid; the message names it.
+        Conflict: A marker is listed twice; the message names it.
+    """
     listed: set[tuple[str, int]] = set()
     size = dictionary_size(layout.dictionary)
     for marker in layout.markers:
@@ -164,7 +182,7 @@ def check_layout(layout: Layout) -> None:
         listed.add((layout.dictionary, number))
         side = layout.size if not isinstance(marker.size, float | int) else marker.size
         if not (math.isfinite(side) and 0 < side < 10):
-            raise InvalidData(f"the size of marker {number} has to be a positive number of metres, not {side}")
+            raise InvalidData(f"the size of marker {number} must be positive, in m, not {side}")
         check_pose(marker.pose, f"the pose of marker {number}")
     for index, board in enumerate(layout.boards):
         board_of(board)
@@ -175,7 +193,11 @@ def check_layout(layout: Layout) -> None:
 
 
 def check_pose(pose: Pose, name: str) -> None:
-    """Raise InvalidData for a pose with numbers that are not finite, or too large to be one."""
+    """Require a finite pose of plausible size.
+
+    Raises:
+        InvalidData: A number is not finite or too large.
+    """
     numbers = (*pose.position, *pose.orientation)
     if not all(map(math.isfinite, numbers)) or max(map(abs, pose.position)) > 1000:
-        raise InvalidData(f"{name} has to be finite, in metres", str(numbers))
+        raise InvalidData(f"{name} must be finite, in m", str(numbers))

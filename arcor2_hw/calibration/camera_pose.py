@@ -1,4 +1,4 @@
-"""Where a camera stands, from what it sees of markers and boards of known size and place."""
+"""The pose of a camera, from images of markers and boards of known size and pose."""
 
 import math
 from collections.abc import Sequence
@@ -26,33 +26,34 @@ from arcor2_hw.exceptions import InvalidData
 
 MOST_PICTURES: Final = 100
 _GOOD: Final = 0.002
-"""m, standard deviation of a position up to which it is good."""
+"""Standard deviation of the position up to which a result is good, m."""
 _STOOD_STILL: Final = 0.5
-"""px, by which a marker may move from picture to picture."""
+"""Maximum movement of a marker between images, px."""
 
 
 def find_camera_pose(
     pictures: Sequence[Picture], parameters: CameraParameters, layout: Layout, options: PoseOptions | None = None
 ) -> CameraPose:
-    """Find the pose of a camera in the origin's frame.
+    """Find the pose of a camera in the frame of the origin.
 
     Args:
-        pictures: one, or several that the same camera took from the same place; their noise is averaged.
-        parameters: of the lens, for the size of the pictures.
-        layout: the markers and boards that may be in sight; others in the picture do not matter.
-        options: method, hints and limits.
+        pictures: One image, or several from the same camera at the same place, whose noise is averaged.
+        parameters: Parameters of the lens for this image size.
+        layout: Markers and boards that may be visible; others are ignored.
+        options: Method, hints and limits.
 
     Raises:
-        InvalidPicture: a picture that is none, is damaged or too large; pictures of different sizes.
-        InvalidData: parameters that are none; a marker that is not in its dictionary; Conflict: one listed twice.
-        CalibrationRefused: blurred; no marker; ambiguous (one marker seen from the front: the text says what helps);
-            unobservable (known too badly); implausible (a marker twice in the picture, or elsewhere than it is said to
-            be; the camera moved between the pictures).
+        InvalidPicture: A file is not an image, damaged or too large, or the images have different sizes.
+        InvalidData: Parameters or a marker are invalid.
+        Conflict: A marker is listed twice.
+        CalibrationRefused: The image is blurred; there is no marker; the pose is ambiguous (one marker seen from the
+            front; the message says what helps), unobservable (too uncertain) or implausible (a marker appears twice or
+            not at its configured place, or the camera moved between the images).
     """
     options = options or PoseOptions()
     hints = _hints(options)
     if not 1 <= len(pictures) <= MOST_PICTURES:
-        raise InvalidData(f"one to {MOST_PICTURES} pictures are needed, not {len(pictures)}")
+        raise InvalidData(f"1 to {MOST_PICTURES} images are needed, not {len(pictures)}")
     greys = list(one_by_one(pictures)) if len(pictures) > 1 else [grey_of(pictures[0])]
     lens = Lens(parameters, greys[0].shape[1], greys[0].shape[0])
     sighting = sight_of(greys, lens, layout, options.blur_threshold, options.largest_blur)
@@ -65,7 +66,11 @@ def find_camera_pose(
 
 
 def _hints(options: PoseOptions) -> Hints:
-    """Give what is known beforehand. Raises InvalidData."""
+    """Return prior knowledge.
+
+    Raises:
+        InvalidData: An option is invalid.
+    """
     expected = gravity = None
     if isinstance(options.expected, Pose):
         check_pose(options.expected, "the expected pose of the camera")
@@ -74,20 +79,22 @@ def _hints(options: PoseOptions) -> Hints:
         gravity = np.array(tuple(options.gravity))
         length = float(np.linalg.norm(gravity))
         if not (math.isfinite(length) and length > 1e-6):
-            raise InvalidData(
-                "the direction of gravity has to be a vector other than zero", str(tuple(options.gravity))
-            )
+            raise InvalidData("the direction of gravity must be a non-zero vector", str(tuple(options.gravity)))
         gravity = gravity / length
     for name in ("expected_position", "expected_orientation", "gravity_deviation", "largest_deviation"):
         if not (math.isfinite(getattr(options, name)) and getattr(options, name) > 0):
-            raise InvalidData(f"{name} has to be a positive number, not {getattr(options, name)}")
+            raise InvalidData(f"{name} must be a positive number, not {getattr(options, name)}")
     if not options.min_distance < options.max_distance:
-        raise InvalidData("min_distance has to be less than max_distance")
+        raise InvalidData("min_distance must be less than max_distance")
     return Hints(expected, options.expected_position, options.expected_orientation, gravity, options.gravity_deviation)
 
 
 def _check_still(seen: list[Seen]) -> None:
-    """Raise CalibrationRefused when markers are at other places in later pictures."""
+    """Require that markers are at the same pixels in all images.
+
+    Raises:
+        CalibrationRefused: Something moved.
+    """
     first: dict[tuple[str, int], Seen] = {}
     for each in seen:
         before = first.setdefault(each.key, each)
@@ -95,7 +102,8 @@ def _check_still(seen: list[Seen]) -> None:
             moved = float(np.linalg.norm(each.pixels.mean(axis=0) - before.pixels.mean(axis=0)))
             if moved > _STOOD_STILL:
                 raise CalibrationRefused(
-                    f"The camera, or {each.name}, moved between picture {before.picture} and picture {each.picture}.",
+                    f"The camera or {each.name} moved between picture {before.picture} and picture {each.picture}. "
+                    "Fix both, then try again.",
                     f"by {moved:.1f} px",
                     Reason.IMPLAUSIBLE,
                 )
@@ -104,7 +112,7 @@ def _check_still(seen: list[Seen]) -> None:
 def _result(
     found: Found, seen: list[Seen], layout: Layout, options: PoseOptions, blur: float, pictures: int
 ) -> CameraPose:
-    """Give what was found with its errors in words, or refuse it."""
+    """Return the result with its verdict, or refuse it."""
     covariance = found.covariance
     position = float(np.sqrt(np.linalg.eigvalsh(covariance[:3, :3])[-1]))
     orientation = float(np.sqrt(np.linalg.eigvalsh(covariance[3:, 3:])[-1]))
@@ -151,7 +159,11 @@ def _result(
 
 
 def _check_known(found: Found, position: float, options: PoseOptions) -> None:
-    """Raise CalibrationRefused for a pose that is known too badly, or contradicts a hint."""
+    """Require that the pose is certain enough and agrees with the hints.
+
+    Raises:
+        CalibrationRefused: It does not.
+    """
     if math.isfinite(position) and position <= options.largest_deviation:
         return
     only = len({each.key for each in found.seen} - found.left_out) == 1
@@ -173,7 +185,7 @@ def _verdict(
     errors: list[MarkerError],
     f: float,
 ) -> tuple[Grade, str]:
-    """Say how good a pose is, and what a technician should look at."""
+    """Return how good a pose is, and what a technician should check."""
     markers = sum(kind == "marker" for kind, _ in places)
     boards = len(places) - markers
     parts = [f"{n} {name}{'s' if n > 1 else ''}" for n, name in ((markers, "marker"), (boards, "board")) if n]
@@ -200,11 +212,21 @@ def _verdict(
 
 
 def draw_camera_pose(picture: Picture, parameters: CameraParameters, layout: Layout, result: CameraPose) -> bytes:
-    """Draw where markers should be with that pose onto the picture, by how much they are off, and the verdict: PNG.
+    """Draw the expected markers for a pose onto an image, with their errors and the verdict.
 
-    parameters: as find_camera_pose was given them; drawn is with those of the result.
+    Args:
+        picture: The image.
+        parameters: As given to `find_camera_pose`; those of the result are used for drawing.
+        layout: Markers and boards.
+        result: The result of `find_camera_pose`.
 
-    Raises InvalidPicture, InvalidData, CalibrationRefused as find_camera_pose.
+    Returns:
+        A PNG file.
+
+    Raises:
+        InvalidPicture: As in `find_camera_pose`.
+        InvalidData: As in `find_camera_pose`.
+        CalibrationRefused: As in `find_camera_pose`.
     """
     grey = grey_of(picture)
     lens = Lens(parameters, grey.shape[1], grey.shape[0])
@@ -229,7 +251,7 @@ def draw_camera_pose(picture: Picture, parameters: CameraParameters, layout: Lay
 
 
 def _outlines(layout: Layout) -> list[Array]:
-    """Give the corners of all that is listed, 4 × 3 each, m, in the origin's frame."""
+    """Return the corners of everything listed, (4, 3) each, in the frame of the origin, m."""
     result = []
     for marker in layout.markers:
         half = (marker.size if isinstance(marker.size, float | int) else layout.size) / 2

@@ -1,6 +1,6 @@
-"""Options and results of calibrations by pictures: camera pose, hand-eye, intrinsics. Imports no numerics: they travel.
+"""Options and results of calibrations by images: camera pose, hand-eye, intrinsics. Imports no numerics.
 
-Lengths in m, angles in rad, errors of pictures in pixels; the middle of a pixel has whole coordinates.
+Lengths are in m, angles in rad, image errors in px. The centre of a pixel has integer coordinates.
 """
 
 from typing import Literal
@@ -15,23 +15,29 @@ PoseMethod = Literal["joint", "averaged"]
 
 
 class PoseOptions(Data, frozen=True):
-    """How a camera's pose is computed, and when the result is refused.
+    """How the pose of a camera is computed, and when the result is refused.
 
-    method: `joint` solves the corners of all markers in all pictures as one problem; `averaged` averages one pose per
-    marker with distance and angle as weights.
-    blur_threshold: least variance of the Laplacian of the picture at 640 × 480; a picture below it is refused unless
-    the markers' edges are sharp. largest_blur: px, width (standard deviation) of a marker's edge from which on the
-    picture is refused.
-    min_distance, max_distance: m, at which a marker's weight by distance is 1 and 0.
-    largest_deviation: m, standard deviation of the position (largest axis) from which on a pose is refused.
-    largest_residual: px, of a marker; what lies beyond does not stand where it is said to.
-    focal_deviation, centre_deviation, distortion_deviation: how well the intrinsics are known: fx and fy as a part of
-    themselves, cx and cy in px, each coefficient as a part of itself (standard deviations).
-    expected: where the camera is roughly known to be, in the origin's frame, with its standard deviations
-    expected_position (m) and expected_orientation (rad).
-    gravity: direction of gravity in the camera's frame, of an accelerometer, of any length; the origin's z is then
-    taken to be vertical. gravity_deviation: rad.
-    lowest: m, the least z that the camera can have in the origin's frame: 0 for one that hangs above the table.
+    Attributes:
+        method: `joint` solves the corners of all markers in all images as one problem; `averaged` averages one pose per
+            marker, weighted by distance and angle.
+        blur_threshold: Minimum variance of the Laplacian of the image at 640 × 480. An image below it is refused unless
+            the edges of the markers are sharp.
+        largest_blur: Width (standard deviation) of the edges of markers above which an image is refused, px.
+        min_distance: Distance up to which a marker has full weight, m.
+        max_distance: Distance above which a marker has no weight, m.
+        largest_deviation: Maximum standard deviation of the position (largest axis), m.
+        largest_residual: Residual of a marker above which it is not where it should be, px.
+        focal_deviation: Standard deviation of fx and fy as a fraction.
+        centre_deviation: Standard deviation of cx and cy, px.
+        distortion_deviation: Standard deviation of each distortion coefficient as a fraction.
+        expected: Approximate pose of the camera in the frame of the origin.
+        expected_position: Standard deviation of its position, m.
+        expected_orientation: Standard deviation of its orientation, rad.
+        gravity: Direction of gravity in the camera's frame, of any length, from an accelerometer. The origin's z is
+            then
+            taken as vertical.
+        gravity_deviation: Standard deviation of that direction, rad.
+        lowest: Minimum z of the camera in the frame of the origin, m; 0 for a camera above the table.
     """
 
     method: PoseMethod = "joint"
@@ -53,11 +59,17 @@ class PoseOptions(Data, frozen=True):
 
 
 class MarkerError(Data, frozen=True):
-    """How well one marker, or one board, fits the pose that was found.
+    """How well one marker or board fits the pose.
 
-    name: `marker 3`, `board 1`. picture: index of the picture. corners: how many were measured. residual, largest: px,
-    root mean square and largest distance of a corner from where it should be. distance: from the camera, m. angle:
-    between the marker's normal and the line to the camera, rad. used: false when it does not stand where it is said to.
+    Attributes:
+        name: `marker 3` or `board 1`.
+        picture: Index of the image.
+        corners: Number of measured corners.
+        residual: Root mean square distance of a corner from its expected place, px.
+        largest: Largest such distance, px.
+        distance: Distance from the camera, m.
+        angle: Angle between the marker's normal and the line to the camera, rad.
+        used: Whether it was used; false when it is not where it should be.
     """
 
     name: str
@@ -71,15 +83,20 @@ class MarkerError(Data, frozen=True):
 
 
 class CameraPose(Data, frozen=True):
-    """Where a camera stands, and how well that is known.
+    """The pose of a camera, and how certain it is.
 
-    pose: of the camera in the origin's frame. quality: 0..1 as the protocol has it, the mean weight of all configured
-    markers and boards. residual: px, root mean square. covariance: 6 × 6, of a small displacement (x, y, z in m) and
-    rotation (rotation vector in rad, turned after the pose), both in the origin's frame. position_deviation: m,
-    standard deviation along its worst axis. orientation_deviation: rad, likewise. blur: px, standard deviation of the
-    edges, 0 where it could not be measured. parameters: the intrinsics with which the pose explains the picture; they
-    differ from the given ones by as much as the picture shows them to be off, within what is known of them. verdict:
-    one sentence or two for the operator.
+    Attributes:
+        pose: Pose of the camera in the frame of the origin.
+        quality: Mean weight of all configured markers and boards, 0 to 1 (protocol).
+        residual: Root mean square error of the corners, px.
+        covariance: 6 × 6, of a small displacement (x, y, z in m) and rotation (rotation vector in rad, applied
+            after the
+            pose), both in the frame of the origin.
+        position_deviation: Standard deviation along the worst axis, m.
+        orientation_deviation: Standard deviation about the worst axis, rad.
+        blur: Standard deviation of edges, px; 0 where it could not be measured.
+        parameters: Intrinsics that explain the image best within their standard deviations.
+        verdict: One or two sentences for the operator.
     """
 
     pose: Pose
@@ -97,7 +114,7 @@ class CameraPose(Data, frozen=True):
     parameters: CameraParameters | Unset = UNSET
 
     def estimated(self, *, inverse: bool = False) -> EstimatedPose:
-        """Give it as the protocol has it; with `inverse`, the pose of the origin in the camera's frame."""
+        """Return the result as the protocol has it; with `inverse`, the pose of the origin in the camera's frame."""
         return EstimatedPose(self.pose.inverted() if inverse else self.pose, self.quality)
 
 
@@ -106,19 +123,22 @@ Mounting = Literal["eye_in_hand", "eye_to_hand"]
 
 
 class HandEyeSample(Data, frozen=True):
-    """One picture of the target and where the robot's flange was meanwhile, in the robot's base frame."""
+    """One image of the target, and the pose of the robot's flange in the robot's base frame when it was taken."""
 
     flange: Pose
     picture: bytes
 
 
 class HandEyeOptions(Data, frozen=True):
-    """When a hand-eye calibration is refused.
+    """When a hand-eye calibration is refused. See PoseOptions for options not listed here.
 
-    smallest_turn: rad, the rotation between two stations that counts as one. smallest_spread: rad, between the axes of
-    two such rotations. largest_residual: px, root mean square over all. largest_deviation: m. See PoseOptions for the
-    others. robot_position (m), robot_orientation (rad): how exact the flange's poses are, for the weights; how large
-    the errors really are is seen in the pictures.
+    Attributes:
+        smallest_turn: Minimum rotation between two stations that counts, rad.
+        smallest_spread: Minimum angle between the axes of two such rotations, rad.
+        largest_residual: Maximum root mean square error over all corners, px.
+        largest_deviation: Maximum standard deviation of the position, m.
+        robot_position: Expected standard deviation of flange positions, m, used as a weight.
+        robot_orientation: Expected standard deviation of flange orientations, rad, used as a weight.
     """
 
     smallest_turn: float = 0.15
@@ -132,7 +152,7 @@ class HandEyeOptions(Data, frozen=True):
 
 
 class HandEyeMethod(Data, frozen=True):
-    """What one method gave. rotation (rad) and translation (m): how far the target's pose scatters with it (r.m.s.)."""
+    """The result of one method, and the scatter of the target's pose with it: rotation (rad), translation (m)."""
 
     name: str
     pose: Pose
@@ -141,7 +161,14 @@ class HandEyeMethod(Data, frozen=True):
 
 
 class HandEyeError(Data, frozen=True):
-    """How well one sample fits. residual, largest: px. used: false with `problem` said when it was left out."""
+    """How well one sample fits.
+
+    Attributes:
+        residual: Root mean square error of the corners, px.
+        largest: Largest error of a corner, px.
+        used: Whether it was used.
+        problem: Why it was not used.
+    """
 
     sample: int
     corners: int
@@ -152,11 +179,13 @@ class HandEyeError(Data, frozen=True):
 
 
 class HandEye(Data, frozen=True):
-    """Where a camera sits on the flange (eye_in_hand), or in the robot's base frame (eye_to_hand).
+    """The pose of a camera on the flange (eye_in_hand), or in the robot's base frame (eye_to_hand).
 
-    target: pose of the target in the base frame (eye_in_hand) or on the flange (eye_to_hand). methods: what the closed
-    forms gave, for comparison; `pose` is refined from the best of them by the reprojection of all corners. covariance:
-    as in CameraPose, in the flange's or base frame. picture: PNG, the errors of all corners.
+    Attributes:
+        target: Pose of the target in the base frame (eye_in_hand) or on the flange (eye_to_hand).
+        methods: Results of closed-form methods, for comparison. `pose` is the best of them, refined by reprojection.
+        covariance: As in CameraPose, in the frame of the flange or base.
+        picture: PNG file with the errors of all corners.
     """
 
     mounting: Mounting
@@ -177,9 +206,13 @@ class HandEye(Data, frozen=True):
 class IntrinsicsOptions(Data, frozen=True):
     """How intrinsics are computed, and when they are refused.
 
-    coefficients: of the lens model: 4 (k1, k2, p1, p2), 5 (and k3), 8 (rational) or 12 (and thin prism).
-    fewest_views: with at least six corners each. smallest_tilt: rad, by which some views must differ in direction.
-    smallest_coverage: part of the picture (of 8 × 6 fields) in which there were corners. largest_residual: px, r.m.s.
+    Attributes:
+        coefficients: Number of distortion coefficients: 4 (k1, k2, p1, p2), 5 (and k3), 8 (rational), 12 (and thin
+            prism).
+        fewest_views: Minimum number of images with at least six corners.
+        smallest_tilt: Minimum angle between the directions of some views, rad.
+        smallest_coverage: Minimum fraction of the image, in 8 × 6 fields, that has corners.
+        largest_residual: Maximum root mean square error, px.
     """
 
     coefficients: Literal[4, 5, 8, 12] = 5
@@ -191,7 +224,14 @@ class IntrinsicsOptions(Data, frozen=True):
 
 
 class ViewError(Data, frozen=True):
-    """How well one picture fits. residual, largest: px. used: false with `problem` said when it was left out."""
+    """How well one image fits.
+
+    Attributes:
+        residual: Root mean square error of the corners, px.
+        largest: Largest error of a corner, px.
+        used: Whether it was used.
+        problem: Why it was not used.
+    """
 
     view: int
     corners: int
@@ -202,11 +242,14 @@ class ViewError(Data, frozen=True):
 
 
 class Intrinsics(Data, frozen=True):
-    """A camera's intrinsics for pictures of width × height.
+    """The intrinsics of a camera for images of width × height.
 
-    deviations: standard deviations of fx, fy, cx, cy (px). focal_deviation, centre_deviation: the same as PoseOptions
-    wants them. coverage: part of the picture in which there were corners. picture: PNG, where the corners were and
-    their errors.
+    Attributes:
+        deviations: Standard deviations of fx, fy, cx, cy, px.
+        focal_deviation: The same, as PoseOptions needs it.
+        centre_deviation: The same, as PoseOptions needs it.
+        coverage: Fraction of the image that has corners.
+        picture: PNG file with all corners and their errors.
     """
 
     parameters: CameraParameters

@@ -1,16 +1,16 @@
-"""Which markers stand where, as a technician writes it into a file: ours, and that of the original's service.
+"""The configuration file of markers, in our format and in that of the original calibration service.
 
     marker_size: 0.1            # m, side of the black square
     dictionary: 4x4_50
     markers:                    # a list of marker_id and pose, or a mapping by id as in the original
       10: {pose: {position: {x: 0.2, y: 0, z: 0}, orientation: {x: 0, y: 0, z: 0, w: 1}}}
     boards: []                  # ChArUco boards
-    blur_threshold: 150         # least sharpness of a picture
-    min_distance: 0.3           # m, at which a marker counts fully, and no more
+    blur_threshold: 150         # minimum sharpness of an image
+    min_distance: 0.3           # m, up to which a marker has full weight
     max_distance: 2.0
-    lowest: 0                   # m, the least height at which the camera can hang above the origin
+    lowest: 0                   # m, minimum height of the camera above the origin
 
-Imports no numerics: the server knows it.
+Imports no numerics, so that the server can use it.
 """
 
 from pathlib import Path
@@ -25,12 +25,12 @@ from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.exceptions import InvalidData, NotFound
 
 MAX_SIZE: Final = 1 << 20
-"""Bytes of a file."""
+"""Maximum size of a file, bytes."""
 MAX_MARKERS: Final = 1000
 
 
 class CalibrationConfiguration(Data, frozen=True, forbid_unknown_fields=True):
-    """The file's content. See PoseOptions for the options."""
+    """The content of the file. See PoseOptions for the options."""
 
     marker_size: float = 0.1
     dictionary: MarkerDictionary = "4x4_50"
@@ -44,28 +44,28 @@ class CalibrationConfiguration(Data, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         if not 0.0 < self.marker_size < 100.0:
-            raise ValueError(f"marker_size has to be above 0 m and below 100 m, not {self.marker_size:g}")
+            raise ValueError(f"marker_size must be above 0 m and below 100 m, not {self.marker_size:g}")
         if not 0.0 <= self.min_distance < self.max_distance:
-            raise ValueError("min_distance has to be below max_distance, and not below 0")
+            raise ValueError("min_distance must be 0 or more, and below max_distance")
         ids = [marker.marker_id for marker in self.markers]
         if twice := sorted({one for one in ids if ids.count(one) > 1}):
             raise ValueError(f"marker {twice[0]} is listed twice")
         if len(ids) > MAX_MARKERS:
-            raise ValueError(f"there are {len(ids)} markers; {MAX_MARKERS} are the most")
+            raise ValueError(f"there are {len(ids)} markers; the maximum is {MAX_MARKERS}")
         for marker in self.markers:
             if marker.marker_id < 0:
-                raise ValueError(f"marker {marker.marker_id}: an id is not below 0")
+                raise ValueError(f"marker {marker.marker_id}: the id must not be negative")
             if not isinstance(marker.size, Unset) and not 0.0 < marker.size < 100.0:
-                raise ValueError(f"marker {marker.marker_id}: size has to be above 0 m and below 100 m")
+                raise ValueError(f"marker {marker.marker_id}: size must be above 0 m and below 100 m")
 
     @property
     def layout(self) -> Layout:
-        """Give markers and boards."""
+        """Return markers and boards."""
         return Layout(self.markers, self.boards, self.marker_size, self.dictionary)
 
     @property
     def options(self) -> PoseOptions:
-        """Give how poses are computed."""
+        """Return the options for computing poses."""
         return PoseOptions(
             method=self.method,
             blur_threshold=self.blur_threshold,
@@ -76,13 +76,17 @@ class CalibrationConfiguration(Data, frozen=True, forbid_unknown_fields=True):
 
 
 _OLDER: Final = {"min_dist": "min_distance", "max_dist": "max_distance"}
-"""Names of the original's file, from general knowledge of it."""
+"""Names of the original file, from general knowledge of it."""
 
 
 def configuration_of(content: Any, where: str) -> CalibrationConfiguration:
-    """Read plain data. InvalidData naming `where`, and the marker."""
+    """Read plain data.
+
+    Raises:
+        InvalidData: The data is invalid; the message names `where` and the marker.
+    """
     if not isinstance(content, dict):
-        raise InvalidData(f"{where}: a mapping with marker_size and markers is expected.")
+        raise InvalidData(f"{where}: expected a mapping with marker_size and markers.")
     content = {_OLDER.get(key, key): value for key, value in content.items()}
     if isinstance(markers := content.get("markers"), dict):
         content["markers"] = [_listed(key, value, where) for key, value in markers.items()]
@@ -96,28 +100,37 @@ def _listed(key: Any, value: Any, where: str) -> dict[str, Any]:
     try:
         number = int(key)
     except (TypeError, ValueError):
-        raise InvalidData(f"{where}: {key!r} is no id of a marker.") from None
+        raise InvalidData(f"{where}: {key!r} is not the id of a marker.") from None
     if not isinstance(value, dict):
         raise InvalidData(f"{where}: marker {number} needs a pose.")
     return {"marker_id": number} | (value if "pose" in value else {"pose": value})
 
 
 def read_configuration(path: Path) -> CalibrationConfiguration:
-    """Read a file. NotFound, or InvalidData naming the file and what is wrong there; a marker listed twice is."""
+    """Read a file.
+
+    Raises:
+        NotFound: There is no such file.
+        InvalidData: The file is invalid, such as a marker listed twice; the message names the file and the place.
+    """
     try:
         if path.stat().st_size > MAX_SIZE:
-            raise InvalidData(f"{path} is larger than {MAX_SIZE} bytes: it is no configuration of markers.")
+            raise InvalidData(f"{path} is larger than {MAX_SIZE} bytes, so it is not a configuration of markers.")
         text = path.read_bytes()
     except FileNotFoundError:
-        raise NotFound(f"There is no {path}.") from None
+        raise NotFound(f"There is no file {path}.") from None
     except OSError as error:
         raise InvalidData(f"{path} cannot be read: {error.strerror}.") from None
     return configuration_of(yaml_of(text, str(path)), str(path))
 
 
 def yaml_of(text: bytes, where: str) -> Any:
-    """Read YAML; InvalidData naming `where`, also for a key that is there twice, of which YAML would take the last."""
-    import yaml  # 10 ms that the server's start does without
+    """Parse YAML.
+
+    Raises:
+        InvalidData: It is invalid, or a key is repeated, which YAML itself ignores; the message names `where`.
+    """
+    import yaml  # imported here because it takes 10 ms of the server's start
 
     try:
         root = yaml.compose(text, yaml.SafeLoader)

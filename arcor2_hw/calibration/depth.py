@@ -1,4 +1,4 @@
-"""Depth pictures: read, checked, averaged, filtered and turned into a cloud in the camera's frame."""
+"""Depth images: reading, validation, averaging, filtering, and conversion to a point cloud in the camera's frame."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -13,17 +13,17 @@ from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.exceptions import InvalidData
 
 DepthPictures = npt.NDArray[np.uint16]
-"""One picture (rows, columns) or several of a standing scene (n, rows, columns): mm, 0 where there is none."""
+"""One depth image (rows, columns), or several of a static scene (n, rows, columns): mm, 0 where invalid."""
 Floats = npt.NDArray[np.float64]
 
 RANGE: Final = (0.15, 8.0)
-"""m within which a depth is taken for one."""
+"""Range of valid depths, m."""
 JUMP: Final = 0.02
-"""Of the distance: depths of neighbours that differ by more are an edge, where sensors give what is neither side."""
+"""Relative difference between neighbouring depths that counts as an edge, where sensors return values in between."""
 LEAST_POINTS: Final = 500
 SAMPLE: Final = 2_000
 TRIALS: Final = 150
-"""Of planes through three points each."""
+"""Number of random planes through three points that are tried."""
 _IHDR: Final = 8 + 4 + 4
 _PNG: Final = b"\x89PNG\r\n\x1a\n"
 
@@ -31,43 +31,45 @@ _PNG: Final = b"\x89PNG\r\n\x1a\n"
 def read_depth(picture: bytes) -> DepthPictures:
     """Read a PNG file of 16-bit depth in mm.
 
-    Raises InvalidPicture: no PNG, damaged, colour or 8 bit, more than LARGEST_PIXELS or LARGEST_BYTES.
+    Raises:
+        InvalidPicture: It is not a PNG file, damaged, in colour, 8 bit, or larger than LARGEST_PIXELS or LARGEST_BYTES.
     """
     if len(picture) > LARGEST_BYTES:
-        raise InvalidPicture(f"The depth picture has {len(picture)} bytes; {LARGEST_BYTES} are the most.")
+        raise InvalidPicture(f"The depth image has {len(picture)} bytes; the maximum is {LARGEST_BYTES}.")
     if picture[:8] != _PNG or len(picture) < _IHDR + 17:
-        raise InvalidPicture("The depth picture is no PNG file.")
+        raise InvalidPicture("The depth image is not a PNG file.")
     width, height = (int.from_bytes(picture[_IHDR + 4 * i : _IHDR + 4 * i + 4], "big") for i in range(2))
     if not 0 < width * height <= LARGEST_PIXELS:
-        raise InvalidPicture(f"The depth picture has {width} × {height} pixels; {LARGEST_PIXELS} are the most.")
+        raise InvalidPicture(f"The depth image has {width} × {height} pixels; the maximum is {LARGEST_PIXELS}.")
     bits, kind = picture[_IHDR + 8], picture[_IHDR + 9]
     if (bits, kind) != (16, 0):
         raise InvalidPicture(
-            f"A depth picture has one channel of 16 bit in mm; this one has {bits} bit, PNG type {kind}."
+            f"A depth image needs one channel of 16 bit in mm; this one has {bits} bit, PNG type {kind}."
         )
     try:
         found = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error as e:
-        raise InvalidPicture("The depth picture is damaged.", str(e)) from e
+        raise InvalidPicture("The depth image is damaged.", str(e)) from e
     if found is None or found.dtype != np.uint16 or found.shape != (height, width):
-        raise InvalidPicture("The depth picture is damaged.")
+        raise InvalidPicture("The depth image is damaged.")
     return np.asarray(found, dtype=np.uint16)
 
 
 def mean_depth(pictures: DepthPictures) -> Floats:
-    """Give the mean of several pictures, m, 0 where fewer than half of them have a depth or where they disagree.
+    """Return the mean of several depth images, m; 0 where fewer than half of them have a value, or where they disagree.
 
-    Raises InvalidData: not 16 bit, not one picture or several of one size.
+    Raises:
+        InvalidData: The images are not 16 bit, or not of one size.
     """
     if pictures.dtype != np.uint16 or pictures.ndim not in (2, 3) or not pictures.size:
         raise InvalidData(
-            f"A depth picture has rows and columns of 16 bit in mm, not shape {pictures.shape} of {pictures.dtype}."
+            f"A depth image needs rows and columns of 16 bit in mm, not shape {pictures.shape} of {pictures.dtype}."
         )
     if pictures.ndim == 2 or len(pictures) == 1:
         return np.asarray(pictures.reshape(pictures.shape[-2:]), dtype=np.float64) * 1e-3
     total = np.zeros(pictures.shape[1:])
     squares, count = np.zeros_like(total), np.zeros_like(total)
-    for picture in pictures:  # one at a time: a thousand pictures need no more memory than two
+    for picture in pictures:  # one at a time, so that a thousand images need no more memory than two
         z = picture * 1e-3
         total += z
         squares += z * z
@@ -79,10 +81,12 @@ def mean_depth(pictures: DepthPictures) -> Floats:
 
 @dataclass(frozen=True)
 class DepthView:
-    """A filtered depth picture with the rays of its pixels.
+    """A filtered depth image with the rays of its pixels.
 
-    depth: (rows, columns), m, 0 where there is none that could be used. seen: the same before edges were taken out.
-    rays: (rows, columns, 3) in the camera's optical frame, z = 1, so that ray times depth is the point.
+    Attributes:
+        depth: (rows, columns), m, 0 where not usable.
+        seen: The same before edges were removed.
+        rays: (rows, columns, 3) in the camera's optical frame with z = 1, so that ray times depth is the point.
     """
 
     depth: Floats
@@ -90,17 +94,17 @@ class DepthView:
     rays: Floats
 
     def points(self) -> Floats:
-        """Give the usable points (n, 3) in the camera's frame."""
+        """Return the usable points (n, 3) in the camera's frame."""
         there = self.depth > 0
         return np.asarray(self.rays[there] * self.depth[there][:, None])
 
 
 def look(pictures: DepthPictures, parameters: CameraParameters) -> DepthView:
-    """Average, filter and unproject.
+    """Average, filter and unproject depth images.
 
     Raises:
-        InvalidData: pictures that are none, or of another size than the lens's parameters are for.
-        CalibrationRefused: fewer than LEAST_POINTS have a depth.
+        InvalidData: An image is invalid, or its size does not match the parameters of the lens.
+        CalibrationRefused: Fewer than LEAST_POINTS pixels are usable.
     """
     seen = mean_depth(pictures)
     rays = pixel_rays(seen.shape[1], seen.shape[0], parameters)
@@ -108,8 +112,8 @@ def look(pictures: DepthPictures, parameters: CameraParameters) -> DepthView:
     depth = _without_edges(seen)
     if (count := int(np.count_nonzero(depth))) < LEAST_POINTS:
         raise CalibrationRefused(
-            f"The depth picture has {count} usable points; {LEAST_POINTS} are the least. Is the camera covered,"
-            " too near, or the scene without texture and light?",
+            f"The depth image has {count} usable points, but at least {LEAST_POINTS} are needed. Check that "
+            "the camera is not covered or too near, and that the scene has texture and light.",
             f"{int(np.count_nonzero(seen))} of {seen.size} pixels have a depth",
             Reason.TOO_FEW_POINTS,
         )
@@ -117,16 +121,20 @@ def look(pictures: DepthPictures, parameters: CameraParameters) -> DepthView:
 
 
 def pixel_rays(width: int, height: int, parameters: CameraParameters) -> Floats:
-    """Give the ray of every pixel, (rows, columns, 3) with z = 1. Raises InvalidData when picture and lens disagree."""
+    """Return the ray of every pixel, (rows, columns, 3) with z = 1.
+
+    Raises:
+        InvalidData: The size of the image does not match the parameters of the lens.
+    """
     values = (parameters.fx, parameters.fy, parameters.cx, parameters.cy, *parameters.dist_coefs)
     if not np.isfinite(values).all() or parameters.fx <= 0 or parameters.fy <= 0:
-        raise InvalidData(f"fx and fy of a camera are positive and all of its parameters finite, not {values}.")
+        raise InvalidData(f"fx and fy of a camera must be positive and all parameters finite, not {values}.")
     if width * height > LARGEST_PIXELS:
-        raise InvalidData(f"The depth picture has {width} × {height} pixels; {LARGEST_PIXELS} are the most.")
+        raise InvalidData(f"The depth image has {width} × {height} pixels; the maximum is {LARGEST_PIXELS}.")
     if not (0.25 * width < parameters.cx < 0.75 * width and 0.25 * height < parameters.cy < 0.75 * height):
         raise InvalidData(
-            f"The depth picture has {width} × {height} pixels, but the camera's parameters are for another size: their"
-            f" centre is at {parameters.cx:.0f}, {parameters.cy:.0f}."
+            f"The depth image has {width} × {height} pixels, but the camera's parameters are for another "
+            f"size: their centre is at {parameters.cx:.0f}, {parameters.cy:.0f}."
         )
     u, v = np.meshgrid(np.arange(width, dtype=np.float64), np.arange(height, dtype=np.float64))
     matrix = np.array([[parameters.fx, 0.0, parameters.cx], [0.0, parameters.fy, parameters.cy], [0.0, 0.0, 1.0]])
@@ -136,7 +144,7 @@ def pixel_rays(width: int, height: int, parameters: CameraParameters) -> Floats:
 
 
 def _without_edges(z: Floats) -> Floats:
-    """Take out pixels beside a jump of depth: what a sensor tells there lies between the two sides."""
+    """Remove pixels next to a jump of depth, where a sensor returns values between both sides."""
     kernel = np.ones((3, 3), np.uint8)
     far = cv2.dilate(z, kernel)
     near = cv2.erode(np.where(z > 0, z, 1e3), kernel)
@@ -145,9 +153,13 @@ def _without_edges(z: Floats) -> Floats:
 
 
 def planes(points: Floats, random: np.random.Generator, most: int = 3) -> list[tuple[Floats, float]]:
-    """Find large planes in a cloud (n, 3): of each its unit normal and offset, so that normal · point = offset.
+    """Find large planes in a point cloud (n, 3).
 
-    Source: M. Fischler and R. Bolles, "Random sample consensus" (1981). A plane has at least a tenth of the points.
+    Returns:
+        For each plane its unit normal and offset, so that normal · point = offset. A plane has at least 10 % of the
+        points.
+
+    Source: M. Fischler and R. Bolles, "Random sample consensus" (1981).
     """
     rest = points[random.permutation(len(points))[:SAMPLE]]
     least = max(len(rest) // 10, 50)
@@ -174,5 +186,5 @@ def planes(points: Floats, random: np.random.Generator, most: int = 3) -> list[t
 
 
 def plane_thickness(points: Floats) -> Floats:
-    """Give how far from a plane points (n, 3, in the camera's frame) may be and still belong to it, m."""
+    """Return the distance from a plane within which points (n, 3, in the camera's frame) belong to it, m."""
     return np.asarray(0.006 + 0.005 * points[:, 2] ** 2)

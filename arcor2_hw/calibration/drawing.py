@@ -1,4 +1,4 @@
-"""Pictures of errors: what a technician looks at to see which marker, or which view, is the odd one."""
+"""Images of errors, in which a technician sees which marker or view does not fit."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -26,25 +26,25 @@ LINES: Final[tuple[Colour, ...]] = (
     (40, 40, 200),
     (120, 120, 20),
 )
-"""Blue, green, red; told apart also by who does not see red and green alike."""
+"""Colours as blue, green, red; distinguishable with red-green colour blindness."""
 
 _WIDTH: Final = 900
 _SIDE: Final = 320
 _HEAD: Final = 64
 _ARROW: Final = 36.0
-"""px that the 95th percentile of errors is drawn with."""
+"""Length of the arrow for the 95th percentile of errors, px."""
 _BARS: Final = 40
 
 
 def png_of(canvas: Canvas) -> bytes:
-    """Give a picture as a PNG file."""
+    """Encode an image as a PNG file."""
     done, data = cv2.imencode(".png", canvas)
     assert done
     return bytes(data.tobytes())
 
 
 def write(canvas: Canvas, text: str, at: tuple[int, int], colour: Colour = DARK, size: float = 0.5) -> None:
-    """Write a line; what its letters lack (×, °, ±) is written otherwise."""
+    """Write a line of text; characters that the font lacks (×, °, ±) are replaced."""
     for letter, instead in (("×", "x"), ("°", " deg"), ("±", "+-"), ("–", "-"), ("…", "...")):
         text = text.replace(letter, instead)
     cv2.putText(canvas, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, colour, 1, cv2.LINE_AA)
@@ -58,7 +58,7 @@ def arrow(canvas: Canvas, start: Array, end: Array, colour: Colour) -> None:
 
 
 def magnification(errors: Sequence[Array]) -> float:
-    """Give by how much errors are drawn larger than they are: a round number."""
+    """Return the factor by which errors are enlarged, a round number."""
     together = np.concatenate([np.linalg.norm(each, axis=1) for each in errors if len(each)] or [np.zeros(1)])
     typical = max(float(np.percentile(together, 95)), 1e-6)
     wanted = max(_ARROW / typical, 1.0)
@@ -69,13 +69,16 @@ def magnification(errors: Sequence[Array]) -> float:
 def error_picture(
     size: tuple[int, int], views: Sequence[tuple[str, Array, Array, bool]], title: str, left: Canvas | None = None
 ) -> bytes:
-    """Draw where in the picture corners were and by how much they are off, and a bar per view: PNG.
+    """Draw corners and their errors, and a bar for each view.
 
     Args:
-        size: width and height of the camera's pictures, px.
-        views: name, corners (n × 2, px), errors (n × 2, px), whether it was used.
-        title: a line above.
-        left: drawn over instead of an empty field; of the size of the pictures.
+        size: Width and height of the camera's images, px.
+        views: Name, corners (n, 2) in px, errors (n, 2) in px, and whether the view was used.
+        title: First line of text.
+        left: Background of the size of the images instead of an empty field.
+
+    Returns:
+        A PNG file.
     """
     scale = _WIDTH / size[0]
     height = max(round(size[1] * scale), 24 * 4)
@@ -101,7 +104,7 @@ def error_picture(
 
 
 def _bars(field: Canvas, views: Sequence[tuple[str, Array, Array, bool]]) -> None:
-    """Draw the error of each view as a bar; of many views the worst."""
+    """Draw the error of each view as a bar; of many views only the worst."""
     values = [
         (float(np.sqrt(np.mean(np.sum(errors**2, axis=1)))) if len(errors) else 0.0, index)
         for index, (_, _, errors, _) in enumerate(views)

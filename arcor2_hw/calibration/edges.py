@@ -1,10 +1,10 @@
-"""A marker's corners from all its edges, also those inside, measured across them to a hundredth of a pixel.
+"""Corners of a marker from all its edges, also inner ones, measured to a hundredth of a pixel.
 
-The cells of a marker are a chart of straight edges. Across each of them grey values are sampled at many places; where
-the step lies is measured by the area under it. A homography from the marker to the rays of the camera (distortion
-undone) is fitted to all of them at once, so that a corner is never looked for in the picture itself. Dark cells look
-smaller, or larger, than they are: by the camera's tone curve, by light that spreads, by ink. Since edges face both
-ways, that shift is found together with the homography.
+The cells of a marker form a chart of straight edges. Across each edge, grey values are sampled at many places, and
+the position of the step is measured by the area under it. A homography from the marker to undistorted camera rays is
+fitted to all of them at once, so corners are never searched in the image itself. Dark cells can look smaller or
+larger than they are, because of the camera's tone curve, stray light or ink. Edges face both ways, so this shift is
+estimated together with the homography.
 """
 
 import functools
@@ -19,35 +19,38 @@ import numpy.typing as npt
 from arcor2_hw.calibration.lens import Array, Lens
 
 ALONG: Final = 6
-"""Places on each edge of a cell."""
+"""Number of places on each edge of a cell."""
 _UNIT: Final = np.linspace(-1.0, 1.0, 17)
-"""Samples across an edge."""
+"""Positions of samples across an edge."""
 _WEIGHTS: Final = np.where(np.abs(_UNIT) == 1.0, 0.5, 1.0) * (_UNIT[1] - _UNIT[0])
 _CLEAR: Final = 1.8
-"""How many times the blur a place has to be away from where its edge turns."""
+"""Minimum distance of a place from the end of its edge, as a multiple of the blur."""
 _LEAST_SHARE: Final = 0.8
-"""Of the places at which there is a step from dark to light; with fewer it is another marker, or none."""
+"""Minimum share of places with a step from dark to light; with fewer it is another marker, or none."""
 _LEAST_CONTRAST: Final = 0.02
-"""Of the range of grey values."""
+"""Minimum contrast as a fraction of the grey range."""
 _WIDEST: Final = 4.0
-"""px to each side of an edge, along its normal; more in a blurred picture."""
+"""Maximum search distance on each side of an edge along its normal, px; larger in a blurred image."""
 _NARROWEST: Final = 1.5
 _ROUNDS: Final = 4
 _AS_BEFORE: Final = 0.3
-"""px; after a smaller step edges are crossed in the same directions as before."""
+"""Step size below which edges are sampled in the same directions as before, px."""
 _SHIFT_DEVIATION: Final = 0.3
-"""px, what a shift of edges is known before."""
+"""Prior standard deviation of the shift of edges, px."""
 _CORNER_FLOOR: Final = 0.01
-"""px, by which a corner may be off for reasons that are the same all along an edge: lens model, paper."""
+"""Standard deviation of a corner by effects common to a whole edge, such as lens model or paper, px."""
 
 
 @dataclass(frozen=True, eq=False)
 class Chart:
     """The edges inside and around a marker, in cells from its middle (x right, y up).
 
-    points: n × 2, ALONG on each edge. across: n, 0 where the edge is crossed along x, 1 along y.
-    towards: n, 1 or -1, where it is light. free: n, distance to where the edge ends or turns. corners: 4 × 2, upper
-    left first, clockwise.
+    Attributes:
+        points: (n, 2), ALONG on each edge.
+        across: (n), 0 where the edge is crossed along x, 1 along y.
+        towards: (n), 1 or -1, the direction of the light side.
+        free: (n), distance to the end of the edge.
+        corners: (4, 2), clockwise from the upper left.
     """
 
     points: Array
@@ -61,8 +64,13 @@ class Chart:
 class Measured:
     """A measured marker.
 
-    corners: 4 × 2, px. information: 8 × 8, the inverse of their covariance, px⁻². blur: px, standard deviation of an
-    edge. cell: px, width of a cell. shift: px, by which edges lie towards the light. contrast: of the range of light.
+    Attributes:
+        corners: (4, 2), px.
+        information: (8, 8), inverse of their covariance, px⁻².
+        blur: Standard deviation of an edge, px.
+        cell: Width of a cell, px.
+        shift: Distance by which edges are shifted towards the light side, px.
+        contrast: Contrast as a fraction of the range.
     """
 
     number: int
@@ -76,7 +84,7 @@ class Measured:
 
 @functools.lru_cache(maxsize=1024)
 def chart_of(dictionary: int, number: int) -> Chart:
-    """Give the edges of a marker of one of OpenCV's predefined dictionaries."""
+    """Return the edges of a marker of one of OpenCV's predefined dictionaries."""
     known = cv2.aruco.getPredefinedDictionary(dictionary)
     side = known.markerSize + 2
     light = np.pad(cv2.aruco.generateImageMarker(known, number, side) > 127, 1, constant_values=True)
@@ -118,10 +126,15 @@ def measure(
     number: int,
     corners: Array,
 ) -> Measured | None:
-    """Measure a marker whose corners are known to a pixel or two; None when its edges are not where they should be.
+    """Measure a marker whose corners are known to one or two pixels; return None when its edges are not found there.
 
-    picture: light, 0..1, rows × columns, of a part of the picture; first: column and row of its first pixel. corners:
-    4 × 2, px, upper left first, clockwise.
+    Args:
+        picture: Brightness 0 to 1 of a part of the image, rows × columns.
+        first: Column and row of its first pixel.
+        lens: The lens.
+        chart: Edges of the marker.
+        number: Number of the marker.
+        corners: (4, 2), px, clockwise from the upper left.
     """
     model = np.ascontiguousarray(chart.corners, dtype=np.float32)
     rays = np.ascontiguousarray(lens.rays(corners), dtype=np.float32)
@@ -144,7 +157,7 @@ def measure(
         prior[8] = 1.0
         spread = max(float(np.sqrt(np.sum(weights * residual**2) / max(weights.sum(), 1.0))), 0.01)
         balance = (spread / _SHIFT_DEVIATION) ** 2
-        # Columns of very different size are brought to one, or the normal equations lose half of their digits.
+        # Scale columns of very different size, otherwise the normal equations lose half of their digits.
         scale = np.sqrt(np.sum(wanted**2, axis=0))
         scaled = wanted / scale
         normal = scaled.T @ (scaled * weights[:, None]) + np.diag(prior * balance / scale**2)
@@ -176,13 +189,13 @@ def measure(
 
 
 def _mapped(h: Array, points: Array) -> Array:
-    """Give the rays of points of the marker."""
+    """Return the rays of points of the marker."""
     q = points @ h[6:8] + 1.0
     return np.column_stack(((points @ h[0:2] + h[2]) / q, (points @ h[3:5] + h[5]) / q))
 
 
 def _by_h(h: Array, points: Array, rays: Array) -> Array:
-    """Give the derivatives of rays by the homography: n × 2 × 8."""
+    """Return the derivatives of rays with respect to the homography, (n, 2, 8)."""
     q = points @ h[6:8] + 1.0
     one = np.column_stack((points, np.ones(len(points)))) / q[:, None]
     result = np.zeros((len(points), 2, 8))
@@ -194,11 +207,15 @@ def _by_h(h: Array, points: Array, rays: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Sight:
-    """How edges look in the picture.
+    """Appearance of edges in the image.
 
-    normals: n × 2, unit vectors towards the light. ways: n × 2, the marker's own direction across an edge, towards the
-    light; it goes along the neighbouring edges, never over them. cell: n, px, width of a cell along it. slant: n, the
-    cosine between the two. room: n, px, to the neighbouring edge. by_h: n × 8, by how much h moves edges along normals.
+    Attributes:
+        normals: (n, 2), unit vectors towards the light side.
+        ways: (n, 2), the marker's own direction across an edge towards the light side, which never crosses other edges.
+        cell: (n), width of a cell along it, px.
+        slant: (n), cosine between the two.
+        room: (n), distance to the neighbouring edge, px.
+        by_h: (n, 8), derivative of the edge position along the normal with respect to the homography.
     """
 
     normals: Array
@@ -235,7 +252,7 @@ def _sight(h: Array, chart: Chart, slopes: Array) -> _Sight:
 def _crossings(
     picture: npt.NDArray[np.float32], at: Array, sight: _Sight, blur: float
 ) -> tuple[Array, npt.NDArray[np.bool_], float, float] | None:
-    """Measure by how much edges lie off along their normals: offsets, which are valid, the blur, the contrast."""
+    """Measure the offsets of edges along their normals; return offsets, their validity, the blur and the contrast."""
     reach = np.minimum(
         np.maximum(0.45 * sight.cell, _NARROWEST), max(_WIDEST, 3.0 * blur) / np.maximum(sight.slant, 0.3)
     )
@@ -249,7 +266,7 @@ def _crossings(
     if places < 24:
         return None
     values = cv2.remap(picture, map_x, map_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(np.float64)
-    # Dark and light are taken of the whole edge, so that noise does not move single places.
+    # Dark and light levels are taken from the whole edge, so that noise does not shift single places.
     counts = np.maximum(valid.reshape(-1, ALONG).sum(axis=1), 1) * 2.0
     dark, light = (
         np.repeat(((values[:, a] + values[:, b]) * valid).reshape(-1, ALONG).sum(axis=1) / counts, ALONG)
@@ -271,7 +288,7 @@ def _crossings(
 
 
 def _tukey(residual: Array, valid: npt.NDArray[np.bool_]) -> Array:
-    """Give weights that leave out what lies far off."""
+    """Return weights that suppress outliers."""
     if not valid.any():
         return np.zeros(len(residual))
     middle = _median(residual[valid])
@@ -281,5 +298,5 @@ def _tukey(residual: Array, valid: npt.NDArray[np.bool_]) -> Array:
 
 
 def _median(values: Array) -> float:
-    """Give the (upper) median."""
+    """Return the (upper) median."""
     return float(np.partition(values, len(values) // 2)[len(values) // 2])

@@ -1,4 +1,4 @@
-"""Where a camera sits on a robot's flange (eye in hand), or beside the robot (eye to hand)."""
+"""The pose of a camera on a robot's flange (eye in hand), or next to the robot (eye to hand)."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -35,13 +35,13 @@ from arcor2_hw.exceptions import InvalidData
 FEWEST: Final = 3
 MOST_SAMPLES: Final = 300
 _TARGET_DEVIATION: Final = 0.03
-"""m, standard deviation of one picture's pose from which on the picture is left out."""
+"""Standard deviation of the position from one image above which the image is not used, m."""
 _OUTLIER: Final = 4.0
-"""How many times the median of all samples' errors a sample's may be."""
+"""Ratio of a sample's error to the median error above which the sample is not used."""
 _LEAST_OUTLIER: Final = 1.0
-"""px, that a sample's error may be in any case."""
+"""Error up to which a sample is always used, px."""
 _GOOD: Final = 0.001
-"""m, standard deviation up to which a result is good."""
+"""Standard deviation of the position up to which a result is good, m."""
 
 
 def find_hand_eye(
@@ -52,20 +52,21 @@ def find_hand_eye(
     options: HandEyeOptions | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> HandEye:
-    """Find a camera's pose on the flange, or in the robot's base frame.
+    """Find the pose of a camera on the flange, or in the robot's base frame.
 
     Args:
-        samples: at least three, better ten or more, with the flange turned about two axes or more in between.
-        parameters: of the lens, for the size of the pictures.
-        target: the markers or the board, their poses in the target's own frame, wherever that is.
-        mounting: `eye_in_hand`: the target stands still; `eye_to_hand`: the flange carries the target.
-        options: limits.
-        progress: is called with how many pictures are done, and how many there are.
+        samples: At least three, better ten or more, with the flange rotated about two or more axes between them.
+        parameters: Parameters of the lens for this image size.
+        target: Markers or board, with poses in the target's own frame.
+        mounting: `eye_in_hand`: the target is fixed; `eye_to_hand`: the flange carries the target.
+        options: Limits.
+        progress: Called with the number of processed images and their total number.
 
     Raises:
-        InvalidPicture, InvalidData: as find_camera_pose; fewer than three samples; a flange's pose that is not finite.
-        CalibrationRefused: no marker (in too many pictures); degenerate (all rotations about one axis, or hardly any);
-            implausible (the flange's poses do not belong to the pictures); unobservable (known too badly).
+        InvalidPicture: As in `find_camera_pose`.
+        InvalidData: As in `find_camera_pose`; also fewer than three samples, or a flange pose that is not finite.
+        CalibrationRefused: No marker in too many images; degenerate (rotations about one axis only, or too small);
+            implausible (flange poses do not match the images); unobservable (too uncertain).
     """
     options = options or HandEyeOptions()
     if not FEWEST <= len(samples) <= MOST_SAMPLES:
@@ -73,7 +74,7 @@ def find_hand_eye(
     for index, each in enumerate(samples):
         check_pose(each.flange, f"the flange's pose of sample {index}")
     if not (0 < options.robot_position < 1 and 0 < options.robot_orientation < 1):
-        raise InvalidData("robot_position and robot_orientation have to be small positive numbers, in m and rad")
+        raise InvalidData("robot_position and robot_orientation must be small positive numbers, in m and rad")
     problems: dict[int, str] = {}
     stations: list[Station] = []
     eyes: list[Array] = []
@@ -111,23 +112,32 @@ def find_hand_eye(
 
 
 def _check_enough(stations: list[Station], problems: dict[int, str]) -> None:
-    """Raise CalibrationRefused for too few pictures of the target."""
+    """Require enough images of the target.
+
+    Raises:
+        CalibrationRefused: There are too few.
+    """
     if len(stations) < FEWEST:
         first = next((f"sample {index}: {problem}" for index, problem in problems.items()), "")
         raise CalibrationRefused(
-            f"The target is seen well in {len(stations)} pictures only; {FEWEST} are the least, ten are good.",
+            f"The target is well visible in {len(stations)} pictures only; at least {FEWEST} are needed, ten "
+            "are recommended.",
             first,
             Reason.TOO_FEW_POINTS if stations else Reason.NO_MARKER,
         )
 
 
 def _check_turns(hands: list[Array], options: HandEyeOptions) -> None:
-    """Raise CalibrationRefused unless the hand is turned about two axes."""
+    """Require rotations of the flange about two axes.
+
+    Raises:
+        CalibrationRefused: The rotations are too small, or about one axis.
+    """
     turns = [rotation_vector(a[:3, :3].T @ b[:3, :3]) for index, a in enumerate(hands) for b in hands[index + 1 :]]
     large = [turn / np.linalg.norm(turn) for turn in turns if np.linalg.norm(turn) >= options.smallest_turn]
     if not large:
         raise CalibrationRefused(
-            "The flange was hardly turned from picture to picture: turn it by 30° and more, about different axes.",
+            "The flange was hardly turned between the images. Turn it by 30° or more about different axes.",
             f"largest rotation {math.degrees(max(float(np.linalg.norm(turn)) for turn in turns)):.1f}°",
             Reason.DEGENERATE,
         )
@@ -135,8 +145,8 @@ def _check_turns(hands: list[Array], options: HandEyeOptions) -> None:
     spread = float(np.arccos(np.clip(np.abs(axes @ axes.T), 0.0, 1.0).min()))
     if spread < options.smallest_spread:
         raise CalibrationRefused(
-            "The flange was turned about one axis only, which leaves the camera's place along it open: turn it about "
-            "another one, too.",
+            "The flange was turned about one axis only, which leaves the position of the camera along this "
+            "axis open. Turn it about another axis, too.",
             f"axes within {math.degrees(spread):.1f}°, at least {math.degrees(options.smallest_spread):.1f}°",
             Reason.DEGENERATE,
         )
@@ -145,7 +155,7 @@ def _check_turns(hands: list[Array], options: HandEyeOptions) -> None:
 def _solve(
     lens: Lens, stations: list[Station], eyes: list[Array], options: HandEyeOptions
 ) -> tuple[Mount, list[HandEyeMethod]]:
-    """Give the mount that explains the pictures best, and what the closed forms gave."""
+    """Return the mount that explains the images best, and the results of closed-form methods."""
     hands = [each.hand for each in stations]
     methods: list[HandEyeMethod] = []
     found: list[Mount] = []
@@ -167,15 +177,15 @@ def _solve(
             found.append(solution)
     if not found:
         raise CalibrationRefused(
-            "The flange's poses do not belong to the pictures: no place of the camera explains both. Are they in the "
-            "same order, of the flange, in the base frame, and is the mounting the right one?",
+            "The flange poses do not match the images: no pose of the camera explains both. Check that they "
+            "are in the same order and in the base frame, and that the mounting is correct.",
             reason=Reason.IMPLAUSIBLE,
         )
     return min(found, key=lambda each: _root_mean_square(np.concatenate(each.errors))), methods
 
 
 def _scatter(targets: list[Array]) -> tuple[Array, float, float]:
-    """Give the mean of poses and how far they scatter about it (r.m.s.): rad, m."""
+    """Return the mean of poses, and their scatter (rms) in rad and m."""
     stacked = np.stack(targets)
     middle = motion(mean_rotation(stacked[:, :3, :3], np.ones(len(targets))), stacked[:, :3, 3].mean(axis=0))
     turns = [float(np.linalg.norm(rotation_vector(middle[:3, :3].T @ each[:3, :3]))) for each in targets]
@@ -188,7 +198,7 @@ def _root_mean_square(errors: Array) -> float:
 
 
 def _outlier(mount: Mount) -> int | None:
-    """Give the sample that fits far worse than the others."""
+    """Return the sample that fits far worse than the others."""
     residuals = [_root_mean_square(each) for each in mount.errors]
     worst = int(np.argmax(residuals))
     return worst if residuals[worst] > max(_OUTLIER * float(np.median(residuals)), _LEAST_OUTLIER) else None
@@ -203,7 +213,7 @@ def _result(
     options: HandEyeOptions,
     lens: Lens,
 ) -> HandEye:
-    """Give what was found with its errors in words, or refuse it."""
+    """Return the result with its verdict, or refuse it."""
     residual = _root_mean_square(np.concatenate(best.errors))
     if residual > options.largest_residual:
         raise CalibrationRefused(
@@ -212,7 +222,7 @@ def _result(
             f"at most {options.largest_residual} px",
             Reason.IMPLAUSIBLE,
         )
-    # As everywhere outside the solvers: position before rotation, the displacement being that of the camera itself.
+    # Outside of the solvers, position comes before rotation, and the displacement is that of the camera itself.
     turn = np.zeros((6, 6))
     turn[:3, :3] = -crossed(best.mount[:3, 3])
     turn[:3, 3:] = turn[3:, :3] = np.eye(3)

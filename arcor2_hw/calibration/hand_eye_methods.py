@@ -1,7 +1,7 @@
-"""Closed solutions of the hand-eye equation, with the arguments and results of OpenCV's calibrateHandEye.
+"""Closed-form solutions of the hand-eye equation, with the arguments and results of OpenCV's calibrateHandEye.
 
-OpenCV 5.0 has lost that function; when it is back, it may stand here with `method=` instead. Two ways that weigh errors
-differently are worth comparing: Park and Martin solve rotation first, Daniilidis both at once.
+OpenCV 5.0 no longer has that function. Two methods with different weighting of errors are compared: Park and Martin
+solve the rotation first, Daniilidis solves rotation and translation together.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,19 +23,21 @@ def park(
     target2cam_at: Sequence[Array],
     smallest_turn: float = 0.1,
 ) -> tuple[Array, Array]:
-    """Give the camera's rotation (3 × 3) and position (3, m) on the gripper.
+    """Compute the camera's rotation (3, 3) and position (3, m) on the gripper.
 
     F. C. Park, B. J. Martin, Robot sensor calibration: solving AX = XB on the Euclidean group, 1994, section III.
 
     Args:
-        gripper2base, gripper2base_at: rotations and positions (m) of the gripper in the robot's base, per station.
-        target2cam, target2cam_at: of the target in the camera's frame.
-        smallest_turn: rad; pairs of stations with less rotation between them are not used.
+        gripper2base: Rotations of the gripper in the robot's base, one per station.
+        gripper2base_at: Positions of the gripper in the robot's base, m.
+        target2cam: Rotations of the target in the camera's frame.
+        target2cam_at: Positions of the target in the camera's frame, m.
+        smallest_turn: Rotation between stations below which a pair is not used, rad.
     """
     hand, hand_at, eye, eye_at = _motions(gripper2base, gripper2base_at, target2cam, target2cam_at, smallest_turn)
     alpha = np.stack([rotation_vector(each) for each in hand])
     beta = np.stack([rotation_vector(each) for each in eye])
-    # The rotation that takes all beta to alpha; of the matrix it is the orthogonal part.
+    # The rotation from all beta to alpha is the orthogonal part of the matrix.
     u, _, v = np.linalg.svd(alpha.T @ beta)
     rotation = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
     left = (np.eye(3) - hand).reshape(-1, 3)
@@ -50,7 +52,7 @@ def daniilidis(
     target2cam_at: Sequence[Array],
     smallest_turn: float = 0.1,
 ) -> tuple[Array, Array]:
-    """Give the camera's rotation and position on the gripper; arguments as for `park`.
+    """Compute the camera's rotation (3, 3) and position (3, m) on the gripper; arguments as for `park`.
 
     K. Daniilidis, Hand-eye calibration using dual quaternions, 1999, section 6.
     """
@@ -68,13 +70,13 @@ def daniilidis(
     _, _, v = np.linalg.svd(np.vstack(rows), full_matrices=False)
     first, second = v[6], v[7]
     u1, w1, u2, w2 = first[:4], first[4:], second[:4], second[4:]
-    # Of all combinations the one of unit length whose halves are perpendicular: a quadratic for their ratio.
+    # Among all combinations, the one of unit length with perpendicular halves: a quadratic equation for their ratio.
     ratios = np.roots([u1 @ w1, u1 @ w2 + u2 @ w1, u2 @ w2])
     lengths = [(s.real**2 * (u1 @ u1) + 2 * s.real * (u1 @ u2) + u2 @ u2, s.real) for s in ratios]
     length, ratio = max(lengths) if lengths else (float(u2 @ u2), 0.0)
     q = (ratio * u1 + u2) / np.sqrt(length)
     d = (ratio * w1 + w2) / np.sqrt(length)
-    # Twice the dual half times the conjugate is the position.
+    # The position is twice the dual half times the conjugate.
     position = 2 * (q[0] * d[1:] - d[0] * q[1:] + np.cross(q[1:], d[1:]))
     return _matrix(q), np.asarray(position)
 
@@ -85,7 +87,7 @@ METHODS: Final[dict[str, Method]] = {"Park": park, "Daniilidis": daniilidis}
 def _motions(
     hand: Sequence[Array], hand_at: Sequence[Array], eye: Sequence[Array], eye_at: Sequence[Array], smallest: float
 ) -> tuple[Array, Array, Array, Array]:
-    """Give motions between stations, of the gripper and of the camera, in which there is enough rotation."""
+    """Return motions of gripper and camera between stations with enough rotation."""
     count = len(hand)
     pairs = [(i, j) for i in range(count) for j in range(i + 1, count)]
     pairs = [(i, j) for i, j in pairs if np.linalg.norm(rotation_vector(hand[j].T @ hand[i])) >= smallest]
@@ -100,7 +102,7 @@ def _motions(
 
 
 def _dual_quaternion(rotation: Array, position: Array) -> tuple[Array, Array]:
-    """Give a motion as a dual quaternion, scalars first and not negative."""
+    """Convert a motion to a dual quaternion, scalars first and not negative."""
     vector = rotation_vector(rotation)
     angle = float(np.linalg.norm(vector))
     axis = vector / angle if angle > 1e-12 else np.array([0.0, 0.0, 1.0])
@@ -110,6 +112,6 @@ def _dual_quaternion(rotation: Array, position: Array) -> tuple[Array, Array]:
 
 
 def _matrix(q: Array) -> Array:
-    """Give the rotation matrix of a quaternion, scalar first."""
+    """Return the rotation matrix of a quaternion, scalar first."""
     k = crossed(q[1:])
     return np.asarray(np.eye(3) + 2 * q[0] * k + 2 * k @ k)

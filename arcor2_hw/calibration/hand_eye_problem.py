@@ -1,7 +1,7 @@
-"""Hand and eye as one least-squares problem: the corners of all pictures against one mount and one target.
+"""Hand-eye calibration as one least-squares problem over the corners of all images, with one mount and one target.
 
-Of station i is known `parent_from_hand` (of what carries the camera, or of what the camera carries turned round): a
-point p of the target is seen at X⁻¹ · Hᵢ⁻¹ · T · p, with the mount X and the target T, both unknown.
+For station i, `parent_from_hand` is known (of the carrier of the camera, or inversely of the carried target). A point
+p of the target is projected from X⁻¹ · Hᵢ⁻¹ · T · p, with unknown mount X and target T.
 """
 
 from collections.abc import Sequence
@@ -17,12 +17,12 @@ from arcor2_hw.calibration.rigid import crossed, inverted, moved
 _ROUNDS: Final = 60
 _WEIGHINGS: Final = 2
 _SOFT: Final = 3.0
-"""How many times the usual error a station may be off before it counts less (Cauchy)."""
+"""Ratio of a station's error to the typical error above which it has less weight (Cauchy)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Station:
-    """One picture: index of the sample, where the hand was (4 × 4), what was seen (points in the target's frame)."""
+    """One image: index of the sample, pose of the hand (4, 4), and detected points in the frame of the target."""
 
     index: int
     hand: Array
@@ -30,20 +30,21 @@ class Station:
 
     @property
     def points(self) -> Array:
-        """Give the points of the target that were seen, n × 3."""
+        """Return the detected points of the target, (n, 3)."""
         return np.concatenate([each.points for each in self.seen])
 
     @property
     def pixels(self) -> Array:
-        """Give where they were seen, n × 2."""
+        """Return their pixels, (n, 2)."""
         return np.concatenate([each.pixels for each in self.seen])
 
 
 @dataclass(frozen=True, eq=False)
 class Mount:
-    """mount (X) and target (T), 4 × 4; errors of each station's corners, px.
+    """The mount (X) and the target (T), (4, 4), and the errors of each station's corners, px.
 
-    covariance: of a small motion after the mount (rotation in rad, displacement in m), in the hand's frame.
+    Attributes:
+        covariance: Of a small motion after the mount (rotation in rad, displacement in m), in the frame of the hand.
     """
 
     mount: Array
@@ -53,7 +54,7 @@ class Mount:
 
 
 def errors_at(lens: Lens, stations: Sequence[Station], mount: Array, target: Array) -> list[Array] | None:
-    """Give the errors of all corners, px; None where something would lie behind the camera."""
+    """Return the errors of all corners, px; None where a point would be behind the camera."""
     result = []
     for each in stations:
         chain = inverted(each.hand @ mount) @ target
@@ -67,11 +68,16 @@ def errors_at(lens: Lens, stations: Sequence[Station], mount: Array, target: Arr
 def refined(
     lens: Lens, stations: Sequence[Station], mount: Array, target: Array, robot: tuple[float, float]
 ) -> Mount | None:
-    """Search for the mount and the target that explain all corners best, from a start.
+    """Find the mount and the target that explain all corners best, from an initial guess.
 
-    robot: how exact the hand's poses are, m and rad (standard deviations); only their ratio, to each other and to the
-    errors of the corners, matters. An inexact hand moves all corners of a picture together: without that in the
-    weights, the search would take such a motion for many measurements that agree.
+    Args:
+        lens: The lens.
+        stations: Images and hand poses.
+        mount: Initial mount, (4, 4).
+        target: Initial target, (4, 4).
+        robot: Standard deviations of hand poses, m and rad. Only their ratio to each other and to the errors of corners
+            matters. An inexact hand pose moves all corners of an image together; without it in the weights, such a
+            motion would count as many independent measurements.
     """
     found: Mount | None = None
     for _ in range(_WEIGHINGS):
@@ -86,7 +92,7 @@ def refined(
 def _searched(
     lens: Lens, stations: Sequence[Station], mount: Array, target: Array, whiteners: Sequence[Array]
 ) -> Mount | None:
-    """Search with given weights (Levenberg and Marquardt)."""
+    """Search with given weights (Levenberg-Marquardt)."""
     errors = errors_at(lens, stations, mount, target)
     if errors is None:
         return None
@@ -120,7 +126,7 @@ def _searched(
 def _whiteners(
     lens: Lens, stations: Sequence[Station], mount: Array, target: Array, robot: tuple[float, float]
 ) -> list[Array] | None:
-    """Give, per station, what makes its errors independent and of unit variance; None where something is behind."""
+    """Return for each station the matrix that whitens its errors; None where a point would be behind the camera."""
     if errors_at(lens, stations, mount, target) is None:
         return None
     position, orientation = robot
@@ -139,7 +145,7 @@ def _whiteners(
 
 
 def _usual(errors: Sequence[Array], whiteners: Sequence[Array]) -> float:
-    """Give the size of a station's errors, in what they were taken to be: the median."""
+    """Return the typical error of a station relative to its expected error, the median."""
     sizes = [np.mean((root @ each.ravel()) ** 2) for each, root in zip(errors, whiteners, strict=True)]
     return max(float(np.sqrt(np.median(sizes))), 1e-3)
 
@@ -153,7 +159,7 @@ def _cost(errors: Sequence[Array], whiteners: Sequence[Array], usual: float) -> 
 
 
 def _slopes(lens: Lens, each: Station, mount: Array, target: Array) -> Array:
-    """Give the derivatives of a station's pixels by small motions of mount and target (rotation, displacement)."""
+    """Return the derivatives of a station's pixels by small motions of mount and target (rotation, displacement)."""
     hand_from_parent, camera_from_hand = inverted(each.hand), inverted(mount)
     placed = each.points @ target[:3, :3].T + target[:3, 3]
     at_hand = placed @ hand_from_parent[:3, :3].T + hand_from_parent[:3, 3]
@@ -174,7 +180,7 @@ def _equations(
     whiteners: Sequence[Array],
     usual: float,
 ) -> tuple[Array, Array]:
-    """Give the normal equations for small motions of mount and target (rotation, displacement)."""
+    """Return the normal equations for small motions of mount and target (rotation, displacement)."""
     normal, right = np.zeros((12, 12)), np.zeros(12)
     for each, left, root in zip(stations, errors, whiteners, strict=True):
         a = root @ _slopes(lens, each, mount, target)

@@ -1,4 +1,4 @@
-"""A camera's intrinsics and distortion, from pictures of a ChArUco board."""
+"""Camera intrinsics and distortion from images of a ChArUco board."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -30,11 +30,11 @@ _FLAGS: Final = {
 _FIELDS: Final = (8, 6)
 """Columns and rows of the fields in which corners are counted."""
 _OUTLIER: Final = 3.0
-"""How many times the median of all views' errors a view's may be."""
+"""Ratio of a view's error to the median error above which the view is not used."""
 _LEAST_OUTLIER: Final = 0.5
-"""px, that a view's error may be in any case."""
+"""Error up to which a view is always used, px."""
 _GOOD: Final = 0.0007
-"""Deviation of the focal length, as a part of it, up to which a calibration is good."""
+"""Standard deviation of the focal length, as a fraction, up to which a calibration is good."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class _Solved:
     deviations: Array
     errors: list[Array]
     normals: Array
-    """Directions of the board's normal in the camera's frame, n × 3."""
+    """Normals of the board in the camera's frame, (n, 3)."""
 
 
 def find_intrinsics(
@@ -63,20 +63,20 @@ def find_intrinsics(
     """Find the intrinsics of a camera.
 
     Args:
-        pictures: of the board from various directions and distances, all over the picture; 10 to 30 are good.
-        board: its pose does not matter.
-        options: lens model and limits.
-        progress: is called with how many pictures are done, and how many there are.
+        pictures: Images of the board from different directions and distances, all over the image; 10 to 30 are good.
+        board: The board; its pose is ignored.
+        options: Lens model and limits.
+        progress: Called with the number of processed images and their total number.
 
     Raises:
-        InvalidPicture: as find_camera_pose; pictures of different sizes.
-        InvalidData: a board that cannot be; no pictures, or more than MOST_PICTURES.
-        CalibrationRefused: too few points (in too few pictures, or in too little of the picture); degenerate (the
-            board is seen from one direction only); implausible (the errors are large: another board, a bent one).
+        InvalidPicture: As in `find_camera_pose`; also images of different sizes.
+        InvalidData: The board is invalid, or there are no images or more than MOST_PICTURES.
+        CalibrationRefused: Too few images or too little coverage; degenerate (the board is seen from one direction
+            only); implausible (errors are large: another board, or a bent one).
     """
     options = options or IntrinsicsOptions()
     if not 1 <= len(pictures) <= MOST_PICTURES:
-        raise InvalidData(f"one to {MOST_PICTURES} pictures are needed, not {len(pictures)}")
+        raise InvalidData(f"1 to {MOST_PICTURES} images are needed, not {len(pictures)}")
     made = board_of(board)
     size = (0, 0)
     views: list[_View] = []
@@ -103,14 +103,18 @@ def find_intrinsics(
 
 def _why_not(grey: Grey, options: IntrinsicsOptions) -> str:
     if sharpness_of(grey) < options.blur_threshold:
-        return "the board is not in sight, or the picture is blurred"
-    return "the board is not in sight, or too little of it, or too small"
+        return "the board is not visible, or the picture is blurred"
+    return "the board is not visible, only in part, or too small"
 
 
 def _check_enough(
     views: list[_View], problems: dict[int, str], size: tuple[int, int], options: IntrinsicsOptions
 ) -> None:
-    """Raise CalibrationRefused for too few views, or too little of the picture."""
+    """Require enough views and coverage.
+
+    Raises:
+        CalibrationRefused: There are too few views, or too little coverage.
+    """
     if len(views) < options.fewest_views:
         if not views:
             reason, text = Reason.NO_MARKER, "The board is in none of the pictures: is it the one that was described?"
@@ -129,7 +133,7 @@ def _check_enough(
 
 
 def coverage_of(pixels: Sequence[Array], size: tuple[int, int]) -> float:
-    """Give the part of a picture's fields in which there is a corner."""
+    """Return the fraction of an image's fields that has a corner."""
     columns, rows = _FIELDS
     together = np.concatenate(pixels) / size * _FIELDS
     fields = {(int(x), int(y)) for x, y in together if 0 <= x < columns and 0 <= y < rows}
@@ -147,7 +151,7 @@ def _solve(views: list[_View], size: tuple[int, int], options: IntrinsicsOptions
         )
     except cv2.error as error:
         raise CalibrationRefused(
-            "The pictures determine no lens: are they all of the board, and from different directions?",
+            "The pictures do not determine a lens. Check that all of them show the board, from different directions.",
             str(error).strip(),
             Reason.DEGENERATE,
         ) from error
@@ -169,7 +173,7 @@ def _solve(views: list[_View], size: tuple[int, int], options: IntrinsicsOptions
 
 
 def _outlier(solved: _Solved) -> int | None:
-    """Give the view that fits far worse than the others."""
+    """Return the view that fits far worse than the others."""
     residuals = [_root_mean_square(each) for each in solved.errors]
     worst = int(np.argmax(residuals))
     return worst if residuals[worst] > max(_OUTLIER * float(np.median(residuals)), _LEAST_OUTLIER) else None
@@ -180,7 +184,7 @@ def _root_mean_square(errors: Array) -> float:
 
 
 def _tilt_between(normals: Array) -> float:
-    """Give the largest angle between two directions from which the board was seen, rad."""
+    """Return the largest angle between two directions from which the board was seen, rad."""
     return float(np.arccos(np.clip(normals @ normals.T, -1.0, 1.0).min()))
 
 
@@ -192,7 +196,7 @@ def _result(
     options: IntrinsicsOptions,
     pictures: int,
 ) -> Intrinsics:
-    """Give what was found with its errors in words, or refuse it."""
+    """Return the result with its verdict, or refuse it."""
     tilt = _tilt_between(solved.normals)
     if tilt < options.smallest_tilt:
         raise CalibrationRefused(
@@ -213,8 +217,8 @@ def _result(
     width, height = size
     if not (0.25 < cx / width < 0.75 and 0.25 < cy / height < 0.75 and fx > 0 and 0.5 < fx / fy < 2.0):
         raise CalibrationRefused(
-            "The lens that fits the pictures cannot be: its axis is far from their middle. More pictures, tilted to "
-            "all sides, are needed.",
+            "The lens that fits the pictures is implausible: its axis is far from their middle. Take more "
+            "pictures, tilted to all sides.",
             f"fx {fx:.1f}, fy {fy:.1f}, cx {cx:.1f}, cy {cy:.1f}",
             Reason.IMPLAUSIBLE,
         )
@@ -243,7 +247,7 @@ def _result(
         picture=error_picture(
             size,
             [(f"picture {v.index}", v.pixels, e, True) for v, e in zip(views, solved.errors, strict=True)],
-            f"{len(views)} pictures, r.m.s. {residual:.2f} px, corners in {covered:.0%} of the picture",
+            f"{len(views)} pictures, rms {residual:.2f} px, corners in {covered:.0%} of the picture",
         ),
     )
 
@@ -251,7 +255,7 @@ def _result(
 def _verdict(
     used: int, pictures: int, residual: float, focal_px: float, focal: float, centre: float, covered: float
 ) -> tuple[Grade, str]:
-    """Say how good intrinsics are, and what would make them better."""
+    """Return how good intrinsics are, and what would improve them."""
     text = (
         f"The focal length is known to {focal_px:.1f} px and the middle of the picture to {centre:.1f} px (standard "
         f"deviations, {used} of {pictures} pictures, residual {residual:.2f} px, corners in {covered:.0%} of it)."

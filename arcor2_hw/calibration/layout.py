@@ -1,7 +1,7 @@
-"""What a camera looks at when it is calibrated: markers and boards, and where they stand. Imports no numerics.
+"""Calibration targets: markers and boards, and their poses. Imports no numerics.
 
-Frames. Camera: the optical frame (x right, y down, z forward). Marker: origin in its middle, x right, y up, z out of it
-towards who looks at it. Board: the same, as if it were one large marker. Lengths in m.
+Frames. Camera: optical frame (x right, y down, z forward). Marker: origin in its middle, x right, y up, z out of it
+towards the viewer. Board: the same, as if it was one large marker. Lengths in m.
 """
 
 from typing import Literal
@@ -18,11 +18,16 @@ MarkerDictionary = Literal[
     "7x7_50", "7x7_100", "7x7_250", "7x7_1000",
     "original", "apriltag_16h5", "apriltag_25h9", "apriltag_36h10", "apriltag_36h11", "mip_36h12",
 ]  # fmt: skip
-"""ArUco's predefined dictionaries. The protocol's is 4x4_50."""
+"""ArUco's predefined dictionaries. The protocol uses 4x4_50."""
 
 
 class Marker(Data, frozen=True):
-    """One ArUco marker. pose: in the origin's frame. size: side of its black square; unset: the layout's."""
+    """One ArUco marker.
+
+    Attributes:
+        pose: Pose in the frame of the origin.
+        size: Side of its black square, m; unset: the size of the layout.
+    """
 
     marker_id: int
     pose: Pose
@@ -30,10 +35,15 @@ class Marker(Data, frozen=True):
 
 
 class CharucoBoard(Data, frozen=True):
-    """One ChArUco board of columns × rows squares, its markers numbered from `first_id` on.
+    """One ChArUco board of columns × rows squares with markers numbered from `first_id`.
 
-    square, marker: their sides, m. pose: of the board's middle in the origin's frame. legacy_pattern: printed by OpenCV
-    before 4.6 with an even number of rows (a white square in the upper left corner).
+    Attributes:
+        square: Side of a square, m.
+        marker: Side of a marker, m.
+        pose: Pose of the board's middle in the frame of the origin.
+        legacy_pattern: Whether it was printed by OpenCV before 4.6 with an even number of rows, which has a white
+            square
+            in the upper left corner.
     """
 
     columns: int
@@ -47,7 +57,12 @@ class CharucoBoard(Data, frozen=True):
 
 
 class Layout(Data, frozen=True):
-    """Which markers and boards stand where. size: side of the markers that state none. dictionary: of the markers."""
+    """Markers and boards with their poses.
+
+    Attributes:
+        size: Side of markers that state none, m.
+        dictionary: Dictionary of the markers.
+    """
 
     markers: list[Marker] = field(default_factory=list)
     boards: list[CharucoBoard] = field(default_factory=list)

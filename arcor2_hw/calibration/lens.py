@@ -1,4 +1,4 @@
-"""A camera's lens as the solvers use it: pixels to rays and back, by OpenCV's model."""
+"""A camera's lens for the solvers: pixels to rays and back, by OpenCV's model."""
 
 import math
 from typing import Any, Final
@@ -14,16 +14,17 @@ Array = npt.NDArray[np.float64]
 
 _UNDISTORTING: Final = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 60, 1e-12)
 _ROUND_TRIP: Final = 0.01
-"""px, by which a corner of the picture may differ after it was taken to a ray and back."""
+"""Maximum error of an image corner after conversion to a ray and back, px."""
 _STEP: Final = 1e-5
 _NOTHING: Final = np.zeros(3)
 
 
 class Lens:
-    """Intrinsics, checked for pictures of width × height.
+    """Intrinsics, validated for images of width × height.
 
-    Raises InvalidData: numbers that are not finite or not positive; a principal point that cannot belong to pictures of
-    that size; distortion that cannot be undone in the corners of the picture.
+    Raises:
+        InvalidData: A number is not finite or not positive, the principal point is not inside images of this size, or
+            the distortion cannot be inverted in the corners of the image.
     """
 
     def __init__(self, parameters: CameraParameters, width: int, height: int) -> None:
@@ -35,8 +36,8 @@ class Lens:
             raise InvalidData("the camera's parameters must be finite numbers")
         if not (0.25 < p.cx / width < 0.75 and 0.25 < p.cy / height < 0.75):
             raise InvalidData(
-                f"the camera's parameters are not those of pictures of {width} × {height}: "
-                f"the principal point is at {p.cx:.0f}, {p.cy:.0f}"
+                f"the camera's parameters do not match images of {width} × {height}: the principal point is at "
+                f"{p.cx:.0f}, {p.cy:.0f}"
             )
         self.parameters = parameters
         self.width, self.height = width, height
@@ -45,29 +46,29 @@ class Lens:
         corners = np.array([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]])
         rays = self.rays(corners)
         miss = float(np.abs(self.pixels(rays) - corners).max())
-        # From the middle to the corners the picture must not turn back on itself.
+        # From the middle to the corners, the distorted radius must grow.
         _, slopes = self.pixels_and_slopes(np.concatenate([rays * part for part in np.linspace(0.05, 1.0, 20)]))
         if not (miss < _ROUND_TRIP and np.linalg.det(slopes).min() > 0):
             raise InvalidData(
-                "the camera's distortion cannot be undone in the corners of the picture: "
-                "its coefficients are wrong, or of another lens model",
+                "the camera's distortion cannot be inverted in the corners of the image: its coefficients are "
+                "wrong, or belong to another lens model",
                 f"{p.dist_coefs}, off by {miss:.3g} px",
             )
 
     def rays(self, pixels: Array) -> Array:
-        """Give x and y at distance 1 of the rays that pixels see: n × 2."""
+        """Return x and y at distance 1 of the rays of pixels, (n, 2)."""
         points = np.ascontiguousarray(pixels, dtype=np.float64).reshape(-1, 1, 2)
         found: Any = cv2.undistortPoints(points, self.matrix, self.coefficients, criteria=_UNDISTORTING)
         return np.asarray(found, dtype=np.float64).reshape(-1, 2)
 
     def pixels(self, rays: Array) -> Array:
-        """Give the pixels to which rays (x and y at distance 1) go: n × 2."""
+        """Return the pixels of rays (x and y at distance 1), (n, 2)."""
         points = np.column_stack((rays, np.ones(len(rays))))
         found: Any = cv2.projectPoints(points, _NOTHING, _NOTHING, self.matrix, self.coefficients)[0]
         return np.asarray(found, dtype=np.float64).reshape(-1, 2)
 
     def pixels_and_slopes(self, rays: Array) -> tuple[Array, Array]:
-        """Give the pixels of rays, n × 2, and by how much they move per x and per y of the ray: n × 2 × 2."""
+        """Return the pixels of rays, (n, 2), and their derivatives by x and y of the ray, (n, 2, 2)."""
         count = len(rays)
         moved = np.concatenate((rays, rays + np.array([_STEP, 0.0]), rays + np.array([0.0, _STEP])))
         found = self.pixels(moved)
@@ -76,12 +77,12 @@ class Lens:
         return at, slopes
 
     def projected(self, points: Array, change: Array) -> Array:
-        """Project points in the camera's frame with intrinsics changed by that much (as `numbers`): n × 2."""
+        """Project points in the camera's frame with intrinsics changed by `change` (as `numbers`), (n, 2)."""
         pixels: Any = cv2.projectPoints(points, _NOTHING, _NOTHING, *self._changed(change))[0]
         return np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
 
     def projected_with_slopes(self, points: Array, change: Array) -> tuple[Array, Array, Array]:
-        """Project points as `projected` does; give the derivatives by the points and by the intrinsics, too."""
+        """Project points like `projected`, and return the derivatives by the points and by the intrinsics."""
         pixels: Any
         pixels, derivatives = cv2.projectPoints(points, _NOTHING, _NOTHING, *self._changed(change))[:2]
         jacobian = np.asarray(derivatives, dtype=np.float64).reshape(len(points), 2, -1)
@@ -89,12 +90,12 @@ class Lens:
 
     @property
     def numbers(self) -> Array:
-        """Give fx, fy, cx, cy and the coefficients as one vector."""
+        """Return fx, fy, cx, cy and the coefficients as one vector."""
         p = self.parameters
         return np.array([p.fx, p.fy, p.cx, p.cy, *p.dist_coefs])
 
     def changed(self, change: Array) -> CameraParameters:
-        """Give the intrinsics changed by that much (as `numbers`)."""
+        """Return the intrinsics changed by `change` (as `numbers`)."""
         fx, fy, cx, cy, *coefficients = map(float, self.numbers + change)
         return CameraParameters(fx, fy, cx, cy, coefficients)
 

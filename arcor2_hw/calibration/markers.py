@@ -1,4 +1,4 @@
-"""Markers in a picture: found, and their corners measured to a hundredth of a pixel."""
+"""Detection of markers in images, and measurement of their corners to a hundredth of a pixel."""
 
 from collections import defaultdict
 from typing import Any, Final
@@ -14,23 +14,23 @@ from arcor2_hw.calibration.pictures import Grey, Picture, grey_of
 from arcor2_hw.data.camera import CameraParameters, Corner, MarkerCorners
 
 _COARSE: Final = 0.5
-"""px, standard deviation of a corner of the detector's, where the edges could not be measured."""
+"""Standard deviation of a detected corner where the edges could not be measured, px."""
 
 
 _SEARCHES: Final = (((29,), 15.0), ((13, 33), 6.0))
-"""Windows (px) of the local threshold, and by how much a marker is darker than its surroundings (grey levels)."""
+"""Windows (px) of the local threshold, and the difference of a marker to its surroundings (grey levels)."""
 _MARGIN: Final = 8
-"""px around a marker that are looked at."""
+"""Margin around a marker that is processed, px."""
 _STRAIGHT: Final = 0.1
-"""px, shift of edges up to which a tone curve is the right one."""
+"""Shift of edges up to which a tone curve is correct, px."""
 _LEVELS: Final = np.arange(256) / 255.0
 _SRGB: Final = np.where(_LEVELS <= 0.04045, _LEVELS / 12.92, ((_LEVELS + 0.055) / 1.055) ** 2.4)
 TONES: Final = (_SRGB.astype(np.float32), _LEVELS.astype(np.float32))
-"""Light by grey value (IEC 61966-2-1, and a straight line)."""
+"""Brightness by grey value (IEC 61966-2-1, and linear)."""
 
 
 def dictionary_number(dictionary: MarkerDictionary) -> int:
-    """Give OpenCV's number of a dictionary."""
+    """Return OpenCV's number of a dictionary."""
     prefix = "DICT_" if dictionary[0].isdigit() else "DICT_ARUCO_"
     if dictionary.startswith("apriltag"):
         prefix = "DICT_"
@@ -38,14 +38,14 @@ def dictionary_number(dictionary: MarkerDictionary) -> int:
 
 
 def dictionary_size(dictionary: MarkerDictionary) -> int:
-    """Give how many markers a dictionary has."""
+    """Return the number of markers in a dictionary."""
     return len(cv2.aruco.getPredefinedDictionary(dictionary_number(dictionary)).bytesList)
 
 
 def detect(grey: Grey, dictionary: MarkerDictionary, enough: int = 1000) -> list[tuple[int, Array]]:
-    """Find markers: number and corners (4 × 2, px, to a pixel or so). One that is found twice at a place is given once.
+    """Detect markers: number and corners (4, 2), px, to about one pixel. Duplicates at one place are merged.
 
-    A picture in which fewer than `enough` are found is searched once more for those of low contrast.
+    An image with fewer than `enough` markers is searched again for markers of low contrast.
     """
     family = cv2.aruco.getPredefinedDictionary(dictionary_number(dictionary))
     result: list[tuple[int, Array]] = []
@@ -69,10 +69,11 @@ def detect(grey: Grey, dictionary: MarkerDictionary, enough: int = 1000) -> list
 
 
 def measured(grey: Grey, lens: Lens, dictionary: MarkerDictionary, found: list[tuple[int, Array]]) -> list[Measured]:
-    """Measure the corners of markers that were found; one whose edges cannot be measured keeps the detector's.
+    """Measure the corners of detected markers; where edges cannot be measured, the detected corners are used.
 
-    Grey values are light by one of two tone curves, that of sRGB or a straight line: with the right one, edges of the
-    largest marker lie where they should.
+    Grey values are converted to brightness by one of two tone curves, sRGB or linear: the one with which the edges of
+    the
+    largest marker are where they should be.
     """
     family = dictionary_number(dictionary)
     result: dict[int, Measured] = {}
@@ -92,7 +93,7 @@ def measured(grey: Grey, lens: Lens, dictionary: MarkerDictionary, found: list[t
 def _measured(
     grey: Grey, tone: npt.NDArray[np.float32], lens: Lens, chart: Chart, number: int, corners: Array
 ) -> Measured | None:
-    """Measure one marker in its part of the picture."""
+    """Measure one marker in its part of the image."""
     left, top = np.maximum(np.floor(corners.min(axis=0)) - _MARGIN, 0).astype(int)
     right, bottom = np.ceil(corners.max(axis=0)).astype(int) + _MARGIN
     light = cv2.LUT(grey[top:bottom, left:right], tone)
@@ -102,12 +103,14 @@ def _measured(
 def find_marker_corners(
     picture: Picture, parameters: CameraParameters, dictionary: MarkerDictionary = "4x4_50"
 ) -> list[MarkerCorners]:
-    """Give the corners of every marker in the picture, configured or not, by their ids.
+    """Return the corners of every marker in an image, configured or not, ordered by id.
 
-    Corners: px, in the picture as it is (with the lens's distortion), upper left first as the marker is printed, then
-    clockwise. An empty list when there is none; an id that is there twice is given twice.
+    Corners are in px of the distorted image, clockwise from the upper left of the printed marker. A marker that appears
+    twice is returned twice.
 
-    Raises InvalidPicture, InvalidData as find_camera_pose.
+    Raises:
+        InvalidPicture: As in `find_camera_pose`.
+        InvalidData: As in `find_camera_pose`.
     """
     grey = grey_of(picture)
     lens = Lens(parameters, grey.shape[1], grey.shape[0])

@@ -1,4 +1,4 @@
-"""The pose of a camera as one least-squares problem over all corners of everything that is seen, and over hints."""
+"""The pose of a camera as one least-squares problem over all detected corners and hints."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,24 +12,28 @@ from arcor2_hw.calibration.rigid import crossed, inverted, motion, moved, rotati
 
 _ROUNDS: Final = 30
 _CONVERGED: Final = 1e-3
-"""Gain of cost (chi square) in a round below which the search is over."""
+"""Decrease of cost (chi square) in one iteration below which the search ends."""
 _GIVES_UP_AFTER: Final = 2
 _FAR_ABOVE: Final = 60.0
-"""Cost above that of another pose from which on a start is not followed to its end."""
+"""Cost above that of another pose at which a start is abandoned."""
 _BEHIND: Final = 1e9
-"""Cost of a pose from which something that is seen would lie behind the camera."""
+"""Cost of a pose at which a point would be behind the camera."""
 _SOFT: Final = 4.0
-"""How many standard deviations per corner a marker may be off before it counts less (Cauchy)."""
+"""Standard deviations per corner above which a marker has less weight (Cauchy)."""
 _CANDIDATES_OF: Final = 6
-"""Of how many markers, the largest, the poses are tried as starts."""
+"""Number of markers, largest first, whose poses are used as starts."""
 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """Something of known place that is seen: a marker, or a board.
+    """A detected marker or board of known pose.
 
-    points: n × 3, m, in the origin's frame. pixels: n × 2. root: 2n × 2n, the square root of the information (px⁻¹):
-    root @ errors has unit variance. normal: of its plane, in the origin's frame. middle: m, likewise.
+    Attributes:
+        points: (n, 3), in the frame of the origin, m.
+        pixels: (n, 2).
+        root: (2n, 2n), square root of the information (px⁻¹): root @ errors has unit variance.
+        normal: Normal of its plane in the frame of the origin.
+        middle: Its middle in the frame of the origin, m.
     """
 
     name: str
@@ -41,21 +45,22 @@ class Seen:
     normal: Array
     middle: Array
     square: Array | None = None
-    """World from marker, 4 × 4, for a marker; None for a board."""
+    """Pose of a marker in the world, (4, 4); None for a board."""
     size: float = 0.0
 
     @property
     def extent(self) -> float:
-        """Give its size in the picture, px."""
+        """Return its size in the image, px."""
         return float(np.linalg.norm(np.ptp(self.pixels, axis=0)))
 
 
 @dataclass(frozen=True, eq=False)
 class Hints:
-    """What else is known: rows of a linear, weighted condition are made of it at every pose.
+    """Prior knowledge, linearized at each pose as weighted conditions.
 
-    expected: camera_from_origin with standard deviations in m and rad. gravity: unit vector in the camera's frame, with
-    its standard deviation in rad.
+    Attributes:
+        expected: camera_from_origin with standard deviations in m and rad.
+        gravity: Unit vector in the camera's frame with its standard deviation in rad.
     """
 
     expected: Array | None = None
@@ -65,11 +70,12 @@ class Hints:
     gravity_deviation: float = 1.0
 
     def rows(self, pose: Array) -> tuple[Array, Array]:
-        """Give residuals and their derivatives by a small motion of the pose (rotation, displacement)."""
+        """Return residuals and their derivatives by a small motion of the pose (rotation, displacement)."""
         residuals: list[Array] = []
         slopes: list[Array] = []
         if self.expected is not None:
-            # The camera's position in the origin is what is known, so the error is stated in the camera's frame.
+            # The position of the camera in the frame of the origin is known, so the error is stated in the camera's
+            # frame.
             eye = pose[:3, :3] @ inverted(self.expected)[:3, 3] + pose[:3, 3]
             residuals.append(eye / self.expected_position)
             slopes.append(np.hstack((-crossed(eye), np.eye(3))) / self.expected_position)
@@ -87,10 +93,11 @@ class Hints:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A pose (camera_from_origin, 4 × 4), the intrinsics' change in standard deviations, cost, covariance of the pose.
+    """A pose (camera_from_origin, (4, 4)), the change of intrinsics in standard deviations, cost, and covariance.
 
-    covariance: 6 × 6, of a small motion after the pose (rotation vector, displacement), with what the intrinsics may be
-    off in it.
+    Attributes:
+        covariance: (6, 6), of a small motion after the pose (rotation vector, displacement), including the uncertainty
+            of the intrinsics.
     """
 
     pose: Array
@@ -100,7 +107,7 @@ class Solution:
 
 
 class _Group:
-    """Things with as many points each, so that they are computed at once."""
+    """Targets with equal numbers of points, computed together."""
 
     def __init__(self, members: list[int], seen: Sequence[Seen], firsts: Sequence[int]) -> None:
         self.members = members
@@ -110,18 +117,20 @@ class _Group:
         self.rows = 2 * count
 
     def white(self, errors: Array) -> Array:
-        """Give errors in standard deviations: members × rows."""
+        """Return errors in standard deviations, members × rows."""
         own = errors[self.index].reshape(len(self.members), self.rows)
         return np.asarray(np.matmul(self.roots, own[:, :, None])[:, :, 0])
 
 
 class PoseProblem:
-    """All that one camera sees from one place, with intrinsics that are known to `deviations` (as Lens.numbers).
+    """Everything that one camera sees from one place, with intrinsics known to `deviations` (as Lens.numbers).
 
-    The intrinsics are unknowns too, held by what is known of them: an error of theirs that the picture shows does not
-    go into the pose, and one that it does not show goes into the pose's covariance.
+    The intrinsics are unknowns with prior knowledge. Their errors that the image shows do not affect the pose; the
+    others
+    increase the covariance of the pose.
 
-    scale: standard deviations that count as one. Above 1 where things stand a little elsewhere than they are said to.
+    Attributes:
+        scale: Unit of standard deviations; above 1 where targets are not exactly where they should be.
     """
 
     def __init__(self, lens: Lens, seen: Sequence[Seen], hints: Hints, deviations: Array) -> None:
@@ -140,14 +149,14 @@ class PoseProblem:
         self._groups = [_Group(members, self.seen, firsts) for members in alike]
 
     def starts(self) -> list[Array]:
-        """Give poses from which a search may begin: both that each marker allows, and those of all corners."""
+        """Return initial poses: both that each marker allows, and those of all corners together."""
         found: list[Array] = []
         if len(self.seen) > 1:
             rays = self.lens.rays(self._pixels)
             flat = self._points - self._points.mean(axis=0)
             _, sizes, axes = np.linalg.svd(flat, full_matrices=False)
             if sizes[2] < 1e-6 * sizes[0]:
-                # IPPE wants the points in its xy plane.
+                # IPPE needs the points in its xy plane.
                 turn = axes if np.linalg.det(axes) > 0 else axes * np.array([[1.0], [1.0], [-1.0]])
                 to_plane = motion(turn, -turn @ self._points.mean(axis=0))
                 found += [pose @ to_plane for pose in _solved(flat @ turn.T, rays, cv2.SOLVEPNP_IPPE)]
@@ -158,7 +167,7 @@ class PoseProblem:
         return found
 
     def typical(self, pose: Array, change: Array | None = None) -> float:
-        """Give how many standard deviations a corner is off at a pose: the median over what is seen."""
+        """Return the typical error of a corner at a pose in standard deviations: the median."""
         errors = self._errors(pose, self.unchanged if change is None else change)
         if errors is None:
             return float("inf")
@@ -166,7 +175,7 @@ class PoseProblem:
         return float(np.sqrt(np.median(np.concatenate(squares))))
 
     def cost(self, pose: Array, change: Array | None = None) -> float:
-        """Give the robust cost of a pose."""
+        """Return the robust cost of a pose."""
         change = self.unchanged if change is None else change
         errors = self._errors(pose, change)
         if errors is None:
@@ -180,9 +189,10 @@ class PoseProblem:
         return total
 
     def refined(self, start: Array, change: Array | None = None, *, enough: float = _BEHIND) -> Solution | None:
-        """Search for the least cost from a start (Levenberg and Marquardt).
+        """Minimize the cost from an initial pose (Levenberg-Marquardt).
 
-        None if there is none in front of the start, or if after some rounds it is still far above `enough`.
+        Returns:
+            None when a point is behind the camera at the start, or the cost stays far above `enough`.
         """
         pose, damping = start, 1e-4
         change = self.unchanged if change is None else change
@@ -212,7 +222,7 @@ class PoseProblem:
         return Solution(pose, change, cost, covariance)
 
     def errors(self, pose: Array, change: Array) -> list[Array] | None:
-        """Give the errors of all that is seen at a pose, px, n × 2 each; None where something is behind the camera."""
+        """Return the errors of all targets at a pose, px, (n, 2) each; None where a point is behind the camera."""
         errors = self._errors(pose, change)
         return None if errors is None else [errors[part] for part in self._parts]
 
@@ -223,7 +233,7 @@ class PoseProblem:
         return np.asarray(self.lens.projected(camera, change * self._deviations) - self._pixels)
 
     def _equations(self, pose: Array, change: Array) -> tuple[Array, Array]:
-        """Give the normal equations at a pose: rotation, displacement, intrinsics in standard deviations."""
+        """Return the normal equations at a pose: rotation, displacement, intrinsics in standard deviations."""
         camera = self._points @ pose[:3, :3].T + pose[:3, 3]
         pixels, by_point, by_lens = self.lens.projected_with_slopes(camera, change * self._deviations)
         errors = pixels - self._pixels
@@ -248,7 +258,7 @@ class PoseProblem:
 
 
 def planar_poses(lens: Lens, each: Seen) -> list[Array]:
-    """Give the poses of the camera (camera_from_origin) that one marker, or one board, allows: one or two."""
+    """Return the poses of the camera (camera_from_origin) that one marker or board allows: one or two."""
     rays = lens.rays(each.pixels)
     if each.square is not None:
         half = each.size / 2
@@ -268,7 +278,7 @@ def planar_poses(lens: Lens, each: Seen) -> list[Array]:
 
 
 def _solved(points: Array, rays: Array, flags: int) -> list[Array]:
-    """Give OpenCV's closed solutions for points seen along rays, 4 × 4; none where it finds none."""
+    """Return OpenCV's closed-form solutions for points along rays, (4, 4); empty when there is none."""
     try:
         _, turns, places, _ = cv2.solvePnPGeneric(
             np.ascontiguousarray(points), np.ascontiguousarray(rays), np.eye(3), np.zeros(4), flags=flags
@@ -286,7 +296,7 @@ def _solved(points: Array, rays: Array, flags: int) -> list[Array]:
 
 
 def _cross(a: Array, b: Array) -> Array:
-    """Give the cross products of vectors along the last axis; np.cross takes several times as long for so few."""
+    """Return the cross products of vectors along the last axis; np.cross is several times slower for so few."""
     x, y, z = a[..., 0], a[..., 1], a[..., 2]
     u, v, w = b[..., 0], b[..., 1], b[..., 2]
     result = np.empty(b.shape)

@@ -1,4 +1,4 @@
-"""The search for a camera's pose: several starts; what contradicts is left out, what is ambiguous is refused."""
+"""The search for the pose of a camera from several starts. Contradictions are excluded, ambiguity is refused."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -14,24 +14,25 @@ from arcor2_hw.calibration.rigid import apart, inverted
 from arcor2_hw.data.camera import CameraParameters
 
 _TRIED: Final = 4
-"""How many of the best starts are followed."""
+"""Number of best starts that are refined."""
 _TELL_APART: Final = 16.0
-"""Difference of cost (chi square) from which on the better of two poses is the right one: four standard deviations."""
+"""Difference of cost (chi square) above which the better of two poses is correct: four standard deviations."""
 _NO_RIVAL: Final = 300.0
-"""Cost of a start above that of the best pose from which on it leads to no pose that could be taken for it.
+"""Cost of a start above that of the best pose from which it cannot lead to a rival.
 
-The closed form for all corners gives both poses that a flat layout allows; other starts are for when it is misled.
+The closed form for all corners yields both poses that a flat layout allows; other starts are for cases it misses.
 """
 _SCALINGS: Final = 3
 _SAME: Final = (0.002, 0.004)
-"""m, rad, up to which two poses are one."""
+"""Differences in m and rad up to which two poses are the same."""
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """A pose (camera_from_origin), errors in px, the lens that goes with it.
+    """A pose (camera_from_origin), errors in px, and the lens.
 
-    covariance: of the camera in the origin's frame, m and rad.
+    Attributes:
+        covariance: Of the camera in the frame of the origin, m and rad.
     """
 
     pose: Array
@@ -43,7 +44,11 @@ class Found:
 
 
 def search(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOptions) -> Found:
-    """Find the pose that explains all that is seen. Raises CalibrationRefused (AMBIGUOUS, IMPLAUSIBLE, …)."""
+    """Find the pose that explains everything detected.
+
+    Raises:
+        CalibrationRefused: The result is ambiguous, implausible or missing.
+    """
     left_out: set[tuple[str, int]] = set()
     deviations = intrinsics_deviations(lens, options)
     everything = PoseProblem(lens, seen, hints, deviations)
@@ -65,7 +70,7 @@ def search(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOptions)
         left_out.add(worst_key)
         if 2 * (len(names) - 1) <= len({each.key for each in seen}):
             raise CalibrationRefused(
-                "Most markers do not stand where they are said to: no majority of them agrees on where the camera is.",
+                "Most markers are not at their configured poses: no majority agrees on the pose of the camera.",
                 f"{len(left_out)} of {len({each.key for each in seen})} contradict the others",
                 Reason.IMPLAUSIBLE,
             )
@@ -76,9 +81,10 @@ def search(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOptions)
 
 
 def solve(problem: PoseProblem, options: PoseOptions) -> Solution:
-    """Give the best pose of a problem. Raises CalibrationRefused when another one is as good, or there is none.
+    """Return the best pose of a problem, even if it contradicts the image.
 
-    One that contradicts what is seen is given all the same: which of several is best does not matter then.
+    Raises:
+        CalibrationRefused: Another pose is equally good, or there is none.
     """
     typical = [(problem.typical(start), start) for start in problem.starts()]
     starts = [start for errors, start in typical if np.isfinite(errors)]
@@ -98,7 +104,7 @@ def solve(problem: PoseProblem, options: PoseOptions) -> Solution:
     if not allowed:
         what = "lies below where it can be" if found else "could not be found"
         raise CalibrationRefused(
-            f"The camera's place, as the picture has it, {what}.",
+            f"The position of the camera according to the picture is impossible: it {what}.",
             "" if not found else f"z = {inverted(found[0].pose)[2, 3]:.3f} m, at least {options.lowest} m",
             Reason.IMPLAUSIBLE if found else Reason.NOT_CONVERGED,
         )
@@ -119,7 +125,7 @@ def solve(problem: PoseProblem, options: PoseOptions) -> Solution:
 
 
 def worst_of(problem: PoseProblem, solution: Solution) -> tuple[float, tuple[str, int]]:
-    """Give the residual, px, of what fits a pose worst, and which that is."""
+    """Return the largest residual of a target, px, and the target."""
     errors = problem.errors(solution.pose, solution.change) or []
     residuals = [float(np.sqrt(np.mean(np.sum(each**2, axis=1)))) for each in errors]
     index = int(np.argmax(residuals))
@@ -127,7 +133,7 @@ def worst_of(problem: PoseProblem, solution: Solution) -> tuple[float, tuple[str
 
 
 def covariance_of(solution: Solution) -> Array:
-    """Give the covariance of the camera in the origin's frame: position (m), rotation vector (rad), 6 × 6."""
+    """Return the covariance of the camera in the frame of the origin: position (m), rotation vector (rad), (6, 6)."""
     # From a motion of the origin before the camera (rotation, displacement) to one of the camera in the origin.
     back = -solution.pose[:3, :3].T
     turn = np.zeros((6, 6))
@@ -137,7 +143,7 @@ def covariance_of(solution: Solution) -> Array:
 
 
 def intrinsics_deviations(lens: Lens, options: PoseOptions) -> Array:
-    """Give how well the intrinsics are known (standard deviations, as Lens.numbers)."""
+    """Return the standard deviations of the intrinsics (as Lens.numbers)."""
     p = lens.parameters
     centre = options.centre_deviation
     coefficients = np.abs(lens.coefficients) * options.distortion_deviation
@@ -145,7 +151,7 @@ def intrinsics_deviations(lens: Lens, options: PoseOptions) -> Array:
 
 
 def _minima(problem: PoseProblem, starts: list[Array]) -> list[Solution]:
-    """Give the distinct minima that the best starts lead to, the best one first."""
+    """Return the distinct minima reached from the best starts, best first."""
     result: list[Solution] = []
     tried: list[Array] = []
     least = float("inf")
@@ -163,17 +169,17 @@ def _minima(problem: PoseProblem, starts: list[Array]) -> list[Solution]:
 
 
 def _same(a: Array, b: Array) -> bool:
-    """Tell whether two poses (camera_from_origin) are one."""
+    """Return whether two poses (camera_from_origin) are the same."""
     distance, angle = apart(inverted(a), inverted(b))
     return distance < _SAME[0] and angle < _SAME[1]
 
 
 def _allowed(pose: Array, options: PoseOptions) -> bool:
-    """Tell whether the camera may be there."""
+    """Return whether the camera may be at a pose."""
     return not isinstance(options.lowest, float | int) or float(inverted(pose)[2, 3]) >= options.lowest
 
 
 def _who(problem: PoseProblem) -> str:
-    """Name what is seen."""
+    """Name the detected targets."""
     names = sorted({each.name for each in problem.seen})
     return f"{names[0]} is" if len(names) == 1 else f"{', '.join(names)} are"

@@ -1,4 +1,4 @@
-"""The record that every calibration leaves, and the check of a later measurement against it. Imports no numerics."""
+"""The check of a later measurement against the record of a calibration. Imports no numerics."""
 
 import math
 
@@ -17,22 +17,22 @@ def check_against(
     distance_limit: float = 0.002,
     angle_limit: float = math.radians(0.2),
 ) -> CalibrationCheck:
-    """Compare a pose measured now, or a reference pose, with the pose of the record.
+    """Compare a measured pose, or a reference pose, with the pose of the record.
 
     Args:
-        record: one with a pose as its result.
-        measured: stated in the same parent frame as the record's.
-        distance_limit: m, positive.
-        angle_limit: rad, positive.
+        record: A record whose result has a pose.
+        measured: Pose in the same parent frame as that of the record.
+        distance_limit: Maximum distance, m, positive.
+        angle_limit: Maximum angle, rad, positive.
 
     Raises:
-        InvalidData: the record's result is no pose, or a limit is not positive.
+        InvalidData: The result has no pose, or a limit is not positive.
     """
     if isinstance(record.after, Unset):
-        raise InvalidData(f"The calibration {record.id} ({record.kind.value}) gave no pose that could be checked.")
+        raise InvalidData(f"The calibration {record.id} ({record.kind.value}) has no pose that could be checked.")
     for name, limit in (("distance_limit", distance_limit), ("angle_limit", angle_limit)):
         if not 0.0 < limit < math.inf:
-            raise InvalidData(f"{name} has to be positive, not {limit}.")
+            raise InvalidData(f"{name} must be positive, not {limit}.")
     distance = record.after.position.distance_to(measured.position)
     angle = record.after.orientation.angle_to(measured.orientation)
     if not (math.isfinite(distance) and math.isfinite(angle)):

@@ -1,4 +1,4 @@
-"""The error of a calibration that would have given nonsense. Imports no numerics: the server knows it too."""
+"""The error of a calibration without a reliable result. Imports no numerics, so that the server can use it."""
 
 import enum
 
@@ -6,32 +6,33 @@ from arcor2_hw.exceptions import Arcor2Error
 
 
 class Reason(enum.StrEnum):
-    """Why a calibration gave no result."""
+    """Why a calibration has no result."""
 
     TOO_FEW_POINTS = "too_few_points"
-    """Hardly anything was measured, or hardly anything of it can be used."""
+    """Too little was measured, or too little of it is usable."""
     NO_OVERLAP = "no_overlap"
-    """What was measured lies nowhere near what was looked for."""
+    """The measurement is nowhere near the expected object."""
     NOT_CONVERGED = "not_converged"
-    """The search came to no end, or ended where measurement and model disagree."""
+    """The search did not converge, or model and measurement disagree at its end."""
     AMBIGUOUS = "ambiguous"
     """Several results explain the measurement equally well."""
     UNOBSERVABLE = "unobservable"
-    """A direction is left free: the view, or the set of points, is too symmetric."""
+    """A direction is undetermined: the view, or the set of points, is too symmetric."""
     DEGENERATE = "degenerate"
-    """The points or orientations given do not determine a result: on one line, or all alike."""
+    """The points or orientations do not determine a result, such as points on one line."""
     NO_MARKER = "no_marker"
-    """None of the configured markers and boards is in the picture, or none is configured."""
+    """No configured marker or board is in the image, or none is configured."""
     BLURRED = "blurred"
-    """The picture is not sharp enough to measure in."""
+    """The image is not sharp enough."""
     IMPLAUSIBLE = "implausible"
-    """What is seen contradicts what was said: a marker stands elsewhere, or is there twice, or the camera moved."""
+    """The measurement contradicts the configuration: a marker is elsewhere or appears twice, or the camera moved."""
 
 
 class CalibrationRefused(Arcor2Error):
-    """The measurement determines no result that could be trusted.
+    """The measurement does not determine a reliable result.
 
-    reason: for programs. `str(error)` says what a technician may change; detail has the figures.
+    Attributes:
+        reason: Reason for programs. `str(error)` says what a technician can change; `detail` contains the numbers.
     """
 
     code = "calibration_refused"

@@ -1,7 +1,7 @@
-"""Registration of a cloud onto the part of a surface that a camera sees: point to plane, Tukey's kernel, from a start.
+"""Registration of a point cloud onto the visible part of a surface: point to plane, Tukey's kernel, from a start.
 
-Source of the method: Y. Chen and G. Medioni, "Object modelling by registration of multiple range images" (1992), for
-point to plane; A. Beaton and J. Tukey (1974) for the kernel's weights.
+Sources: Y. Chen and G. Medioni, "Object modelling by registration of multiple range images" (1992), for point to
+plane; A. Beaton and J. Tukey (1974) for the weights.
 """
 
 from typing import Final, NamedTuple
@@ -16,24 +16,24 @@ from arcor2_hw.calibration.surface import RobotSurface
 Floats = npt.NDArray[np.float64]
 
 LEAST_SEEN: Final = 60
-"""Points below which no step is made."""
+"""Minimum number of points for a step."""
 COARSE: Final = 5e-4
 FINE: Final = 1e-5
-"""m; a step that moves the points by less is the last one of its stage."""
+"""Step size at which a stage ends, m."""
 COMES_NEAR: Final = 4.0
-"""Of a stage's reach: a point farther from the surface does not come within reach any more."""
+"""Multiple of a stage's reach beyond which a point is not considered again."""
 GRAZING: Final = 0.2
-"""Cosine of the angle between ray and normal below which a point is too uncertain to be used."""
+"""Cosine of the angle between ray and normal below which a point is not used."""
 
 
 DEPTH_NOISE: Final = 0.001
-"""1/m: standard deviation of a depth over its square, as of a stereo pair; only how points weigh depends on it."""
+"""Standard deviation of a depth divided by its square, 1/m, as of a stereo camera; used for weights only."""
 SURFACE_NOISE: Final = 0.0007
-"""m, by which a model differs from its robot all the same."""
+"""Standard deviation between a model and its robot, m."""
 
 
 class Rendered(NamedTuple):
-    """What of a surface is seen along rays: depth (n,) along the optical axis, infinite where nothing is."""
+    """A surface as seen along rays: depth (n,) along the optical axis, infinite where there is none."""
 
     depth: Floats
     normals: Floats
@@ -41,44 +41,46 @@ class Rendered(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """The end of a registration. Rows of (position, rotation vector about `centre`), in the base frame."""
+    """The end of a registration. Rows are (position, rotation vector about `centre`), in the base frame."""
 
     base_from_camera: Floats
     rows: Floats
-    """(n, 6): how the distance of each point used changes with a small motion."""
+    """(n, 6), derivative of the distance of each used point by a small motion."""
     errors: Floats
-    """(n,): its distance from the surface, m, before the last step."""
+    """(n,), distance from the surface before the last step, m."""
     weights: Floats
-    """(n,): 0..1."""
+    """(n,), 0 to 1."""
     used: npt.NDArray[np.intp]
     """Indices of the points used."""
     centre: Floats
     spread: float
-    """m, rms distance of the points used from the centre."""
+    """Root mean square distance of the points used from the centre, m."""
     moved: float
-    """m, by the last step, at the distance of `spread`."""
+    """Length of the last step at the distance `spread`, m."""
 
     @property
     def residual(self) -> float:
-        """Give the rms of the weighted distances, m."""
+        """Return the root mean square of the weighted distances, m."""
         return float(np.sqrt((self.weights * self.errors**2).sum() / max(self.weights.sum(), 1e-12)))
 
     def scaled_rows(self) -> Floats:
-        """Give the rows with rotations as motions at the distance of `spread`: all columns in the same unit."""
+        """Return the rows with rotations as motions at the distance `spread`, so that all columns are in m."""
         return np.asarray(self.rows / np.array([1.0] * 3 + [max(self.spread, 1e-6)] * 3))
 
     def least_known(self) -> float:
-        """Give how much of a motion in the worst known direction the distances show: 1 all, 0 nothing."""
+        """Return the visibility of a motion in the worst direction: 1 complete, 0 none."""
         rows = self.scaled_rows()
         information = (rows * self.weights[:, None]).T @ rows / max(self.weights.sum(), 1e-12)
         return float(np.sqrt(max(0.0, np.linalg.eigvalsh(information)[0])))
 
     def covariance(self, tiles: npt.NDArray[np.intp]) -> Floats:
-        """Give the 6 × 6 covariance of position and rotation of the base in its own frame.
+        """Return the covariance (6, 6) of position and rotation of the base in its own frame.
 
-        Errors of a depth picture belong together where pixels are neighbours: `tiles` (n,) says which tile of the
-        picture each point of the cloud is in, and only tiles count as independent. Source: K.-Y. Liang and S. Zeger,
-        "Longitudinal data analysis using generalized linear models" (1986), the clustered sandwich.
+        Errors of neighbouring depth pixels are correlated, so only tiles count as independent. Source: K.-Y. Liang and
+        S. Zeger, "Longitudinal data analysis using generalized linear models" (1986), the clustered sandwich.
+
+        Args:
+            tiles: (n,), tile of the image of each point of the cloud.
         """
         weighted = self.rows * self.weights[:, None]
         bread = np.linalg.pinv(weighted.T @ self.rows, rcond=1e-12, hermitian=True)
@@ -94,7 +96,7 @@ class Fit(NamedTuple):
 
 
 class Model:
-    """A robot's surface at which rays are cast. Everything is in the base frame. Not thread-safe."""
+    """A robot's surface for ray casting, in the base frame. Not thread-safe."""
 
     def __init__(self, surface: RobotSurface) -> None:
         self._scene = o3d.t.geometry.RaycastingScene()
@@ -113,31 +115,31 @@ class Model:
         return Rendered(hit["t_hit"].numpy().astype(np.float64), normals)
 
     def distance(self, points: Floats) -> Floats:
-        """Give how far points (n, 3) are from the surface, m."""
+        """Return the distances of points (n, 3) from the surface, m."""
         found = self._scene.compute_distance(o3d.core.Tensor.from_numpy(points.astype(np.float32)))
         return np.asarray(found.numpy(), dtype=np.float64)
 
     def nearest(self, points: Floats) -> tuple[Floats, Floats]:
-        """Give the nearest point of the surface to each point, and the normal there."""
+        """Return the nearest point of the surface to each point, and its normal."""
         found = self._scene.compute_closest_points(o3d.core.Tensor.from_numpy(points.astype(np.float32)))
         return found["points"].numpy().astype(np.float64), found["primitive_normals"].numpy().astype(np.float64)
 
 
 def _towards(normals: Floats, rays: npt.NDArray[np.float32]) -> Floats:
-    """Turn normals against the rays; how triangles are wound is not relied upon."""
+    """Flip normals against the rays; the winding of triangles is not relied upon."""
     away = np.einsum("ij,ij->i", normals, rays) > 0
     normals[away] *= -1.0
     return normals
 
 
 def tukey(distances: Floats, reach: float) -> Floats:
-    """Give Tukey's weights: 1 at 0, 0 from `reach` on."""
+    """Return Tukey's weights: 1 at 0, 0 from `reach` on."""
     square: Floats = np.minimum(1.0, (distances / reach) ** 2)
     return (1.0 - square) ** 2
 
 
 def rotation(vector: Floats) -> Floats:
-    """Give the matrix of a rotation vector (Rodrigues)."""
+    """Return the matrix of a rotation vector (Rodrigues)."""
     angle = float(np.linalg.norm(vector))
     x, y, z = vector
     k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
@@ -147,16 +149,19 @@ def rotation(vector: Floats) -> Floats:
 
 
 class Stage(NamedTuple):
-    """So many steps with a kernel that takes points up to `reach` m."""
+    """A number of steps with a kernel that reaches up to `reach` m."""
 
     reach: float
     steps: int
 
 
 def approach(model: Model, cloud: Floats, rays: Floats, start: Floats, stages: tuple[Stage, ...]) -> Fit | None:
-    """Register a cloud (n, 3, in the camera's frame) onto what is seen of the surface along rays, from far off.
+    """Register a cloud (n, 3, in the camera's frame) onto the visible surface along rays, from a distant start.
 
-    What is seen is rendered anew after every step. Gives None when too little is near enough to determine a step.
+    The surface is rendered again after every step.
+
+    Returns:
+        None when too few points are near enough to determine a step.
     """
     pose = start
     fit: Fit | None = None
@@ -186,9 +191,10 @@ def approach(model: Model, cloud: Floats, rays: Floats, start: Floats, stages: t
 
 
 def refine(model: Model, cloud: Floats, start: Floats, stages: tuple[Stage, ...]) -> Fit | None:
-    """Register a cloud (n, 3, in the camera's frame) onto the nearest points of the surface, from near by.
+    """Register a cloud (n, 3, in the camera's frame) onto the nearest points of the surface, from a near start.
 
-    Gives None when too little is near enough to determine a step.
+    Returns:
+        None when too few points are near enough to determine a step.
     """
     pose = start
     fit: Fit | None = None
@@ -204,7 +210,7 @@ def refine(model: Model, cloud: Floats, start: Floats, stages: tuple[Stage, ...]
             if np.count_nonzero(near) < LEAST_SEEN:
                 return None
             fit, pose = _fit(pose, points[near], kept[near], targets[near], normals[near], stage.reach)
-            kept = kept[gaps < COMES_NEAR * stage.reach]  # to ask for the nearest of far points takes longest
+            kept = kept[gaps < COMES_NEAR * stage.reach]  # nearest-point queries take longest for far points
             if fit.moved < FINE:
                 break
     return fit
@@ -213,7 +219,7 @@ def refine(model: Model, cloud: Floats, start: Floats, stages: tuple[Stage, ...]
 def _fit(
     pose: Floats, points: Floats, used: npt.NDArray[np.intp], targets: Floats, normals: Floats, reach: float
 ) -> tuple[Fit, Floats]:
-    """Make one step: the motion that brings points onto the planes of their targets."""
+    """Compute one step: the motion that moves points onto the planes of their targets."""
     errors = np.einsum("ij,ij->i", normals, targets - points)
     ways = points - pose[:3, 3]
     away = np.linalg.norm(ways, axis=1)
@@ -227,7 +233,7 @@ def _fit(
     scale = np.array([1.0] * 3 + [max(spread, 1e-6)] * 3)
     weighted = (rows * weights[:, None]).T
     information = weighted @ rows / np.outer(scale, scale)
-    information += np.eye(6) * (1e-6 * np.trace(information) + 1e-12)  # a free direction stays where it is
+    information += np.eye(6) * (1e-6 * np.trace(information) + 1e-12)  # an undetermined direction is not moved
     solution = np.linalg.solve(information, weighted @ errors / scale) / scale
     motion = np.eye(4)
     motion[:3, :3] = rotation(solution[3:])

@@ -1,4 +1,4 @@
-"""What the calibrations of robots, frames and tools give. Imports no numerics: these travel and are stored."""
+"""Results of the calibrations of robots, frames and tools. Imports no numerics, because they are sent and stored."""
 
 import enum
 
@@ -7,25 +7,33 @@ from arcor2_hw.data.geometry import Orientation, Pose, Position
 
 
 class Grade(enum.StrEnum):
-    """How far a result may be trusted. What may not be is refused (CalibrationRefused), never graded."""
+    """How reliable a result is. An unreliable one is refused (CalibrationRefused), never graded."""
 
     GOOD = "good"
     """As good as the method gets."""
     USABLE = "usable"
-    """Nothing contradicts it, but it is less certain than usual, or nothing could check it; the verdict says why."""
+    """Not contradicted, but less certain than usual or not checked by anything; the verdict says why."""
 
 
 class RobotPose(Data, frozen=True):
-    """Where a robot stands, found from a depth picture.
+    """The pose of a robot, found from depth images.
 
-    pose: world_from_base. fitness: part of the robot's visible surface that the picture confirms, 0..1; occluded: part
-    of it that something else hides. uneven: rms over parts of the picture of how far the model is from what is seen
-    there on the average, m: large when joints or model are not the robot's. residual: rms distance of the points used
-    from the model's surface, m; points: how many were used. covariance: 6 × 6, of a small motion of the base in its own
-    frame: position (m), then rotation vector (rad), as rows; position_deviation (m) and orientation_deviation (rad):
-    standard deviation in the direction that is known worst. moved (m) and turned (rad): by how much the result differs
-    from the pose that was assumed. starts: of the search, 7 where all of these agreed; agreed: how many of them ended
-    at this pose. seconds: time it took.
+    Attributes:
+        pose: world_from_base.
+        fitness: Fraction of the robot's visible surface that the image confirms, 0 to 1.
+        occluded: Fraction of the surface hidden by something else, 0 to 1.
+        uneven: Root mean square, over parts of the image, of the mean distance between model and image, m; large when
+            joints or model are not those of the robot.
+        residual: Root mean square distance of the points used from the surface, m.
+        points: Number of points used.
+        covariance: (6, 6), of a small motion of the base in its own frame: position (m), then rotation vector (rad).
+        position_deviation: Standard deviation of the position in the worst direction, m.
+        orientation_deviation: Standard deviation of the orientation in the worst direction, rad.
+        moved: Distance from the assumed pose, m.
+        turned: Angle from the assumed pose, rad.
+        starts: Number of starts of the search, 7 when all of these agreed.
+        agreed: Number of starts that ended at this pose.
+        seconds: Duration, s.
     """
 
     pose: Pose
@@ -49,10 +57,13 @@ class RobotPose(Data, frozen=True):
 class TouchedFrame(Data, frozen=True):
     """A frame from touched points.
 
-    pose: of the frame, in the frame in which the points were stated. residuals: distance of each point from where the
-    frame has it, m, in the order given; residual: their rms; worst: index of the largest. checked: whether there were
-    more points than the frame needs; if not, residuals are zero by construction and say nothing. angle_deviation:
-    rad, standard deviation of the worst known direction, 0 where not checked.
+    Attributes:
+        pose: Pose of the frame, in the frame of the given points.
+        residuals: Distance of each point from its place in the frame, m, in the given order.
+        residual: Root mean square of the residuals, m.
+        worst: Index of the largest residual.
+        checked: Whether there were more points than needed; otherwise the residuals are zero by construction.
+        angle_deviation: Standard deviation in the worst direction, rad; 0 when not checked.
     """
 
     pose: Pose
@@ -66,11 +77,15 @@ class TouchedFrame(Data, frozen=True):
 
 
 class TouchedTip(Data, frozen=True):
-    """A tool's tip, from one point touched in several orientations.
+    """The tip of a tool, from one point touched in several orientations.
 
-    position: of the tip on the flange (flange_from_tip), m. point: that was touched, in the robot's base. residuals:
-    distance of the tip from the point for each orientation, m; residual: rms; worst: index of the largest.
-    deviation: standard deviation of the position in the direction that is known worst, m.
+    Attributes:
+        position: Position of the tip on the flange (flange_from_tip), m.
+        point: The touched point in the robot's base, m.
+        residuals: Distance of the tip from the point for each orientation, m.
+        residual: Root mean square of the residuals, m.
+        worst: Index of the largest residual.
+        deviation: Standard deviation of the position in the worst direction, m.
     """
 
     position: Position
@@ -84,7 +99,7 @@ class TouchedTip(Data, frozen=True):
 
 
 class TouchedOrientation(Data, frozen=True):
-    """A tool's orientation on the flange (flange_from_tool). residuals: angle of each measurement from it, rad."""
+    """The orientation of a tool on the flange (flange_from_tool), with the angle of each measurement from it, rad."""
 
     orientation: Orientation
     grade: Grade

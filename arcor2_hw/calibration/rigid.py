@@ -1,4 +1,4 @@
-"""Rigid motions as arrays: what the solvers of calibrations share."""
+"""Rigid motions as arrays, for the solvers."""
 
 import numpy as np
 import numpy.typing as npt
@@ -7,7 +7,7 @@ Array = npt.NDArray[np.float64]
 
 
 def crossed(vector: Array) -> Array:
-    """Give the matrix of the cross product with a vector; of n × 3 vectors, n × 3 × 3."""
+    """Return the matrix of the cross product with a vector; for (n, 3) vectors, (n, 3, 3)."""
     zero = np.zeros(vector.shape[:-1])
     x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
     rows = [np.stack(row, axis=-1) for row in ((zero, -z, y), (z, zero, -x), (-y, x, zero))]
@@ -15,7 +15,7 @@ def crossed(vector: Array) -> Array:
 
 
 def turned(vector: Array) -> Array:
-    """Give the rotation matrix of a rotation vector, rad (Rodrigues)."""
+    """Return the rotation matrix of a rotation vector, rad (Rodrigues)."""
     angle = float(np.linalg.norm(vector))
     k = crossed(vector)
     if angle < 1e-9:
@@ -24,7 +24,7 @@ def turned(vector: Array) -> Array:
 
 
 def rotation_vector(rotation: Array) -> Array:
-    """Give the rotation vector, rad, with an angle in 0..pi."""
+    """Return the rotation vector of a rotation matrix, with an angle from 0 to pi."""
     skew = np.array([rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]])
     sine, cosine = float(np.linalg.norm(skew)) / 2, (float(np.trace(rotation)) - 1) / 2
     angle = float(np.arctan2(sine, cosine))
@@ -39,7 +39,7 @@ def rotation_vector(rotation: Array) -> Array:
 
 
 def motion(rotation: Array, position: Array) -> Array:
-    """Give the homogeneous matrix, 4 × 4."""
+    """Return the homogeneous matrix (4, 4) of a rotation and a position."""
     result = np.eye(4)
     result[:3, :3] = rotation
     result[:3, 3] = np.ravel(position)
@@ -47,19 +47,19 @@ def motion(rotation: Array, position: Array) -> Array:
 
 
 def inverted(matrix: Array) -> Array:
-    """Give the inverse of a homogeneous matrix."""
+    """Return the inverse of a homogeneous matrix."""
     rotation = matrix[:3, :3].T
     return motion(rotation, -rotation @ matrix[:3, 3])
 
 
 def moved(matrix: Array, step: Array) -> Array:
-    """Give a motion after a small one, stated where it ends: rotation vector (rad), then displacement (m)."""
+    """Return a motion followed by a small one in its end frame: rotation vector (rad), then displacement (m)."""
     turn = turned(step[:3])
     return motion(turn @ matrix[:3, :3], turn @ matrix[:3, 3] + step[3:])
 
 
 def apart(a: Array, b: Array) -> tuple[float, float]:
-    """Give by how much two motions differ: m, rad."""
+    """Return the difference of two motions: m, rad."""
     return (
         float(np.linalg.norm(a[:3, 3] - b[:3, 3])),
         float(np.linalg.norm(rotation_vector(a[:3, :3].T @ b[:3, :3]))),
@@ -67,10 +67,10 @@ def apart(a: Array, b: Array) -> tuple[float, float]:
 
 
 def mean_rotation(rotations: Array, weights: Array) -> Array:
-    """Give the weighted mean of rotations, n × 3 × 3, by F. L. Markley et al., Averaging Quaternions, 2007, eq. 13.
+    """Return the weighted mean of rotations, (n, 3, 3), by F. L. Markley et al., Averaging Quaternions, 2007, eq. 13.
 
-    The mean is the eigenvector of the sum of weighted outer products of the quaternions, at its largest eigenvalue. For
-    rotation matrices the same mean is the rotation next to their weighted sum (section II.B there).
+    The mean is the eigenvector of the weighted sum of outer products of quaternions with the largest eigenvalue. For
+    rotation matrices, the same mean is the rotation nearest to their weighted sum (section II.B there).
     """
     total = np.einsum("n,nij->ij", weights, rotations)
     u, _, v = np.linalg.svd(total)

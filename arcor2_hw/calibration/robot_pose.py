@@ -1,8 +1,8 @@
-"""Where a robot stands, from an RGB-D camera: the depth picture registered onto the robot's model.
+"""The pose of a robot from an RGB-D camera: depth images registered onto the robot's model.
 
-The robot's surface in its measured joint state is rendered from the camera; the averaged and filtered cloud is
-registered onto what can be seen of it, point to plane with Tukey's kernel, from several starts; what comes out is
-compared with the picture once more, pixel by pixel, and refused where the two disagree.
+The robot's surface at its measured joint values is rendered from the camera. The averaged and filtered cloud is
+registered onto its visible part, point to plane with Tukey's kernel, from several starts. The result is compared with
+the image pixel by pixel, and refused where the two disagree.
 """
 
 import math
@@ -27,28 +27,36 @@ Floats = npt.NDArray[np.float64]
 
 MANY_RAYS: Final = 60_000
 ALIKE: Final = 0.93
-"""Of the best end's score that makes another one as good."""
+"""Fraction of the best score from which another result counts as equally good."""
 UNEVEN: Final = (0.0015, 0.012)
-"""m of unevenness up to which a result is good, and from which on it is none."""
+"""Unevenness up to which a result is good, and from which it is refused, m."""
 LEAST_KNOWN: Final = 0.05
-"""Of a motion in the worst direction that distances have to show."""
+"""Minimum visibility of a motion in the worst direction, see `Fit.least_known`."""
 FLOOR: Final = (4e-4, math.radians(0.05))
-"""Standard deviation, m and rad, that no number of points takes away: what noise does at curved surfaces and edges, and
-a lens that is known to 0.05 %."""
+"""Minimum standard deviations, m and rad.
+
+They cover errors that more points do not reduce: curved surfaces, edges, and a lens known to 0.05 %.
+"""
 GOOD: Final = (0.0015, math.radians(0.25))
-"""Standard deviation, m and rad, up to which a result is good."""
+"""Standard deviations up to which a result is good, m and rad."""
 SETTLED: Final = 2e-4
-"""m: a last step that was longer has not come to an end."""
+"""Length of the last step above which the search did not converge, m."""
 
 
 @dataclass(frozen=True)
 class RobotPoseOptions:
-    """How far to look for the robot (m, rad) and what to demand of a result.
+    """Limits of the search and of the result.
 
-    within and angle_within: how far the assumed pose may be off. least_fitness: part of the visible surface that the
-    picture has to confirm, 0..1; most_contradicted: part of it through which the picture sees something farther away.
-    most_deviation (m) and most_angle_deviation (rad): standard deviation of the worst known direction beyond which a
-    view is refused. Raises InvalidData for numbers that make no sense.
+    Attributes:
+        within: Maximum distance from the assumed pose, m.
+        angle_within: Maximum angle from the assumed pose, rad.
+        least_fitness: Minimum fraction of the visible surface that the image confirms, 0 to 1.
+        most_contradicted: Maximum fraction of the surface through which the image shows something farther away.
+        most_deviation: Maximum standard deviation of the position in the worst direction, m.
+        most_angle_deviation: Maximum standard deviation of the orientation in the worst direction, rad.
+
+    Raises:
+        InvalidData: A value is out of range.
     """
 
     within: float = 0.08
@@ -61,7 +69,7 @@ class RobotPoseOptions:
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
             if not 0.0 < getattr(self, name) <= 1.0:
-                raise InvalidData(f"{name} of a robot's pose is more than 0 and at most 1, not {getattr(self, name)}.")
+                raise InvalidData(f"{name} of a robot's pose must be above 0 and at most 1, not {getattr(self, name)}.")
 
 
 def find_robot_pose(
@@ -75,16 +83,16 @@ def find_robot_pose(
     """Find the pose of a robot's base in the world.
 
     Args:
-        surface: of the robot in the joint state in which the picture was taken.
-        depth: of the colour camera's view, one picture or several of which the mean is taken.
-        parameters: of the lens, for the size of the pictures.
+        surface: The robot at the joint values of the image.
+        depth: One depth image in the view of the colour camera, or several that are averaged.
+        parameters: Parameters of the lens for this image size.
         camera_pose: world_from_camera, of the optical frame (x right, y down, z forward).
         assumed: world_from_base, at most `options.within` and `options.angle_within` off.
-        options: limits.
+        options: Limits.
 
     Raises:
-        InvalidData: a depth picture of the wrong size or kind, parameters that are none.
-        CalibrationRefused: too few points, no overlap, not converged, ambiguous, or a direction is left free.
+        InvalidData: A depth image has the wrong size or kind, or parameters are invalid.
+        CalibrationRefused: Too few points, no overlap, not converged, ambiguous, or a direction is undetermined.
     """
     began = time.monotonic()
     limits = options or RobotPoseOptions()
@@ -103,8 +111,8 @@ def find_robot_pose(
     known = best.least_known()
     if known < LEAST_KNOWN or deviations[0] > limits.most_deviation or deviations[1] > limits.most_angle_deviation:
         raise CalibrationRefused(
-            f"The camera's view leaves a motion of {surface.name} open: another joint state or another place of the"
-            " camera, from which more of it is seen, settles it.",
+            f"The view of the camera leaves a motion of {surface.name} undetermined. Move the robot or the "
+            "camera so that more of it is visible.",
             f"standard deviation {deviations[0] * 1e3:.1f} mm, {math.degrees(deviations[1]):.2f}°; known {known:.3f}",
             Reason.UNOBSERVABLE,
         )
@@ -146,15 +154,15 @@ def _refuse_disagreement(surface: RobotSurface, found: Compared, fit: Fit, limit
     )
     if found.contradicted > limits.most_contradicted or found.uneven > UNEVEN[1]:
         raise CalibrationRefused(
-            f"The camera sees through where {surface.name} would be: it stands elsewhere, its joints are others than"
-            " told, or the model is of another robot.",
+            f"The camera sees through the expected place of {surface.name}: check its pose, its joint values "
+            "and its model.",
             figures,
             Reason.NOT_CONVERGED,
         )
     if found.confirmed < limits.least_fitness:
         raise CalibrationRefused(
-            f"Too little of {surface.name} was recognised: something stands before it, it stands elsewhere, or the"
-            " model is of another robot.",
+            f"Too little of {surface.name} was recognized. Check whether it is covered, and check its pose "
+            "and its model.",
             figures,
             Reason.NOT_CONVERGED,
         )
@@ -163,7 +171,7 @@ def _refuse_disagreement(surface: RobotSurface, found: Compared, fit: Fit, limit
 def _refuse_unsettled(surface: RobotSurface, best: Fit, start: Floats, limits: RobotPoseOptions) -> None:
     if best.moved > SETTLED:
         raise CalibrationRefused(
-            f"The search for {surface.name} did not settle.",
+            f"The search for {surface.name} did not converge.",
             f"the last step was {best.moved * 1e3:.2f} mm",
             Reason.NOT_CONVERGED,
         )
@@ -185,9 +193,9 @@ def _refuse_ambiguous(surface: RobotSurface, ends: list[End]) -> None:
             between = other.fit.base_from_camera @ np.linalg.inv(best.fit.base_from_camera)
             at_middle = between[:3, :3] @ best.fit.centre + between[:3, 3] - best.fit.centre
             raise CalibrationRefused(
-                f"Two poses of {surface.name} explain the picture equally well,"
-                f" {np.linalg.norm(at_middle) * 1e3:.0f} mm and {math.degrees(angle_of(between[:3, :3])):.1f}° apart:"
-                " another joint state or another place of the camera tells them apart.",
+                f"Two poses of {surface.name} explain the image equally well, "
+                f"{np.linalg.norm(at_middle) * 1e3:.0f} mm and {math.degrees(angle_of(between[:3, :3])):.1f}° "
+                "apart. Move the robot or the camera, then try again.",
                 f"scores {best.compared.score:.3f} and {other.compared.score:.3f}",
                 Reason.AMBIGUOUS,
             )

@@ -1,4 +1,4 @@
-"""The search for a robot in a depth picture: from starts around the assumed pose; what the picture says of each end."""
+"""The search for a robot in a depth image from starts around the assumed pose, and the comparison with the image."""
 
 import itertools
 import math
@@ -17,45 +17,45 @@ Floats = npt.NDArray[np.float64]
 FAR: Final = (Stage(0.06, 8), Stage(0.03, 7), Stage(0.015, 7))
 NEAR: Final = (Stage(0.02, 8), Stage(0.01, 12))
 FITTING: Final = 3.0
-"""Of the distances' standard deviation: what lies farther off is not the robot. Within these bounds, m:"""
+"""Multiple of the standard deviation of the distances beyond which a point is not part of the robot."""
 REACH: Final = (0.004, 0.012)
 FEW_POINTS: Final = 1_500
-"""Of the cloud, for the way from a start."""
+"""Number of points of the cloud used in the search."""
 MOST_POINTS: Final = 20_000
-"""Of the cloud, for the result."""
+"""Number of points of the cloud used for the result."""
 ENOUGH: Final = 7
-"""Starts after which no more are made when all of them, one along and about each axis, ended at one place."""
+"""Number of starts after which the search ends when all of them, along and about each axis, ended at one pose."""
 CELL: Final = 0.03
-"""m, of the grid on which is decided what of the cloud may be the robot."""
+"""Grid cell size for pre-filtering the point cloud, m."""
 FEW_RAYS: Final = 12_000
 TILES: Final = 40
-"""Of the picture's width, each counted as one independent measurement."""
+"""Number of tiles across the image, each counted as one independent measurement."""
 TOLERANCE: Final = (0.008, 0.006)
-"""A depth confirms the model when it differs by no more than the first, m, and the second times its square."""
+"""Difference up to which a depth confirms the model: constant in m, and a factor of its square in 1/m."""
 APART: Final = (0.004, 0.012)
-"""m and rad beyond which two ends of the search are different ones."""
+"""Differences beyond which two results are different, m and rad."""
 FEW_IN_TILE: Final = 8
-"""Rays of a tile below which its mean says nothing."""
+"""Number of rays of a tile below which its mean is not used."""
 
 
 class Compared(NamedTuple):
-    """Model and picture, as parts of the rays on which the model would be seen and the picture has a depth."""
+    """Comparison of model and image, as fractions of the rays that hit the model and have a depth."""
 
     confirmed: float
     occluded: float
     contradicted: float
     rays: int
     uneven: float = 0.0
-    """m: rms over tiles of the picture of how far the model's surface is from what is seen there on the average."""
+    """Root mean square over tiles of the mean distance between model and image, m."""
 
     @property
     def score(self) -> float:
-        """Give what is the larger the better an end of the search is."""
+        """Return the score of a result; larger is better."""
         return self.confirmed - self.contradicted
 
 
 class End(NamedTuple):
-    """Where starts of the search ended, how many of them, and what the picture says of it."""
+    """A result of the search, the number of starts that reached it, and its comparison with the image."""
 
     fit: Fit
     compared: Compared
@@ -63,7 +63,7 @@ class End(NamedTuple):
 
 
 class Search:
-    """The cloud near the model, and what is found from the starts around the assumed pose."""
+    """The cloud near the model, and the results from the starts around the assumed pose."""
 
     def __init__(
         self, surface: RobotSurface, view: DepthView, start: Floats, within: float, angle_within: float
@@ -71,7 +71,7 @@ class Search:
         self._surface, self._view, self._start = surface, view, start
         self._within, self._angle_within = within, angle_within
         self._model = Model(surface)
-        self._random = np.random.default_rng(0)  # the same picture gives the same result
+        self._random = np.random.default_rng(0)  # the same image gives the same result
         rows, columns = np.nonzero(view.depth)
         cloud = view.points()
         low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
@@ -80,14 +80,14 @@ class Search:
         chosen = np.flatnonzero(((based > low - margin) & (based < high + margin)).all(axis=1))
         near = np.zeros(len(cloud), dtype=np.bool_)
         near[chosen[self._may_be(based[chosen])]] = True
-        for normal, offset in planes(cloud[~near], self._random):  # a table, a wall: robots stand on them
+        for normal, offset in planes(cloud[~near], self._random):  # robots are mounted on tables or walls
             near &= np.abs(cloud @ normal - offset) > plane_thickness(cloud)
         chosen = np.flatnonzero(near)
         if len(chosen) < LEAST_POINTS:
             raise CalibrationRefused(
-                f"The camera sees hardly anything where {surface.name} is taken to stand. Does it look there, and are"
-                " its pose and the robot's right to a few centimetres?",
-                f"{len(chosen)} of {len(cloud)} points are near the model; {LEAST_POINTS} are the least",
+                f"The camera sees hardly anything at the expected place of {surface.name}. Check where the "
+                "camera looks, and whether its pose and that of the robot are correct to a few centimetres.",
+                f"{len(chosen)} of {len(cloud)} points are near the model; at least {LEAST_POINTS} are needed",
                 Reason.NO_OVERLAP,
             )
         if len(chosen) > MOST_POINTS:
@@ -98,7 +98,7 @@ class Search:
         self.starts = 0
 
     def _may_be(self, points: Floats) -> npt.NDArray[np.bool_]:
-        """Tell which points (n, 3, in the base frame) may be the robot's; each cell of a grid is asked once."""
+        """Return which points (n, 3, in the base frame) may be part of the robot; each grid cell is checked once."""
         if not len(points):
             return np.zeros(0, dtype=np.bool_)
         corner = points.min(axis=0)
@@ -110,7 +110,11 @@ class Search:
         return np.asarray((self._model.distance(centres.astype(np.float64)) < allowed)[where.reshape(-1)])
 
     def ends(self) -> list[End]:
-        """Search from all starts; give the different ends, the best first. Raises CalibrationRefused: there is none."""
+        """Search from all starts and return the distinct results, best first.
+
+        Raises:
+            CalibrationRefused: There is no result.
+        """
         few = self._cloud[self._random.permutation(len(self._cloud))[:FEW_POINTS]]
         some = self._cloud[self._random.permutation(len(self._cloud))[: 6 * FEW_POINTS]]
         rays = self._rays(FEW_RAYS)
@@ -125,7 +129,7 @@ class Search:
                 found.append((fit, 1))
             else:
                 found[same] = found[same][0], found[same][1] + 1
-            if found[0][1] == self.starts == ENOUGH:  # they came from all sides to one place
+            if found[0][1] == self.starts == ENOUGH:  # starts from all sides reached one pose
                 break
         compared = [(fit, count, self.compare(fit.base_from_camera, FEW_RAYS)) for fit, count in found]
         compared.sort(key=lambda each: -each[2].score)
@@ -140,29 +144,33 @@ class Search:
             else:
                 ends[same] = ends[same]._replace(starts=ends[same].starts + count)
         if not ends:
-            raise self._unlike(f"none of {self.starts} starts came to an end")
+            raise self._unlike(f"none of {self.starts} starts converged")
         return sorted(ends, key=lambda end: -end.compared.score)
 
     def last(self, fit: Fit) -> Fit:
-        """Give the result from all points. Raises CalibrationRefused: nothing is near."""
+        """Return the result from all points.
+
+        Raises:
+            CalibrationRefused: No point is near enough.
+        """
         best = refine(self._model, self._cloud, fit.base_from_camera, (Stage(REACH[1], 12),))
         if best is not None:
             sigma = 1.4826 * float(np.median(np.abs(best.errors)))
             reach = float(np.clip(FITTING * sigma, *REACH))
             best = refine(self._model, self._cloud, best.base_from_camera, (Stage(reach, 25),))
         if best is None:
-            raise self._unlike("nothing near enough was left in the end")
+            raise self._unlike("no points near enough were left at the end")
         return best
 
     def _unlike(self, detail: str) -> CalibrationRefused:
         return CalibrationRefused(
-            f"What the camera sees near the assumed place of {self._surface.name} does not look like it.",
+            f"What the camera sees near the expected place of {self._surface.name} does not look like it.",
             detail,
             Reason.NO_OVERLAP,
         )
 
     def compare(self, base_from_camera: Floats, most_rays: int) -> Compared:
-        """Compare model and picture."""
+        """Compare model and image."""
         stride = self._stride(most_rays)
         rays = self._view.rays[::stride, ::stride].reshape(-1, 3)
         seen = self._view.seen[::stride, ::stride].reshape(-1)
@@ -189,7 +197,7 @@ class Search:
         return self._view.rays[::stride, ::stride].reshape(-1, 3)
 
     def _offsets(self) -> list[Floats]:
-        """Give the starts, as motions in the base frame: none, and to both sides along and about every axis."""
+        """Return the starts as motions in the base frame: none, and to both sides along and about every axis."""
         offsets = [np.eye(4)]
         for sign, axis in itertools.product((1.0, -1.0), np.eye(3)):
             along, about = np.eye(4), np.eye(4)
@@ -215,6 +223,6 @@ def _near(one: Fit, other: Fit, times: float) -> bool:
 
 
 def angle_of(matrix: Floats) -> float:
-    """Give the angle of a rotation matrix, rad, 0..pi."""
+    """Return the angle of a rotation matrix, rad, 0 to pi."""
     sine = np.linalg.norm([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
     return float(math.atan2(float(sine), float(np.trace(matrix)) - 1.0))

@@ -1,4 +1,4 @@
-"""What pictures show of a layout: from files to corners of known place, or a refusal that says what is missing."""
+"""Detection of a layout in images: from files to corners of known place, or a refusal that says what is missing."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -16,14 +16,14 @@ from arcor2_hw.calibration.pose_problem import Seen
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 
 _RESOLVED: Final = 0.25
-"""Part of a cell's width that an edge may be wide (standard deviation); what is wider cannot be measured there."""
+"""Maximum width (standard deviation) of an edge as a fraction of a cell's width."""
 _SHARP: Final = 1.4
-"""px, that any edge may be wide."""
+"""Width that any edge may have, px."""
 
 
 @dataclass(frozen=True)
 class Sighting:
-    """What is seen, and the blur: px, standard deviation of the edges, 0 where it could not be measured."""
+    """Detected targets, and the blur: standard deviation of edges, px, 0 where it could not be measured."""
 
     seen: list[Seen]
     blur: float
@@ -31,11 +31,14 @@ class Sighting:
 
 @dataclass
 class _Look:
-    """What one picture shows.
+    """Content of one image.
 
-    widths: px, of the markers' edges and cells. blurs: px, of all edges that were measured. pieces: whether there are
-    markers of boards. unclear: numbers of markers that were recognised and could not be measured. strangers: of those
-    that are not listed.
+    Attributes:
+        widths: Widths of edges and cells of markers, px.
+        blurs: Widths of all measured edges, px.
+        pieces: Whether there are markers of boards.
+        unclear: Numbers of markers that were detected but could not be measured.
+        strangers: Numbers of markers that are not listed.
     """
 
     seen: list[Seen] = field(default_factory=list)
@@ -47,14 +50,19 @@ class _Look:
 
 
 def sight_of(greys: Sequence[Grey], lens: Lens, layout: Layout, blur_threshold: float, largest_blur: float) -> Sighting:
-    """Find what of a layout is in the pictures.
+    """Find the targets of a layout in images.
 
-    Raises CalibrationRefused: nothing of it is (NO_MARKER), pictures are blurred (BLURRED), a marker is there twice
-    (IMPLAUSIBLE); InvalidData, Conflict for a layout that cannot be.
+    Raises:
+        CalibrationRefused: No target is visible (NO_MARKER), images are blurred (BLURRED), or a marker appears twice
+            (IMPLAUSIBLE).
+        InvalidData: The layout is invalid.
+        Conflict: A marker is listed twice.
     """
     check_layout(layout)
     if not layout.markers and not layout.boards:
-        raise CalibrationRefused("No marker is configured: say which ones stand where.", reason=Reason.NO_MARKER)
+        raise CalibrationRefused(
+            "No marker is configured. Configure the markers and their poses.", reason=Reason.NO_MARKER
+        )
     looks = []
     for picture, grey in enumerate(greys):
         name = "The picture" if len(greys) == 1 else f"Picture {picture}"
@@ -69,7 +77,11 @@ def sight_of(greys: Sequence[Grey], lens: Lens, layout: Layout, blur_threshold: 
 
 
 def _check_sharp(grey: Grey, look: _Look, name: str, blur_threshold: float, largest_blur: float) -> None:
-    """Raise CalibrationRefused for a picture that is blurred."""
+    """Require a sharp image.
+
+    Raises:
+        CalibrationRefused: It is blurred.
+    """
     relative = [blur / min(largest_blur, max(_RESOLVED * cell, _SHARP)) for blur, cell in look.widths]
     if relative and np.median(relative) > 1.0:
         raise CalibrationRefused(
@@ -78,19 +90,19 @@ def _check_sharp(grey: Grey, look: _Look, name: str, blur_threshold: float, larg
             f"at most {largest_blur:.1f} px, and a quarter of a cell",
             Reason.BLURRED,
         )
-    # Sharp edges were measured, or something was at least recognised: what is missing then is not sharpness.
+    # Sharp edges were measured, or something was at least recognized: sharpness is not what is missing.
     if look.blurs or ((look.strangers or look.pieces) and not look.unclear):
         return
     if (sharpness := sharpness_of(grey)) < blur_threshold:
         raise CalibrationRefused(
-            f"{name} is blurred, or shows nothing at all. Is the camera in focus, the lens clean and the light on?",
+            f"{name} is blurred, or shows nothing. Check the focus, the lens and the light.",
             f"variance of the Laplacian {sharpness:.0f}, at least {blur_threshold:.0f}",
             Reason.BLURRED,
         )
 
 
 def _in_picture(grey: Grey, picture: int, lens: Lens, layout: Layout, name: str) -> _Look:
-    """Find and measure what one picture shows."""
+    """Detect and measure the targets in one image."""
     found: dict[MarkerDictionary, list[tuple[int, Array]]] = {}
     for dictionary in {layout.dictionary} | {board.dictionary for board in layout.boards}:
         own_boards = [board for board in layout.boards if board.dictionary == dictionary]
@@ -126,7 +138,7 @@ def _in_picture(grey: Grey, picture: int, lens: Lens, layout: Layout, name: str)
 
 
 def _numbers_of(board: CharucoBoard) -> set[tuple[MarkerDictionary, int]]:
-    """Give the board's markers."""
+    """Return the markers of a board."""
     count = board.columns * board.rows // 2
     return {(board.dictionary, number) for number in range(board.first_id, board.first_id + count)}
 
@@ -134,7 +146,7 @@ def _numbers_of(board: CharucoBoard) -> set[tuple[MarkerDictionary, int]]:
 def _look_for_board(
     look: _Look, grey: Grey, lens: Lens, board: CharucoBoard, index: int, picture: int, found: list[tuple[int, Array]]
 ) -> None:
-    """Measure a board, if it is there."""
+    """Measure a board if it is visible."""
     made = board_of(board)
     fine = measured_board(grey, lens, board, made, found)
     if fine is not None:
@@ -151,12 +163,12 @@ def _look_for_board(
 
 
 def _root_of(each: Measured) -> Array:
-    """Give the square root of the information of a measured marker."""
+    """Return the square root of the information of a measured marker."""
     return np.asarray(np.linalg.cholesky(each.information).T, dtype=np.float64)
 
 
 def _seen_marker(each: Measured, origin_from_marker: Array, size: float, picture: int) -> Seen:
-    """Give a measured marker as part of a problem."""
+    """Return a measured marker as part of a problem."""
     half = size / 2
     corners = np.array([[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0]])
     return Seen(
@@ -174,19 +186,20 @@ def _seen_marker(each: Measured, origin_from_marker: Array, size: float, picture
 
 
 def _missing(layout: Layout, looks: Sequence[_Look]) -> str:
-    """Say that nothing of a layout was seen, and what was seen instead."""
+    """Return a message that no target was visible, and what was visible instead."""
     wanted = [f"marker {marker.marker_id}" for marker in layout.markers[:8]]
     wanted += [f"a board of {board.columns} × {board.rows} squares" for board in layout.boards]
     unclear = sorted({number for look in looks for number in look.unclear})
     others = sorted({number for look in looks for number in look.strangers})
     if unclear:
         return (
-            f"Marker {', '.join(map(str, unclear))} was recognised, but its edges cannot be measured: is it too small "
-            "in the picture, bent, or covered in part?"
+            f"Marker {', '.join(map(str, unclear))} was recognized, but its edges cannot be measured. Check "
+            "that it is large enough in the image, flat and not covered."
         )
     if any(look.pieces for look in looks):
         return (
-            f"Too little is seen of {' and '.join(wanted)}: only some of its markers. Is it too far away, or covered?"
+            f"Too little is seen of {' and '.join(wanted)}: only some of its markers. Move the camera "
+            "nearer, and uncover it."
         )
     text = f"None of what is configured is in sight: {', '.join(wanted)}."
     if others:

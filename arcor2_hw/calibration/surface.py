@@ -1,4 +1,4 @@
-"""The outside of a robot in one joint state, as triangles in its base frame: what a camera is compared with."""
+"""The surface of a robot in one joint configuration, as triangles in its base frame, for comparison with a camera."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -23,9 +23,10 @@ _SIDES: Final = 96
 
 @dataclass(frozen=True)
 class RobotSurface:
-    """Triangles of all links: vertices (n, 3) in m in the robot's base frame, triangles (m, 3) of indices into them.
+    """Triangles of all links: vertices (n, 3) in m in the robot's base frame, and triangles (m, 3) of indices.
 
-    Raises InvalidData when there are none, too many (MOST_TRIANGLES), not finite numbers or indices out of range.
+    Raises:
+        InvalidData: There are no triangles or more than MOST_TRIANGLES, or numbers or indices are invalid.
     """
 
     vertices: Floats
@@ -34,21 +35,23 @@ class RobotSurface:
 
     def __post_init__(self) -> None:
         if self.vertices.ndim != 2 or self.vertices.shape[1] != 3 or not len(self.vertices):
-            raise InvalidData(f"The model of {self.name} has no vertices of three coordinates.")
+            raise InvalidData(f"The model of {self.name} has no vertices with three coordinates.")
         if self.triangles.ndim != 2 or self.triangles.shape[1] != 3 or not len(self.triangles):
-            raise InvalidData(f"The model of {self.name} has no triangles: it cannot be seen.")
+            raise InvalidData(f"The model of {self.name} has no triangles, so it is invisible.")
         if len(self.triangles) > MOST_TRIANGLES:
             raise InvalidData(
-                f"The model of {self.name} has {len(self.triangles)} triangles; {MOST_TRIANGLES} are the most."
+                f"The model of {self.name} has {len(self.triangles)} triangles; the maximum is {MOST_TRIANGLES}."
             )
         if not np.isfinite(self.vertices).all():
             raise InvalidData(f"The model of {self.name} has vertices that are not finite.")
         if self.triangles.min() < 0 or self.triangles.max() >= len(self.vertices):
-            raise InvalidData(f"The model of {self.name} has a triangle of a vertex that does not exist.")
+            raise InvalidData(f"The model of {self.name} has a triangle with a missing vertex.")
 
     @classmethod
     def of_links(cls, links: Iterable[tuple[Floats, Indices, Floats]], name: str = "the robot") -> "RobotSurface":
-        """Put links together: of each, vertices in its own frame, triangles, and base_from_link as a 4 × 4 matrix."""
+        """Combine links: for each link its vertices in its own frame, its triangles, and base_from_link as a (4, 4)
+        matrix.
+        """
         vertices: list[Floats] = []
         triangles: list[Indices] = []
         count = 0
@@ -57,19 +60,21 @@ class RobotSurface:
             triangles.append(np.asarray(indices, dtype=np.int64) + count)
             count += len(own)
         if not vertices:
-            raise InvalidData(f"The model of {name} has no links that could be seen.")
+            raise InvalidData(f"The model of {name} has no links with a shape.")
         return cls(np.concatenate(vertices), np.concatenate(triangles), name)
 
     @property
     def size(self) -> float:
-        """Give the length of the diagonal of the box around it, m."""
+        """Return the diagonal of its bounding box, m."""
         return float(np.linalg.norm(self.vertices.max(axis=0) - self.vertices.min(axis=0)))
 
 
 def surface_of(model: "RobotModel", joints: Iterable[Joint]) -> RobotSurface:
-    """Give the outside of a robot in a joint state: its visual shapes, or those for collision where a link has none.
+    """Return the surface of a robot at joint values: visual shapes, or collision shapes where a link has none.
 
-    Raises ModelError naming the joints that are missing or given twice, InvalidData when nothing of it can be seen.
+    Raises:
+        ModelError: Joints are missing or repeated; the message names them.
+        InvalidData: The robot has no shapes.
     """
     poses = model.link_poses(model.values(joints))
     seen = {shape.link for shape in model.visual}
@@ -82,7 +87,7 @@ def surface_of(model: "RobotModel", joints: Iterable[Joint]) -> RobotSurface:
 
 
 def finely_of(shape: Shape) -> TriangleMesh:
-    """Give a shape as triangles that leave a round one by less than 0.1 % of its radius."""
+    """Return a shape as triangles that deviate from a round shape by less than 0.1 % of its radius."""
     import trimesh
 
     made: Any

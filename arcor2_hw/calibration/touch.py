@@ -15,39 +15,39 @@ from arcor2_hw.exceptions import InvalidData
 Floats = npt.NDArray[np.float64]
 
 SHORTEST: Final = 0.01
-"""m between points; with less, half a millimetre of touching is 3° of the frame."""
+"""Minimum distance between points, m; below it, half a millimetre of error rotates the frame by 3°."""
 LEAST_SINE: Final = math.sin(math.radians(10.0))
-"""Of the angle by which three points have to be off one line."""
+"""Minimum sine of the angle that three points must form."""
 FITS: Final = 0.001
-"""m rms up to which touched points agree well."""
+"""Root mean square residual up to which touched points agree well, m."""
 MISFIT: Final = 0.05
-"""Residual over the spread of the points beyond which they are not the points that were meant."""
+"""Maximum ratio of residual to spread of the points; above it they are different points."""
 ORIENTATION_SPREAD: Final = 0.12
-"""Least singular value, per root of the count, of the tip's equations: some 15° about every axis."""
+"""Minimum singular value, per square root of the count, of the equations of the tip: some 15° about every axis."""
 TIP_FITS: Final = 0.0005
 TIP_MISFIT: Final = 0.01
-"""m rms beyond which the tip was not on one point."""
+"""Root mean square residual above which the tip was not at one point, m."""
 TURN_FITS: Final = math.radians(0.5)
 TURN_MISFIT: Final = math.radians(5.0)
 _MOST: Final = 1000
 _FARTHEST: Final = 1e4
-"""m; no robot reaches there, and its square is a number still."""
+"""Maximum coordinate, m; larger ones are invalid."""
 
 
 def frame_by_axes(origin: Position, on_x: Position, in_plane: Sequence[Position]) -> TouchedFrame:
-    """Find a frame from its origin, a point on its +x axis and points in its xy plane on the side of +y.
+    """Find a frame from its origin, a point on its +x axis, and points in its xy plane on the side of +y.
 
-    The plane is the best fit of all points, the origin the first point's foot on it. With one point in the plane the
-    three determine the frame exactly and nothing checks them.
+    The plane is the best fit of all points; the origin is the projection of the first point onto it. One point in the
+    plane determines the frame exactly, without any check.
 
     Args:
-        origin: of the frame, touched, m.
-        on_x: a point on the +x axis.
-        in_plane: at least one point; the first one has +y on its side of x.
+        origin: Origin of the frame, touched, m.
+        on_x: A point on the +x axis, m.
+        in_plane: At least one point, m; the first one is on the +y side of x.
 
     Raises:
-        InvalidData: no point in the plane, or a coordinate that is not finite.
-        CalibrationRefused: the points lie on one line or too near each other, or in no plane.
+        InvalidData: There is no point in the plane, or a coordinate is not finite.
+        CalibrationRefused: The points are on one line, too near each other, or not in one plane.
     """
     points = _points("touched", [origin, on_x, *in_plane], 3)
     along = points[1] - points[0]
@@ -81,21 +81,23 @@ def frame_by_axes(origin: Position, on_x: Position, in_plane: Sequence[Position]
 
 
 def frame_by_points(known: Sequence[Position], touched: Sequence[Position]) -> TouchedFrame:
-    """Find a frame in which at least three points are known, from where they were touched: best fit (Kabsch).
+    """Find a frame from at least three points known in it, and the same points as touched: best fit (Kabsch).
 
     Source: W. Kabsch, "A solution for the best rotation to relate two sets of vectors", Acta Crystallographica A 32
     (1976), with the sign that keeps the rotation proper.
 
     Args:
-        known: points in the frame that is looked for, m.
-        touched: the same points in the frame of whoever touched them, in the same order.
+        known: Points in the frame to be found, m.
+        touched: The same points as touched, in the same order, m.
 
     Raises:
-        InvalidData: fewer than three, counts differ, or a coordinate that is not finite.
-        CalibrationRefused: the points lie on one line or too near each other, or the two sets have different shapes.
+        InvalidData: There are fewer than three points, counts differ, or a coordinate is not finite.
+        CalibrationRefused: The points are on one line or too near each other, or the two sets have different shapes.
     """
     if len(known) != len(touched):
-        raise InvalidData(f"{len(known)} points are known and {len(touched)} were touched: each needs the other.")
+        raise InvalidData(
+            f"{len(known)} points are known and {len(touched)} were touched. Give the same number of both."
+        )
     ours, theirs = _points("known", known, 3), _points("touched", touched, 3)
     for name, points in (("known", ours), ("touched", theirs)):
         spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
@@ -122,9 +124,8 @@ def tip_by_touches(flange: Sequence[Pose]) -> TouchedTip:
     """Find the tip of a tool from at least four poses of the flange (base_from_flange) with the tip on one point.
 
     Raises:
-        InvalidData: fewer than four poses, or a number that is not finite.
-        CalibrationRefused: the orientations are too much alike, or turned about one axis only, or the touches do not
-            agree on a point.
+        InvalidData: There are fewer than four poses, or a number is not finite.
+        CalibrationRefused: The orientations are too similar or about one axis only, or the touches do not agree.
     """
     origins = _points("flange", [pose.position for pose in flange], 4)
     count = len(origins)
@@ -134,14 +135,14 @@ def tip_by_touches(flange: Sequence[Pose]) -> TouchedTip:
     least = singular / math.sqrt(count)
     if least[4] < ORIENTATION_SPREAD:
         raise CalibrationRefused(
-            "The orientations of the tool are too much alike: turn it by 30° or more between touches.",
+            "The orientations of the tool are too much alike. Turn it by 30° or more between touches.",
             f"singular values {np.round(least, 3).tolist()}",
             Reason.DEGENERATE,
         )
     if least[5] < ORIENTATION_SPREAD:
         raise CalibrationRefused(
-            "The tool was turned about one axis only, so that the tip's place along that axis stays open: tilt it"
-            " to another side, too.",
+            "The tool was turned about one axis only, which leaves the position of the tip along this axis "
+            "open. Tilt it to another side, too.",
             f"singular values {np.round(least, 3).tolist()}",
             Reason.DEGENERATE,
         )
@@ -179,14 +180,15 @@ def tip_by_touches(flange: Sequence[Pose]) -> TouchedTip:
 
 
 def orientation_by_alignment(flange: Sequence[Orientation], reference: Orientation) -> TouchedOrientation:
-    """Find a tool's orientation from orientations of the flange with the tool's axes put along a reference's.
+    """Find the orientation of a tool from flange orientations with the tool aligned with a reference frame.
 
     Args:
         flange: base_from_flange, at least one.
-        reference: base_from_reference, whose axes the tool's were put along.
+        reference: base_from_reference, the frame that the tool was aligned with.
 
     Raises:
-        InvalidData: no orientation. CalibrationRefused: they differ by more than measuring explains.
+        InvalidData: There is no orientation.
+        CalibrationRefused: The orientations differ by more than measurement errors.
     """
     if not 1 <= len(flange) <= _MOST:
         raise InvalidData(f"A tool's orientation needs 1 to {_MOST} orientations of the flange, not {len(flange)}.")
@@ -214,16 +216,18 @@ def orientation_by_alignment(flange: Sequence[Orientation], reference: Orientati
 
 
 def orientation_by_points(flange: Orientation, tip: Position, along_z: Position, on_x: Position) -> TouchedOrientation:
-    """Find a tool's orientation by moving its tip, the flange not turning, along the tool's +z and to its +x side.
+    """Find the orientation of a tool by moving its tip along the tool's +z and to its +x side without rotation.
 
     Args:
         flange: base_from_flange, the same for all three.
-        tip: position of the tip, or of the flange, before, in the base, m.
-        along_z: after a move along the tool's +z, the way it works.
-        on_x: after a move from `tip` to the side of the tool's +x; how far it was off square is the residual.
+        tip: Position of the tip, or of the flange, at the start, in the base, m.
+        along_z: Position after a move along the tool's +z (working) direction, m.
+        on_x: Position after a move from `tip` to the tool's +x side, m. The deviation from a right angle is the
+            residual.
 
     Raises:
-        InvalidData: a number that is not finite. CalibrationRefused: moves too short, or along one line.
+        InvalidData: A number is not finite.
+        CalibrationRefused: The moves are too short, or along one line.
     """
     start, forward, side = _points("tip", [tip, along_z, on_x], 3)
     z, x = forward - start, side - start
@@ -247,7 +251,7 @@ def orientation_by_points(flange: Orientation, tip: Position, along_z: Position,
 # ---------------------------------------------------------------------------------------------------- what they share
 def _points(name: str, points: Sequence[Position], least: int) -> Floats:
     if not least <= len(points) <= _MOST:
-        raise InvalidData(f"This needs {least} to {_MOST} {name} points, not {len(points)}.")
+        raise InvalidData(f"{least} to {_MOST} {name} points are needed, not {len(points)}.")
     found = np.array([tuple(point) for point in points], dtype=np.float64)
     if not np.isfinite(found).all():
         wrong = int(np.argmin(np.isfinite(found).all(axis=1)))
@@ -260,14 +264,14 @@ def _points(name: str, points: Sequence[Position], least: int) -> Floats:
 
 def _too_near(what: str, to: str) -> CalibrationRefused:
     return CalibrationRefused(
-        f"{what} and {to} are less than {SHORTEST * 1e3:.0f} mm apart: take points farther away.",
+        f"{what} and {to} are less than {SHORTEST * 1e3:.0f} mm apart. Take points farther apart.",
         reason=Reason.DEGENERATE,
     )
 
 
 def _on_one_line() -> CalibrationRefused:
     return CalibrationRefused(
-        "The points lie on one line, so that the frame can turn about it: take one that is farther aside.",
+        "The points are on one line, so that the frame can rotate about it. Take one that is farther aside.",
         reason=Reason.DEGENERATE,
     )
 

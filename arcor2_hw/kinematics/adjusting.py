@@ -1,4 +1,4 @@
-"""A description that follows the settings of an object, or the calibration of one arm."""
+"""Adjustment of a URDF description to the settings of an object, or to the calibration of one robot."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -15,9 +15,15 @@ _TINY: Final = 1e-6
 
 
 def with_settings(description: Description, values: Mapping[str, object]) -> Description:
-    """Let joints and links follow the settings that the description names; others are passed over.
+    """Apply settings that the description declares; other settings are ignored.
 
-    Raises ModelError for a setting that is no finite number where one is needed, or limits that cross.
+    Args:
+        description: The description.
+        values: Settings of the object by name.
+
+    Raises:
+        ModelError: A value is not a finite number, or the limits of a joint would cross.
+        ZeroLength: A link to be scaled has no length in the description.
     """
     joints = {joint.name: joint for joint in description.joints}
     links = dict(description.links)
@@ -39,7 +45,15 @@ def with_settings(description: Description, values: Mapping[str, object]) -> Des
 
 
 def with_origins(description: Description, origins: Mapping[str, Array]) -> Description:
-    """Put joints elsewhere in their parent links, (4, 4) each, as a calibration says. Raises ModelError."""
+    """Replace the origins of joints in their parent links.
+
+    Args:
+        description: The description.
+        origins: Origin (4, 4) by joint name, from a calibration.
+
+    Raises:
+        ModelError: There is no such joint.
+    """
     if unknown := origins.keys() - {joint.name for joint in description.joints}:
         raise ModelError(f"{description.name} has no joint {', '.join(sorted(unknown))}.")
     moved = (replace(joint, origin=origins.get(joint.name, joint.origin)) for joint in description.joints)
@@ -57,7 +71,7 @@ def _adjusted(description: Description, joint: Joint, component: str, value: flo
         return replace(joint, velocity=value)
     if component in ("lower", "upper"):
         lower, upper = (value, joint.upper) if component == "lower" else (joint.lower, value)
-        if lower > upper and component == "upper":  # the lower one has been set before, if it is
+        if lower > upper and component == "upper":  # a new lower limit has been set before
             raise ModelError(f"{description.name}: the limits of {joint.name} cross: {lower:g} to {upper:g}.")
         return replace(joint, lower=lower, upper=upper)
     at = ORIGIN.index(component)
@@ -72,15 +86,15 @@ def _adjusted(description: Description, joint: Joint, component: str, value: flo
 
 
 def _nominal(description: Description, setting: Setting) -> float:
-    """Give what a stretched link's setting is in the description itself: the joint's component that follows it too."""
+    """Return the nominal value of a setting that scales a link: the origin of the joint that follows it too."""
     for other in description.settings:
         if other.target == "joint" and other.name == setting.name and other.component in ORIGIN[:3]:
             joint = next(joint for joint in description.joints if joint.name == other.of)
             value = float(joint.origin[ORIGIN.index(other.component), 3])
             if abs(value) < _TINY:
-                raise ZeroLength(f"{description.name}: {setting.name} is zero, so that {setting.of} has no length.")
+                raise ZeroLength(f"{description.name}: {setting.name} is zero, so {setting.of} has no length.")
             return value
-    raise ModelError(f"{description.name}: no joint follows {setting.name}, so that {setting.of} cannot either.")
+    raise ModelError(f"{description.name}: {setting.of} cannot follow {setting.name}, because no joint does.")
 
 
 def _stretched(geometry: Geometry, axis: int, ratio: float) -> Geometry:

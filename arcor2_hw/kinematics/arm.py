@@ -1,7 +1,7 @@
-"""The chain from a robot's root to one end effector: where it is for joint values, how it moves, how well.
+"""The chain of joints from a robot's root link to one end effector: poses, Jacobians, dexterity.
 
-Joint values are arrays in the order of `joint_names`, rad, m where prismatic; matrices are (4, 4) homogeneous, in the
-frame of the model's root link. Nothing here is safe for two threads at once.
+Joint values are arrays in the order of `joint_names`, rad or (prismatic) m. Matrices are homogeneous, (4, 4), in the
+frame of the model's root link. Not safe for use by two threads at once.
 """
 
 from collections.abc import Iterable, Sequence
@@ -22,16 +22,27 @@ if TYPE_CHECKING:
     from arcor2_hw.kinematics.model import RobotModel
 
 NEAR_SINGULAR: Final = 0.02
-"""Smallest singular value, see `Dexterity`, below which a configuration counts as near a singularity. Of a UR5e that is
-a wrist within 2° of straight, where 0.1 rad/s at the tool ask for 250 °/s of a joint, or an elbow within 9°, where
-10 mm/s ask for 20 °/s."""
+"""Smallest singular value (see `Dexterity`) below which a configuration is near a singularity.
+
+For a UR5e this is a wrist within 2° of straight, where 0.1 rad/s of the tool need 250 °/s of a joint, or an elbow
+within 9°, where 10 mm/s need 20 °/s.
+"""
 NEAR_LIMIT: Final = 0.05
-"""rad, or a twentieth of the range where that is shorter, from a limit within which a joint counts as near it."""
+"""Distance to a limit below which a joint is near it, rad or m; a twentieth of the range where that is shorter."""
 
 
 class Step(NamedTuple):
-    """One joint of a chain: origin in the one before, axis (None: fixed), and which column of the model's joint values
-    moves it: value = factor * q[column] + offset."""
+    """One joint of a chain. Its value is factor * q[column] + offset, where q are the joint values of the model.
+
+    Attributes:
+        name: Name of the joint.
+        origin: Origin in the frame of the previous joint, (4, 4).
+        axis: Axis, None for a fixed joint.
+        prismatic: Whether it is prismatic.
+        column: Index of the model's joint that moves it, -1 for a fixed joint.
+        factor: Factor of a mimicking joint.
+        offset: Offset of a mimicking joint, rad or m.
+    """
 
     name: str
     origin: Array
@@ -45,9 +56,10 @@ class Step(NamedTuple):
 class Dexterity(Data, frozen=True):
     """How well an arm moves in a configuration.
 
-    manipulability: Yoshikawa's measure, the root of det(J Jᵀ), of the directions that the arm commands. smallest: the
-    smallest singular value of the Jacobian with lengths divided by the arm's own, so that it has no unit.
-    near_singularity: that value is below NEAR_SINGULAR.
+    Attributes:
+        manipulability: Yoshikawa's measure, the square root of det(J Jᵀ), of the commanded directions.
+        smallest: Smallest singular value of the Jacobian with lengths divided by the arm's length (dimensionless).
+        near_singularity: Whether `smallest` is below NEAR_SINGULAR.
     """
 
     manipulability: float
@@ -56,12 +68,18 @@ class Dexterity(Data, frozen=True):
 
 
 class Arm:
-    """The chain to one end effector. Made by `RobotModel.arm`.
+    """The chain to one end effector. Created by `RobotModel.arm`.
 
-    end_effector: which link, which of its directions are free, how exactly it has to be met. joint_names, lower, upper,
-    velocity: of the joints of this chain. indices: where these are among the model's joints.
-    length: of the chain from its first joint to the tip, m. centre: of the first joint. reach: m from there beyond
-    which nothing is.
+    Attributes:
+        end_effector: The link, its free directions and tolerances.
+        joint_names: Names of the joints of this chain.
+        lower: Lower limits, rad or m.
+        upper: Upper limits, rad or m.
+        velocity: Maximum velocities, rad/s or m/s.
+        indices: Indices of these joints in the model.
+        length: Length of the chain from its first joint to the tip, m.
+        centre: Position of the first joint, (3).
+        reach: Maximum distance of the tip from `centre`, m.
     """
 
     def __init__(self, model: "RobotModel", end_effector: EndEffector, steps: Sequence[Step], tool: Array) -> None:
@@ -80,7 +98,7 @@ class Arm:
         self.set_tool(tool)
 
     def set_tool(self, tool: Array) -> None:
-        """Fix a tool to the end effector: its tip in the end effector's frame, (4, 4)."""
+        """Attach a tool: the pose of its tip in the frame of the end effector, (4, 4)."""
         self.tool = np.array(tool, dtype=np.float64)
         self._pin: Any = pin.Model()
         body = 0
@@ -98,7 +116,7 @@ class Arm:
 
     # -------------------------------------------------------------------------------- where
     def forward(self, q: Array) -> Array:
-        """Give the tip, (4, 4)."""
+        """Return the pose of the tip, (4, 4)."""
         if self._factors is not None:
             q = self._factors @ q + self._offsets
         pin.forwardKinematics(self._pin, self._data, q)
@@ -106,11 +124,11 @@ class Arm:
         return out
 
     def pose(self, q: Array) -> Pose:
-        """Give the tip as a pose."""
+        """Return the pose of the tip."""
         return Pose.from_matrix(self.forward(q))
 
     def placement(self, q: Array) -> Any:
-        """Give the tip as Pinocchio's SE3: a view that the next call overwrites."""
+        """Return the pose of the tip as Pinocchio's SE3, a view that the next call overwrites."""
         if self._factors is not None:
             q = self._factors @ q + self._offsets
         pin.forwardKinematics(self._pin, self._data, q)
@@ -118,14 +136,11 @@ class Arm:
 
     # -------------------------------------------------------------------------------- how
     def jacobian(self, q: Array) -> Array:
-        """Give velocity (m/s) and angular velocity (rad/s) of the tip per joint velocity, (6, n), in the root's axes.
-
-        Angular below linear.
-        """
+        """Return the Jacobian (6, n) in the axes of the root link: linear rows (m/s) above angular rows (rad/s)."""
         return self._jacobian(q, pin.LOCAL_WORLD_ALIGNED)
 
     def jacobian_in_tip(self, q: Array) -> Array:
-        """Give the same in the axes of the tip."""
+        """Return the Jacobian (6, n) in the axes of the tip."""
         return self._jacobian(q, pin.LOCAL)
 
     def _jacobian(self, q: Array, axes: Any) -> Array:
@@ -136,63 +151,67 @@ class Arm:
         return np.asarray(pin.computeFrameJacobian(self._pin, self._data, whole, self._tip, axes) @ self._factors)
 
     def dexterity(self, q: Array) -> Dexterity:
-        """Tell how well the arm moves in a configuration."""
+        """Return how well the arm moves in a configuration."""
         values = np.linalg.svd(self.jacobian_in_tip(q)[self.rows], compute_uv=False)
         smallest = self.smallest(q)
         return Dexterity(float(np.prod(values)), smallest, smallest < NEAR_SINGULAR)
 
     def smallest(self, q: Array) -> float:
-        """Give the smallest singular value of the Jacobian whose lengths are divided by the arm's, see `Dexterity`."""
+        """Return the smallest singular value of the Jacobian with lengths divided by the arm's, see `Dexterity`."""
         return float(np.linalg.svd(self.jacobian_in_tip(q)[self.rows] / self._scale, compute_uv=False)[-1])
 
     @property
     def rows(self) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":
-        """Give which of x, y, z, rx, ry, rz of the tip's frame are commanded."""
+        """Return the indices of the commanded directions among x, y, z, rx, ry, rz of the tip."""
         return self._rows
 
     # -------------------------------------------------------------------------------- joint values
     def of(self, q: Array) -> Array:
-        """Give the values of this chain's joints out of those of the whole model."""
+        """Select the values of this chain from those of the whole model."""
         return np.asarray(q[self.indices])
 
     def whole(self, q: Array, others: Array | None = None) -> Array:
-        """Give values of all joints of the model: this chain's, and `others` (neutral if None) where it has none."""
+        """Return values of all joints of the model: those of this chain, and `others` (default: neutral) elsewhere."""
         out = self.model.neutral() if others is None else np.array(others, dtype=np.float64)
         out[self.indices] = q
         return out
 
     def values(self, joints: Iterable[robot.Joint]) -> Array:
-        """Give this chain's values out of named joints. Raises ModelError naming what is missing."""
+        """Return the values of this chain from named joints.
+
+        Raises:
+            ModelError: A joint is missing or not finite.
+        """
         given = {joint.name: joint.value for joint in joints}
         if missing := [name for name in self.joint_names if name not in given]:
-            raise ModelError(f"Of {self.model.name} the joints {', '.join(missing)} are missing.")
+            raise ModelError(f"Joints of {self.model.name} are missing: {', '.join(missing)}.")
         values = np.array([given[name] for name in self.joint_names], dtype=np.float64)
         if not np.isfinite(values).all():
             raise ModelError(f"The joints of {self.model.name} must be finite numbers.")
         return values
 
     def named(self, q: Array) -> list[robot.Joint]:
-        """Give joint values with their names."""
+        """Return joint values with their names."""
         return [robot.Joint(name, float(value)) for name, value in zip(self.joint_names, q, strict=True)]
 
     def middle(self) -> Array:
-        """Give the middle of each joint's range, zero where it has none."""
+        """Return the middle of the range of each joint, zero where the range is infinite."""
         whole = np.isfinite(self.lower) & np.isfinite(self.upper)
         return np.where(whole, (np.where(whole, self.lower, 0.0) + np.where(whole, self.upper, 0.0)) / 2.0, 0.0)
 
     def within(self, q: Array, slack: float = 1e-9) -> bool:
-        """Tell whether joint values keep the limits."""
+        """Return whether joint values are within the limits."""
         return bool(((q >= self.lower - slack) & (q <= self.upper + slack)).all())
 
     def near_limits(self, q: Array) -> list[str]:
-        """Give the names of joints that are near a limit, or beyond."""
+        """Return the names of joints that are near a limit or beyond it."""
         margin = np.minimum(NEAR_LIMIT, (self.upper - self.lower) / 20.0)
         near = (q < self.lower + margin) | (q > self.upper - margin)
         return [name for name, is_near in zip(self.joint_names, near, strict=True) if is_near]
 
     # -------------------------------------------------------------------------------- inside
     def _build(self, columns: list[int]) -> None:
-        """Draw the fixed joints into the moving ones; note how the chain's joints move these."""
+        """Merge fixed joints into the moving ones, and compute how the joints of the chain move these."""
         at = np.eye(4)
         self._moving: list[tuple[Array, Array, bool]] = []
         rows: list[tuple[int, float, float]] = []
@@ -220,12 +239,12 @@ class Arm:
 
     @property
     def moving(self) -> list[tuple[Array, Array, bool]]:
-        """Give origin in the one before, axis and whether it slides, of each moving joint of the chain."""
+        """Return origin in the previous joint, axis, and whether it is prismatic, of each moving joint."""
         return self._moving
 
     @property
     def coupling(self) -> tuple[Array, Array]:
-        """Give factors (m, n) and offsets (m) by which the n joints of the chain move its m moving ones."""
+        """Return factors (m, n) and offsets (m) from the n joints of the chain to its m moving joints."""
         if self._factors is None:
             return np.eye(self.dof), self._offsets
         return self._factors, self._offsets

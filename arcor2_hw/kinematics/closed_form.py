@@ -1,13 +1,12 @@
-"""All configurations of two kinds of arm with six turning joints, computed.
+"""Closed-form inverse kinematics of two kinds of arm with six revolute joints.
 
-`ThreeParallel`: the second, third and fourth axis are parallel and the last two meet, as in the UR. `SphericalWrist`:
-the second and third are parallel and the last three meet, as in most industrial arms.
+`ThreeParallel`: axes 2, 3 and 4 are parallel and axes 5 and 6 meet, as in the UR. `SphericalWrist`: axes 2 and 3 are
+parallel and the last three meet, as in most industrial arms. The kind is recognized by the axes.
 
-Which arms are of that kind is read off their axes, not their names. The decomposition is that of A. J. Elias and J.
-T. Wen, "IK-Geo" (2022): joint 1 follows from the height of the wrist above the plane of the arm; then, of the first
-kind, joint 5 from the direction of the last axis, joint 6 from that of the parallel ones, and a triangle is left; of
-the second, the triangle comes first and the three angles of the wrist are left. For an arm that is calibrated the
-axes are not quite parallel: what comes out is then near a solution, not one.
+The decomposition follows A. J. Elias and J. T. Wen, "IK-Geo" (2022). Joint 1 follows from the height of the wrist
+above the plane of the arm. For the first kind, joint 5 follows from the direction of the last axis, joint 6 from that
+of the parallel axes, and a triangle remains; for the second kind, the triangle comes first and the three angles of
+the wrist remain. The axes of a calibrated arm are not exactly parallel: results are then approximate.
 """
 
 import math
@@ -42,19 +41,19 @@ from arcor2_hw.kinematics.subproblems import (
 )
 
 NEARLY: Final = 0.02
-"""How far the axes may be off, rad and m: calibrations are off by less."""
+"""Maximum deviation of the axes from the ideal geometry, rad and m; calibrations deviate less."""
 
 
 class ThreeParallel:
-    """Geometry of one arm: unit axes h, and points p of each axis relative to the one before, all at zero angles.
+    """Geometry of an arm with three parallel axes. Created by `of`; `solve` returns up to eight configurations.
 
-    Made by `of`; `solve` gives up to eight configurations.
+    It consists of unit axes h, and points p on each axis relative to the previous one, at zero angles.
     """
 
     def __init__(self, axes: Array, points: Array, tip: Array) -> None:
         self._h1, self._h2, _, _, self._h5, self._h6 = (vector(axis) for axis in axes)
-        # The axes are moved along themselves so that 1 and 2, and 5 and 6, share an origin where they can.
-        # What turns the other way about the same axis turns by minus the angle.
+        # Points are moved along the axes so that 1 and 2, and 5 and 6, share an origin where they can. An axis in the
+        # opposite direction changes the sign of the angle.
         self._sign3, self._sign4 = (1.0 if axes[1] @ axes[i] > 0.0 else -1.0 for i in (2, 3))
         self._origin = vector(points[0])
         self._p12, self._p23, self._p34, self._p45 = (vector(points[i + 1] - points[i]) for i in range(4))
@@ -66,9 +65,10 @@ class ThreeParallel:
 
     @classmethod
     def of(cls, axes: Array, points: Array, tip: Array) -> Self | None:
-        """Read the geometry off axes (6, 3), points on them (6, 3) and the tip (4, 4), all for zero angles.
+        """Read the geometry from axes (6, 3), points on them (6, 3) and the tip (4, 4), all at zero angles.
 
-        None when the arm is not of this kind.
+        Returns:
+            None when the arm is not of this kind.
         """
         if len(axes) != 6:
             return None
@@ -84,9 +84,9 @@ class ThreeParallel:
         return cls(axes, moved, tip)
 
     def solve(self, target: Array, seed: Array) -> list[Six]:
-        """Give the configurations, angles within -pi and pi, that bring the tip to a pose (4, 4).
+        """Return the configurations, angles from -pi to pi, that move the tip to a pose (4, 4).
 
-        Where one joint of two is free, as at singularities, it is as in the seed.
+        At a singularity, where only the sum of two joints is determined, one of them is taken from the seed.
         """
         turn = product(rows_of(target[:3, :3]), transposed(self._tip_turn))
         position = (float(target[0, 3]), float(target[1, 3]), float(target[2, 3]))
@@ -110,9 +110,9 @@ class ThreeParallel:
                         yield q1, q2, self._sign3 * q3, self._sign4 * q4, q5, q6
 
     def _last(self, q5: float, back: Vector, if_free: float, rest_of_turn: Rows, shoulder: Vector) -> list[float]:
-        """Give the angles of joint 6. Where it turns about the axis of joints 2 to 4 it is free, as far as these reach.
+        """Return the angles of joint 6. It is undetermined where its axis is parallel to those of joints 2 to 4.
 
-        Then it is `if_free`, and also what lets the links just reach, since they may not with the former.
+        Then the result is `if_free`, and the angles at which the links just reach, since they may not with the former.
         """
         h2, h5, h6 = self._h2, self._h5, self._h6
         v = spun(h5, -q5, h2)
@@ -129,13 +129,13 @@ class ThreeParallel:
             share = (far * far + short * short - longest * longest) / (2.0 * far * short)
             middle, half = between(h2, tail, to, 0.0), math.acos(max(-1.0, min(1.0, share)))
             sign = math.copysign(1.0, dot(h2, spun(h5, q5, h6)))
-            # Joints 2 to 4 together, and joint 6, make one turn.
+            # Joints 2 to 4 and joint 6 rotate about parallel axes, so that their angles add up.
             found += [math.remainder(if_free + sign * (q14 - middle - part * half), math.tau) for part in (-1, 0, 1)]
         return found
 
 
 class SphericalWrist:
-    """Geometry of one arm of the second kind. Made by `of`; `solve` gives up to eight configurations."""
+    """Geometry of an arm with a spherical wrist. Created by `of`; `solve` returns up to eight configurations."""
 
     def __init__(self, axes: Array, points: Array, wrist: Array, tip: Array) -> None:
         self._h1, self._h2, _, self._h4, self._h5, self._h6 = (vector(axis) for axis in axes)
@@ -151,9 +151,10 @@ class SphericalWrist:
 
     @classmethod
     def of(cls, axes: Array, points: Array, tip: Array) -> Self | None:
-        """Read the geometry off axes (6, 3), points on them (6, 3) and the tip (4, 4), all for zero angles.
+        """Read the geometry from axes (6, 3), points on them (6, 3) and the tip (4, 4), all at zero angles.
 
-        None when the arm is not of this kind.
+        Returns:
+            None when the arm is not of this kind.
         """
         if len(axes) != 6 or np.linalg.norm(np.cross(axes[1], axes[2])) > NEARLY:
             return None
@@ -166,9 +167,9 @@ class SphericalWrist:
         return cls(axes, points, wrist, tip)
 
     def solve(self, target: Array, seed: Array) -> list[Six]:
-        """Give the configurations, angles within -pi and pi, that bring the tip to a pose (4, 4).
+        """Return the configurations, angles from -pi to pi, that move the tip to a pose (4, 4).
 
-        Where one joint of two is free, as at singularities, it is as in the seed.
+        At a singularity, where only the sum of two joints is determined, one of them is taken from the seed.
         """
         turn = product(rows_of(target[:3, :3]), transposed(self._tip_turn))
         wrist = subtract(add(vector(target[:3, 3]), turned(rows_of(target[:3, :3]), self._offset)), self._origin)
@@ -194,5 +195,5 @@ class SphericalWrist:
 
 
 def closed_form(axes: Array, points: Array, tip: Array) -> ThreeParallel | SphericalWrist | None:
-    """Read off axes (6, 3), points on them (6, 3) and the tip (4, 4) of which kind an arm is; None: of neither."""
+    """Recognize the kind of an arm by axes (6, 3), points on them (6, 3) and the tip (4, 4); None for others."""
     return ThreeParallel.of(axes, points, tip) or SphericalWrist.of(axes, points, tip)

@@ -1,13 +1,13 @@
-"""URDF text -> what it says, checked: links, joints, shapes, and what settings and end effectors we add to it.
+"""Parsing and validation of URDF: links, joints, shapes, and our extensions for settings and end effectors.
 
-Of the format (wiki.ros.org/urdf/XML) everything that places and limits is read; inertia, colours, transmissions and
-simulators' elements are passed over. Ours is one element `arcor2_hw`, which other readers pass over:
+Everything in the format (wiki.ros.org/urdf/XML) that places or limits parts is read; inertia, colours, transmissions
+and elements of simulators are ignored. Our extension is one element `arcor2_hw`, which other readers ignore:
 
     <arcor2_hw>
       <end_effector link="tcp" free="rz" position_tolerance="1e-3" orientation_tolerance="0.02"/>
       <setting name="link_1" joint="joint_2" component="x"/>          the joint's origin: x, y, z (m), rx, ry, rz (rad)
       <setting name="lower_1" joint="joint_1" component="lower"/>     its limit: lower, upper, velocity
-      <setting name="link_1" link="link_1" component="x"/>            stretches the boxes of a link from its origin
+      <setting name="link_1" link="link_1" component="x"/>            scales the boxes of a link from its origin
       <disable_collisions link1="base" link2="forearm"/>
     </arcor2_hw>
 """
@@ -28,12 +28,12 @@ JointKind = Literal["revolute", "continuous", "prismatic", "fixed"]
 KINDS: Final[tuple[JointKind, ...]] = ("revolute", "continuous", "prismatic", "fixed")
 ORIGIN: Final = ("x", "y", "z", "rx", "ry", "rz")
 MAX_PARTS: Final = 2000
-"""Links of one description."""
+"""Maximum number of links."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeshFile:
-    """A mesh that a shape refers to, with its scale."""
+    """Reference to a mesh file, with its scale."""
 
     reference: str
     scale: tuple[float, float, float]
@@ -41,7 +41,7 @@ class MeshFile:
 
 @dataclass(frozen=True, eq=False)
 class Primitive:
-    """A box, cylinder, sphere or capsule: its kind and sizes, m."""
+    """A box, cylinder, sphere or capsule with its sizes, m."""
 
     kind: Literal["box", "cylinder", "sphere", "capsule"]
     sizes: tuple[float, ...]
@@ -49,7 +49,7 @@ class Primitive:
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """A shape of a link, where it stands in the link's frame, (4, 4)."""
+    """A shape of a link, and its pose in the frame of the link, (4, 4)."""
 
     what: MeshFile | Primitive
     origin: Array
@@ -57,7 +57,7 @@ class Geometry:
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """A link with the shapes to be shown and those to collide."""
+    """A link with its visual and collision shapes."""
 
     name: str
     visual: tuple[Geometry, ...]
@@ -66,7 +66,7 @@ class Link:
 
 @dataclass(frozen=True)
 class Mimic:
-    """A joint's value is `multiplier` times that of another plus `offset`."""
+    """A joint that follows another one: value = multiplier * value of `joint` + offset."""
 
     joint: str
     multiplier: float
@@ -75,7 +75,20 @@ class Mimic:
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """A joint: origin (4, 4) in the parent link, axis in its own frame, limits in rad or m, velocity per s."""
+    """A joint.
+
+    Attributes:
+        name: Name.
+        kind: Kind of joint.
+        parent: Parent link.
+        child: Child link.
+        origin: Pose in the parent link, (4, 4).
+        axis: Unit axis in its own frame.
+        lower: Lower limit, rad or m.
+        upper: Upper limit, rad or m.
+        velocity: Maximum velocity, rad/s or m/s.
+        mimic: The joint that it follows, if any.
+    """
 
     name: str
     kind: JointKind
@@ -91,7 +104,14 @@ class Joint:
 
 @dataclass(frozen=True)
 class EndEffector:
-    """A link that poses are meant for. free: directions of its frame that do not matter (rx, ry, rz)."""
+    """A link for which poses are specified.
+
+    Attributes:
+        link: The link.
+        free: Directions of its frame that are not controlled, of rx, ry, rz.
+        position_tolerance: Maximum position error, m.
+        orientation_tolerance: Maximum orientation error, rad.
+    """
 
     link: str
     free: frozenset[str] = frozenset()
@@ -111,7 +131,7 @@ class Setting:
 
 @dataclass(frozen=True, eq=False)
 class Description:
-    """All that a URDF says, joints ordered from the root outwards."""
+    """The content of a URDF; joints are ordered from the root outwards."""
 
     name: str
     root: str
@@ -126,16 +146,26 @@ _Part = TypeVar("_Part", Link, Joint)
 
 
 def describe(content: bytes, name: str) -> Description:
-    """Read a URDF. Raises ModelError naming the link or joint and what is wrong, JointLoop, UnsafeDescription."""
+    """Parse a URDF.
+
+    Args:
+        content: The file.
+        name: Name of the file in messages.
+
+    Raises:
+        ModelError: The URDF is invalid; the message names the link or joint.
+        JointLoop: The joints form a loop.
+        UnsafeDescription: The file is rejected for safety.
+    """
     root = parse_xml(content, name)
     if root.tag != "robot":
-        raise ModelError(f"{name} describes no robot but a {root.tag}.")
+        raise ModelError(f"{name} describes a {root.tag}, not a robot.")
     robot = root.get("name") or name
     links = _unique([_link(each, robot) for each in root.findall("link")], f"{robot}: link")
     if not links:
         raise ModelError(f"{robot} has no links.")
     if len(links) > MAX_PARTS:
-        raise UnsafeDescription(f"{robot} has {len(links)} links; at most {MAX_PARTS} are taken.")
+        raise UnsafeDescription(f"{robot} has {len(links)} links; the maximum is {MAX_PARTS}.")
     joints = _unique([_joint(each, robot) for each in root.findall("joint")], f"{robot}: joint")
     base, ordered = _tree(robot, links, joints.values())
     _check_mimics(robot, joints)
@@ -155,7 +185,7 @@ def _unique(parts: Iterable[_Part], what: str) -> dict[str, _Part]:
     found: dict[str, _Part] = {}
     for part in parts:
         if part.name in found:
-            raise ModelError(f"{what} {part.name} is there twice.")
+            raise ModelError(f"{what} {part.name} is defined twice.")
         found[part.name] = part
     return found
 
@@ -186,7 +216,7 @@ def _number(element: Element, attribute: str, default: float, where: str) -> flo
 
 
 def transform(xyz: tuple[float, ...], rpy: tuple[float, ...]) -> Array:
-    """Give the (4, 4) matrix of a position and of turns about the fixed axes x, then y, then z."""
+    """Return the matrix (4, 4) of a position and of rotations about the fixed axes x, then y, then z."""
     (cr, cp, cy), (sr, sp, sy) = map(math.cos, rpy), map(math.sin, rpy)
     out = np.eye(4)
     out[0, :3] = cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr
@@ -216,7 +246,7 @@ def _geometry(element: Element, where: str) -> Geometry:
     found = element.find("geometry")
     what = found[0] if found is not None and len(found) else None
     if what is None:
-        raise ModelError(f"{where}: there is no geometry.")
+        raise ModelError(f"{where}: the geometry is missing.")
     origin = _origin(element, where)
     match what.tag:
         case "mesh":
@@ -229,7 +259,7 @@ def _geometry(element: Element, where: str) -> Geometry:
             return Geometry(Primitive(kind, sizes), origin)
         case "sphere":
             return Geometry(Primitive("sphere", (_number(what, "radius", 0.0, where),)), origin)
-    raise ModelError(f"{where}: a geometry of kind {what.tag} is not known.")
+    raise ModelError(f"{where}: geometry of kind {what.tag} is not supported.")
 
 
 def _joint(element: Element, robot: str) -> Joint:
@@ -237,7 +267,7 @@ def _joint(element: Element, robot: str) -> Joint:
     where = f"{robot}: joint {name}"
     kind = _text(element, "type", where)
     if kind not in KINDS:
-        raise ModelError(f"{where} is of type {kind}; {', '.join(KINDS)} can be used.")
+        raise ModelError(f"{where} is of type {kind}; supported are {', '.join(KINDS)}.")
     parent, child = (element.find(each) for each in ("parent", "child"))
     if parent is None or child is None:
         raise ModelError(f"{where} needs a parent and a child.")
@@ -246,7 +276,7 @@ def _joint(element: Element, robot: str) -> Joint:
         x, y, z = _numbers(axis, "xyz", (1.0, 0.0, 0.0), where)
     length = math.hypot(x, y, z)
     if kind != "fixed" and length < 1e-6:
-        raise ModelError(f"{where} has an axis without direction.")
+        raise ModelError(f"{where} has an axis of length zero.")
     lower, upper, velocity = _limits(element, kind, where)
     return Joint(
         name,
@@ -275,7 +305,7 @@ def _limits(element: Element, kind: str, where: str) -> tuple[float, float, floa
         raise ModelError(f"{where} has no limit.")
     lower, upper = _number(found, "lower", 0.0, where), _number(found, "upper", 0.0, where)
     if lower > upper:
-        raise ModelError(f"{where}: its lower limit {lower:g} is above the upper, {upper:g}.")
+        raise ModelError(f"{where}: its lower limit {lower:g} is above the upper limit {upper:g}.")
     return lower, upper, velocity
 
 
@@ -290,16 +320,21 @@ def _mimic(element: Element, where: str) -> Mimic | None:
 
 # ------------------------------------------------------------------------------------------------ the whole
 def _tree(robot: str, links: Mapping[str, Link], joints: Iterable[Joint]) -> tuple[str, tuple[Joint, ...]]:
-    """Give the root and the joints from there outwards. Raises ModelError, JointLoop."""
+    """Return the root link, and the joints ordered from there outwards.
+
+    Raises:
+        ModelError: A link is missing, or there are several roots.
+        JointLoop: The joints form a loop.
+    """
     to: dict[str, Joint] = {}
     behind: dict[str, list[Joint]] = {}
     for joint in joints:
         for link in (joint.parent, joint.child):
             if link not in links:
-                raise ModelError(f"{robot}: joint {joint.name} names the link {link}, which is not there.")
+                raise ModelError(f"{robot}: joint {joint.name} refers to the link {link}, which does not exist.")
         if joint.child in to:
             raise JointLoop(
-                f"{robot}: the joints {to[joint.child].name} and {joint.name} both carry the link {joint.child}."
+                f"{robot}: the joints {to[joint.child].name} and {joint.name} have the same child link {joint.child}."
             )
         to[joint.child] = joint
         behind.setdefault(joint.parent, []).append(joint)
@@ -312,9 +347,9 @@ def _tree(robot: str, links: Mapping[str, Link], joints: Iterable[Joint]) -> tup
     if not roots or (len(roots) == 1 and len(ordered) < len(to)):
         reached = {joint.name for joint in ordered}
         around = [joint.name for joint in to.values() if joint.name not in reached]
-        raise JointLoop(f"{robot}: the joints {', '.join(around)} close a loop.")
+        raise JointLoop(f"{robot}: the joints {', '.join(around)} form a loop.")
     if len(roots) > 1:
-        raise ModelError(f"{robot}: the links {', '.join(roots)} hang on nothing; one of them alone may be the base.")
+        raise ModelError(f"{robot}: multiple root links: {', '.join(roots)}. Exactly one is allowed.")
     return roots[0], tuple(ordered)
 
 
@@ -324,13 +359,13 @@ def _check_mimics(robot: str, joints: Mapping[str, Joint]) -> None:
         if mimic is None:
             continue
         if (other := joints.get(mimic.joint)) is None or other.kind == "fixed":
-            raise ModelError(f"{robot}: joint {joint.name} mimics {mimic.joint}, which is no joint that moves.")
+            raise ModelError(f"{robot}: joint {joint.name} mimics {mimic.joint}, which is not a moving joint.")
         if other.mimic is not None:
-            raise ModelError(f"{robot}: joint {joint.name} mimics {mimic.joint}, which mimics another.")
+            raise ModelError(f"{robot}: joint {joint.name} mimics {mimic.joint}, which itself mimics another joint.")
 
 
 def _leaves(found: Description) -> tuple[EndEffector, ...]:
-    """Give the links at the ends of chains that move."""
+    """Return the links at the ends of moving chains."""
     inner = {joint.parent for joint in found.joints}
     moved = {found.root: False}
     for joint in found.joints:
@@ -341,15 +376,15 @@ def _leaves(found: Description) -> tuple[EndEffector, ...]:
 def _end_effector(element: Element, found: Description) -> EndEffector:
     link = _text(element, "link", found.name)
     if link not in found.links:
-        raise ModelError(f"{found.name}: the end effector {link} is no link of it.")
+        raise ModelError(f"{found.name}: the end effector {link} is not a link of the robot.")
     where = f"{found.name}: end effector {link}"
     free = frozenset((element.get("free") or "").split())
     if free not in (frozenset(), frozenset({"rz"}), frozenset(ORIGIN[3:])):
-        raise ModelError(f"{where}: free may be empty, rz, or rx ry rz, not {element.get('free')!r}.")
+        raise ModelError(f"{where}: free must be empty, rz, or rx ry rz, not {element.get('free')!r}.")
     position = _number(element, "position_tolerance", EndEffector.position_tolerance, where)
     orientation = _number(element, "orientation_tolerance", EndEffector.orientation_tolerance, where)
     if not (0.0 < position < 0.1 and 0.0 < orientation < 0.5):
-        raise ModelError(f"{where}: its tolerances must be above 0, and below 0.1 m and 0.5 rad.")
+        raise ModelError(f"{where}: the tolerances must be above 0, and below 0.1 m and 0.5 rad.")
     return EndEffector(link, free, position, orientation)
 
 
@@ -364,5 +399,5 @@ def _setting(element: Element, found: Description) -> Setting:
         return Setting(name, "joint", joint, component)
     link = _text(element, "link", where)
     if link not in found.links or component not in ORIGIN[:3]:
-        raise ModelError(f"{where}: {component} of the link {link} cannot follow it.")
+        raise ModelError(f"{where}: {component} of the link {link} cannot follow a setting.")
     return Setting(name, "link", link, component)

@@ -1,9 +1,9 @@
-"""Denavit-Hartenberg parameters: a controller's calibration of one arm, put into a model made from nominal ones.
+"""Denavit-Hartenberg parameters: the calibration of one robot, applied to its nominal model.
 
-Rows are of the classic convention, as robots' makers publish them: rotate by theta about z, move by d along z, by a
-along x, rotate by alpha about x. Of axes that are nearly parallel, d may come out as metres in either direction, with
-the next row leading back; so joints are not put where the rows' frames are, but onto the same axes, as near as can be
-to where the model has them. The links' shapes stay in their places, and the tip goes exactly where the rows say.
+Rows use the classic convention, as manufacturers publish them: rotate by theta about z, move by d along z, move by a
+along x, rotate by alpha about x. For nearly parallel axes, d can be several metres in one row and back in the next.
+Joints are therefore not placed at the frames of the rows, but on the same axes, as near as possible to their nominal
+places. The shapes of links stay where they are, and the end is exactly where the rows put it.
 """
 
 import math
@@ -18,11 +18,11 @@ from arcor2_hw.kinematics.model import RobotModel
 from arcor2_hw.kinematics.shapes import Array
 
 FARTHEST: Final = 0.05
-"""m, and rad, by which a calibration may move a joint's axis: what is more is the calibration of another arm."""
+"""Maximum displacement of an axis by a calibration, m and rad; a larger one belongs to another robot."""
 
 
 class DhRow(NamedTuple):
-    """One joint: theta, alpha in rad, d, a in m. `plus` adds the differences that some makers give instead."""
+    """One joint: theta and alpha in rad, d and a in m."""
 
     theta: float
     d: float
@@ -30,11 +30,11 @@ class DhRow(NamedTuple):
     alpha: float
 
     def plus(self, delta: "DhRow") -> "DhRow":
-        """Give this row with differences added."""
+        """Return this row with differences added, as some manufacturers publish them."""
         return DhRow(*(one + other for one, other in zip(self, delta, strict=True)))
 
     def matrix(self, q: float = 0.0) -> Array:
-        """Give the transform of the row for a joint value, (4, 4)."""
+        """Return the transform of the row for a joint value, (4, 4)."""
         ct, st = math.cos(self.theta + q), math.sin(self.theta + q)
         ca, sa = math.cos(self.alpha), math.sin(self.alpha)
         return np.array(
@@ -48,12 +48,12 @@ class DhRow(NamedTuple):
 
 
 def rows_of(calibration: KinematicCalibration) -> list[DhRow]:
-    """Give the rows of what a controller told of its arm."""
+    """Return the rows of a calibration."""
     return [DhRow(each.theta, each.d, each.a, each.alpha) for each in calibration.joints]
 
 
 def chain(rows: Sequence[DhRow], q: Sequence[float] | Array) -> Array:
-    """Give the end of a chain of rows for joint values, (4, 4)."""
+    """Return the end of a chain of rows for joint values, (4, 4)."""
     at = np.eye(4)
     for row, value in zip(rows, q, strict=True):
         at = at @ row.matrix(float(value))
@@ -61,21 +61,28 @@ def chain(rows: Sequence[DhRow], q: Sequence[float] | Array) -> Array:
 
 
 def calibrated(model: RobotModel, end_effector: str, rows: Sequence[DhRow]) -> RobotModel:
-    """Give the model of the very arm that these rows describe; they begin in the frame of the chain's first joint.
+    """Return the model of the robot that these rows describe.
 
-    The end of the rows is the link that is fixed to the last joint's. Raises ModelError unless the chain has as many
-    joints, all turning about their z axes, and the rows are near to it: 50 mm and 0.05 rad.
+    Args:
+        model: The nominal model.
+        end_effector: End effector whose chain the rows describe.
+        rows: One row for each joint, starting in the frame of the first joint. Their end is the link that is fixed to
+            the link of the last joint.
+
+    Raises:
+        ModelError: The joints are not revolute about their z axes, their number differs, or the rows deviate from the
+            nominal model by more than 50 mm or 0.05 rad.
     """
     arm = model.arm(end_effector)
     moving = [step for step in arm.steps if step.axis is not None]
     if len(moving) != len(rows) or any(step.prismatic or not np.allclose(step.axis, (0, 0, 1)) for step in moving):  # type: ignore[arg-type]
-        raise ModelError(f"{model.name} is not described by {len(rows)} DH rows: its joints are of another kind.")
+        raise ModelError(f"{model.name} cannot be described by {len(rows)} DH rows: its joints do not match them.")
     if not np.isfinite(rows).all():
-        raise ModelError(f"The calibration for {model.name} has numbers that are not finite.")
+        raise ModelError(f"The calibration of {model.name} has numbers that are not finite.")
     names = [step.name for step in arm.steps]
     first, last = names.index(moving[0].name), names.index(moving[-1].name)
     if len(moving) != last - first + 1 or last + 1 == len(names):
-        raise ModelError(f"{model.name} is not described by DH rows: there are fixed joints between its joints.")
+        raise ModelError(f"{model.name} cannot be described by DH rows: it has fixed joints between its joints.")
     origins: dict[str, Array] = {}
     nominal, before, at = np.eye(4), np.eye(4), np.eye(4)
     for number, step in enumerate(moving):
@@ -87,25 +94,29 @@ def calibrated(model: RobotModel, end_effector: str, rows: Sequence[DhRow]) -> R
         before = placed
     end = at @ rows[-1].matrix()
     if np.abs(end - nominal @ arm.steps[last + 1].origin).max() > FARTHEST:
-        raise ModelError(f"The calibration is not one of {model.name}: its end is elsewhere by more than 50 mm.")
+        raise ModelError(f"The calibration does not belong to {model.name}: its end differs by more than 50 mm.")
     origins[names[last + 1]] = np.linalg.inv(before) @ end
     return model.with_origins(origins)
 
 
 def of_very_arm(nominal: RobotModel, calibration: KinematicCalibration) -> RobotModel:
-    """Give the model of the very arm whose controller told the calibration. Raises ModelError when it is of another."""
+    """Return the model of one robot, calibrated with the parameters from its controller.
+
+    Raises:
+        ModelError: The calibration belongs to another kind of robot.
+    """
     if not nominal.end_effectors:
-        raise ModelError(f"{nominal.name} has no end effector, and so no arm that a calibration could be of.")
-    # Those of one arm share its joints.
+        raise ModelError(f"{nominal.name} has no end effector, so no calibration can be applied.")
+    # All end effectors share the joints of the arm.
     return calibrated(nominal, next(iter(nominal.end_effectors)), rows_of(calibration))
 
 
 def _onto(axis_frame: Array, nominal: Array, what: str) -> Array:
-    """Give the frame on the z axis of `axis_frame` that is nearest to a nominal one."""
+    """Return the frame on the z axis of `axis_frame` that is nearest to the nominal frame."""
     z, at = axis_frame[:3, 2], axis_frame[:3, 3]
     origin = at + z * float(z @ (nominal[:3, 3] - at))
     if np.linalg.norm(origin - nominal[:3, 3]) > FARTHEST or np.linalg.norm(z - nominal[:3, 2]) > FARTHEST:
-        raise ModelError(f"The calibration is not one of this arm: {what} is elsewhere by more than 50 mm or 0.05 rad.")
+        raise ModelError(f"The calibration belongs to another robot: {what} differs by more than 50 mm or 0.05 rad.")
     x = nominal[:3, 0] - z * float(z @ nominal[:3, 0])
     x /= np.linalg.norm(x)
     out = np.eye(4)

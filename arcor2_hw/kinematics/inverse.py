@@ -1,9 +1,9 @@
-"""Joints for a pose: nearest to a seed, within limits, free of collision if asked; or all distinct ones.
+"""Inverse kinematics: joint values within limits nearest to a seed, optionally collision-free; or all distinct ones.
 
-An arm of the UR's kind, or with a spherical wrist as most industrial ones, has its up to eight configurations
-computed, see `closed_form`, and each refined; for any other arm damped least squares (Levenberg and Marquardt's)
-start at the seed and, if need be, at up to 40 random places. These places are the same in every call, so that the
-same question has the same answer.
+Arms like the UR, or with a spherical wrist, have up to eight configurations computed in closed form (see
+`closed_form`) and then refined. Other arms are solved by damped least squares (Levenberg-Marquardt), from the seed
+and, if needed, from up to 40 random starts. The starts are the same in every call, so that the same question has the
+same answer.
 """
 
 import itertools
@@ -22,29 +22,29 @@ CollisionCheck = Callable[[Array], str]
 """Function from joint values of the arm to the first contact as text, empty when there is none."""
 
 STARTS: Final = 40
-"""At most; an arm with few joints has no more than so many minima to be caught in."""
+"""Maximum number of random starts; an arm with few joints has fewer local minima and gets fewer starts."""
 _STARTS_PER_JOINT: Final = 6
 ROUNDS: Final = 60
 EXACT: Final = 1e-8
-"""m and rad at which a solution counts as exact; what is less exact has to keep the end effector's tolerances."""
+"""Error below which a solution is exact, m and rad; others must be within the tolerances of the end effector."""
 SAME: Final = 1e-3
-"""rad or m by which some joint of two distinct solutions differs at least."""
+"""Minimum difference of some joint between two distinct solutions, rad or m."""
 _FEW: Final = 2
 _MOST_DAMPING: Final = 1e-4
 _LEAST_DAMPING: Final = 1e-14
 _SLACK: Final = 1e-6
-"""rad or m by which rounding may put a joint beyond its limit; it is put back there."""
+"""Rounding error beyond a limit that is clipped, rad or m."""
 _PATIENCE: Final = 8
 _PROGRESS: Final = 0.9
-"""Rounds after which at most this share of the error has to be left."""
+"""Maximum share of the error that may remain after _PATIENCE iterations."""
 _STEP: Final = 0.7
-"""rad, or m, that a joint goes in one round at most."""
+"""Maximum change of a joint in one iteration, rad or m."""
 
 
 class InverseKinematics:
-    """Finds joints of one arm. Targets are (4, 4) in the frame of the model's root link; joints in the arm's order.
+    """Inverse kinematics of one arm. Not safe for use by two threads at once.
 
-    Not safe for two threads at once.
+    Targets are (4, 4) in the frame of the model's root link; joint values are in the order of the arm.
     """
 
     def __init__(self, arm: Arm) -> None:
@@ -55,7 +55,7 @@ class InverseKinematics:
         self._form = _closed_form(arm) if len(self._rows) == 6 else None
         lower, upper = arm.lower.copy(), arm.upper.copy()
         wide = self._turning & (upper - lower > 2.0 * np.pi)
-        # A turn more leads to the same place: to begin within one is enough.
+        # Whole turns lead to the same place, so starts within one turn are enough.
         middle = np.clip(0.0, lower[wide] + np.pi, upper[wide] - np.pi)
         lower[wide], upper[wide] = middle - np.pi, middle + np.pi
         self._starts = np.random.default_rng(0).uniform(
@@ -64,14 +64,21 @@ class InverseKinematics:
 
     @property
     def has_closed_form(self) -> bool:
-        """Tell whether the configurations are computed rather than searched for."""
+        """Return whether the configurations are computed in closed form."""
         return self._form is not None
 
     # -------------------------------------------------------------------------------- answers
     def solve(self, target: Array, seed: Array | None = None, check: CollisionCheck | None = None) -> Array:
-        """Give joints for a pose, of those that are free the nearest to `seed` (the middle of the joints if None).
+        """Return joint values for a pose.
 
-        Raises OutOfReach, or OnlyInCollision naming the pair that the nearest of them is in.
+        Args:
+            target: The pose, (4, 4).
+            seed: The nearest solution to these joint values is returned; default: the middle of the ranges.
+            check: Collision check; solutions in collision are skipped.
+
+        Raises:
+            OutOfReach: There is no solution.
+            OnlyInCollision: All solutions are in collision; the message names the contact of the nearest one.
         """
         near = self._checked(target, seed)
         hit = ""
@@ -88,10 +95,15 @@ class InverseKinematics:
     def solutions(
         self, target: Array, seed: Array | None = None, check: CollisionCheck | None = None, *, turns: bool = False
     ) -> list[Array]:
-        """Give all distinct joints found for a pose, nearest to `seed` first; none when it is out of reach.
+        """Return all distinct solutions for a pose, nearest to `seed` first; empty when it is out of reach.
 
-        Joints that differ by whole turns count as one, the nearest, unless `turns` are asked for. Of an arm with more
-        joints than it needs there is a continuum: what comes then is a sample of it.
+        An arm with redundant joints has infinitely many solutions, of which this is a sample.
+
+        Args:
+            target: The pose, (4, 4).
+            seed: Joint values for ordering; default: the middle of the ranges.
+            check: Collision check; solutions in collision are skipped.
+            turns: Whether solutions that differ by whole turns are distinct; otherwise only the nearest is returned.
         """
         near = self._checked(target, seed)
         found = [q for q in self._nearest_first(target, near, everything=True) if not (check and check(q))]
@@ -100,7 +112,7 @@ class InverseKinematics:
         return sorted(found, key=lambda q: float(np.sum((q - near) ** 2)))
 
     def candidates(self, target: Array, seed: Array | None = None) -> Iterator[Array]:
-        """Give joints for a pose one after the other, nearest to `seed` first, each found when it is asked for."""
+        """Yield solutions for a pose, nearest to `seed` first, each computed when needed."""
         return self._nearest_first(target, self._checked(target, seed))
 
     def _checked(self, target: Array, seed: Array | None) -> Array:
@@ -109,7 +121,7 @@ class InverseKinematics:
         if seed is None:
             seed = self.arm.middle()
         if seed.shape != (self.arm.dof,) or not np.isfinite(seed).all():
-            raise OutOfReach(f"{self.arm.model.name} needs {self.arm.dof} finite joint values to begin with.")
+            raise OutOfReach(f"{self.arm.model.name} needs {self.arm.dof} finite joint values as a seed.")
         return seed
 
     # -------------------------------------------------------------------------------- candidates
@@ -118,14 +130,14 @@ class InverseKinematics:
             return
         if self._form is not None:
             raw = np.array(self._form.solve(target, seed)).reshape(-1, 6)
-            near = self._near(raw, seed, NEARLY)  # calibrated, it may keep the limits yet
+            near = self._near(raw, seed, NEARLY)  # refinement may move it within the limits
             some = False
             for q in self._computed(pin.SE3(target), near, seed):
                 some = True
                 yield q
             if some or not len(near):
                 return
-            # At the edge of reach, and where axes meet, what was computed may be too far off to be refined.
+            # At the edge of the workspace, and where axes meet, the closed form may be too inexact to be refined.
             yield from self._searched(target, seed, everything, _FEW)
         else:
             yield from self._searched(target, seed, everything, STARTS)
@@ -143,7 +155,7 @@ class InverseKinematics:
                 yield q
 
     def _searched(self, target: Array, seed: Array, everything: bool, starts: int) -> Iterator[Array]:
-        """Give what is found from the seed, then what is found from elsewhere, in the order of its distance."""
+        """Yield the solution found from the seed, then those found from other starts, nearest first."""
         goal = pin.SE3(target)
         first = self._refined(goal, np.clip(seed, self.arm.lower, self.arm.upper))
         given: list[Array] = []
@@ -175,7 +187,7 @@ class InverseKinematics:
 
     # -------------------------------------------------------------------------------- turns
     def _near(self, q: Array, seed: Array, slack: float = _SLACK) -> Array:
-        """Give joints, (n) or (m, n), the same place by whole turns, as near to the seed as the limits allow."""
+        """Shift joint values, (n) or (m, n), by whole turns as near to the seed as the limits allow."""
         turned = q + np.where(self._turning, 2.0 * np.pi * np.round((seed - q) / (2.0 * np.pi)), 0.0)
         over, under = turned > self.arm.upper + slack, turned < self.arm.lower - slack
         if over.any() or under.any():
@@ -196,7 +208,7 @@ class InverseKinematics:
 
     # -------------------------------------------------------------------------------- refinement
     def _refined(self, goal: Any, q: Array, rounds: int = ROUNDS, clamp: bool = True) -> Array | None:
-        """Give joints near `q` that meet the goal, None when these steps lead to none."""
+        """Refine joint values near `q` until they reach the goal; None when the iteration does not converge."""
         arm = self.arm
         error, size = self._error(goal, q)
         damping = min(max(size * size, _LEAST_DAMPING), _MOST_DAMPING)
@@ -206,7 +218,7 @@ class InverseKinematics:
             if size < EXACT:
                 break
             if number % _PATIENCE == 0:
-                if size > _PROGRESS * before:  # a minimum that is none of nothing, or the way along a limit
+                if size > _PROGRESS * before:  # a local minimum, or motion along a limit
                     break
                 before = size
             if jacobian is None:
@@ -236,7 +248,7 @@ class InverseKinematics:
         return q if good else None
 
     def _error(self, goal: Any, q: Array) -> tuple[Array, float]:
-        """Give what is missing to the goal in the tip's axes, of the directions that are commanded, and its size."""
+        """Return the remaining error of the commanded directions in the axes of the tip, and its norm."""
         missing = self.arm.placement(q).actInv(goal)
         if len(self._rows) == 6:
             error = np.concatenate((missing.translation, pin.log3(missing.rotation)))
@@ -253,7 +265,7 @@ class InverseKinematics:
 
 
 def _closed_form(arm: Arm) -> ThreeParallel | SphericalWrist | None:
-    """Read axes and points off the arm at zero angles."""
+    """Read axes and points of the arm at zero angles."""
     if arm.dof != 6 or len(arm.moving) != 6 or any(arm.prismatic) or not np.array_equal(arm.coupling[0], np.eye(6)):
         return None
     if arm.coupling[1].any():

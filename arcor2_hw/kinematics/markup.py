@@ -1,4 +1,4 @@
-"""XML from outside: without document types, so that nothing is fetched and nothing grows. Imports no numerics."""
+"""XML parsing of untrusted files. Imports no numerics."""
 
 from typing import Final
 from xml.etree.ElementTree import Element, TreeBuilder
@@ -10,16 +10,24 @@ MAX_DEPTH: Final = 64
 
 
 def parse_xml(content: bytes, name: str) -> Element:
-    """Give the root of a document. Raises ModelError when it is none, UnsafeDescription for a document type.
+    """Parse a document and return its root.
 
-    Without document types there are no entities, so that nothing is fetched and nothing grows.
+    Document types are rejected, so that entities cannot fetch or expand anything.
+
+    Args:
+        content: The document.
+        name: Name of the file in messages.
+
+    Raises:
+        ModelError: It is not XML, or a xacro file.
+        UnsafeDescription: It has a document type, or is nested too deeply.
     """
     parser = expat.ParserCreate()
     builder = TreeBuilder()
     depth = 0
 
     def refuse(*_: object) -> None:
-        raise UnsafeDescription(f"{name} has a document type or an entity, which is refused.")
+        raise UnsafeDescription(f"{name} has a document type or an entity, which is not allowed. Remove it.")
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         nonlocal depth
@@ -27,7 +35,7 @@ def parse_xml(content: bytes, name: str) -> Element:
         if depth > MAX_DEPTH:
             raise UnsafeDescription(f"{name} is nested deeper than {MAX_DEPTH} elements.")
         if tag.startswith("xacro:"):
-            raise ModelError(f"{name} is a xacro: expand it into a URDF first.")
+            raise ModelError(f"{name} is a xacro file. Convert it to a URDF first.")
         builder.start(tag, attributes)
 
     def end(tag: str) -> None:
@@ -43,4 +51,4 @@ def parse_xml(content: bytes, name: str) -> Element:
         parser.Parse(content, True)
         return builder.close()
     except (expat.ExpatError, ValueError, AssertionError, LookupError) as error:
-        raise ModelError(f"{name} is no XML: {error}.") from error
+        raise ModelError(f"{name} is not valid XML: {error}.") from error

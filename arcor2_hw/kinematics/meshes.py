@@ -1,4 +1,4 @@
-"""Meshes from files: bounded before they are parsed, checked after; STL, OBJ, PLY, OFF, COLLADA and binary glTF."""
+"""Mesh files: STL, OBJ, PLY, OFF, COLLADA and binary glTF. Sizes are checked before parsing, content after it."""
 
 import io
 import json
@@ -22,16 +22,20 @@ _Z_FROM_UP: Final = {
     "X": np.array(((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0))),
     "Y": np.array(((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))),
 }
-"""Turns what has this axis up so that z is; COLLADA's X_UP has y to the left and z to the viewer."""
+"""Rotations from the named up axis to z up; with X_UP in COLLADA, y is to the left and z towards the viewer."""
 _FARTHEST: Final = 1e4
-"""m: a vertex farther away than that is a mistake in the units at least."""
+"""Maximum coordinate of a vertex, m; larger ones mean wrong units."""
 _NO_COLOUR: Final = ((102, 102, 102, 255),)
-"""What trimesh takes where a file says nothing of colours."""
+"""Colour that trimesh uses where a file has none."""
 
 
 class Surface(NamedTuple):
-    """What a mesh looks like: vertices (n, 3) in m, triangles (m, 3), colours (n, 3) of red, green and blue in sRGB,
-    0..1, None where the file has none.
+    """A mesh for display.
+
+    Attributes:
+        vertices: (n, 3), m.
+        triangles: (m, 3).
+        colours: (n, 3), red, green and blue in sRGB from 0 to 1, or None.
     """
 
     vertices: Array
@@ -40,9 +44,10 @@ class Surface(NamedTuple):
 
 
 def kind_of(content: bytes, name: str) -> str:
-    """Tell of which kind a mesh is: by its first bytes, and where they say nothing by the ending of its name.
+    """Return the format of a mesh: by its first bytes, otherwise by the extension of its name.
 
-    Raises BadMesh when neither says.
+    Raises:
+        BadMesh: The format is unknown.
     """
     for magic, kind in _MAGIC:
         if content.startswith(magic):
@@ -55,19 +60,25 @@ def kind_of(content: bytes, name: str) -> str:
     binary = len(content) >= 84 and len(content) == 84 + 50 * int(struct.unpack_from("<I", content, 80)[0])
     if binary or content.startswith(b"solid"):
         return "stl"
-    raise BadMesh(f"The mesh {name} is of no kind that is known: {', '.join(KINDS)}.")
+    raise BadMesh(f"The format of the mesh {name} is unknown. Supported are {', '.join(KINDS)}.")
 
 
 def read_mesh(
     content: bytes, name: str, scale: tuple[float, float, float] = (1.0, 1.0, 1.0), *, upright: bool = True
 ) -> TriangleMesh:
-    """Give the triangles of a mesh file, each axis multiplied by `scale`.
+    """Read the triangles of a mesh file.
 
-    Of COLLADA the unit is heeded. upright: what COLLADA and glTF have up comes to be along z; without, axes stay as
-    they are in the file, as robots' descriptions have come to expect.
+    The unit of a COLLADA file is applied.
 
-    Raises BadMesh naming the file: not of a known kind, larger than 64 MiB or a million triangles, damaged, empty,
-    with numbers that are not finite or farther than 10 km.
+    Args:
+        content: The file.
+        name: Name of the file in messages.
+        scale: Factor of each axis.
+        upright: Whether the up axis of COLLADA and glTF is rotated to z. URDF expects the axes of the file.
+
+    Raises:
+        BadMesh: The format is unknown, the file is larger than 64 MiB or a million triangles, damaged or empty, or has
+            coordinates that are not finite or beyond 10 km. The message names the file.
     """
     kind = _looked_at(content, name, MAX_MESH)
     vertices, triangles = _parse(content, kind, name)
@@ -76,15 +87,25 @@ def read_mesh(
         vertices = _turned(vertices, content, kind)
     scaled = vertices * np.asarray(scale)
     _refuse_far(scaled[np.unique(triangles)], name)
-    if np.prod(scale) < 0.0:  # mirrored: what was outside must not become inside
+    if np.prod(scale) < 0.0:  # a mirrored mesh needs the opposite winding
         triangles = triangles[:, ::-1]
     return TriangleMesh(np.ascontiguousarray(scaled), np.ascontiguousarray(triangles))
 
 
 def read_surface(content: bytes, name: str, *, upright: bool, most_bytes: int, most_triangles: int) -> Surface:
-    """Give what a mesh file looks like, with its colours; those of textures as they are at the vertices.
+    """Read a mesh file for display, with its colours; textures are sampled at the vertices.
 
-    Bounds are the caller's, all else is as of `read_mesh`. Nothing that a file refers to is read. Raises BadMesh.
+    Files that it refers to are not read.
+
+    Args:
+        content: The file.
+        name: Name of the file in messages.
+        upright: Whether the up axis of COLLADA and glTF is rotated to z.
+        most_bytes: Maximum size, bytes.
+        most_triangles: Maximum number of triangles.
+
+    Raises:
+        BadMesh: As in `read_mesh`.
     """
     kind = _looked_at(content, name, most_bytes)
     vertices, triangles, colours = _parse_coloured(content, kind, name)
@@ -102,7 +123,7 @@ def _parse(content: bytes, kind: str, name: str) -> tuple[Array, Triangles]:
         vertices = np.asarray(whole.vertices, dtype=np.float64).reshape(-1, 3)
         return vertices, np.asarray(whole.faces, dtype=np.int64).reshape(-1, 3)
     except Exception as error:
-        raise BadMesh(f"The mesh {name} is damaged, or is none.", f"{type(error).__name__}: {error}") from error
+        raise BadMesh(f"The mesh {name} is damaged or not a mesh.", f"{type(error).__name__}: {error}") from error
 
 
 def _parse_coloured(content: bytes, kind: str, name: str) -> tuple[Array, Triangles, NDArray[np.float32] | None]:
@@ -113,7 +134,7 @@ def _parse_coloured(content: bytes, kind: str, name: str) -> tuple[Array, Triang
         meshes = [each for each in scene.dump() if isinstance(each, trimesh.Trimesh) and len(each.faces)]
         parts = [_part(mesh, linear=kind == "glb") for mesh in meshes]
     except Exception as error:
-        raise BadMesh(f"The mesh {name} is damaged, or is none.", f"{type(error).__name__}: {error}") from error
+        raise BadMesh(f"The mesh {name} is damaged or not a mesh.", f"{type(error).__name__}: {error}") from error
     if not parts:
         raise BadMesh(f"The mesh {name} has no triangles.")
     starts = np.cumsum([0, *(len(vertices) for vertices, _, _ in parts)])
@@ -124,12 +145,12 @@ def _parse_coloured(content: bytes, kind: str, name: str) -> tuple[Array, Triang
     plain = np.full(3, 0.75, dtype=np.float32)
     colours = [np.broadcast_to(plain if given is None else given, (len(at), 3)) for at, _, given in parts]
     together = np.concatenate(colours)
-    # Programs that know of no colours write black: one thing that is all black says nothing.
+    # Programs without colours write black, so a mesh that is all black counts as having none.
     return vertices, triangles, together if together.any() else None
 
 
 def _part(mesh: Any, *, linear: bool) -> tuple[Array, Triangles, NDArray[np.float32] | None]:
-    """Give one mesh of a file: vertices, triangles, and colours (n, 3) or (3,)."""
+    """Return vertices, triangles and colours (n, 3) or (3,) of one mesh of a file."""
     vertices = np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3)
     faces = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
     visual, given = mesh.visual, None
@@ -148,7 +169,7 @@ def _part(mesh: Any, *, linear: bool) -> tuple[Array, Triangles, NDArray[np.floa
 
 
 def _textured(visual: Any, linear: bool) -> tuple[NDArray[Any] | None, bool]:
-    """Give the colours of a material, and whether they are linear, as glTF has its factors but not its textures."""
+    """Return the colours of a material, and whether they are linear, as glTF factors are but glTF textures are not."""
     material = visual.material
     image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
     if image is not None and visual.uv is not None and len(visual.uv):
@@ -160,21 +181,21 @@ def _textured(visual: Any, linear: bool) -> tuple[NDArray[Any] | None, bool]:
 
 
 def srgb(linear: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Give colours in sRGB (IEC 61966-2-1), 0..1, of those that are linear."""
+    """Convert linear colours, 0 to 1, to sRGB (IEC 61966-2-1)."""
     return np.where(linear <= 0.0031308, linear * 12.92, 1.055 * np.power(linear, 1 / 2.4) - 0.055).astype(np.float32)
 
 
 def linear_of(colours: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Give linear colours, 0..1, of those in sRGB."""
+    """Convert sRGB colours, 0 to 1, to linear."""
     return np.where(colours <= 0.04045, colours / 12.92, np.power((colours + 0.055) / 1.055, 2.4)).astype(np.float32)
 
 
 # ------------------------------------------------------------------------------------------------ checks
 def _looked_at(content: bytes, name: str, most_bytes: int) -> str:
-    """Give the kind of a mesh that may be parsed."""
+    """Return the format of a mesh that is safe to parse."""
     kind = kind_of(content, name)
     if len(content) > most_bytes:
-        raise BadMesh(f"The mesh {name} has {len(content)} bytes; at most {most_bytes} are taken.")
+        raise BadMesh(f"The mesh {name} has {len(content)} bytes; the maximum is {most_bytes}.")
     if kind == "dae":
         _refuse_entities(content, name)
     if kind == "glb":
@@ -183,46 +204,49 @@ def _looked_at(content: bytes, name: str, most_bytes: int) -> str:
 
 
 def _checked(vertices: Array, triangles: Triangles, name: str, most_triangles: int) -> Array:
-    """Give the vertices, those that no triangle has made finite."""
+    """Return the vertices; those that no triangle uses are made finite."""
     if not len(triangles):
         raise BadMesh(f"The mesh {name} has no triangles.")
     if len(triangles) > most_triangles:
-        raise BadMesh(f"The mesh {name} has {len(triangles)} triangles; at most {most_triangles} are taken.")
+        raise BadMesh(f"The mesh {name} has {len(triangles)} triangles; the maximum is {most_triangles}.")
     if triangles.min() < 0 or triangles.max() >= len(vertices):
-        raise BadMesh(f"The mesh {name} has triangles of vertices that it does not have.")
+        raise BadMesh(f"The mesh {name} has triangles that refer to missing vertices.")
     if not np.isfinite(vertices[np.unique(triangles)]).all():
-        raise BadMesh(f"The mesh {name} has vertices that are not finite numbers.")
+        raise BadMesh(f"The mesh {name} has vertices that are not finite.")
     return np.where(np.isfinite(vertices), vertices, 0.0)
 
 
 def _refuse_far(used: Array, name: str) -> None:
     if np.abs(used).max() > _FARTHEST:
-        raise BadMesh(f"The mesh {name} reaches farther than {_FARTHEST:g} m; are its units right?")
+        raise BadMesh(f"The mesh {name} extends beyond {_FARTHEST:g} m. Check its units.")
 
 
 def _refuse_entities(content: bytes, name: str) -> None:
-    """Refuse what makes an XML parser read other files or grow without bounds."""
+    """Reject what makes an XML parser read other files or expand without bounds."""
     if b"\0" in content[:4096]:
         raise BadMesh(f"The mesh {name} must be encoded in UTF-8.")
     lowered = content.lower()
     if b"<!doctype" in lowered or b"<!entity" in lowered:
-        raise BadMesh(f"The mesh {name} has a document type, which is refused.")
+        raise BadMesh(f"The mesh {name} has a document type, which is not allowed. Remove it.")
 
 
 def _refuse_compressed(content: bytes, name: str) -> None:
-    """Refuse glTF of which nothing could be read, by what it needs."""
+    """Reject compressed glTF by its list of required extensions."""
     try:
         (length,) = struct.unpack_from("<I", content, 12)
         required = json.loads(content[20 : 20 + length]).get("extensionsRequired", [])
     except (struct.error, ValueError, AttributeError, RecursionError):
-        return  # the parser says what is wrong
+        return  # the parser reports the error
     packed = {"KHR_draco_mesh_compression", "EXT_meshopt_compression"} & {str(each) for each in required}
     if packed:
-        raise BadMesh(f"The mesh {name} is compressed ({', '.join(sorted(packed))}), which is not read.")
+        raise BadMesh(
+            f"The mesh {name} is compressed ({', '.join(sorted(packed))}), which is not supported. Export it "
+            "without compression."
+        )
 
 
 def _unit(content: bytes, kind: str, name: str) -> float:
-    """Give the metres of a COLLADA file's unit, 1 for other kinds."""
+    """Return the unit of a COLLADA file in m; 1 for other formats."""
     if kind != "dae":
         return 1.0
     found = _UNIT.search(content)
@@ -231,12 +255,12 @@ def _unit(content: bytes, kind: str, name: str) -> float:
     except ValueError:
         unit = 0.0
     if not 1e-6 <= unit <= 1e3:
-        raise BadMesh(f"The mesh {name} has a unit that is none.")
+        raise BadMesh(f"The mesh {name} has an invalid unit.")
     return unit
 
 
 def _turned(vertices: Array, content: bytes, kind: str) -> Array:
-    """Give vertices with z up; glTF has y up, and so has COLLADA that says nothing."""
+    """Return vertices with z up; glTF, and COLLADA without an up axis, have y up."""
     if kind not in ("dae", "glb"):
         return vertices
     found = _UP.search(content) if kind == "dae" else None

@@ -1,7 +1,7 @@
-"""A robot's model: its joints, links, shapes and end effectors, and where they are for joint values.
+"""A robot model: joints, links, shapes and end effectors, and poses for joint values.
 
-Nothing here is safe for two threads at once: a model computes in place. Joint values are arrays in the order of
-`joints`, rad, m where prismatic; matrices are (4, 4) homogeneous, in the root link's frame unless said otherwise.
+Joint values are arrays in the order of `joints`, rad or (prismatic) m. Matrices are homogeneous, (4, 4), in the frame
+of the root link unless stated otherwise. Not safe for use by two threads at once: a model computes in place.
 """
 
 from collections.abc import Iterable, Mapping
@@ -28,7 +28,7 @@ _TOUCHING: Final = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class LinkShape:
-    """A shape of a link, and where it stands in the link's frame, (4, 4)."""
+    """A shape of a link, and its pose in the frame of the link, (4, 4)."""
 
     link: str
     name: str
@@ -37,11 +37,18 @@ class LinkShape:
 
 
 class RobotModel:
-    """A robot as its description says. Make it by `load`.
+    """A robot as its URDF describes it. Created by `load`.
 
-    name: of the robot. joints: those that take values, without fixed and mimicking ones, from the root outwards.
-    lower, upper: their limits (infinite for continuous joints); velocity: their maxima per s. links: from the root
-    outwards. end_effectors: names of links that poses are meant for. visual, collision: shapes by link.
+    Attributes:
+        name: Name of the robot.
+        joints: Joints that take values (neither fixed nor mimicking), from the root outwards.
+        lower: Lower limits, rad or m; infinite for continuous joints.
+        upper: Upper limits, rad or m; infinite for continuous joints.
+        velocity: Maximum velocities, rad/s or m/s.
+        links: Names of the links, from the root outwards.
+        end_effectors: Links for which poses are specified.
+        visual: Shapes for display.
+        collision: Shapes for collision checks.
     """
 
     def __init__(self, description: Description, package: Package, beside: str, mesh_use: MeshUse = "hull") -> None:
@@ -62,7 +69,7 @@ class RobotModel:
         self.tree = Tree(description, np.eye(4))
         self.links: tuple[str, ...] = tuple(self.tree.bodies)
         self.touching: frozenset[frozenset[str]] | None = None
-        """Links that overlap by design, once somebody has looked."""
+        """Pairs of links that overlap by design, once computed."""
         self._refuse_zero_lengths()
         self.visual, self.collision = self._shapes()
 
@@ -76,10 +83,16 @@ class RobotModel:
         name: str = "",
         mesh_use: MeshUse = "hull",
     ) -> Self:
-        """Read a package (folder, zip archive, lone URDF file, or the bytes of one of the latter two).
+        """Load a package: a folder, zip archive or single URDF file, or the bytes of an archive or URDF file.
 
-        `settings` are those of the object, which the description may follow; `mesh_use` says whether collision meshes
-        are taken for their convex hull, which is fast, or exactly. Raises ModelError and its kinds, see `errors`.
+        Args:
+            source: The package.
+            settings: Settings of the object, which the URDF may depend on.
+            name: Name in messages.
+            mesh_use: Whether collision meshes are replaced by their convex hulls, which is faster.
+
+        Raises:
+            ModelError: The package cannot be used; see `errors` for the kinds.
         """
         package = Package.open(source, name)
         beside, content = package.urdf()
@@ -87,16 +100,26 @@ class RobotModel:
         return cls(adjusting.with_settings(description, settings or {}), package, beside, mesh_use)
 
     def with_origins(self, origins: Mapping[str, Array]) -> Self:
-        """Give a model whose joints stand elsewhere in their parent links, (4, 4) each. Raises ModelError."""
+        """Return a model with other origins of joints in their parent links, (4, 4) each.
+
+        Raises:
+            ModelError: There is no such joint.
+        """
         moved = adjusting.with_origins(self.description, origins)
         return type(self)(moved, self._package, self._beside, self._mesh_use)
 
     # -------------------------------------------------------------------------------- joint values
     def values(self, joints: Iterable[robot.Joint], others: Array | None = None) -> Array:
-        """Give joint values of named joints in the model's order.
+        """Return the values of named joints in the model's order.
 
-        Joints that the model lacks (a gripper's) are passed over; for one that is not given `others` stands in.
-        Raises ModelError naming a joint that is missing or given twice, or whose value is not finite.
+        Unknown joints, such as those of a gripper, are ignored.
+
+        Args:
+            joints: Named joint values.
+            others: Values of joints that are not named; None: all are required.
+
+        Raises:
+            ModelError: A joint is missing, repeated, or not finite.
         """
         found: dict[str, float] = {}
         for joint in joints:
@@ -107,33 +130,39 @@ class RobotModel:
             found[joint.name] = joint.value
         missing = [name for name in self.joint_names if name not in found]
         if missing and others is None:
-            raise ModelError(f"Of {self.name} the joints {', '.join(missing)} are missing.")
+            raise ModelError(f"Joints of {self.name} are missing: {', '.join(missing)}.")
         out = np.zeros(len(self.joints)) if others is None else np.array(others, dtype=np.float64)
         for name, number in self._column.items():
             out[number] = found.get(name, out[number])
         return out
 
     def named(self, q: Array) -> list[robot.Joint]:
-        """Give joint values with their names."""
+        """Return joint values with their names."""
         return [robot.Joint(name, float(value)) for name, value in zip(self.joint_names, q, strict=True)]
 
     def neutral(self) -> Array:
-        """Give zero for each joint, or the limit nearest to it."""
+        """Return zero for each joint, or the limit nearest to it."""
         return np.clip(np.zeros(len(self.joints)), self.lower, self.upper)
 
     # -------------------------------------------------------------------------------- where things are
     def link_poses(self, q: Array) -> dict[str, Array]:
-        """Give the frame of each link, (4, 4)."""
+        """Return the frame of each link, (4, 4)."""
         return self.tree.frames(q)
 
     def arm(self, end_effector: str, tool: Array | None = None) -> Arm:
-        """Give the chain from the root to an end effector, or to any link; `tool` (4, 4) is fixed to it.
+        """Return the chain from the root to an end effector, or to any link.
 
-        Raises NotFound when there is no such link, ModelError when no joint moves it.
+        Args:
+            end_effector: The link.
+            tool: Pose of a tool's tip in the frame of the link, (4, 4).
+
+        Raises:
+            NotFound: There is no such link.
+            ModelError: No joint moves it.
         """
         if end_effector not in self.description.links:
             known = ", ".join(self.end_effectors)
-            raise NotFound(f"{self.name} has no end effector {end_effector!r}; there are {known}.")
+            raise NotFound(f"{self.name} has no end effector {end_effector!r}. Available: {known}.")
         steps: list[Step] = []
         link = end_effector
         to = {joint.child: joint for joint in self.description.joints}
@@ -155,7 +184,7 @@ class RobotModel:
 
     # -------------------------------------------------------------------------------- inside
     def _refuse_zero_lengths(self) -> None:
-        """Refuse a link between two joints about one and the same axis: neither can be told from the other."""
+        """Reject two joints about the same axis, because the link between them has no length."""
         frames = self.link_poses(self.neutral())
         to = {joint.child: joint for joint in self.description.joints}
         for joint in self.joints:
@@ -196,7 +225,7 @@ class RobotModel:
         what = geometry.what
         if isinstance(what, MeshFile):
             if 0.0 in what.scale:
-                raise ZeroLength(f"{where}: the mesh {what.reference} is scaled to nothing.")
+                raise ZeroLength(f"{where}: the mesh {what.reference} has a scale of zero.")
             path = self._package.locate(what.reference, self._beside)
             mesh = read_mesh(self._package.read(path, MAX_MESH), path, what.scale, upright=False)
             return mesh if use == "exact" else shapes.hull_of(mesh.vertices, f"{where}: the mesh {path}")
@@ -207,7 +236,7 @@ class RobotModel:
 
 
 def _capsules(made: list[LinkShape]) -> list[LinkShape]:
-    """Take a cylinder with a ball of its radius at both ends for what it is, a capsule, which collides faster."""
+    """Replace a cylinder with a sphere of its radius at both ends by a capsule, which is faster to check."""
     left = list(made)
     for each in made:
         cylinder = each.shape

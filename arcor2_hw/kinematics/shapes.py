@@ -85,7 +85,7 @@ def hull_of(vertices: Array, what: str) -> Hull:
     try:
         found = ConvexHull(vertices)
     except (QhullError, ValueError) as error:
-        raise BadMesh(f"{what} is flat: it has no inside.", str(error).splitlines()[0]) from error
+        raise BadMesh(f"{what} is flat and has no volume.", str(error).splitlines()[0]) from error
     number = np.full(len(vertices), -1)
     number[found.vertices] = np.arange(len(found.vertices))
     triangles = number[found.simplices]

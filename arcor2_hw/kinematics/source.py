@@ -1,4 +1,4 @@
-"""A robot's description as it comes: a folder, a zip archive or a lone URDF; every file is bounded and stays inside."""
+"""Packages of robot models: a folder, a zip archive or a single URDF file. Sizes and paths are checked."""
 
 import io
 import posixpath
@@ -13,16 +13,18 @@ from arcor2_hw.kinematics.errors import MissingMesh, ModelError, UnsafeDescripti
 MAX_FILES: Final = 10_000
 MAX_URDF: Final = 16 * 1024 * 1024
 MAX_MESH: Final = 64 * 1024 * 1024
-"""Bytes of one mesh; the largest of a vendor's packages have some 20 MB."""
+"""Maximum size of a mesh, bytes; the largest in packages of manufacturers have some 20 MB."""
 MAX_PACKAGE: Final = 512 * 1024 * 1024
-"""Bytes of all files of an archive, unpacked."""
+"""Maximum unpacked size of an archive, bytes."""
 _CHUNK: Final = 1024 * 1024
 
 
 class Package:
-    """The files of one robot's description, read when they are asked for. Make it by `open`.
+    """The files of one robot model, read when needed. Created by `open`.
 
-    name: of the folder or archive, for messages. names: relative paths with forward slashes.
+    Attributes:
+        name: Name of the folder or archive in messages.
+        names: Relative paths with forward slashes.
     """
 
     def __init__(self, name: str, sizes: dict[str, int], read: Callable[[str, int], bytes]) -> None:
@@ -33,10 +35,11 @@ class Package:
 
     @classmethod
     def open(cls, source: Path | bytes, name: str = "") -> Self:
-        """Open a folder, a zip archive or a URDF file, or the bytes of one of the latter two.
+        """Open a folder, a zip archive or a URDF file, or the bytes of an archive or URDF file.
 
-        Raises ModelError when it is none of them or cannot be read, UnsafeDescription when it is too large, has
-        encrypted files, or files that lie outside of it.
+        Raises:
+            ModelError: It is none of them, or cannot be read.
+            UnsafeDescription: It is too large, or has encrypted files or files outside of it.
         """
         if isinstance(source, bytes):
             return cls._of_bytes(source, name or "upload")
@@ -45,7 +48,7 @@ class Package:
             if source.is_dir():
                 return cls._of_folder(source, name)
             if not source.is_file():
-                raise ModelError(f"There is no robot description {name}.")
+                raise ModelError(f"There is no robot model {name}.")
             if source.stat().st_size > MAX_PACKAGE:
                 raise UnsafeDescription(f"{name} is larger than {MAX_PACKAGE} bytes.")
             return cls._of_bytes(source.read_bytes(), name)
@@ -61,7 +64,7 @@ class Package:
                 continue
             inner = path.relative_to(folder).as_posix()
             if not path.resolve().is_relative_to(root):
-                raise UnsafeDescription(f"{name}: {inner} is a link that leads out of the folder.")
+                raise UnsafeDescription(f"{name}: {inner} is a link to a file outside of the folder.")
             sizes[inner] = path.stat().st_size
             if len(sizes) > MAX_FILES:
                 raise UnsafeDescription(f"{name} has more than {MAX_FILES} files.")
@@ -80,73 +83,91 @@ class Package:
         try:
             archive = zipfile.ZipFile(io.BytesIO(content))
         except (zipfile.BadZipFile, ValueError, NotImplementedError) as error:
-            raise ModelError(f"{name} is no zip archive.", str(error)) from error
+            raise ModelError(f"{name} is not a zip archive.", str(error)) from error
         sizes: dict[str, int] = {}
         for each in archive.infolist():
             if each.is_dir():
                 continue
             if _outside(each.filename):
-                raise UnsafeDescription(f"{name}: the file {each.filename!r} lies outside of the archive.")
+                raise UnsafeDescription(f"{name}: the file {each.filename!r} is outside of the archive.")
             if each.flag_bits & 1:
                 raise UnsafeDescription(f"{name}: the file {each.filename!r} is encrypted.")
             sizes[posixpath.normpath(each.filename)] = each.file_size
         if len(sizes) > MAX_FILES:
             raise UnsafeDescription(f"{name} has more than {MAX_FILES} files.")
         if sum(sizes.values()) > MAX_PACKAGE:
-            raise UnsafeDescription(f"{name} has more than {MAX_PACKAGE} bytes when it is unpacked.")
+            raise UnsafeDescription(f"{name} is larger than {MAX_PACKAGE} bytes when unpacked.")
         entries = {posixpath.normpath(each.filename): each for each in archive.infolist()}
 
         def read(inner: str, limit: int) -> bytes:
-            try:  # what an archive says of its sizes need not be true
+            try:  # the sizes stated in an archive may be wrong
                 with archive.open(entries[inner]) as file:
                     return file.read(limit + 1)
             except (zipfile.BadZipFile, NotImplementedError, EOFError, RuntimeError, ValueError, OSError) as error:
                 raise ModelError(f"{name}: the file {inner} is damaged.", str(error)) from error
             except Exception as error:
-                if type(error).__name__ != "error":  # zlib's, which has no name of its own to catch
+                if type(error).__name__ != "error":  # the error of zlib is not a public class
                     raise
                 raise ModelError(f"{name}: the file {inner} is damaged.", str(error)) from error
 
         return cls(name, sizes, read)
 
     def read(self, inner: str, limit: int) -> bytes:
-        """Give a file. Raises UnsafeDescription when it has more than `limit` bytes, ModelError when it is damaged."""
+        """Return the content of a file.
+
+        Raises:
+            UnsafeDescription: The file is larger than `limit` bytes.
+            ModelError: The file is damaged.
+        """
         if self._sizes[inner] <= limit:
             content = self._read(inner, limit)
             if len(content) <= limit:
                 return content
-        raise UnsafeDescription(f"{self.name}: {inner} has more than {limit} bytes.")
+        raise UnsafeDescription(f"{self.name}: {inner} is larger than {limit} bytes.")
 
     def urdf(self) -> tuple[str, bytes]:
-        """Give path and content of the description. Raises ModelError unless there is one, UnsafeDescription."""
+        """Return path and content of the URDF file.
+
+        Raises:
+            ModelError: There is no URDF file, or several.
+            UnsafeDescription: The file is too large.
+        """
         found = [name for name in self.names if name.lower().endswith(".urdf") and not name.startswith("__MACOSX/")]
-        if len(found) > 1:  # the one that lies nearest to the top, if it does so alone
+        if len(found) > 1:  # the one nearest to the top, if there is only one
             depth = min(name.count("/") for name in found)
             found = [name for name in found if name.count("/") == depth]
         if not found:
-            raise ModelError(f"{self.name} has no file .urdf.")
+            raise ModelError(f"{self.name} has no URDF file.")
         if len(found) > 1:
-            raise ModelError(f"{self.name} has {len(found)} descriptions: {', '.join(found)}.")
+            raise ModelError(f"{self.name} has {len(found)} URDF files: {', '.join(found)}. Exactly one is allowed.")
         return found[0], self.read(found[0], MAX_URDF)
 
     def locate(self, reference: str, beside: str) -> str:
-        """Give the path of the file that a description at the path `beside` refers to.
+        """Return the path of a file that a URDF refers to.
 
-        `package://name/path`, `model://name/path`, `file:path` and relative paths are known; folders that are missing
-        at the front are forgiven. Raises UnsafeDescription for a path that leaves the package or another scheme,
-        MissingMesh when there is no such file.
+        `package://name/path`, `model://name/path`, `file:path` and relative paths are supported. Missing leading
+        folders
+        are tolerated.
+
+        Args:
+            reference: Reference in the URDF.
+            beside: Path of the URDF.
+
+        Raises:
+            UnsafeDescription: The path is outside of the package, or has another scheme.
+            MissingMesh: There is no such file.
         """
         scheme, _, rest = reference.partition("://")
         if not rest:
             scheme, rest = "", reference.removeprefix("file:")
         if scheme not in ("", "package", "model"):
-            raise UnsafeDescription(f"{self.name}: {reference!r} is no file of the package.")
+            raise UnsafeDescription(f"{self.name}: {reference!r} is not a file of the package.")
         wanted = unquote(rest).replace("\\", "/")
         if _outside(wanted) and scheme:
-            raise UnsafeDescription(f"{self.name}: {reference!r} leads out of the package.")
+            raise UnsafeDescription(f"{self.name}: {reference!r} is outside of the package.")
         at = posixpath.normpath(wanted if scheme else posixpath.join(posixpath.dirname(beside), wanted))
         if _outside(at):
-            raise UnsafeDescription(f"{self.name}: {reference!r} leads out of the package.")
+            raise UnsafeDescription(f"{self.name}: {reference!r} is outside of the package.")
         parts = at.split("/")
         for first in range(len(parts)):
             tail = "/".join(parts[first:])
@@ -159,6 +180,6 @@ class Package:
 
 
 def _outside(path: str) -> bool:
-    """Tell whether a relative path leads out of where it starts, or is none."""
+    """Return whether a relative path leads outside, or is absolute or invalid."""
     normal = posixpath.normpath(path.replace("\\", "/"))
     return normal.startswith(("/", "../")) or normal == ".." or ":" in normal.split("/")[0] or "\0" in normal

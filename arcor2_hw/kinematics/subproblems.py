@@ -1,6 +1,6 @@
-"""Steps by which configurations are computed: angles that bring vectors to a height, onto each other, to a length.
+"""Subproblems of inverse kinematics: angles that rotate a vector to a height, onto another one, or to a length.
 
-The canonical subproblems of B. Paden and W. Kahan, on plain floats: vectors of three are too short for arrays.
+The canonical subproblems of B. Paden and W. Kahan, on plain floats, which are faster than arrays of length 3.
 """
 
 import math
@@ -12,9 +12,9 @@ from arcor2_hw.kinematics.shapes import Array
 
 TINY: Final = 1e-9
 SINGULAR: Final = 1e-10
-"""Product of two sines below which an angle says nothing."""
+"""Product of two sines below which an angle is undetermined."""
 BEYOND: Final = 0.02
-"""By how much a cosine may be beyond 1 and still count as 1, for what is then refined."""
+"""Excess of a cosine over 1 that is still accepted; the result is refined later."""
 
 Vector = tuple[float, float, float]
 Rows = tuple[Vector, Vector, Vector]
@@ -24,7 +24,7 @@ Six = tuple[float, float, float, float, float, float]
 def level(
     axis: Vector, turned: Vector, along: Vector, height: float, if_free: float, *, backwards: bool = False
 ) -> list[float]:
-    """Give the angles about `axis` by which `turned` comes to a height along `along`; backwards: by minus these."""
+    """Return the angles about `axis` by which `turned` reaches a height along `along`; with `backwards`, negated."""
     across = cross(axis, turned)
     a = dot(along, cross(across, axis))
     b = dot(along, across)
@@ -42,7 +42,7 @@ def level(
 
 
 def between(axis: Vector, one: Vector, other: Vector, if_free: float) -> float:
-    """Give the angle about `axis` that turns `one` nearest to `other`."""
+    """Return the angle about `axis` that rotates `one` nearest to `other`."""
     across = cross(axis, one)
     sine, cosine = dot(across, other), dot(cross(across, axis), other)
     if math.hypot(sine, cosine) < SINGULAR:
@@ -51,7 +51,7 @@ def between(axis: Vector, one: Vector, other: Vector, if_free: float) -> float:
 
 
 def folded(axis: Vector, outer: Vector, inner: Vector, to: Vector) -> list[float]:
-    """Give the angles about `axis` of the outer of two links, so that both together are as long as `to`, across it."""
+    """Return the angles about `axis` between two links at which both together span the length of `to`."""
     outer, inner, to = (subtract(each, scaled(axis, dot(axis, each))) for each in (outer, inner, to))
     a, b = dot(inner, outer), dot(inner, cross(axis, outer))
     size = math.hypot(a, b)
@@ -64,7 +64,7 @@ def folded(axis: Vector, outer: Vector, inner: Vector, to: Vector) -> list[float
 
 
 def nearest_points(one: Array, along: Array, other: Array, other_along: Array) -> tuple[float, Array, Array]:
-    """Give the distance of two lines that are not parallel, and the points of both that are nearest."""
+    """Return the distance of two lines that are not parallel, and the nearest points on them."""
     across = np.cross(along, other_along)
     matrix = np.column_stack((along, -other_along, across))
     s, t, gap = np.linalg.solve(matrix, other - one)
@@ -73,54 +73,54 @@ def nearest_points(one: Array, along: Array, other: Array, other_along: Array) -
 
 # ------------------------------------------------------------------------------------------------ vectors of three
 def vector(array: Array) -> Vector:
-    """Give the three floats of an array."""
+    """Return the three floats of an array."""
     return float(array[0]), float(array[1]), float(array[2])
 
 
 def rows_of(matrix: Array) -> Rows:
-    """Give the rows of a matrix (3, 3)."""
+    """Return the rows of a matrix (3, 3)."""
     (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
     return (a, b, c), (d, e, f), (g, h, i)
 
 
 def dot(a: Vector, b: Vector) -> float:
-    """Give the scalar product."""
+    """Return the dot product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(a: Vector, b: Vector) -> Vector:
-    """Give the vector product."""
+    """Return the cross product."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 def add(*vectors: Vector) -> Vector:
-    """Give the sum."""
+    """Return the sum."""
     return sum(v[0] for v in vectors), sum(v[1] for v in vectors), sum(v[2] for v in vectors)
 
 
 def subtract(a: Vector, b: Vector) -> Vector:
-    """Give a - b."""
+    """Return a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 def scaled(a: Vector, by: float) -> Vector:
-    """Give a multiple."""
+    """Return a multiple."""
     return a[0] * by, a[1] * by, a[2] * by
 
 
 def turned(m: Rows, v: Vector) -> Vector:
-    """Give a matrix times a vector."""
+    """Return a matrix times a vector."""
     return dot(m[0], v), dot(m[1], v), dot(m[2], v)
 
 
 def transposed(m: Rows) -> Rows:
-    """Give the transposed matrix."""
+    """Return the transposed matrix."""
     (a, b, c), (d, e, f), (g, h, i) = m
     return (a, d, g), (b, e, h), (c, f, i)
 
 
 def product(m: Rows, n: Rows) -> Rows:
-    """Give m times n."""
+    """Return m times n."""
     x, y, z = transposed(n)
     return (
         (dot(m[0], x), dot(m[0], y), dot(m[0], z)),
@@ -130,7 +130,7 @@ def product(m: Rows, n: Rows) -> Rows:
 
 
 def rotation(axis: Vector, angle: float) -> Rows:
-    """Give the rotation about a unit axis (Rodrigues' formula)."""
+    """Return the rotation matrix about a unit axis (Rodrigues' formula)."""
     (x, y, z), c, s = axis, math.cos(angle), math.sin(angle)
     t = 1.0 - c
     return (
@@ -141,7 +141,7 @@ def rotation(axis: Vector, angle: float) -> Rows:
 
 
 def spun(axis: Vector, angle: float, v: Vector) -> Vector:
-    """Give a vector turned about a unit axis."""
+    """Return a vector rotated about a unit axis."""
     (x, y, z), (a, b, d), c, s = axis, v, math.cos(angle), math.sin(angle)
     along = (1.0 - c) * (x * a + y * b + z * d)
     return (

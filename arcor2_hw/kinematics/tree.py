@@ -1,4 +1,4 @@
-"""A description as Pinocchio's tree of joints, and on which of its bodies each link sits."""
+"""A URDF description as Pinocchio's tree of joints."""
 
 from typing import Any
 
@@ -10,10 +10,15 @@ from arcor2_hw.kinematics.shapes import Array
 
 
 class Tree:
-    """Joints that move, mimicking ones too, with fixed joints drawn in; `base` (4, 4) is where the root stands.
+    """Joints that move, including mimicking ones; fixed joints are merged. `base` (4, 4) is the pose of the root.
 
-    model, data: Pinocchio's. bodies: by link, number of the body in Pinocchio's model (0: the root's, which does not
-    move) and the link's frame in it. Joint values are those of the joints that do not mimic.
+    Joint values are those of joints that do not mimic.
+
+    Attributes:
+        model: Pinocchio's model.
+        data: Pinocchio's data.
+        bodies: By link, the number of its body in Pinocchio's model (0: the root, which does not move) and the frame of
+            the link in it.
     """
 
     def __init__(self, description: Description, base: Array) -> None:
@@ -40,23 +45,23 @@ class Tree:
         self.has_mimics = len(moving) != len(leaders)
 
     def expand(self, q: Array) -> Array:
-        """Give the values of all joints of Pinocchio's model."""
+        """Return the values of all joints of Pinocchio's model."""
         return np.asarray(self._factors @ q + self._offsets) if self.has_mimics else q
 
     @property
     def coupling(self) -> Array:
-        """Give by how much (m, n) the n joints that do not mimic move the m joints of Pinocchio's model."""
+        """Return the factors (m, n) by which n joints that do not mimic move the m joints of Pinocchio's model."""
         return self._factors
 
     def frames(self, q: Array) -> dict[str, Array]:
-        """Give the frame of each link, (4, 4)."""
+        """Return the frame of each link, (4, 4)."""
         pin.forwardKinematics(self.model, self.data, self.expand(q))
         bodies = [np.array(placement.homogeneous) for placement in self.data.oMi]
         return {link: bodies[body] @ placement for link, (body, placement) in self.bodies.items()}
 
 
 def joint_model(axis: Array, prismatic: bool) -> Any:
-    """Give Pinocchio's joint about, or along, an axis."""
+    """Return Pinocchio's model of a joint about, or along, an axis."""
     for number, letter in enumerate("XYZ"):
         if axis[number] == 1.0:
             return getattr(pin, f"JointModel{'P' if prismatic else 'R'}{letter}")()

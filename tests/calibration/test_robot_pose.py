@@ -165,7 +165,7 @@ def test_depth_files_are_read_and_others_named() -> None:
     eight = cv2.imencode(".png", depth.astype(np.uint8))[1].tobytes()
     bomb = bytearray(encoded)
     bomb[16:24] = (60_000).to_bytes(4, "big") * 2
-    wrong = {b"": "no PNG", b"hello": "no PNG", eight: "8 bit", bytes(bomb): "the most", encoded[:60]: "damaged"}
+    wrong = {b"": "not a PNG", b"hello": "not a PNG", eight: "8 bit", bytes(bomb): "maximum", encoded[:60]: "damaged"}
     for content, reason in wrong.items():
         with pytest.raises(InvalidPicture, match=reason):
             read_depth(content)
@@ -177,7 +177,7 @@ def test_a_surface_that_is_none_is_named() -> None:
         (np.zeros((0, 3)), one, "no vertices"),
         (corners, np.zeros((0, 3), np.int64), "no triangles"),
         (corners * np.nan, one, "not finite"),
-        (corners, one + 1, "does not exist"),
+        (corners, one + 1, "missing vertex"),
     ):
         with pytest.raises(InvalidData, match=reason):
             RobotSurface(vertices, faces)

@@ -257,11 +257,11 @@ def test_a_robot_of_plain_shapes_needs_no_mesh_and_no_library_that_reads_them(
     [
         (b"solid nothing", "part.stl", BadMesh, "part.stl"),
         (b"", "part.stl", BadMesh, "part.stl"),
-        (b"anything", "part.step", BadMesh, "part.step is of no kind that is known"),
+        (b"anything", "part.step", BadMesh, "format of the mesh part.step is unknown"),
         (b"v 0 0 0\nv 0 0 0\nv 1 1 1\nf 1 2 3\n", "line.obj", BadMesh, "mesh line.obj have zero area"),
         (b"PK\3\4 but no archive", "arm.zip", ModelError, "arm.zip is no zip"),
         (packed(a_dot_txt="x"), "arm.zip", ModelError, r"arm.zip has no file \.urdf"),
-        (b"<robot><link</robot>", "arm.urdf", ModelError, "arm.urdf is no XML"),
+        (b"<robot><link</robot>", "arm.urdf", ModelError, "arm.urdf is not valid XML"),
         (b"<sdf><robot/></sdf>", "arm.urdf", ModelError, "describes a sdf, not a robot"),
         (b'<!DOCTYPE r [<!ENTITY a "a">]><robot/>', "arm.urdf", UnsafeDescription, "document type"),
         (packed(r_dot_urdf='<robot name="r"/>', **{"..__out": "x"}), "arm.zip", UnsafeDescription, "outside"),

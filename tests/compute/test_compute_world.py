@@ -254,7 +254,7 @@ async def test_what_is_held_moves_along(compute: Compute) -> None:
     check = t.CheckLines([t.Line(part.position + Position(0, 0.04, 0), part.position)], ignore=["arm"])
     assert await compute.run(check, world=world(longer, held)) == [None]
     assert await met(joints) == "part"
-    with pytest.raises(NotFound, match="held by arm"):
+    with pytest.raises(NotFound, match="attached to arm"):
         await compute.run(check, world=world(held))
     with pytest.raises(NotFound, match="no link 'nose'"):
         await compute.run(t.PlaceInLink(model, joints, "nose", part))

@@ -130,7 +130,7 @@ def test_what_is_no_body_is_refused(world: CollisionWorld) -> None:
         world.put("thin", Box(1.0, 0.0, 1.0), Pose())
     with pytest.raises(InvalidData, match="lost"):
         world.put("lost", Sphere(0.1), at(math.nan, 0.0, 0.0))
-    with pytest.raises(Conflict, match="arm is a robot"):
+    with pytest.raises(Conflict, match="arm cannot be added: a robot has that id"):
         world.put("arm", Sphere(0.1), Pose())
     with pytest.raises(Conflict, match="arm"):
         world.add_robot("arm", ur(), Pose())
@@ -203,7 +203,7 @@ def test_what_is_held_moves_with_the_gripper_and_collides_with_the_rest(world: C
     assert pairs(world, moved) == {("part", "wall")}
     assert not world.is_free("arm", moved)
     assert world.is_free("arm", HOME)
-    with pytest.raises(Conflict, match="held by arm"):
+    with pytest.raises(Conflict, match="attached to arm"):
         world.attach("part", "arm", "flange")
     world.allow("part", "wall")
     assert world.is_free("arm", moved)
@@ -214,7 +214,7 @@ def test_what_is_held_moves_with_the_gripper_and_collides_with_the_rest(world: C
     assert np.allclose(left.matrix(), expected.matrix(), atol=1e-9)
     assert pairs(world, moved) == {("arm/wrist_3_link", "part")}
     assert world.is_free("arm", HOME)
-    with pytest.raises(NotFound, match="not held"):
+    with pytest.raises(NotFound, match="not attached"):
         world.detach("part")
 
 

@@ -417,4 +417,4 @@ def test_the_arm_is_computed_as_its_controller_told(host: HostProcess) -> None:
     host.send(m.Calibrate("obj_arm", calibration(0.2)))
     error = host.call("obj_arm", "get_end_effector_pose", end_effector="tcp")
     assert isinstance(error, m.ErrorData)
-    assert "not one of" in error.message
+    assert "another robot" in error.message
