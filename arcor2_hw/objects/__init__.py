@@ -1,4 +1,4 @@
-"""The abstract bases of object types."""
+"""The abstract base classes of object types."""
 
 from arcor2_hw.objects.camera import Camera
 from arcor2_hw.objects.generic import CollisionObject, Generic, GenericWithPose, VirtualCollisionObject

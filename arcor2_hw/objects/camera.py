@@ -1,4 +1,4 @@
-"""Camera: colour and depth pictures."""
+"""Camera: colour and depth images."""
 
 import abc
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Mode(NamedTuple):
-    """A size of pictures, pixels, and their rate, Hz."""
+    """An image size in pixels, and its frame rate, Hz."""
 
     width: int
     height: int
@@ -27,9 +27,10 @@ class Mode(NamedTuple):
 
 
 class Camera(CollisionObject):
-    """A camera. Its pose is the optical frame: x right, y down, z forward.
+    """A camera. Its pose is that of the optical frame: x right, y down, z forward.
 
-    `max_age`: a picture older than that (s) is an error, not a picture.
+    Attributes:
+        max_age: Maximum age of an image, s; an older one raises Stale.
     """
 
     category: ClassVar[str] = "Cameras"
@@ -50,46 +51,51 @@ class Camera(CollisionObject):
     @abc.abstractmethod
     @action
     def color_image(self, *, an: str | None = None) -> "Image.Image":
-        """Take a colour picture."""
+        """Capture a colour image."""
 
     @action
     def depth_image(self, averaged_frames: int = 1, *, an: str | None = None) -> "Image.Image":
-        """Take a depth picture: 16 bit, mm, 0 = invalid, in the colour camera's view.
+        """Capture a depth image: 16 bit, mm, 0 = invalid, in the view of the colour camera.
 
-        :param averaged_frames: how many frames are averaged
+        :param averaged_frames: number of frames to average
         """
         raise Arcor2NotImplemented("depth_image")
 
     # -------------------------------------------------------------------------------- optional hooks
     def capture(self) -> Frame:
-        """Give the newest colour and depth, of one instant. Raises Stale when it is older than `max_age`."""
+        """Return the newest colour and depth images of one instant.
+
+        Raises:
+            Stale: They are older than `max_age`.
+        """
         raise Arcor2NotImplemented("capture")
 
     def trigger(self) -> Frame:
-        """Give colour and depth of an instant after this call."""
+        """Capture colour and depth images after this call, and return them."""
         raise Arcor2NotImplemented("trigger")
 
     def point_cloud(self, frame: Frame) -> "npt.NDArray[np.float32]":
-        """Give the points of a frame, m, in the optical frame: height × width × 3, NaN where depth is invalid.
+        """Return the points of a frame in the optical frame, m: height × width × 3, NaN where depth is invalid.
 
-        Raises NoDepth for a frame without depth.
+        Raises:
+            NoDepth: The frame has no depth image.
         """
         if frame.depth is None:
             raise NoDepth(f"{self.name}: the frame has no depth")
         return cloud(frame.depth, frame.note.parameters)
 
     def depth_range(self) -> tuple[float, float]:
-        """Give the nearest and the farthest depth that is measured, m."""
+        """Return the minimum and maximum depth that can be measured, m."""
         raise Arcor2NotImplemented("depth_range")
 
     def set_exposure(self, exposure: float | None) -> None:
-        """Set the exposure, s; None leaves it to the camera."""
+        """Set the exposure time, s; None: automatic."""
         raise Arcor2NotImplemented("set_exposure")
 
     def modes(self) -> list[Mode]:
-        """Give the modes that it can be set to."""
+        """Return the supported modes."""
         raise Arcor2NotImplemented("modes")
 
     def illumination(self, on: bool) -> None:
-        """Switch its light."""
+        """Switch the illumination on or off."""
         raise Arcor2NotImplemented("illumination")

@@ -1,6 +1,6 @@
-"""Frame: colour and depth of one instant, with all that makes points in space of them; and what a picture says of it.
+"""Frame: colour and depth images of one instant, with everything needed to compute points in space.
 
-Lens model: OpenCV's, coefficients k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4.
+Lens model: that of OpenCV with the coefficients k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4.
 """
 
 import functools
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from PIL import Image
 
 KEY: Final = "arcor2_view"
-"""Under which a picture carries its PictureNote; as a text chunk when the picture travels as PNG."""
+"""Key of the PictureNote in an image; a text chunk of a PNG file."""
 UNDISTORTING: Final = 10
-"""Iterations; each leaves a tenth of the error with a lens as it is in use."""
+"""Number of iterations; each reduces the error of a usual lens by a factor of ten."""
 
 
 class PictureNote(Data, frozen=True):
-    """How a picture was taken: the lens, the camera's pose in the world (optical frame), when, by which camera."""
+    """How an image was taken: lens parameters, pose of the camera's optical frame in the world, time and camera."""
 
     parameters: CameraParameters
     pose: Pose
@@ -35,29 +35,35 @@ class PictureNote(Data, frozen=True):
     exposure: float | Unset = UNSET
 
     def put_on(self, picture: "Image.Image") -> "Image.Image":
-        """Write it on a picture; gives the picture."""
+        """Write the note into an image and return the image."""
         picture.info[KEY] = msgspec.json.encode(self).decode()
         return picture
 
     @classmethod
     def of(cls, picture: "Image.Image") -> "PictureNote":
-        """Read it from a picture. Raises InvalidData for one that does not say how it was taken."""
+        """Read the note of an image.
+
+        Raises:
+            InvalidData: The image has no valid note.
+        """
         text = picture.info.get(KEY)
         if not isinstance(text, str):
-            raise InvalidData("the picture does not say how it was taken: it needs one as a camera's depth_image gives")
+            raise InvalidData("the image has no note on how it was taken: use an image from the camera's depth_image")
         try:
             return msgspec.json.decode(text, type=cls)
         except (msgspec.MsgspecError, ValueError) as error:
-            raise InvalidData(f"what the picture says of how it was taken is not readable: {error}") from error
+            raise InvalidData(f"the note in the image on how it was taken is invalid: {error}") from error
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """Colour and depth of one instant.
+    """Colour and depth images of one instant.
 
-    color: height × width × 3, uint8, R, G, B. depth: height × width, uint16, mm along the optical axis in the colour
-    camera's view, 0 = invalid; None when there is none. monotonic: when the exposure ended on this computer's monotonic
-    clock, s. exposure: s, None when the camera does not tell.
+    Attributes:
+        color: height × width × 3, uint8, R, G, B.
+        depth: height × width, uint16, mm along the optical axis in the view of the colour camera, 0 = invalid, or None.
+        monotonic: End of the exposure on this computer's monotonic clock, s.
+        exposure: Exposure time, s; None when unknown.
     """
 
     color: "npt.NDArray[np.uint8]"
@@ -68,12 +74,12 @@ class Frame:
 
     @property
     def stamp(self) -> Timestamp:
-        """Give when the exposure ended (UTC)."""
+        """Return the end of the exposure (UTC)."""
         return self.note.stamp
 
 
 def rays(parameters: CameraParameters, width: int, height: int) -> "npt.NDArray[np.float32]":
-    """Give, for every pixel, x and y of its ray at 1 m along the optical axis: height × width × 2, read-only."""
+    """Return x and y of the ray of every pixel at 1 m along the optical axis: height × width × 2, read-only."""
     p = parameters
     return _rays(p.fx, p.fy, p.cx, p.cy, tuple(p.dist_coefs), width, height)
 
@@ -82,7 +88,7 @@ def rays(parameters: CameraParameters, width: int, height: int) -> "npt.NDArray[
 def _rays(
     fx: float, fy: float, cx: float, cy: float, coefficients: tuple[float, ...], width: int, height: int
 ) -> "npt.NDArray[np.float32]":
-    import numpy as np  # 0.1 s that those who have no camera do without
+    import numpy as np  # imported here because it takes 0.1 s
 
     k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = (*coefficients, *(0.0,) * (12 - len(coefficients)))
     v, u = np.indices((height, width), dtype=np.float32)
@@ -100,7 +106,7 @@ def _rays(
 
 
 def cloud(depth: "npt.NDArray[np.uint16]", parameters: CameraParameters) -> "npt.NDArray[np.float32]":
-    """Give the point of every pixel in the optical frame, m: height × width × 3, NaN where depth is invalid."""
+    """Return the point of every pixel in the optical frame, m: height × width × 3, NaN where depth is invalid."""
     import numpy as np
 
     height, width = depth.shape

@@ -1,4 +1,4 @@
-"""Generic, GenericWithPose, CollisionObject, VirtualCollisionObject: what every object type is."""
+"""Generic, GenericWithPose, CollisionObject, VirtualCollisionObject: the base classes of every object type."""
 
 import abc
 from collections.abc import Callable
@@ -13,19 +13,24 @@ from arcor2_hw.exceptions import Arcor2NotImplemented, NotFound
 from arcor2_hw.objects.settings import Settings
 
 DEFAULT_CONNECT_TIMEOUT = 5.0
-"""Seconds. A device on a local network answers within one; five allow for a controller that is busy."""
+"""Default time limit of `connect`, s. A device on a local network answers within 1 s, a busy controller within 5 s."""
 
 
 class Generic(abc.ABC):
     """An object in the workplace.
 
-    `__init__` stores, `connect` opens, `disconnect` closes. A type written for the older convention opens in
-    `__init__` and closes in `cleanup`; it works as it is.
+    `__init__` stores its arguments, `connect` opens the connection, `disconnect` closes it. A type written for the
+    older
+    convention opens it in `__init__` and closes it in `cleanup`; such a type works unchanged.
 
-    Class data: `_ABSTRACT` (may it not be placed in a scene), `loss_reaction` (what the device does when it loses us),
-    `loss_ends_program` (a program that runs is stopped when this device is lost; false where work may go on without),
-    `DYNAMIC_PARAMS` {parameter: (method giving its values, names of the parameters it needs)}, `CANCEL_MAPPING`
-    {action: method that cancels it}, `category` and `icon` for the editor.
+    Class Attributes:
+        _ABSTRACT: Whether the type cannot be added to a scene.
+        loss_reaction: What the device does when it loses the connection.
+        loss_ends_program: Whether the running program ends when this device is disconnected.
+        DYNAMIC_PARAMS: {parameter: (method that returns its values, names of the parameters it needs)}.
+        CANCEL_MAPPING: {action: method that cancels it}.
+        category: Category in the editor.
+        icon: Icon in the editor.
     """
 
     _ABSTRACT: ClassVar[bool] = True
@@ -43,91 +48,110 @@ class Generic(abc.ABC):
 
     @property
     def settings(self) -> Settings:
-        """Give the settings; NotFound when the type has none."""
+        """Return the settings.
+
+        Raises:
+            NotFound: The type has no settings.
+        """
         if self._settings is None:
             raise NotFound(f"{self.name} has no settings")
         return self._settings
 
     @classmethod
     def abstract(cls) -> bool:
-        """Tell whether this type may not be placed in a scene."""
+        """Return whether this type cannot be added to a scene."""
         return cls._ABSTRACT or bool(cls.__abstractmethods__)
 
     @classmethod
     def description(cls) -> str:
-        """Give the first line of the docstring."""
+        """Return the first line of the docstring."""
         return (cls.__doc__ or "No description available.").strip().splitlines()[0]
 
     def scene_object(self) -> SceneObject:
-        """Give this object as it stands in a scene."""
+        """Return this object as it is stored in a scene."""
         return SceneObject(self.name, type(self).__name__, id=self.id)
 
     # -------------------------------------------------------------------------------- connection: optional hooks
     def connect(self, timeout: float = DEFAULT_CONNECT_TIMEOUT) -> None:  # noqa: B027
-        """Open the connection within `timeout` seconds, to observe only; harmless when it is open.
+        """Open the connection for observation only. It does nothing when the connection is open.
 
-        Raises NotConnected naming the address, DeviceTimeout, DeviceFault.
+        Args:
+            timeout: Time limit, s.
+
+        Raises:
+            NotConnected: The device cannot be reached; the message names its address.
+            DeviceTimeout: The device did not answer in time.
+            DeviceFault: The device reports a fault.
         """
 
     def attach(self, find: "Callable[[str], Generic]") -> None:  # noqa: B027
-        """Take the way to the other objects of the scene; called once, between `__init__` and `connect`.
+        """Receive the function that finds other objects of the scene; called once between `__init__` and `connect`.
 
-        `find` gives an object by its name or id. It raises NotFound when the scene has none, NotConnected while it is
-        not made yet: all come up at once. A method is called there on the caller's thread, beside what the object is
-        doing; so only what its type declares for that may be called, as `HasPoints` does.
+        Methods of the found object are called on the caller's thread, concurrently with its own actions. Call only
+        methods whose type allows that, such as those of `HasPoints`.
+
+        Args:
+            find: Returns an object by its name or id. It raises NotFound when the scene has none, and NotConnected
+                while
+                the object is not created yet, because all objects are created concurrently.
         """
 
     def disconnect(self) -> None:  # noqa: B027
-        """Close the connection; harmless when it is closed. Takes no longer than 1 s."""
+        """Close the connection within 1 s. It does nothing when the connection is closed."""
 
     def cleanup(self) -> None:
-        """Close everything (the older name of disconnect)."""
+        """Close the connection (older name of `disconnect`)."""
         self.disconnect()
 
     @property
     def connection(self) -> Connection:
-        """Tell how the connection is; a type without one is always online."""
+        """Return the state of the connection; a type without a connection is always online."""
         return Connection.ONLINE
 
     @property
     def connection_reason(self) -> str:
-        """Tell why the connection is lost or failed; for types that do not keep it by `Observing`, which is asked."""
+        """Return why the connection is lost or failed, for types without `Observing`, which provides it."""
         return ""
 
     @property
     def health(self) -> Health:
-        """Give the condition of the device (NAMUR NE 107)."""
+        """Return the condition of the device (NAMUR NE 107)."""
         return Health.NORMAL
 
     def identify(self) -> Identity:
-        """Ask the device who it is."""
+        """Read the identity of the device."""
         raise Arcor2NotImplemented("identify")
 
     def alarms(self) -> list[Alarm]:
-        """Give what a person should deal with now."""
+        """Return the active alarms."""
         return []
 
     def acknowledge(self, code: str) -> None:
-        """Acknowledge the alarm `code`; NotFound when it does not stand."""
-        raise NotFound(f"{self.name} has no alarm {code}")
+        """Acknowledge the alarm `code`.
+
+        Raises:
+            NotFound: There is no such active alarm.
+        """
+        raise NotFound(f"{self.name} has no active alarm {code}")
 
     # -------------------------------------------------------------------------------- control: optional hooks
     def take_control(self) -> None:  # noqa: B027
-        """Take control, so that commands are obeyed; an act of its own, done on a person's command.
+        """Take control of the device on a user's command, so that it accepts commands.
 
-        Raises NotInControl naming who has it.
+        Raises:
+            NotInControl: Another client has control; the message names it.
         """
 
     def release_control(self) -> None:  # noqa: B027
-        """Give control back; harmless when it is not ours."""
+        """Release control. It does nothing without control."""
 
     def control_owner(self) -> str | None:
-        """Tell who has control: "us", another's name, or None when nobody has."""
+        """Return who has control: "us", the name of another client, or None."""
         return "us"
 
 
 class GenericWithPose(Generic):
-    """An object that stands somewhere."""
+    """An object with a pose."""
 
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: Settings | None = None) -> None:
         super().__init__(obj_id, name, settings)
@@ -135,28 +159,28 @@ class GenericWithPose(Generic):
 
     @property
     def pose(self) -> Pose:
-        """Give where it stands, in the world."""
+        """Return the pose in the world."""
         return self._pose
 
     def set_pose(self, pose: Pose) -> None:
-        """Tell it that it stands elsewhere."""
+        """Set the pose in the world."""
         self._pose = pose
 
     def scene_object(self) -> SceneObject:
-        """Give this object as it stands in a scene."""
+        """Return this object as it is stored in a scene."""
         return SceneObject(self.name, type(self).__name__, self._pose, id=self.id)
 
     @action
     def update_pose(self, new_pose: Pose, *, an: str | None = None) -> None:
-        """Tell the program that the object stands elsewhere.
+        """Update the object's pose.
 
-        :param new_pose: where it stands now
+        :param new_pose: new pose in the world
         """
         self.set_pose(new_pose)
 
 
 class CollisionObject(GenericWithPose):
-    """An object that other things must not run into."""
+    """An object with a collision model."""
 
     category: ClassVar[str] = "Collision objects"
     icon: ClassVar[str] = "solid"
@@ -177,7 +201,7 @@ class CollisionObject(GenericWithPose):
 
     @property
     def enabled(self) -> bool:
-        """Tell whether it counts in collision checks."""
+        """Return whether it is considered in collision checks."""
         return self._enabled
 
     @enabled.setter
@@ -186,19 +210,19 @@ class CollisionObject(GenericWithPose):
         self._told()
 
     def tell_enabled(self, listener: Callable[[], None]) -> None:
-        """Have `listener` called, on whatever thread, when it comes to count in collision checks, or no longer does."""
+        """Register a function that is called, on any thread, when the object is enabled or disabled."""
         self._told = listener
 
     @action
     def set_enabled(self, state: bool, *, an: str | None = None) -> None:
-        """Say whether the object counts in collision checks.
+        """Enable or disable the object in collision checks.
 
-        :param state: false while something may pass through it
+        :param state: false while something may pass through the object
         """
         self.enabled = state
 
 
 class VirtualCollisionObject(CollisionObject):
-    """A collision model with no device behind it: a table, a wall, a zone."""
+    """A collision model without a device, such as a table, a wall or a zone."""
 
     _ABSTRACT = True

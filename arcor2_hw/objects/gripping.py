@@ -14,16 +14,20 @@ from arcor2_hw.objects.settings import Settings
 from arcor2_hw.objects.surroundings import HeldPart
 
 CLEARANCE: Final = 0.002
-"""Distance, m, by which the model of a gripped part is smaller on every side: so it may rest on a surface, and be put
-down on one, with the inaccuracy of taught poses."""
+"""Distance by which the model of a gripped part is smaller on every side, m.
+
+The part may thus rest on a surface, and be
+
+put down with the inaccuracy of taught poses.
+"""
 LARGEST: Final = 2.0
-"""Longest edge of a part, m."""
+"""Maximum edge length of a part, m."""
 
 log = logging.getLogger(__name__)
 
 
 class PartSize(NamedTuple):
-    """Edges of a part along the axes of the tool, m, and the shift of its center along the tool's z axis, m."""
+    """Edges of a part along the axes of the tool, m, and the shift of its centre along the tool's z axis, m."""
 
     x: float
     y: float
@@ -32,7 +36,7 @@ class PartSize(NamedTuple):
 
     @property
     def known(self) -> bool:
-        """Tell whether all edges are known."""
+        """Return whether all edges are known."""
         return min(self.x, self.y, self.z) > 0.0
 
 
@@ -60,7 +64,7 @@ class HoldsParts:
     _holding: _Holding | None = None
 
     def mount(self, find_object: Callable[[str], Generic], find_robot: Callable[[str], Robot]) -> None:
-        """Take the functions that find objects of the scene; called once, before `connect`.
+        """Receive the functions that find objects of the scene; called once before `connect`.
 
         Args:
             find_object: Returns an object by its name or id.
@@ -94,16 +98,16 @@ class HoldsParts:
         """
         found = None if self._find_object is None else self._find_object(object_name)
         if not isinstance(found, CollisionObject):
-            raise NotFound(f"{self.name} cannot grip {object_name}: it is no collision object of the scene")
+            raise NotFound(f"{self.name} cannot grip {object_name}: the scene has no collision object of that name")
         self._part_object = found
 
     # -------------------------------------------------------------------------------- for drivers
     def attach_part(self, size: PartSize | None = None, *, hanging: bool = False) -> None:
-        """Attach the part that is gripped now to the end effector of the robot. Never raises.
+        """Attach the part that was just gripped to the end effector of the robot. Never raises.
 
         Args:
             size: Size to assume when neither an action nor the settings state one.
-            hanging: The part hangs below the tool center point, as on a suction cup, instead of around it.
+            hanging: Whether the part hangs below the tool centre point, as on a suction cup, instead of around it.
         """
         try:
             self._attach(size, hanging)
@@ -145,7 +149,7 @@ class HoldsParts:
         robot.hold_part(part)
 
     def _carrying_robot(self) -> Robot | None:
-        """Return the robot that carries the gripper; None when there is none."""
+        """Return the robot that carries the gripper, None when there is none."""
         if isinstance(self, Robot):
             return self
         if self._find_robot is None:
@@ -160,7 +164,12 @@ class HoldsParts:
 
 
 def check_part_size(settings: Settings, within: Callable[[str, float, float, float], None]) -> None:
-    """Check the settings that state the size of a part, with a driver's own check of ranges."""
+    """Check the settings that state the size of a part.
+
+    Args:
+        settings: The settings.
+        within: The driver's function that checks a range.
+    """
     for axis in "xyz":
         name = f"part_size_{axis}"
         within(name, getattr(settings, name), 0.0, LARGEST)

@@ -8,7 +8,7 @@ from arcor2_hw.exceptions import Arcor2NotImplemented
 
 
 class MachineState(enum.IntEnum):
-    """The states of PackML with their numbers."""
+    """States of PackML with their numbers."""
 
     CLEARING = 1
     STOPPED = 2
@@ -30,7 +30,7 @@ class MachineState(enum.IntEnum):
 
 
 class MachineCommand(enum.IntEnum):
-    """The commands of PackML with their numbers (CntrlCmd)."""
+    """Commands of PackML with their numbers (CntrlCmd)."""
 
     RESET = 1
     START = 2
@@ -45,7 +45,7 @@ class MachineCommand(enum.IntEnum):
 
 
 class UnitMode(enum.IntEnum):
-    """Unit modes of PackML."""
+    """Unit modes of PackML with their numbers."""
 
     PRODUCE = 1
     MAINTENANCE = 2
@@ -67,13 +67,14 @@ ALLOWED: dict[MachineCommand, frozenset[MachineState]] = {
     MachineCommand.CLEAR: frozenset({_S.ABORTED}),
     MachineCommand.COMPLETE: frozenset({_S.EXECUTE}),
 }
-"""In which states PackML lets each command through."""
+"""States in which PackML allows each command."""
 
 
 class Machine(abc.ABC):
     """A unit with the states of PackML. A mixin: `class Tester(Machine, CollisionObject)`.
 
-    Class data `states` names the subset that the unit has: at least Stopped, Idle, Execute and Aborted.
+    Class Attributes:
+        states: States that the unit has, at least Stopped, Idle, Execute and Aborted.
     """
 
     category: ClassVar[str] = "Machines"
@@ -82,28 +83,41 @@ class Machine(abc.ABC):
 
     @abc.abstractmethod
     def machine_state(self) -> MachineState:
-        """Ask for the present state."""
+        """Return the present state."""
 
     @abc.abstractmethod
     def command(self, command: MachineCommand) -> None:
-        """Give a command; Refused, naming command and state, when the state does not allow it."""
+        """Execute a command.
+
+        Raises:
+            Refused: The present state does not allow it; the message names command and state.
+        """
 
     def unit_mode(self) -> UnitMode:
-        """Ask for the unit mode."""
+        """Return the unit mode."""
         raise Arcor2NotImplemented("unit_mode")
 
     def wait_for(self, state: MachineState, timeout: float) -> None:
-        """Return when the unit is in `state`; DeviceTimeout after `timeout` s, DeviceFault when it aborts meanwhile."""
+        """Wait until the unit is in `state`.
+
+        Args:
+            state: The state.
+            timeout: Time limit, s.
+
+        Raises:
+            DeviceTimeout: The unit is not in that state in time.
+            DeviceFault: The unit aborts.
+        """
         raise Arcor2NotImplemented("wait_for")
 
     def counters(self) -> dict[str, int]:
-        """Give the unit's counters by name."""
+        """Return the unit's counters by name."""
         raise Arcor2NotImplemented("counters")
 
     def stop_reason(self) -> str:
-        """Tell why the unit stopped or aborted, empty when it did not."""
+        """Return why the unit stopped or aborted, empty when it did not."""
         raise Arcor2NotImplemented("stop_reason")
 
     def permissives(self) -> list[tuple[str, bool]]:
-        """Give the conditions for a start, each with whether it is met."""
+        """Return the conditions for a start, each with whether it is met."""
         raise Arcor2NotImplemented("permissives")

@@ -30,9 +30,9 @@ Others = list[tuple[Robot, list[Joint]]]
 
 @dataclasses.dataclass(frozen=True)
 class ObstacleSnapshot:
-    """Obstacles by name and other robots by name with their joint values, at one moment.
+    """Obstacles by name, and other robots by name with their joint values, at one moment.
 
-    Tools of robots and parts that robots hold are obstacles with a attachment.
+    Tools of robots and gripped parts are obstacles with an attachment.
     """
 
     obstacles: dict[str, Obstacle]
@@ -94,17 +94,24 @@ class ObstacleSnapshot:
 
     @property
     def empty(self) -> bool:
-        """Tell whether it contains nothing."""
+        """Return whether it contains nothing."""
         return not self.obstacles and not self.robots
 
 
 def build_world(
     robot: Robot, tools: "RobotTools", now: Sequence[Joint], around: ObstacleSnapshot, margin: float
 ) -> "CollisionWorld":
-    """Return the collision world of a robot with joint values `now` and a margin in m.
+    """Create the collision world of a robot.
+
+    Args:
+        robot: The robot.
+        tools: Models and shapes.
+        now: Joint values of the robot.
+        around: Its surroundings.
+        margin: Margin of the world, m.
 
     Raises:
-        Refused: Joint values of another robot, a mesh or the attachment of a part are unknown.
+        Refused: Joint values of another robot, a mesh or the robot that holds a part are unknown.
     """
     from arcor2_hw.collision.world import CollisionWorld
 
@@ -126,24 +133,28 @@ def build_world(
 
 def _attach(world: "CollisionWorld", name: str, shape: "Shape", attachment: Attachment, in_link: Pose) -> None:
     if attachment.robot not in world.robots:
-        raise Refused(f"The position of {attachment.robot}, which holds {name}, is unknown.")
+        raise Refused(
+            f"The pose of {name} is unknown, because the joints of {attachment.robot}, which holds it, are unknown."
+        )
     standing = world.robot(attachment.robot)
     frames = standing.link_frames(standing.q)
     if attachment.link not in frames:
-        raise Refused(f"{name} is held by {attachment.link}, which is no link of {attachment.robot}")
+        raise Refused(f"{name} is attached to {attachment.link}, which is no link of {attachment.robot}")
     world.put(name, shape, Pose.from_matrix(frames[attachment.link]) * in_link)
     world.attach(name, attachment.robot, attachment.link, touching=attachment.touching)
 
 
 def _require_all_joints(robot: Robot, model: "RobotModel", joints: Sequence[Joint]) -> None:
-    """Raise Refused unless the values of all joints that lead to the robot's end effectors are given."""
+    """Require the values of all joints that lead to the robot's end effectors.
+
+    Raises:
+        Refused: A joint value is missing.
+    """
     given = {joint.name for joint in joints}
     for name in model.end_effectors:
         for joint in model.arm(name).joint_names:
             if joint not in given:
-                raise Refused(
-                    f"where {robot.name} stands is not known, which may be in the way: it does not tell {joint}"
-                )
+                raise Refused(f"The position of {robot.name} is unknown, because it does not report the joint {joint}.")
 
 
 def _copied(pose: Pose) -> Pose:

@@ -1,4 +1,4 @@
-"""Watches the obstacles around a robot during a safe move, and stops the robot when one comes into its path."""
+"""Monitoring of obstacles during a safe move: the robot stops when an obstacle comes into its path."""
 
 import itertools
 import logging
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from arcor2_hw.objects.robot_tools import RobotTools
 
 PERIOD: Final = 0.04
-"""Time between two looks at the surroundings, s."""
+"""Time between two checks of the surroundings, s."""
 RESOLUTION: Final = 0.005
-"""Distance, m, that no point of the robot exceeds between two checked configurations."""
+"""Maximum travel of any point of the robot between two checked configurations, m."""
 JOIN_WITHIN: Final = 2.0
-"""Time that the end of a move waits for a check that is under way, s."""
+"""Time that the end of a move waits for a check in progress, s."""
 
 log = logging.getLogger(__name__)
 
@@ -97,12 +97,12 @@ class PathMonitor:
                 return
 
     def _snapshot(self, before: ObstacleSnapshot) -> ObstacleSnapshot:
-        """Return the present surroundings; a robot that does not answer stays where it was."""
+        """Return the present surroundings; a robot that does not answer keeps its last known joints."""
         if self._others is None:
             try:
                 others = self._robot.surroundings.robots()
             except Arcor2Error as error:
-                log.warning("%s moves on with the last known joints of other robots: %s", self._robot.name, error)
+                log.warning("%s continues with the last known joints of other robots: %s", self._robot.name, error)
                 others = self._others = list(before.robots.values())
         else:
             others = self._others
@@ -117,7 +117,7 @@ class PathMonitor:
         if around.empty:
             return None
         joints = self._robot.robot_joints()
-        # Half of the margin: an obstacle whose pose is measured again and again moves a little each time.
+        # Half of the margin, because an obstacle that is measured repeatedly moves a little each time.
         self._world = build_world(self._robot, path.tools, joints, around, path.margin / 2.0)
         sweep = Sweep(self._world, name, path.arm, RESOLUTION)
         hit = sweep.first_contact(rest_of(path.points, path.arm.values(joints), sweep.levers))
@@ -129,7 +129,7 @@ class PathMonitor:
         return found[0] if found else Contact(name, "an obstacle", 0.0)
 
     def _with_surroundings(self, contacts: "Iterable[Contact]") -> "list[Contact]":
-        """Leave out contacts of the robot with itself."""
+        """Remove contacts of the robot with itself."""
         name, world = self._robot.name, self._world
         assert world is not None
         held = world.robot(name).held
@@ -145,7 +145,7 @@ class PathMonitor:
                 stop: Callable[[], None] = self._robot.stop
                 stop()
             except Exception:
-                log.exception("%s could not be stopped before an obstacle", self._robot.name)
+                log.exception("%s could not be stopped in front of an obstacle", self._robot.name)
 
     def _message(self) -> str:
         name, contact = self._robot.name, self._contact

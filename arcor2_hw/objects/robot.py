@@ -1,4 +1,4 @@
-"""Robot and MultiArmRobot: the methods of the protocol, and ours beside them."""
+"""Robot and MultiArmRobot: the methods of the protocol, and our optional ones."""
 
 import abc
 import threading
@@ -14,7 +14,7 @@ from arcor2_hw.objects.surroundings import HeldPart, Nothing, Surroundings
 
 
 class RobotException(DeviceError):
-    """Something is wrong with a robot."""
+    """An error of a robot."""
 
     code = "robot"
 
@@ -22,8 +22,9 @@ class RobotException(DeviceError):
 class Robot(GenericWithPose):
     """A robot with one arm.
 
-    Poses of end effectors are in the world, joint values in rad (m where prismatic), `speed` is 0..1 of the configured
-    maxima. A method whose body only raises Arcor2NotImplemented counts as not there.
+    Poses of end effectors are in the world, joint values in rad (m where prismatic), `speed` is 0 to 1 of the
+    configured
+    maxima. A method whose body only raises Arcor2NotImplemented counts as not implemented.
     """
 
     category: ClassVar[str] = "Robots"
@@ -32,22 +33,22 @@ class Robot(GenericWithPose):
     urdf_package_name: ClassVar[str | None] = None
 
     class KinematicsException(KinematicsError):
-        """There are no joints for the pose, or the numbers make no sense for this robot."""
+        """No joint values reach the pose, or a value is invalid for this robot."""
 
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: Settings | None = None) -> None:
         super().__init__(obj_id, name, pose, settings)
         self._move_lock = threading.Lock()
 
     def surround(self, surroundings: Surroundings) -> None:
-        """Take what tells of the things around the robot; called once, between `__init__` and `connect`.
+        """Receive the surroundings of the robot; called once between `__init__` and `connect`.
 
-        Control of nothing is taken then: what takes time to be read, such as a model, is read here.
+        Load here what takes time, such as a model, because nothing is controlled yet.
         """
         self._around = surroundings
 
     @property
     def surroundings(self) -> Surroundings:
-        """Give what tells of the things around the robot: of nothing, where nobody told of any."""
+        """Return the surroundings of the robot; empty when none were set."""
         return self.__dict__.get("_around") or Nothing()
 
     # -------------------------------------------------------------------------------- held parts
@@ -57,7 +58,7 @@ class Robot(GenericWithPose):
         return dict(self.__dict__.get("_parts", {}))
 
     def hold_part(self, part: HeldPart) -> None:
-        """Attach a part to the robot, in place of one of that name; safe moves keep it clear of obstacles."""
+        """Attach a part to the robot, replacing one of the same name; safe moves keep it clear of obstacles."""
         self._parts = self.parts | {part.name: part}
         self._notify_parts()
 
@@ -81,38 +82,51 @@ class Robot(GenericWithPose):
 
     @property
     def move_in_progress(self) -> bool:
-        """Tell whether a motion that we commanded is under way."""
+        """Return whether a motion that we commanded is in progress."""
         return self._move_lock.locked()
 
     def check_if_ready_to_move(self) -> None:
-        """Raise what keeps the robot from moving now; return when nothing does."""
+        """Require that the robot can move now.
+
+        Raises:
+            Refused: It is moving already.
+            NotConnected: It is not connected.
+        """
         if self.move_in_progress:
             raise Refused(f"{self.name} is moving already")
 
     def move_to_calibration_pose(self) -> None:
-        """Go where a camera sees the robot well."""
+        """Move to a pose in which a camera sees the robot well."""
         raise Arcor2NotImplemented("move_to_calibration_pose")
 
     # -------------------------------------------------------------------------------- mandatory
     @abc.abstractmethod
     def get_end_effectors_ids(self) -> set[str]:
-        """Give the names of the end effectors."""
+        """Return the names of the end effectors."""
 
     @abc.abstractmethod
     def get_end_effector_pose(self, end_effector: str) -> Pose:
-        """Give the pose of an end effector in the world; Stale when none is fresh."""
+        """Return the pose of an end effector in the world.
+
+        Raises:
+            Stale: No recent value is known.
+        """
 
     @abc.abstractmethod
     def robot_joints(self, include_gripper: bool = False) -> list[Joint]:
-        """Give the present joint values; Stale when none are fresh."""
+        """Return the present joint values.
+
+        Raises:
+            Stale: No recent values are known.
+        """
 
     @abc.abstractmethod
     def grippers(self) -> set[str]:
-        """Give the names of the grippers."""
+        """Return the names of the grippers."""
 
     @abc.abstractmethod
     def suctions(self) -> set[str]:
-        """Give the names of the suction cups."""
+        """Return the names of the suction cups."""
 
     # -------------------------------------------------------------------------------- optional, of the protocol
     def move_to_pose(
@@ -126,7 +140,10 @@ class Robot(GenericWithPose):
         raise Arcor2NotImplemented("move_to_joints")
 
     def stop(self) -> None:
-        """Stop at once, functionally: no safety function. Called past whatever else is going on."""
+        """Stop the motion at once.
+
+        This is a functional stop, not a safety function; it may be called during any other call.
+        """
         raise Arcor2NotImplemented("stop")
 
     def inverse_kinematics(
@@ -136,40 +153,57 @@ class Robot(GenericWithPose):
         start_joints: list[Joint] | None = None,
         avoid_collisions: bool = True,
     ) -> list[Joint]:
-        """Give joints that reach a pose in the world, nearest to `start_joints`; KinematicsException if none do."""
+        """Compute joint values that reach a pose in the world, nearest to `start_joints`.
+
+        Raises:
+            KinematicsException: There are none.
+        """
         raise Arcor2NotImplemented("inverse_kinematics")
 
     def forward_kinematics(self, end_effector_id: str, joints: list[Joint]) -> Pose:
-        """Give the pose in the world that joints lead to."""
+        """Compute the pose in the world for joint values."""
         raise Arcor2NotImplemented("forward_kinematics")
 
     def get_hand_teaching_mode(self) -> bool:
-        """Tell whether the arm can be moved by hand."""
+        """Return whether the arm can be moved by hand."""
         raise Arcor2NotImplemented("get_hand_teaching_mode")
 
     def set_hand_teaching_mode(self, enabled: bool) -> None:
-        """Make the arm movable by hand, or stiff again."""
+        """Enable or disable moving the arm by hand."""
         raise Arcor2NotImplemented("set_hand_teaching_mode")
 
     # -------------------------------------------------------------------------------- optional, ours
     def state(self) -> RobotState:
-        """Give the whole state of the robot."""
+        """Return the complete state of the robot."""
         raise Arcor2NotImplemented("state")
 
     def move_path(
         self, waypoints: list[Pose], blend: float = 0.0, linear: bool = True, speed: float = 0.25
     ) -> MoveResult:
-        """Move through poses in the world; `blend` is the radius in m."""
+        """Move through poses in the world.
+
+        Args:
+            waypoints: The poses.
+            blend: Blend radius, m.
+            linear: Whether the end effector moves in straight lines.
+            speed: Fraction of the maximum speed.
+        """
         raise Arcor2NotImplemented("move_path")
 
     def move_until_contact(
         self, direction: tuple[float, float, float], force: float, max_distance: float
     ) -> MoveResult:
-        """Move along a direction of the world until the force (N) is met, at most `max_distance` m."""
+        """Move along a direction of the world until contact.
+
+        Args:
+            direction: Direction.
+            force: Contact force, N.
+            max_distance: Maximum distance, m.
+        """
         raise Arcor2NotImplemented("move_until_contact")
 
     def wrench(self) -> tuple[float, float, float, float, float, float]:
-        """Give force (N) and torque (N m) at the tool."""
+        """Return force (N) and torque (N m) at the tool."""
         raise Arcor2NotImplemented("wrench")
 
     def jog(
@@ -180,44 +214,58 @@ class Robot(GenericWithPose):
         valid_for: float = 0.2,
         end_effector_id: str | None = None,
     ) -> None:
-        """Move with a velocity (m/s and rad/s, or rad/s per joint) that runs out by itself after `valid_for` s.
+        """Move with a velocity that ends by itself after `valid_for`. It returns at once.
 
-        Called again and again while it shall last, each time with what shall be from then on; gives back at once, and
-        is neither a move in progress nor refused as one beside itself. `joint_velocities` are in the order of
-        `robot_joints()`. `twist` is that of the end effector (None: the robot's only one), in the axes of `frame`;
-        `user` is for drivers whose controller has such a frame. Who calls keeps the speed of the end effector at or
-        below 0.25 m/s; where joints are given, by `tcp_speed`, or else by `forward_kinematics`. A type that has neither
-        keeps it itself.
+        It is called repeatedly during the motion, each time with the velocity from then on. It is not a move in
+        progress,
+        and is not refused because of itself. The caller keeps the speed of the end effector at or below 0.25 m/s; for
+        joint velocities by `tcp_speed` or `forward_kinematics`. A type that has neither limits the speed itself.
+
+        Args:
+            twist: Velocity of the end effector in the axes of `frame`, m/s and rad/s.
+            joint_velocities: Joint velocities in the order of `robot_joints()`, rad/s or m/s.
+            frame: Frame of the twist; `user` is for controllers that have such a frame.
+            valid_for: Duration, s.
+            end_effector_id: The end effector; None: the only one.
         """
         raise Arcor2NotImplemented("jog")
 
     def tcp_speed(self, joint_velocities: list[float], end_effector_id: str | None = None) -> float:
-        """Give the speed of an end effector, m/s, that joint rates would give it now, at once and while it is jogged.
+        """Return the present speed of an end effector for joint velocities, m/s.
 
-        For types that can be jogged and whose `forward_kinematics` asks the controller, which takes time.
+        It returns at once, also during jogging.
+
+        For types that can be jogged and whose `forward_kinematics` queries the controller, which takes time.
         """
         raise Arcor2NotImplemented("tcp_speed")
 
     def joint_limits(self) -> dict[str, tuple[float, float]]:
-        """Give lower and upper limit of each joint, rad."""
+        """Return the lower and upper limit of each joint, rad."""
         raise Arcor2NotImplemented("joint_limits")
 
     def max_tcp_speed(self) -> float:
-        """Give the configured maximum speed of the TCP, m/s."""
+        """Return the configured maximum speed of the TCP, m/s."""
         raise Arcor2NotImplemented("max_tcp_speed")
 
     def kinematic_calibration(self) -> KinematicCalibration:
-        """Ask the controller for the measured kinematics of the very arm at it."""
+        """Read the calibrated kinematics of this robot from its controller."""
         raise Arcor2NotImplemented("kinematic_calibration")
 
     def set_tool(
         self, tcp: Pose, mass: float, cog: tuple[float, float, float], inertia: tuple[float, ...] | None = None
     ) -> None:
-        """Tell the controller of its tool: TCP in the flange, mass kg, centre of gravity m, inertia kg m²."""
+        """Set the tool in the controller.
+
+        Args:
+            tcp: Tool centre point in the frame of the flange.
+            mass: Mass, kg.
+            cog: Centre of gravity, m.
+            inertia: Inertia, kg m².
+        """
         raise Arcor2NotImplemented("set_tool")
 
     def power_on(self) -> None:
-        """Switch drive power on; brakes stay closed."""
+        """Switch the drives on; brakes stay closed."""
         raise Arcor2NotImplemented("power_on")
 
     def release_brakes(self) -> None:
@@ -229,44 +277,52 @@ class Robot(GenericWithPose):
         raise Arcor2NotImplemented("home")
 
     def is_referenced(self) -> bool:
-        """Tell whether the axes are referenced."""
+        """Return whether the axes are referenced."""
         raise Arcor2NotImplemented("is_referenced")
 
     def acknowledge_protective_stop(self, confirmed_by: str) -> None:
-        """Unlock a protective stop; `confirmed_by` is the person who looked. The old motion does not continue."""
+        """Unlock a protective stop. The interrupted motion does not continue.
+
+        Args:
+            confirmed_by: The person who inspected the robot.
+        """
         raise Arcor2NotImplemented("acknowledge_protective_stop")
 
     def restart_safety(self, confirmed_by: str) -> None:
-        """Restart the safety system after a fault or violation; `confirmed_by` is the person who looked."""
+        """Restart the safety system after a fault or violation.
+
+        Args:
+            confirmed_by: The person who inspected the robot.
+        """
         raise Arcor2NotImplemented("restart_safety")
 
 
 class MultiArmRobot(Robot):
-    """A robot with several arms: every method takes the arm's id as its last argument."""
+    """A robot with several arms. The last argument of every method is the id of an arm."""
 
     @abc.abstractmethod
     def get_arm_ids(self) -> set[str]:
-        """Give the names of the arms."""
+        """Return the ids of the arms."""
 
     @abc.abstractmethod
     def get_end_effectors_ids(self, arm_id: str | None = None) -> set[str]:
-        """Give the names of the end effectors."""
+        """Return the names of the end effectors."""
 
     @abc.abstractmethod
     def get_end_effector_pose(self, end_effector: str, arm_id: str | None = None) -> Pose:
-        """Give the pose of an end effector in the world."""
+        """Return the pose of an end effector in the world."""
 
     @abc.abstractmethod
     def robot_joints(self, include_gripper: bool = False, arm_id: str | None = None) -> list[Joint]:
-        """Give the present joint values, of all arms when none is named."""
+        """Return the present joint values; of all arms without `arm_id`."""
 
     @abc.abstractmethod
     def grippers(self, arm_id: str | None = None) -> set[str]:
-        """Give the names of the grippers."""
+        """Return the names of the grippers."""
 
     @abc.abstractmethod
     def suctions(self, arm_id: str | None = None) -> set[str]:
-        """Give the names of the suction cups."""
+        """Return the names of the suction cups."""
 
     def move_to_pose(
         self,
@@ -287,7 +343,7 @@ class MultiArmRobot(Robot):
         raise Arcor2NotImplemented("move_to_joints")
 
     def stop(self, arm_id: str | None = None) -> None:
-        """Stop at once: all arms when none is named."""
+        """Stop at once; all arms without `arm_id`."""
         raise Arcor2NotImplemented("stop")
 
     def inverse_kinematics(
@@ -298,19 +354,19 @@ class MultiArmRobot(Robot):
         avoid_collisions: bool = True,
         arm_id: str | None = None,
     ) -> list[Joint]:
-        """Give joints that reach a pose in the world."""
+        """Compute joint values that reach a pose in the world."""
         raise Arcor2NotImplemented("inverse_kinematics")
 
     def forward_kinematics(self, end_effector_id: str, joints: list[Joint], arm_id: str | None = None) -> Pose:
-        """Give the pose in the world that joints lead to."""
+        """Compute the pose in the world for joint values."""
         raise Arcor2NotImplemented("forward_kinematics")
 
     def get_hand_teaching_mode(self, arm_id: str | None = None) -> bool:
-        """Tell whether an arm can be moved by hand."""
+        """Return whether an arm can be moved by hand."""
         raise Arcor2NotImplemented("get_hand_teaching_mode")
 
     def set_hand_teaching_mode(self, enabled: bool, arm_id: str | None = None) -> None:
-        """Make an arm movable by hand, or stiff again."""
+        """Enable or disable moving an arm by hand."""
         raise Arcor2NotImplemented("set_hand_teaching_mode")
 
     def jog(
@@ -322,17 +378,17 @@ class MultiArmRobot(Robot):
         end_effector_id: str | None = None,
         arm_id: str | None = None,
     ) -> None:
-        """Move one arm with a velocity that runs out by itself."""
+        """Move one arm with a velocity that ends by itself."""
         raise Arcor2NotImplemented("jog")
 
     def joint_limits(self, arm_id: str | None = None) -> dict[str, tuple[float, float]]:
-        """Give lower and upper limit of each joint of an arm, rad; of all arms when none is named."""
+        """Return the lower and upper limit of each joint of an arm, rad; of all arms without `arm_id`."""
         raise Arcor2NotImplemented("joint_limits")
 
     def tcp_speed(
         self, joint_velocities: list[float], end_effector_id: str | None = None, arm_id: str | None = None
     ) -> float:
-        """Give the speed of an end effector, m/s, that joint rates of its arm would give it now."""
+        """Return the present speed of an end effector for joint velocities of its arm, m/s."""
         raise Arcor2NotImplemented("tcp_speed")
 
     def move_synchronously(self, targets: dict[str, Pose | list[Joint]], speed: float = 0.25) -> dict[str, MoveResult]:

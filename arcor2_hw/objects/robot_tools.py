@@ -1,4 +1,4 @@
-"""What one thread computes with for a robot: the models of its URDF and of others', chains, meshes.
+"""Models and meshes of a robot, of other robots and of obstacles, for use by one thread.
 
 Pinocchio and coal come with the extra `kinematics` and are imported on first use.
 """
@@ -23,10 +23,14 @@ if TYPE_CHECKING:
 
 
 class RobotTools:
-    """Model, arms and meshes of a robot, and models of others.
+    """Model, arms and meshes of a robot, and models of other robots.
 
-    made_of: settings, package and calibration, by which it is seen whether it still holds. Raises Refused without a
-    package or the extra `kinematics`, ModelError for a model that is not right, or a calibration of another arm.
+    Attributes:
+        made_of: Settings, package and calibration; the object is created again when they change.
+
+    Raises:
+        Refused: There is no package, or the extra `kinematics` is not installed.
+        ModelError: The model cannot be used, or the calibration belongs to another robot.
     """
 
     def __init__(
@@ -35,7 +39,7 @@ class RobotTools:
         self.made_of = settings, package, calibration
         self._surroundings: Surroundings = robot.surroundings
         if package is None:
-            raise Refused(f"{robot.name} has no model (URDF) from which anything could be computed")
+            raise Refused(f"{robot.name} has no model (URDF), so kinematics cannot be computed")
         self.model = _load(robot, settings, package, calibration)
         self.model.name = robot.name
         self._arms: dict[str, Arm] = {}
@@ -44,13 +48,21 @@ class RobotTools:
         self._meshes: dict[tuple[Path, tuple[float, float, float]], TriangleMesh] = {}
 
     def arm(self, end_effector: str) -> "Arm":
-        """Give the chain to an end effector. Raises NotFound."""
+        """Return the chain to an end effector.
+
+        Raises:
+            NotFound: There is no such end effector.
+        """
         if end_effector not in self._arms:
             self._arms[end_effector] = self.model.arm(end_effector)
         return self._arms[end_effector]
 
     def inverse(self, end_effector: str) -> "InverseKinematics":
-        """Give what finds joints for it. Raises NotFound."""
+        """Return the inverse kinematics of an end effector.
+
+        Raises:
+            NotFound: There is no such end effector.
+        """
         from arcor2_hw.kinematics.inverse import InverseKinematics
 
         if end_effector not in self._inverse:
@@ -58,7 +70,7 @@ class RobotTools:
         return self._inverse[end_effector]
 
     def other(self, robot: Robot) -> "RobotModel | None":
-        """Give the model of another robot, None when it has none."""
+        """Return the model of another robot, None when it has none."""
         settings, calibration = settings_of(robot), self._surroundings.calibration(robot.id)
         known = self._others.get(robot.name)
         if known is None or known[0] != (settings, calibration):
@@ -68,7 +80,12 @@ class RobotTools:
         return known[1]
 
     def shape(self, obstacle: Obstacle) -> Any:
-        """Give the shape of an obstacle. Raises Refused for a mesh that is not known here, BadMesh."""
+        """Return the shape of an obstacle.
+
+        Raises:
+            Refused: The file of a mesh is missing.
+            BadMesh: A mesh cannot be used.
+        """
         from arcor2_hw.kinematics import shapes
         from arcor2_hw.kinematics.meshes import read_mesh
         from arcor2_hw.kinematics.source import MAX_MESH
@@ -78,7 +95,7 @@ class RobotTools:
             return shapes.of_model(model)
         file, scale = obstacle.file or self._surroundings.asset(model.asset_id), obstacle.scale
         if file is None or not file.is_file():
-            raise Refused(f"the mesh of {obstacle.name} is not known here, so no way can be looked at for collisions")
+            raise Refused(f"the mesh of {obstacle.name} is not available, so paths cannot be checked for collisions")
         if (file, scale) not in self._meshes:
             with file.open("rb") as opened:
                 self._meshes[file, scale] = read_mesh(opened.read(MAX_MESH + 1), model.asset_id, scale)
@@ -93,7 +110,7 @@ def _load(
         from arcor2_hw.kinematics.model import RobotModel
     except ImportError as error:
         raise Refused(
-            f"{robot.name}: nothing can be computed here: install arcor2-hw[kinematics]", str(error)
+            f"{robot.name}: kinematics are not available. Install arcor2-hw[kinematics].", str(error)
         ) from error
     try:
         nominal = RobotModel.load(package, settings)
@@ -103,7 +120,7 @@ def _load(
 
 
 def package_of(robot: Robot) -> Path | None:
-    """Give the file or folder with a robot's URDF: uploaded, or beside the class that names it."""
+    """Return the file or folder with a robot's URDF: uploaded, or next to the module of the class that names it."""
     for base in type(robot).__mro__:
         name: str | None = base.__dict__.get("urdf_package_name")
         if name is None:
@@ -120,7 +137,7 @@ def package_of(robot: Robot) -> Path | None:
 
 
 def settings_of(robot: Robot) -> dict[str, object]:
-    """Give the settings of an object by name."""
+    """Return the settings of an object by name."""
     settings = robot.__dict__.get("_settings")
     if settings is None or not dataclasses.is_dataclass(settings):
         return {}

@@ -1,6 +1,6 @@
-"""SafeMoves: kinematics, and ways around obstacles, of a robot of which there is a URDF. Poses are in the world.
+"""SafeMoves: kinematics and collision-free paths of a robot with a URDF. Poses are in the world.
 
-What computes, Pinocchio and coal, comes with the extra `kinematics` and is imported on first use.
+Pinocchio and coal come with the extra `kinematics` and are imported on first use.
 """
 
 import contextlib
@@ -28,14 +28,18 @@ if TYPE_CHECKING:
     from arcor2_hw.planning.timing import Trajectory
 
 MARGIN: Final = 0.005
-"""m by which a way keeps away from what is around, half of the resolution: so nothing is missed between two checks.
-Where the robot stands, or shall stand, nearer than that, the way has to be free without it."""
+"""Distance that a path keeps from obstacles, m.
+
+It is half of the resolution, so that no collision is missed between two
+
+checks. Where the start or the goal is nearer than that, the path has to be free without it.
+"""
 RESOLUTION: Final = 0.01
-"""m that no point of the robot travels farther between two configurations that are looked at."""
+"""Maximum travel of any point of the robot between two checked configurations, m."""
 WITHIN: Final = 2.0
-"""s that is searched for a way."""
+"""Maximum time of planning, s."""
 TCP_RAMP: Final = 4.0
-"""1/s: acceleration along a line, by the speed along it."""
+"""Acceleration along a line divided by the speed along it, 1/s."""
 
 log = logging.getLogger(__name__)
 
@@ -45,10 +49,12 @@ T = TypeVar("T")
 
 @dataclasses.dataclass(frozen=True)
 class Way:
-    """Where a robot is to be led: from waypoint to waypoint, all joints in proportion between two of them.
+    """A planned path. Between two waypoints all joints move in proportion.
 
-    waypoints: joint values, first those where it stands. line: an end effector is led in a straight line so, and the
-    waypoints are near each other. speed: fraction of the maxima.
+    Attributes:
+        waypoints: Joint values; the first are those at the start.
+        speed: Fraction of the maxima.
+        line: Whether the end effector moves in a straight line; the waypoints are then closely spaced.
     """
 
     waypoints: list[list[Joint]]
@@ -58,23 +64,30 @@ class Way:
     _planned: PlannedPath | None = dataclasses.field(default=None, repr=False)
 
     def require_begin(self, name: str, now: Sequence[Joint]) -> None:
-        """Raise Refused unless the robot `name` still stands where the way begins: planning takes time."""
+        """Require that the robot is still at the start of the path.
+
+        Raises:
+            Refused: It was moved since planning.
+        """
         present = {joint.name: joint.value for joint in now}
         for joint in self.waypoints[0]:
             if abs(present[joint.name] - joint.value) > JOINT_TOLERANCE:
-                raise Refused(f"{name} was moved while its way was planned")
+                raise Refused(f"{name} was moved while its path was planned. Start the move again.")
 
     def timed(self, tcp_speed: float | None = None) -> "Trajectory":
-        """Give joint values and velocities by time, for a controller that is led by these: see `Trajectory.sampled`.
+        """Return joint values and velocities over time, for controllers that need them; see `Trajectory.sampled`.
 
-        The limits are those of the URDF, times `speed`. A line is passed through at `tcp_speed` m/s at most (None: as
-        fast as the joints can); at the waypoints of other ways the robot stands, as nothing beside them was looked at.
+        The limits are those of the URDF times `speed`. The robot stops at the waypoints of a path that is not a line,
+        because only the path itself was checked for collisions.
+
+        Args:
+            tcp_speed: Maximum speed along a line, m/s; None: as fast as the joints allow.
         """
         return self._timed(tcp_speed)
 
 
 class Tool(NamedTuple):
-    """What stands for the shape of a tool: the link that it sits on, and where in that link's frame."""
+    """A tool that the URDF does not contain: the link it is mounted on, its shape, and its pose in that link."""
 
     link: str
     shape: Models
@@ -82,12 +95,16 @@ class Tool(NamedTuple):
 
 
 class SafeMoves:
-    """Answers for one robot. It may be asked on several threads; each has what it computes with.
+    """Kinematics and safe moves of one robot. It may be used by several threads; each has its own models.
 
-    Its URDF is the package that the type's `urdf_package_name` names: in `urdf/` beside the module of the class that
-    does, unless one of that name was uploaded. Joints that the robot tells beside those of the URDF, a gripper's, are
-    passed over. `settings` gives what the URDF follows, by name; left out, the settings of the object. `tool` gives the
-    shape of a tool that the URDF does not have.
+    The URDF is the package named by `urdf_package_name` of the type: an uploaded asset of that name, or in `urdf/` next
+    to
+    the module of the class. Joints that the URDF lacks, such as those of a gripper, are ignored.
+
+    Args:
+        robot: The robot.
+        settings: Returns the settings that the URDF depends on, by name; default: the settings of the object.
+        tool: Returns the tool that the URDF does not contain, or None.
     """
 
     def __init__(
@@ -102,10 +119,10 @@ class SafeMoves:
         self._here = threading.local()
 
     def prepare(self) -> None:
-        """Import and read what is needed, on this thread; what cannot be is told to who needs it first.
+        """Import and load everything needed on this thread. Errors are raised later, where they matter.
 
-        To be called before control is taken of anything: for some tenths of a second nothing else of this process runs,
-        and no watchdog is fed.
+        Call it before control is taken of any device: other threads of this process wait for some tenths of a second,
+        also those that feed a watchdog.
         """
         try:
             from arcor2_hw.planning import planner  # noqa: F401
@@ -118,17 +135,24 @@ class SafeMoves:
 
     # -------------------------------------------------------------------------------- kinematics
     def end_effectors(self) -> list[str]:
-        """Give the names of the end effectors. Raises Refused without a URDF, ModelError for one that is not right."""
+        """Return the names of the end effectors.
+
+        Raises:
+            Refused: There is no URDF.
+            ModelError: The URDF cannot be used.
+        """
         return list(self._tools().model.end_effectors)
 
     def joint_limits(self) -> dict[str, tuple[float, float]]:
-        """Give lower and upper limit of each joint, rad, m where it slides. Raises as `end_effectors`."""
+        """Return the lower and upper limit of each joint, rad or (prismatic) m. Raises as `end_effectors`."""
         return {joint.name: (joint.lower, joint.upper) for joint in self._tools().model.joints}
 
     def forward(self, end_effector: str, joints: Sequence[Joint]) -> Pose:
-        """Give the pose that joints lead to.
+        """Compute the pose for joint values.
 
-        Raises NotFound for the end effector, ModelError (InvalidData) for joints that are missing or no numbers.
+        Raises:
+            NotFound: There is no such end effector.
+            ModelError: Joints are missing or not finite.
         """
         arm = self._tools().arm(end_effector)
         return self._robot.pose * arm.pose(arm.values(joints))
@@ -136,10 +160,18 @@ class SafeMoves:
     def inverse(
         self, end_effector: str, pose: Pose, near: Sequence[Joint], avoid_collisions: bool = True
     ) -> list[Joint]:
-        """Give joints that reach a pose, of those that are free the nearest to `near`.
+        """Compute joint values that reach a pose, nearest to `near`.
 
-        With `avoid_collisions`: free of the robot itself, and of what is around it. Raises KinematicsException naming
-        why there are none, NotFound, InvalidData.
+        Args:
+            end_effector: The end effector.
+            pose: The pose.
+            near: Joint values to stay near to.
+            avoid_collisions: Whether solutions in collision are skipped.
+
+        Raises:
+            KinematicsException: There are none; the message says why.
+            NotFound: There is no such end effector.
+            InvalidData: A value is not finite.
         """
         with self._named():
             tools = self._tools()
@@ -164,10 +196,20 @@ class SafeMoves:
         safe: bool = True,
         stopped: Stopped | None = None,
     ) -> Way:
-        """Give a way to joint values: straight in joint space where that is free, else around what is in the way.
+        """Plan a path to joint values: straight in joint space where that is free, otherwise around obstacles.
 
-        With `safe` false what is in the way does not count. Raises KinematicsException naming what is met where it
-        stands or at the goal, or that no way was found; InvalidData beyond limits, Refused, Cancelled once `stopped`.
+        Args:
+            now: Present joint values.
+            goal: Joint values at the end.
+            speed: Fraction of the maxima.
+            safe: Whether obstacles are considered.
+            stopped: Returns whether planning is to be cancelled.
+
+        Raises:
+            KinematicsException: Start or goal is in collision, or no path was found; the message names a contact.
+            InvalidData: A value is beyond a limit.
+            Refused: The surroundings are unknown.
+            Cancelled: `stopped` returned true.
         """
         with self._named():
             arm = self._widest(goal)
@@ -191,7 +233,7 @@ class SafeMoves:
         safe: bool = True,
         stopped: Stopped | None = None,
     ) -> Way:
-        """Give a way to a pose, to whichever of its joint values it is shortest. Raises as `to_joints`, NotFound."""
+        """Plan a path to a pose, to whichever joint values give the shortest. Raises as `to_joints`, also NotFound."""
         with self._named():
             tools = self._tools()
             arm, target = tools.arm(end_effector), self._target(pose)
@@ -208,9 +250,11 @@ class SafeMoves:
     def line(
         self, end_effector: str, now: Sequence[Joint], pose: Pose, speed: float = 1.0, *, safe: bool = True
     ) -> Way:
-        """Give a straight line of an end effector to a pose; never another way.
+        """Plan a straight line of an end effector to a pose.
 
-        Raises KinematicsException naming where the line breaks, or, with `safe`, what it meets where; NotFound.
+        Raises:
+            KinematicsException: The line is interrupted or, with `safe`, in collision; the message says where.
+            NotFound: There is no such end effector.
         """
         with self._named():
             from arcor2_hw.kinematics.errors import StartInCollision
@@ -229,14 +273,14 @@ class SafeMoves:
             return self._with_margin(now, checked) if safe else self._way(arm, way, speed, line=True)
 
     def contacts(self, joints: Sequence[Joint]) -> list[str]:
-        """Give what the robot would be in collision with in joints: pairs of names, none when it is free."""
+        """Return the contacts that the robot would have at joint values, as pairs of names."""
         with self._named():
             world = build_world(self._robot, self._tools(), joints, self._snapshot(), 0.0)
             return [str(contact) for contact in world.contacts(self._robot.name, self._q(joints))]
 
     @contextlib.contextmanager
     def monitored(self, way: Way) -> Iterator[None]:
-        """Watch the surroundings while the robot follows a safe way, and stop it when they block the rest of that.
+        """Monitor the surroundings while the robot follows a safe path, and stop it when they block it.
 
         The robot's `stop` is called, after which the motion in the context has to raise Cancelled.
 
@@ -252,7 +296,7 @@ class SafeMoves:
 
     # -------------------------------------------------------------------------------- what is held
     def hold(self, name: str, link: str, joints: Sequence[Joint]) -> None:
-        """Attach a collision object of the scene to a link of the robot, with the pose that both have now.
+        """Attach a collision object of the scene to a link of the robot at their present poses.
 
         Args:
             name: The object.
@@ -260,12 +304,12 @@ class SafeMoves:
             joints: Present joint values.
 
         Raises:
-            NotFound: The object is no obstacle, or the model has no such link.
+            NotFound: The scene has no such collision object, or the model no such link.
             Refused: A robot holds the object already.
         """
         obstacle = next((each for each in self._robot.surroundings.obstacles() if each.name == name), None)
         if obstacle is None:
-            raise NotFound(f"{self._robot.name} cannot hold {name}: it is no collision object of the scene")
+            raise NotFound(f"{self._robot.name} cannot hold {name}: the scene has no collision object of that name")
         if obstacle.attachment is not None:
             raise Refused(f"{self._robot.name} cannot hold {name}: {obstacle.attachment.robot} holds it")
         self._robot.hold_part(HeldPart(name, link, self._link_pose(link, joints).inverted() * obstacle.pose))
@@ -280,7 +324,7 @@ class SafeMoves:
     def _link_pose(self, link: str, joints: Sequence[Joint]) -> Pose:
         frames = self._tools().model.link_poses(self._q(joints))
         if link not in frames:
-            raise NotFound(f"{self._robot.name} has no link {link!r}; there are {', '.join(frames)}")
+            raise NotFound(f"{self._robot.name} has no link {link!r}. Its links: {', '.join(frames)}")
         return self._robot.pose * Pose.from_matrix(frames[link])
 
     # -------------------------------------------------------------------------------- inside
@@ -294,7 +338,16 @@ class SafeMoves:
         *,
         line: bool = False,
     ) -> Way:
-        """Return a way through points; `around` is what it was checked against, None for an unsafe one."""
+        """Return a path through points.
+
+        Args:
+            arm: The arm.
+            points: Waypoints.
+            speed: Fraction of the maxima.
+            around: Surroundings that it was checked against, None for an unsafe path.
+            margin: Margin of the check, m.
+            line: Whether it is a straight line.
+        """
 
         def timed(tcp_speed: float | None) -> "Trajectory":
             from arcor2_hw.planning.timing import MotionLimits, along_line, with_stops
@@ -322,7 +375,7 @@ class SafeMoves:
         return Sweep(world, self._robot.name, arm, RESOLUTION)
 
     def _with_margin(self, now: Sequence[Joint], ask: "Callable[[CollisionWorld, ObstacleSnapshot], T]") -> T:
-        """Ask with the margin; where the start or the goal is too near to something for that, without."""
+        """Plan with the margin; without it where the start or the goal is too near to an obstacle."""
         from arcor2_hw.kinematics.errors import GoalInCollision, OnlyInCollision, StartInCollision
 
         around, tools = self._snapshot(), self._tools()
@@ -343,7 +396,7 @@ class SafeMoves:
         return model.values(joints, model.neutral())
 
     def _widest(self, goal: Sequence[Joint]) -> "Arm":
-        """Give the chain that moves all of the joints: that of the end effector with the most of them."""
+        """Return the chain that contains most of the joints."""
         tools = self._tools()
         names = {joint.name for joint in goal}
         arms = [tools.arm(name) for name in tools.model.end_effectors]
@@ -355,7 +408,7 @@ class SafeMoves:
 
     @contextlib.contextmanager
     def _named(self) -> Iterator[None]:
-        """Give errors of kinematics as the robot's own."""
+        """Convert errors of kinematics to the robot's own class."""
         try:
             yield
         except KinematicsError as error:
@@ -364,7 +417,7 @@ class SafeMoves:
             raise self._robot.KinematicsException(str(error), error.detail or error.code) from error
 
     def _tools(self) -> RobotTools:
-        """Give what the present thread computes with, made anew when settings, model or calibration have changed."""
+        """Return the models of the present thread; reload them when settings, package or calibration changed."""
         robot = self._robot
         made_of = dict(self._settings()), package_of(robot), robot.surroundings.calibration(robot.id)
         found: RobotTools | None = getattr(self._here, "tools", None)

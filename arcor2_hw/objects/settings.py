@@ -17,14 +17,14 @@ from arcor2_hw.exceptions import OutOfRange
 
 @dataclasses.dataclass
 class Settings:
-    """Base of every settings dataclass: fields are bool, int, float, str or enumerations.
+    """Base class of settings: a dataclass with fields of type bool, int, float, str or an enumeration.
 
     A secret is declared by its metadata: `password: str = field(default="", repr=False, metadata={"secret": True})`.
-    The server stores its value apart and never sends it to clients. A str whose name says that it is secret
+    The server stores its value separately and never sends it to clients. A str whose name indicates a secret
     (`password`, `token`, `api_key`, ...) is treated the same unless its metadata has `"secret": False`.
 
-    A stored secret is sent only to the address that it was entered for. A str whose name says so (`host`, `url`,
-    `address`, `port`, ...) is part of that address; metadata `"address": True` or `False` declares it otherwise.
+    A stored secret is sent only to the address that it was entered for. A str whose name indicates an address (`host`,
+    `url`, `address`, `port`, ...) is part of it; metadata `"address": True` or `False` overrides that.
     """
 
 
@@ -54,7 +54,7 @@ def check_url(name: str, url: str, *schemes: str) -> urllib.parse.SplitResult:
 def check_serial_port(name: str, port: str, *, sockets: bool = True) -> None:
     """Check a serial port: the path of a serial device or, with `sockets`, socket://host:port.
 
-    pyserial takes further URLs, some of which write files (spy://) or load classes (alt://).
+    Other URLs of pyserial are rejected, because some of them write files (spy://) or load classes (alt://).
     """
     if sockets and port.startswith("socket://"):
         parts = check_url(name, port, "socket")
@@ -67,7 +67,7 @@ def check_serial_port(name: str, port: str, *, sockets: bool = True) -> None:
     try:
         present = Path(port).stat()
     except OSError:
-        return  # unplugged
+        return  # not plugged in
     if not stat.S_ISCHR(present.st_mode):
         raise OutOfRange(problem)
 
@@ -109,5 +109,5 @@ def _device_files() -> list[Path]:
 
 
 def _normal(path: Path) -> Path:
-    """Return a path without `..`; links are the administrator's and stay."""
+    """Return a path without `..`; links are kept, because only an administrator creates them."""
     return Path(os.path.normpath(path))

@@ -1,4 +1,4 @@
-"""The smaller bases: Gripper, Suction, IOBlock, Axis, Reader, Scale, Printer."""
+"""The smaller base classes: Gripper, Suction, IOBlock, Axis, Reader, Scale, Printer."""
 
 import abc
 import enum
@@ -13,7 +13,7 @@ from arcor2_hw.objects.gripping import HoldsParts
 
 
 class GripperState(enum.StrEnum):
-    """What a gripper is doing."""
+    """State of a gripper."""
 
     INACTIVE = "inactive"
     MOVING = "moving"
@@ -23,7 +23,7 @@ class GripperState(enum.StrEnum):
 
 
 class GripResult(NamedTuple):
-    """What a grip came to: whether something is held, and the width between the fingers, m."""
+    """Result of a grip: whether a part is held, and the width between the fingers, m."""
 
     held: bool
     width: float
@@ -32,8 +32,9 @@ class GripResult(NamedTuple):
 class Gripper(HoldsParts, Generic):
     """A gripper with fingers; it keeps its grip when the connection is lost.
 
-    tcp: its tool centre point, closed, in the flange. mass: kg. Both of the class, or of an object whose settings say
-    which model it is.
+    Attributes:
+        tcp: Tool centre point of the closed gripper in the frame of the flange; of the class or of an object.
+        mass: Mass, kg; of the class or of an object.
     """
 
     category: ClassVar[str] = "Grippers"
@@ -44,11 +45,17 @@ class Gripper(HoldsParts, Generic):
 
     @abc.abstractmethod
     def activate(self) -> None:
-        """Make it ready; it may open and close once."""
+        """Activate the gripper; it may open and close once."""
 
     @abc.abstractmethod
     def grip(self, width: float, force: float, speed: float) -> tuple[bool, float]:
-        """Close to `width` m with `force` N at `speed` m/s; return when it holds or has arrived: a GripResult."""
+        """Close the fingers, and return a GripResult when a part is held or the width is reached.
+
+        Args:
+            width: Width, m.
+            force: Force, N.
+            speed: Speed, m/s.
+        """
 
     @abc.abstractmethod
     def release(self) -> None:
@@ -56,7 +63,7 @@ class Gripper(HoldsParts, Generic):
 
     @abc.abstractmethod
     def state(self) -> GripperState:
-        """Tell what it is doing."""
+        """Return the present state."""
 
 
 class Suction(HoldsParts, Generic):
@@ -76,33 +83,33 @@ class Suction(HoldsParts, Generic):
 
     @abc.abstractmethod
     def part_held(self) -> bool:
-        """Tell whether a part is held."""
+        """Return whether a part is held."""
 
     def blow_off(self) -> None:
-        """Push the part off with a blast of air."""
+        """Blow the part off."""
         raise Arcor2NotImplemented("blow_off")
 
     def vacuum(self) -> Reading[float]:
-        """Give the vacuum below the surrounding pressure, Pa."""
+        """Return the vacuum below ambient pressure, Pa."""
         raise Arcor2NotImplemented("vacuum")
 
 
 class PointKind(enum.StrEnum):
-    """Digital or analogue."""
+    """Whether a point is digital or analogue."""
 
     DIGITAL = "digital"
     ANALOG = "analog"
 
 
 class PointDirection(enum.StrEnum):
-    """Seen from the controller."""
+    """Direction as seen from the controller."""
 
     INPUT = "input"
     OUTPUT = "output"
 
 
 class OnLoss(enum.StrEnum):
-    """What an output does when the device loses us."""
+    """What an output does when the device loses the connection."""
 
     HOLD = "hold"
     OFF = "off"
@@ -110,7 +117,7 @@ class OnLoss(enum.StrEnum):
 
 
 class IOPoint(Data, frozen=True):
-    """A named point; physical value = raw value times `scale`; `debounce` in s."""
+    """A named input or output. Its physical value is the raw value times `scale`; `debounce` is in s."""
 
     name: str
     direction: PointDirection
@@ -123,19 +130,33 @@ class IOPoint(Data, frozen=True):
 
 @runtime_checkable
 class HasPoints(Protocol):
-    """Named inputs and outputs that other objects may use (`Generic.attach`): an IOBlock, a robot with outputs.
+    """Named inputs and outputs that other objects may use (`Generic.attach`), such as those of an IOBlock or a robot.
 
-    All three may be called from any thread, also while the object is busy with an action.
+    All methods may be called from any thread, also while the object executes an action.
     """
 
     def points(self) -> list[IOPoint]:
-        """Give the points."""
+        """Return the points."""
 
     def read(self, name: str) -> Reading[bool | float]:
-        """Read a point. Raises OutOfRange for an unknown name, Stale, ConnectionLost, DeviceTimeout."""
+        """Read a point.
+
+        Raises:
+            OutOfRange: There is no such point.
+            Stale: No recent value is known.
+            ConnectionLost: The connection is lost.
+            DeviceTimeout: The device did not answer in time.
+        """
 
     def write(self, name: str, value: bool | float) -> None:
-        """Write an output. Raises Refused for an input, NotInControl, ConnectionLost, DeviceTimeout."""
+        """Write an output.
+
+        Raises:
+            Refused: The point is an input.
+            NotInControl: Another client has control.
+            ConnectionLost: The connection is lost.
+            DeviceTimeout: The device did not answer in time.
+        """
 
 
 class IOBlock(Generic):
@@ -146,7 +167,7 @@ class IOBlock(Generic):
 
     @abc.abstractmethod
     def points(self) -> list[IOPoint]:
-        """Give the points."""
+        """Return the points."""
 
     @abc.abstractmethod
     def read(self, name: str) -> Reading[bool | float]:
@@ -154,19 +175,27 @@ class IOBlock(Generic):
 
     @abc.abstractmethod
     def write(self, name: str, value: bool | float) -> None:
-        """Write an output; Refused for an input."""
+        """Write an output.
+
+        Raises:
+            Refused: The point is an input.
+        """
 
     def pulse(self, name: str, duration: float) -> None:
         """Switch a digital output on for `duration` s."""
         raise Arcor2NotImplemented("pulse")
 
     def wait_for(self, name: str, value: bool, timeout: float) -> None:
-        """Return when a digital point has the value; DeviceTimeout after `timeout` s."""
+        """Wait until a digital point has the value.
+
+        Raises:
+            DeviceTimeout: It does not have it within `timeout` s.
+        """
         raise Arcor2NotImplemented("wait_for")
 
 
 class Axis(Generic):
-    """A single driven axis; m or rad as its settings say."""
+    """A single driven axis, m or rad depending on its settings."""
 
     category: ClassVar[str] = "Axes"
     icon: ClassVar[str] = "axis"
@@ -177,7 +206,11 @@ class Axis(Generic):
 
     @abc.abstractmethod
     def move_absolute(self, position: float, velocity: float) -> None:
-        """Move to a position; Refused before homing."""
+        """Move to a position.
+
+        Raises:
+            Refused: The axis is not referenced.
+        """
 
     @abc.abstractmethod
     def move_relative(self, distance: float, velocity: float) -> None:
@@ -185,15 +218,15 @@ class Axis(Generic):
 
     @abc.abstractmethod
     def move_velocity(self, velocity: float) -> None:
-        """Move with a velocity until halted."""
+        """Move with a velocity until stopped."""
 
     @abc.abstractmethod
     def halt(self) -> None:
-        """Decelerate to a stand."""
+        """Decelerate to standstill."""
 
     @abc.abstractmethod
     def quick_stop(self) -> None:
-        """Decelerate as quickly as set for emergencies."""
+        """Decelerate to standstill with the emergency deceleration."""
 
     @abc.abstractmethod
     def fault_reset(self) -> None:
@@ -201,11 +234,11 @@ class Axis(Generic):
 
     @abc.abstractmethod
     def position(self) -> Reading[float]:
-        """Give the present position."""
+        """Return the present position."""
 
     @abc.abstractmethod
     def velocity(self) -> Reading[float]:
-        """Give the present velocity."""
+        """Return the present velocity."""
 
 
 class Code(Data, frozen=True):
@@ -215,20 +248,20 @@ class Code(Data, frozen=True):
 
 
 class NoRead(Data, frozen=True):
-    """Nothing was read before the time-out."""
+    """No code was read in time."""
 
     reason: Literal["timeout", "unreadable"] = "timeout"
 
 
 class Reader(Generic):
-    """A reader of codes; a code is consumed once."""
+    """A reader of codes. A code is consumed once."""
 
     category: ClassVar[str] = "Identification"
     icon: ClassVar[str] = "reader"
 
     @abc.abstractmethod
     def trigger(self, timeout: float) -> Code | NoRead:
-        """Read one code now, within `timeout` s; codes from before do not count."""
+        """Read one code within `timeout` s. Codes read before the call are discarded."""
 
 
 class Scale(Generic):
@@ -239,31 +272,31 @@ class Scale(Generic):
 
     @abc.abstractmethod
     def weigh(self, stable: bool = True) -> Reading[float]:
-        """Give the weight, kg; with `stable`, wait until it stands."""
+        """Return the weight, kg; with `stable`, wait until it is stable."""
 
     @abc.abstractmethod
     def tare(self) -> None:
-        """Take the present weight as the container's."""
+        """Use the present weight as the tare."""
 
     @abc.abstractmethod
     def zero(self) -> None:
-        """Take the present weight as nothing."""
+        """Use the present weight as zero."""
 
 
 class Printer(Generic):
-    """A label printer; a label is never resent blindly."""
+    """A label printer. A label is never sent again automatically."""
 
     category: ClassVar[str] = "Printers"
     icon: ClassVar[str] = "printer"
 
     @abc.abstractmethod
     def print(self, label: str) -> str:
-        """Print a label; give the job's id."""
+        """Print a label and return the id of the job."""
 
     @abc.abstractmethod
     def status(self) -> str:
-        """Tell how the printer is."""
+        """Return the state of the printer."""
 
     @abc.abstractmethod
     def counter(self) -> int:
-        """Give the number of labels printed."""
+        """Return the number of labels printed."""

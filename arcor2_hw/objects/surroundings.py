@@ -1,4 +1,4 @@
-"""What stands around a robot, as whoever brings the scene up tells it: for ways that lead into nothing."""
+"""The surroundings of a robot: obstacles and other robots, for safe moves."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -16,13 +16,13 @@ __all__ = ["Attachment", "HeldPart", "Nothing", "Obstacle", "Surroundings"]
 
 
 class HeldPart(Data, frozen=True):
-    """A part that a robot holds and moves with it.
+    """A part that a robot holds.
 
     Attributes:
         name: Unique in the scene.
         link: Link of the robot's model, such as its end effector.
         in_link: Pose in the frame of that link.
-        model: Collision model; None for a collision object of the scene, which brings its own.
+        model: Collision model; None for a collision object of the scene, which has its own.
     """
 
     name: str
@@ -32,39 +32,40 @@ class HeldPart(Data, frozen=True):
 
 
 class Surroundings(Protocol):
-    """Asked anew for every motion, on the thread on which the robot is called."""
+    """The surroundings of a robot. They are queried for every motion, on the thread that calls the robot."""
 
     def obstacles(self) -> list[Obstacle]:
-        """Give what robots must not run into."""
+        """Return the obstacles."""
 
     def robots(self) -> "list[tuple[Robot, list[Joint]]]":
-        """Give the other robots with their joints as they are now.
+        """Return the other robots with their present joint values.
 
-        Raises Refused naming one whose joints nobody knows.
+        Raises:
+            Refused: The joints of a robot are unknown; the message names it.
         """
 
     def asset(self, asset_id: str) -> Path | None:
-        """Give the file of a mesh or robot model that was uploaded, None when it is not known here."""
+        """Return the file of an uploaded mesh or robot model, None when it is not available."""
 
     def calibration(self, robot_id: str) -> KinematicCalibration | None:
-        """Give what the controller of a robot told of its very arm; None: its kinematics are nominal."""
+        """Return the calibrated kinematics of a robot, read from its controller; None: nominal kinematics."""
 
 
 class Nothing:
-    """The surroundings of a robot that nobody told of any."""
+    """Empty surroundings."""
 
     def obstacles(self) -> list[Obstacle]:
-        """Give none."""
+        """Return an empty list."""
         return []
 
     def robots(self) -> "list[tuple[Robot, list[Joint]]]":
-        """Give none."""
+        """Return an empty list."""
         return []
 
     def asset(self, asset_id: str) -> Path | None:
-        """Give none."""
+        """Return None."""
         return None
 
     def calibration(self, robot_id: str) -> KinematicCalibration | None:
-        """Give none."""
+        """Return None."""
         return None

@@ -1,4 +1,4 @@
-"""UrdfRobot: a robot whose controller only drives joints; all else about its moves comes from its URDF."""
+"""UrdfRobot: a robot whose controller only drives joints; everything else is computed from its URDF."""
 
 import abc
 import contextlib
@@ -15,16 +15,18 @@ from arcor2_hw.objects.settings import Settings
 from arcor2_hw.objects.surroundings import Surroundings
 
 SLACK: Final = 1e-4
-"""rad, or m, that a joint may be beyond its limit: what rounding adds to one that stands at it."""
+"""Rounding error that is tolerated beyond a joint limit, rad or m."""
 
 
 class UrdfRobot(Robot):
-    """A robot with one arm that has a URDF, and a way to drive its joints.
+    """A robot with one arm and a URDF.
 
-    A type declares `urdf_package_name`, with the URDF in `urdf/` beside its module, and writes `robot_joints`, `follow`
-    and `stop`. From here come end effectors and their poses, forward and inverse kinematics, joint limits, moves to
-    poses and joints, in a line or not, and, where asked for, safe: around what stands in the scene, or refused.
-    `safe_moves` answers what more a driver wants to know.
+    A type declares `urdf_package_name`, with the URDF in `urdf/` next to its module, and implements `robot_joints`,
+    `follow` and `stop`. This class provides end effectors and their poses, forward and inverse kinematics, joint
+    limits,
+    and moves to poses and joints, linear or not, optionally safe: around obstacles of the scene, or refused. A driver
+    can
+    use `safe_moves` for more.
     """
 
     _ABSTRACT = True
@@ -35,47 +37,61 @@ class UrdfRobot(Robot):
         self._stops = 0
 
     def surround(self, surroundings: Surroundings) -> None:
-        """Take what tells of the things around the robot, and read its model."""
+        """Receive the surroundings of the robot, and load its model."""
         super().surround(surroundings)
         self.safe_moves.prepare()
 
     # -------------------------------------------------------------------------------- to be written for each robot
     @abc.abstractmethod
     def follow(self, way: Way) -> None:
-        """Drive the joints along a way and give back when the robot stands at its end.
+        """Drive the joints along a path, and return when the robot is at standstill at its end.
 
-        Point to point from waypoint to waypoint where all joints arrive together, or as `way.timed` says. Raises
-        Cancelled once `stop` was called, and what keeps the robot from getting there. Called while `move_in_progress`.
+        Move point to point from waypoint to waypoint so that all joints arrive together, or as `way.timed` says. It is
+        called while `move_in_progress`.
+
+        Raises:
+            Cancelled: `stop` was called.
+            DeviceError: The robot cannot reach the end.
         """
 
     @abc.abstractmethod
     def stop(self) -> None:
-        """Stop at once. A type's own calls `super().stop()` first: so nothing that is being planned begins after it."""
+        """Stop at once. An override calls `super().stop()` first, so that no planned motion starts afterwards."""
         self._stops += 1
 
     # -------------------------------------------------------------------------------- what is where
     def get_end_effectors_ids(self) -> set[str]:
-        """Give the end effectors of the URDF."""
+        """Return the end effectors of the URDF."""
         return set(self.safe_moves.end_effectors())
 
     def get_end_effector_pose(self, end_effector: str) -> Pose:
-        """Give the pose of an end effector in the world, of the present joints. Raises NotFound, Stale."""
+        """Return the pose of an end effector in the world at the present joint values.
+
+        Raises:
+            NotFound: There is no such end effector.
+            Stale: No recent joint values are known.
+        """
         return self.forward_kinematics(end_effector, self.robot_joints())
 
     def grippers(self) -> set[str]:
-        """Give none."""
+        """Return an empty set."""
         return set()
 
     def suctions(self) -> set[str]:
-        """Give none."""
+        """Return an empty set."""
         return set()
 
     def joint_limits(self) -> dict[str, tuple[float, float]]:
-        """Give lower and upper limit of each joint, rad, m where it slides."""
+        """Return the lower and upper limit of each joint, rad or (prismatic) m."""
         return self.safe_moves.joint_limits()
 
     def forward_kinematics(self, end_effector_id: str, joints: list[Joint]) -> Pose:
-        """Give the pose in the world that joints lead to. Raises NotFound, InvalidData for joints that are missing."""
+        """Compute the pose in the world for joint values.
+
+        Raises:
+            NotFound: There is no such end effector.
+            InvalidData: Joints are missing.
+        """
         self._check_end_effector(end_effector_id)
         return self.safe_moves.forward(end_effector_id, joints)
 
@@ -86,9 +102,12 @@ class UrdfRobot(Robot):
         start_joints: list[Joint] | None = None,
         avoid_collisions: bool = True,
     ) -> list[Joint]:
-        """Give joints that reach a pose in the world, of those that are free the nearest to `start_joints`.
+        """Compute joint values that reach a pose in the world, nearest to `start_joints`.
 
-        Raises KinematicsException naming why there are none, NotFound, InvalidData.
+        Raises:
+            KinematicsException: There are none; the message says why.
+            NotFound: There is no such end effector.
+            InvalidData: A value is not finite.
         """
         self._check_end_effector(end_effector_id)
         near = start_joints if start_joints is not None else self.robot_joints()
@@ -98,11 +117,18 @@ class UrdfRobot(Robot):
     def move_to_pose(
         self, end_effector_id: str, target_pose: Pose, speed: float, safe: bool = True, linear: bool = True
     ) -> None:
-        """Move an end effector to a pose in the world: in a line, else on a way that may be any.
+        """Move an end effector to a pose in the world, in a line or on any path.
 
-        With `safe` a line that meets something is refused, and another way leads around; the robot stops when an
-        obstacle comes into its path meanwhile. Raises KinematicsException naming why there is no path, PathBlocked
-        naming the obstacle, OutOfRange, Refused, Cancelled, and what `follow` does.
+        With `safe`, a line through an obstacle is refused, and other paths lead around obstacles. The robot stops when
+        an
+        obstacle comes into its path.
+
+        Raises:
+            KinematicsException: There is no path; the message says why.
+            PathBlocked: An obstacle came into the path; the message names it.
+            OutOfRange: `speed` is out of range.
+            Refused: The robot is moving already.
+            Cancelled: The move was stopped.
         """
         self._check_end_effector(end_effector_id)
 
@@ -115,7 +141,7 @@ class UrdfRobot(Robot):
         self._go(way, speed)
 
     def move_to_joints(self, target_joints: list[Joint], speed: float, safe: bool = True) -> None:
-        """Move to joint values; with `safe` around what stands in the way. Raises as `move_to_pose`."""
+        """Move to joint values; with `safe` around obstacles. Raises as `move_to_pose`."""
         self._check_joints(target_joints)
 
         def way(now: list[Joint], stopped: Stopped) -> Way:
@@ -131,7 +157,7 @@ class UrdfRobot(Robot):
         with self._moving():
             way = plan(self.robot_joints(), lambda: self._stops != stops)
             if self._stops != stops:
-                raise Cancelled(f"a move of {self.name} was stopped before it began")
+                raise Cancelled(f"The move of {self.name} was stopped before it started.")
             way.require_begin(self.name, self.robot_joints())
             with self.safe_moves.monitored(way):
                 self.follow(way)
@@ -148,13 +174,13 @@ class UrdfRobot(Robot):
     # -------------------------------------------------------------------------------- checks
     def _check_end_effector(self, end_effector: str) -> None:
         if end_effector not in (known := self.safe_moves.end_effectors()):
-            raise NotFound(f"{self.name} has no end effector {end_effector!r}; there are {', '.join(known)}")
+            raise NotFound(f"{self.name} has no end effector {end_effector!r}. Available: {', '.join(known)}")
 
     def _check_joints(self, joints: list[Joint]) -> None:
         limits = self.joint_limits()
         given = {joint.name: joint.value for joint in joints}
         if len(given) != len(joints) or given.keys() != limits.keys():
-            raise InvalidData(f"the joints of {self.name} are {', '.join(limits)}; given: {', '.join(given)}")
+            raise InvalidData(f"{self.name} has the joints {', '.join(limits)}, not {', '.join(given)}")
         for name, value in given.items():
             low, high = limits[name]
             if not low - SLACK <= value <= high + SLACK:

@@ -61,7 +61,7 @@ class SceneSurroundings:
                 assert isinstance(instance, Robot)
                 joints = device.watch_lane.call("robot_joints", instance.robot_joints, deadline=JOINTS_WITHIN)
             except Arcor2Error as error:
-                raise Refused(f"where {device.name} stands is not known, which may be in the way: {error}") from error
+                raise Refused(f"The position of {device.name} is unknown: {error}") from error
             found.append((instance, joints))
         return found
 

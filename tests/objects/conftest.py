@@ -68,7 +68,7 @@ class Around:
 
     def robots(self) -> list[tuple[Robot, list[Joint]]]:
         if self.unknown:
-            raise Refused(f"where {self.unknown} stands is not known")
+            raise Refused(f"The position of {self.unknown} is unknown.")
         return self.others
 
     def asset(self, asset_id: str) -> Path | None:

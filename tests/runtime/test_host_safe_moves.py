@@ -162,7 +162,7 @@ def test_another_robot_is_known_by_its_joints_or_the_move_is_refused(scene: Host
     error = go(scene, READY)
     assert isinstance(error, m.ErrorData)
     assert error.code == "refused"
-    assert "where other stands is not known" in error.message
+    assert "The position of other is unknown" in error.message
     assert go(scene, READY, safe=False) is None
 
 
@@ -384,7 +384,7 @@ def test_a_robot_with_several_arms_is_in_the_way_when_all_of_it_is_known(host: H
     error = go(host, MEETING)
     assert isinstance(error, m.ErrorData)
     assert error.code == "refused"
-    assert "where pair stands is not known" in error.message
+    assert "The position of pair is unknown" in error.message
     assert "wrist_1_joint" in error.message
 
 
