@@ -51,7 +51,7 @@ OLDER_NAMES: Final[dict[str, dict[str, tuple[str, str]]]] = {
     ),
     "arcor2_runtime": {},
     "arcor2_runtime.exceptions": _all_from("arcor2_hw.runtime.exceptions", "print_exception"),
-    "arcor2_runtime.resources": _all_from(f"{_OLDER}.resources", "Resources"),
+    "arcor2_runtime.resources": _all_from("arcor2_hw.runtime.older_resources", "Resources"),
     "arcor2_web": {},
     "arcor2_web.rest": _all_from(
         f"{_OLDER}.rest", "Method", "RestException", "RestHttpException", "Timeout", "call", "get_image"

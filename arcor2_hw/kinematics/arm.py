@@ -5,7 +5,7 @@ frame of the model's root link. Not safe for use by two threads at once.
 """
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -15,11 +15,9 @@ from arcor2_hw.data.base import Data
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.kinematics.description import EndEffector
 from arcor2_hw.kinematics.errors import ModelError
+from arcor2_hw.kinematics.joints import JointSet
 from arcor2_hw.kinematics.shapes import Array
 from arcor2_hw.kinematics.tree import joint_model
-
-if TYPE_CHECKING:
-    from arcor2_hw.kinematics.model import RobotModel
 
 NEAR_SINGULAR: Final = 0.02
 """Smallest singular value (see `Dexterity`) below which a configuration is near a singularity.
@@ -82,7 +80,7 @@ class Arm:
         reach: Maximum distance of the tip from `centre`, m.
     """
 
-    def __init__(self, model: "RobotModel", end_effector: EndEffector, steps: Sequence[Step], tool: Array) -> None:
+    def __init__(self, model: JointSet, end_effector: EndEffector, steps: Sequence[Step], tool: Array) -> None:
         self.model = model
         self.end_effector = end_effector
         self.steps = tuple(steps)

@@ -78,10 +78,6 @@ class Joint:
     """A joint.
 
     Attributes:
-        name: Name.
-        kind: Kind of joint.
-        parent: Parent link.
-        child: Child link.
         origin: Pose in the parent link, (4, 4).
         axis: Unit axis in its own frame.
         lower: Lower limit, rad or m.

@@ -4,19 +4,19 @@ Joint values are arrays in the order of `joints`, rad or (prismatic) m. Matrices
 of the root link unless stated otherwise. Not safe for use by two threads at once: a model computes in place.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Self
 
 import numpy as np
 
-from arcor2_hw.data import robot
 from arcor2_hw.exceptions import NotFound
 from arcor2_hw.kinematics import adjusting, shapes
 from arcor2_hw.kinematics.arm import Arm, Step
 from arcor2_hw.kinematics.description import Description, EndEffector, Geometry, Joint, MeshFile, describe
-from arcor2_hw.kinematics.errors import ModelError, ZeroLength
+from arcor2_hw.kinematics.errors import ZeroLength
+from arcor2_hw.kinematics.joints import JointSet
 from arcor2_hw.kinematics.meshes import read_mesh
 from arcor2_hw.kinematics.shapes import Array, MeshUse, Shape
 from arcor2_hw.kinematics.source import MAX_MESH, Package
@@ -36,15 +36,10 @@ class LinkShape:
     origin: Array
 
 
-class RobotModel:
+class RobotModel(JointSet):
     """A robot as its URDF describes it. Created by `load`.
 
     Attributes:
-        name: Name of the robot.
-        joints: Joints that take values (neither fixed nor mimicking), from the root outwards.
-        lower: Lower limits, rad or m; infinite for continuous joints.
-        upper: Upper limits, rad or m; infinite for continuous joints.
-        velocity: Maximum velocities, rad/s or m/s.
         links: Names of the links, from the root outwards.
         end_effectors: Links for which poses are specified.
         visual: Shapes for display.
@@ -52,20 +47,12 @@ class RobotModel:
     """
 
     def __init__(self, description: Description, package: Package, beside: str, mesh_use: MeshUse = "hull") -> None:
+        moving = [joint for joint in description.joints if joint.kind != "fixed" and joint.mimic is None]
+        super().__init__(description.name, moving)
         self.description = description
-        self.name = description.name
         self.root = description.root
         self._package, self._beside, self._mesh_use = package, beside, mesh_use
-        moving = [joint for joint in description.joints if joint.kind != "fixed"]
-        self.joints: tuple[Joint, ...] = tuple(joint for joint in moving if joint.mimic is None)
-        if not self.joints:
-            raise ModelError(f"{self.name} has no joint that moves.")
-        self.joint_names = tuple(joint.name for joint in self.joints)
-        self.lower = np.array([joint.lower for joint in self.joints])
-        self.upper = np.array([joint.upper for joint in self.joints])
-        self.velocity = np.array([joint.velocity for joint in self.joints])
         self.end_effectors: dict[str, EndEffector] = {each.link: each for each in description.end_effectors}
-        self._column = {name: number for number, name in enumerate(self.joint_names)}
         self.tree = Tree(description, np.eye(4))
         self.links: tuple[str, ...] = tuple(self.tree.bodies)
         self.touching: frozenset[frozenset[str]] | None = None
@@ -108,43 +95,7 @@ class RobotModel:
         moved = adjusting.with_origins(self.description, origins)
         return type(self)(moved, self._package, self._beside, self._mesh_use)
 
-    # -------------------------------------------------------------------------------- joint values
-    def values(self, joints: Iterable[robot.Joint], others: Array | None = None) -> Array:
-        """Return the values of named joints in the model's order.
-
-        Unknown joints, such as those of a gripper, are ignored.
-
-        Args:
-            joints: Named joint values.
-            others: Values of joints that are not named; None: all are required.
-
-        Raises:
-            ModelError: A joint is missing, repeated, or not finite.
-        """
-        found: dict[str, float] = {}
-        for joint in joints:
-            if joint.name in found:
-                raise ModelError(f"The joint {joint.name} of {self.name} is given twice.")
-            if joint.name in self._column and not np.isfinite(joint.value):
-                raise ModelError(f"The joint {joint.name} of {self.name} must be a finite number, not {joint.value!r}.")
-            found[joint.name] = joint.value
-        missing = [name for name in self.joint_names if name not in found]
-        if missing and others is None:
-            raise ModelError(f"Joints of {self.name} are missing: {', '.join(missing)}.")
-        out = np.zeros(len(self.joints)) if others is None else np.array(others, dtype=np.float64)
-        for name, number in self._column.items():
-            out[number] = found.get(name, out[number])
-        return out
-
-    def named(self, q: Array) -> list[robot.Joint]:
-        """Return joint values with their names."""
-        return [robot.Joint(name, float(value)) for name, value in zip(self.joint_names, q, strict=True)]
-
-    def neutral(self) -> Array:
-        """Return zero for each joint, or the limit nearest to it."""
-        return np.clip(np.zeros(len(self.joints)), self.lower, self.upper)
-
-    # -------------------------------------------------------------------------------- where things are
+    # -------------------------------------------------------------------------------- poses
     def link_poses(self, q: Array) -> dict[str, Array]:
         """Return the frame of each link, (4, 4)."""
         return self.tree.frames(q)

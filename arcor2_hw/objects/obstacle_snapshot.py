@@ -28,6 +28,15 @@ Others = list[tuple[Robot, list[Joint]]]
 """Other robots, each with its joint values."""
 
 
+def other_robots(robot: Robot) -> Others:
+    """Return the other robots around a robot, with their present joint values.
+
+    Raises:
+        Refused: The joints of a robot are unknown; the message names it.
+    """
+    return [(other, joints) for other, joints in robot.surroundings.robots() if isinstance(other, Robot)]
+
+
 @dataclasses.dataclass(frozen=True)
 class ObstacleSnapshot:
     """Obstacles by name, and other robots by name with their joint values, at one moment.

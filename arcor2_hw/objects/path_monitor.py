@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from arcor2_hw.exceptions import Arcor2Error, Cancelled, PathBlocked, Refused
-from arcor2_hw.objects.obstacle_snapshot import ObstacleSnapshot, Others, build_world
+from arcor2_hw.objects.obstacle_snapshot import ObstacleSnapshot, Others, build_world, other_robots
 from arcor2_hw.objects.robot import Robot
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ class PathMonitor:
         """Return the present surroundings; a robot that does not answer keeps its last known joints."""
         if self._others is None:
             try:
-                others = self._robot.surroundings.robots()
+                others = other_robots(self._robot)
             except Arcor2Error as error:
                 log.warning("%s continues with the last known joints of other robots: %s", self._robot.name, error)
                 others = self._others = list(before.robots.values())

@@ -4,7 +4,6 @@ Pinocchio and coal come with the extra `kinematics` and are imported on first us
 """
 
 import contextlib
-import dataclasses
 import logging
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -14,7 +13,8 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import Models
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import Arcor2Error, KinematicsError, NotFound, Refused
-from arcor2_hw.objects.obstacle_snapshot import JOINT_TOLERANCE, ObstacleSnapshot, Others, build_world
+from arcor2_hw.objects.motion_path import MotionPath
+from arcor2_hw.objects.obstacle_snapshot import ObstacleSnapshot, Others, build_world, other_robots
 from arcor2_hw.objects.path_monitor import PathMonitor, PlannedPath
 from arcor2_hw.objects.robot import Robot
 from arcor2_hw.objects.robot_tools import RobotTools, package_of, settings_of
@@ -47,43 +47,7 @@ Stopped = Callable[[], bool]
 T = TypeVar("T")
 
 
-@dataclasses.dataclass(frozen=True)
-class Way:
-    """A planned path. Between two waypoints all joints move in proportion.
-
-    Attributes:
-        waypoints: Joint values; the first are those at the start.
-        speed: Fraction of the maxima.
-        line: Whether the end effector moves in a straight line; the waypoints are then closely spaced.
-    """
-
-    waypoints: list[list[Joint]]
-    speed: float
-    line: bool
-    _timed: "Callable[[float | None], Trajectory]" = dataclasses.field(repr=False)
-    _planned: PlannedPath | None = dataclasses.field(default=None, repr=False)
-
-    def require_begin(self, name: str, now: Sequence[Joint]) -> None:
-        """Require that the robot is still at the start of the path.
-
-        Raises:
-            Refused: It was moved since planning.
-        """
-        present = {joint.name: joint.value for joint in now}
-        for joint in self.waypoints[0]:
-            if abs(present[joint.name] - joint.value) > JOINT_TOLERANCE:
-                raise Refused(f"{name} was moved while its path was planned. Start the move again.")
-
-    def timed(self, tcp_speed: float | None = None) -> "Trajectory":
-        """Return joint values and velocities over time, for controllers that need them; see `Trajectory.sampled`.
-
-        The limits are those of the URDF times `speed`. The robot stops at the waypoints of a path that is not a line,
-        because only the path itself was checked for collisions.
-
-        Args:
-            tcp_speed: Maximum speed along a line, m/s; None: as fast as the joints allow.
-        """
-        return self._timed(tcp_speed)
+Way = MotionPath  # name used by object types of older packages
 
 
 class Tool(NamedTuple):
@@ -195,7 +159,7 @@ class SafeMoves:
         *,
         safe: bool = True,
         stopped: Stopped | None = None,
-    ) -> Way:
+    ) -> MotionPath:
         """Plan a path to joint values: straight in joint space where that is free, otherwise around obstacles.
 
         Args:
@@ -216,7 +180,7 @@ class SafeMoves:
             if not safe:
                 return self._way(arm, [arm.values(now), arm.values(goal)], speed)
 
-            def planned(world: "CollisionWorld", around: ObstacleSnapshot) -> Way:
+            def planned(world: "CollisionWorld", around: ObstacleSnapshot) -> MotionPath:
                 planner = self._planner(world, arm)
                 way = planner.to_joints(arm.values(now), arm.values(goal), within=WITHIN, stopped=stopped)
                 return self._way(arm, way, speed, around, world.margin)
@@ -232,7 +196,7 @@ class SafeMoves:
         *,
         safe: bool = True,
         stopped: Stopped | None = None,
-    ) -> Way:
+    ) -> MotionPath:
         """Plan a path to a pose, to whichever joint values give the shortest. Raises as `to_joints`, also NotFound."""
         with self._named():
             tools = self._tools()
@@ -241,7 +205,7 @@ class SafeMoves:
             if not safe:
                 return self._way(arm, [start, tools.inverse(end_effector).solve(target, start)], speed)
 
-            def planned(world: "CollisionWorld", around: ObstacleSnapshot) -> Way:
+            def planned(world: "CollisionWorld", around: ObstacleSnapshot) -> MotionPath:
                 way = self._planner(world, arm).to_pose(start, target, within=WITHIN, stopped=stopped)
                 return self._way(arm, way, speed, around, world.margin)
 
@@ -249,7 +213,7 @@ class SafeMoves:
 
     def line(
         self, end_effector: str, now: Sequence[Joint], pose: Pose, speed: float = 1.0, *, safe: bool = True
-    ) -> Way:
+    ) -> MotionPath:
         """Plan a straight line of an end effector to a pose.
 
         Raises:
@@ -263,7 +227,7 @@ class SafeMoves:
             arm = self._tools().arm(end_effector)
             way = straight_line(arm, arm.values(now), self._target(pose), self._robot.name)
 
-            def checked(world: "CollisionWorld", around: ObstacleSnapshot) -> Way:
+            def checked(world: "CollisionWorld", around: ObstacleSnapshot) -> MotionPath:
                 sweep = self._sweep(world, arm)
                 if world.margin and not (sweep.is_free(way[0]) and sweep.is_free(way[-1])):
                     raise StartInCollision
@@ -279,7 +243,7 @@ class SafeMoves:
             return [str(contact) for contact in world.contacts(self._robot.name, self._q(joints))]
 
     @contextlib.contextmanager
-    def monitored(self, way: Way) -> Iterator[None]:
+    def monitored(self, way: MotionPath) -> Iterator[None]:
         """Monitor the surroundings while the robot follows a safe path, and stop it when they block it.
 
         The robot's `stop` is called, after which the motion in the context has to raise Cancelled.
@@ -337,7 +301,7 @@ class SafeMoves:
         margin: float = 0.0,
         *,
         line: bool = False,
-    ) -> Way:
+    ) -> MotionPath:
         """Return a path through points.
 
         Args:
@@ -362,7 +326,7 @@ class SafeMoves:
             return along_line(points, limits, lengths, fastest, TCP_RAMP * fastest)
 
         planned = None if around is None else PlannedPath(self._tools(), arm, points, around, margin)
-        return Way([arm.named(q) for q in points], speed, line, timed, planned)
+        return MotionPath([arm.named(q) for q in points], speed, line, timed, planned)
 
     def _planner(self, world: "CollisionWorld", arm: "Arm") -> Any:
         from arcor2_hw.planning.planner import Planner
@@ -385,7 +349,7 @@ class SafeMoves:
             return ask(build_world(self._robot, tools, now, around, 0.0), around)
 
     def _snapshot(self) -> ObstacleSnapshot:
-        return self._look(self._tools(), self._robot.surroundings.robots())
+        return self._look(self._tools(), other_robots(self._robot))
 
     def _look(self, tools: RobotTools, others: Others) -> ObstacleSnapshot:
         with_model = [(other, joints) for other, joints in others if tools.other(other) is not None]

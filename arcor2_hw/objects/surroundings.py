@@ -1,16 +1,15 @@
 """The surroundings of a robot: obstacles and other robots, for safe moves."""
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from arcor2_hw.collision.description import Attachment, Obstacle
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import Models
 from arcor2_hw.data.robot import Joint, KinematicCalibration
-
-if TYPE_CHECKING:
-    from arcor2_hw.objects.robot import Robot
+from arcor2_hw.objects.generic import GenericWithPose
 
 __all__ = ["Attachment", "HeldPart", "Nothing", "Obstacle", "Surroundings"]
 
@@ -37,7 +36,7 @@ class Surroundings(Protocol):
     def obstacles(self) -> list[Obstacle]:
         """Return the obstacles."""
 
-    def robots(self) -> "list[tuple[Robot, list[Joint]]]":
+    def robots(self) -> Sequence[tuple[GenericWithPose, list[Joint]]]:
         """Return the other robots with their present joint values.
 
         Raises:
@@ -58,7 +57,7 @@ class Nothing:
         """Return an empty list."""
         return []
 
-    def robots(self) -> "list[tuple[Robot, list[Joint]]]":
+    def robots(self) -> Sequence[tuple[GenericWithPose, list[Joint]]]:
         """Return an empty list."""
         return []
 

@@ -9,8 +9,9 @@ from typing import Final
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import Cancelled, InvalidData, NotFound, OutOfRange, Refused
+from arcor2_hw.objects.motion_path import MotionPath
 from arcor2_hw.objects.robot import Robot
-from arcor2_hw.objects.safe_moves import SafeMoves, Stopped, Way
+from arcor2_hw.objects.safe_moves import SafeMoves, Stopped
 from arcor2_hw.objects.settings import Settings
 from arcor2_hw.objects.surroundings import Surroundings
 
@@ -43,7 +44,7 @@ class UrdfRobot(Robot):
 
     # -------------------------------------------------------------------------------- to be written for each robot
     @abc.abstractmethod
-    def follow(self, way: Way) -> None:
+    def follow(self, way: MotionPath) -> None:
         """Drive the joints along a path, and return when the robot is at standstill at its end.
 
         Move point to point from waypoint to waypoint so that all joints arrive together, or as `way.timed` says. It is
@@ -132,7 +133,7 @@ class UrdfRobot(Robot):
         """
         self._check_end_effector(end_effector_id)
 
-        def way(now: list[Joint], stopped: Stopped) -> Way:
+        def way(now: list[Joint], stopped: Stopped) -> MotionPath:
             moves = self.safe_moves
             if linear:
                 return moves.line(end_effector_id, now, target_pose, speed, safe=safe)
@@ -144,12 +145,12 @@ class UrdfRobot(Robot):
         """Move to joint values; with `safe` around obstacles. Raises as `move_to_pose`."""
         self._check_joints(target_joints)
 
-        def way(now: list[Joint], stopped: Stopped) -> Way:
+        def way(now: list[Joint], stopped: Stopped) -> MotionPath:
             return self.safe_moves.to_joints(now, target_joints, speed, safe=safe, stopped=stopped)
 
         self._go(way, speed)
 
-    def _go(self, plan: Callable[[list[Joint], Stopped], Way], speed: float) -> None:
+    def _go(self, plan: Callable[[list[Joint], Stopped], MotionPath], speed: float) -> None:
         if not (math.isfinite(speed) and 0.0 < speed <= 1.0):
             raise OutOfRange(f"{self.name}: speed must be above 0 and at most 1, not {speed!r}")
         stops = self._stops

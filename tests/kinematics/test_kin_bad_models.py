@@ -252,7 +252,7 @@ TRIANGLE = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
         (CUBE_STL[:200], "m.stl", "m.stl"),
         (stl([[0.0, 0.0, float("nan")], *TRIANGLE[1:]]), "m.stl", "m.stl has vertices that are not finite"),
         (stl([[0.0, 0.0, float("inf")], *TRIANGLE[1:]]), "m.stl", "m.stl has vertices that are not finite"),
-        (stl([[0.0, 0.0, 1e9], *TRIANGLE[1:]]), "m.stl", "farther than 10000 m"),
+        (stl([[0.0, 0.0, 1e9], *TRIANGLE[1:]]), "m.stl", "beyond 10000 m"),
         (b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "m.obj", "m.obj"),
         (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "m.obj", "m.obj"),
         (b"x", "m.exe", "format of the mesh m.exe is unknown"),
