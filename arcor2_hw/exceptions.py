@@ -1,12 +1,14 @@
-"""One tree of errors: each has a stable code, a sentence for the operator and a detail for the technician."""
+"""All errors: each has a stable code, a message for the operator and a detail for the technician."""
 
 from typing import ClassVar
 
 
 class Arcor2Error(Exception):
-    """Base of all errors. `str(error)` is the sentence for the operator.
+    """Base of all errors. `str(error)` is the message for the operator.
 
-    code: stable text that programs may test. detail: for the technician (address, register, answer received).
+    Attributes:
+        code: Stable text for programs.
+        detail: Detail for the technician, such as address, register or received answer.
     """
 
     code: ClassVar[str] = "error"
@@ -18,25 +20,25 @@ class Arcor2Error(Exception):
 
 # ------------------------------------------------------------------------------------------------ devices
 class DeviceError(Arcor2Error):
-    """Something is wrong with a device or the way to it."""
+    """An error of a device or its connection."""
 
     code = "device"
 
 
 class NotConnected(DeviceError):
-    """The device is not connected: nothing was sent."""
+    """The device is not connected. Nothing was sent."""
 
     code = "not_connected"
 
 
 class ConnectionLost(DeviceError):
-    """The connection broke; what had been sent may or may not have been done."""
+    """The connection broke. Commands sent before may or may not have been executed."""
 
     code = "connection_lost"
 
 
 class DeviceTimeout(DeviceError):
-    """The device did not answer, or did not finish, within the deadline."""
+    """The device did not answer, or did not finish, within the time limit."""
 
     code = "device_timeout"
 
@@ -48,31 +50,31 @@ class Refused(DeviceError):
 
 
 class NotInControl(Refused):
-    """Somebody else has control of the device."""
+    """Another client has control of the device."""
 
     code = "not_in_control"
 
 
 class OutOfRange(DeviceError):
-    """A value lies outside what the device allows: nothing was sent."""
+    """A value is outside of the range that the device allows. Nothing was sent."""
 
     code = "out_of_range"
 
 
 class Stale(DeviceError):
-    """The newest value is older than was asked for."""
+    """The newest value is older than allowed."""
 
     code = "stale"
 
 
 class NoDepth(DeviceError):
-    """The camera gives no depth, or too little of the picture has one."""
+    """The camera has no depth, or too few pixels have one."""
 
     code = "no_depth"
 
 
 class Overexposed(DeviceError):
-    """Too much of the picture is white: there is more light than the exposure takes."""
+    """Too many pixels are saturated. Reduce the exposure or the light."""
 
     code = "overexposed"
 
@@ -88,7 +90,7 @@ class DeviceFault(DeviceError):
 
 
 class SafetyStop(DeviceError):
-    """The safety system stopped the device; a person has to deal with it."""
+    """The safety system stopped the device. A person has to resolve the cause."""
 
     code = "safety_stop"
 
@@ -98,7 +100,7 @@ class SafetyStop(DeviceError):
 
 
 class Cancelled(DeviceError):
-    """The command was stopped before it was done."""
+    """The command was stopped before it was completed."""
 
     code = "cancelled"
 
@@ -110,50 +112,50 @@ class PathBlocked(DeviceError):
 
 
 class KinematicsError(DeviceError):
-    """There are no joints for the pose, or the numbers make no sense for the robot."""
+    """No joint values reach the pose, or a value is invalid for the robot."""
 
     code = "kinematics"
 
 
 # ------------------------------------------------------------------------------------------------ programs and data
 class InvalidData(Arcor2Error):
-    """What was given has a wrong form."""
+    """The data is invalid."""
 
     code = "invalid_data"
 
 
 class AddressChanged(InvalidData):
-    """A stored secret was entered for another address; the message names the device, the setting and both addresses."""
+    """A stored secret was entered for another address. The message names the device, the setting and both addresses."""
 
     code = "address_changed"
 
 
 class TextTooLong(InvalidData):
-    """A text is longer than its field allows; the message names the field and the limit."""
+    """A text is longer than its field allows. The message names the field and the limit."""
 
     code = "text_too_long"
 
 
 class NotFound(Arcor2Error):
-    """What was named does not exist."""
+    """The named item does not exist."""
 
     code = "not_found"
 
 
 class Conflict(Arcor2Error):
-    """What was given stands against what is there."""
+    """The request conflicts with the present state."""
 
     code = "conflict"
 
 
 class InvalidProject(Arcor2Error):
-    """A project cannot be turned into a program."""
+    """A project cannot be converted to a program."""
 
     code = "invalid_project"
 
 
 class InvalidPackage(Arcor2Error):
-    """A package is damaged, or is none."""
+    """A package is damaged or invalid."""
 
     code = "invalid_package"
 
@@ -165,17 +167,17 @@ class StorageError(Arcor2Error):
 
 
 class Arcor2NotImplemented(Arcor2Error):
-    """This object type does not have the optional method."""
+    """This object type does not implement the optional method."""
 
     code = "not_implemented"
 
 
 class ProgramFinished(BaseException):
-    """A flow action ended the program as meant: neither an error nor a stop.
+    """A flow action ended the program regularly: neither an error nor a stop.
 
-    Not under Exception, so that a script's own `except Exception` does not swallow it.
+    It is not derived from Exception, so that `except Exception` in a script does not catch it.
     """
 
 
 class ProgramStopped(BaseException):
-    """Somebody stopped the program. Not under Exception, for the same reason."""
+    """The program was stopped. It is not derived from Exception, for the same reason as ProgramFinished."""

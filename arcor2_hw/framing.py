@@ -1,4 +1,4 @@
-"""How our own processes cut a stream into messages: four bytes of length, little-endian, then the message."""
+"""Framing of messages between our own processes: a length of four bytes, little-endian, then the message."""
 
 import struct
 from typing import Final
@@ -8,18 +8,22 @@ PREFIX_SIZE: Final = _PREFIX.size
 
 
 def prefix(length: int) -> bytes:
-    """Give what stands in front of a message of so many bytes."""
+    """Return the length prefix of a message of so many bytes."""
     return _PREFIX.pack(length)
 
 
 def framed(body: bytes) -> bytes:
-    """Give a message with its length in front."""
+    """Return a message with its length prefix."""
     return prefix(len(body)) + body
 
 
 def body_length(prefix: bytes, limit: int) -> int:
-    """Read the length in front of a message, bytes; ValueError beyond the limit."""
+    """Read the length prefix of a message.
+
+    Raises:
+        ValueError: The length exceeds the limit.
+    """
     (length,) = _PREFIX.unpack(prefix)
     if length > limit:
-        raise ValueError(f"a message of {length} bytes is longer than {limit}")
+        raise ValueError(f"a message of {length} bytes is longer than the maximum of {limit}")
     return int(length)

@@ -1,4 +1,4 @@
-"""Actions: what marks a method as one, and the kinds of parameter it may take."""
+"""Actions: the decorator that marks a method as an action, and the types of its parameters."""
 
 from arcor2_hw.actions.marking import DEFAULT_DEADLINE, IntEnum, StrEnum, action, deadline_of, metadata_of
 from arcor2_hw.actions.parameter_types import PARAMETER_TYPES, ParameterType, ScriptNames, by_annotation, parameter_type

@@ -1,4 +1,4 @@
-"""Arguments and results as JSON text: what travels between processes and in events."""
+"""Arguments and results as JSON text, for messages between processes and for events."""
 
 import io
 from typing import Any, Final
@@ -9,28 +9,29 @@ from arcor2_hw.exceptions import InvalidData
 
 
 def is_picture(value: Any) -> bool:
-    """Tell whether `value` is a PIL picture, without importing Pillow."""
+    """Return whether `value` is a PIL image, without importing Pillow."""
     return hasattr(value, "mode") and callable(getattr(value, "save", None))
 
 
 def _encode_other(value: Any) -> Any:
-    """Give what JSON can hold for what msgspec does not know: numbers and arrays of numpy, pictures."""
+    """Convert values that msgspec does not know, numpy numbers and arrays and images, to JSON values."""
     if is_picture(value):
-        # The protocol carries a picture's file as Latin-1 text: JPEG, but depth and masks must not lose anything.
+        # The protocol sends the file of an image as Latin-1 text: JPEG, but lossless for depth images and masks.
         with io.BytesIO() as file:
             if value.mode in ("L", "RGB", "CMYK", "YCbCr"):
                 value.save(file, format="JPEG")
             else:
-                # A depth picture of 1280 x 720 takes 0.04 s at level 1, 0.2 s at the default for a sixth less.
+                # A depth image of 1280 × 720 takes 0.04 s at level 1, but 0.2 s at the default level, which saves a
+                # sixth.
                 value.save(file, format="PNG", compress_level=1, pnginfo=_notes(value))
             return file.getvalue().decode("latin-1")
     if callable(getattr(value, "tolist", None)):
         return value.tolist()
-    raise NotImplementedError(f"a {type(value).__name__} has no form in JSON")
+    raise NotImplementedError(f"a {type(value).__name__} cannot be converted to JSON")
 
 
 def _notes(picture: Any) -> Any:
-    """Give, as text chunks of a PNG, what is noted on a picture; reading the file puts it back into `info`."""
+    """Return the notes of an image as text chunks of a PNG file; they are restored into `info` when it is read."""
     from PIL.PngImagePlugin import PngInfo
 
     notes = PngInfo()
@@ -44,28 +45,40 @@ _encoder: Final = msgspec.json.Encoder(enc_hook=_encode_other)
 
 
 def encode(value: Any) -> str:
-    """Give any argument or result as JSON text for events; InvalidData when it has no such form."""
+    """Convert an argument or result to JSON text.
+
+    Raises:
+        InvalidData: It cannot be converted.
+    """
     try:
         return _encoder.encode(value).decode()
     except (TypeError, ValueError, NotImplementedError, OverflowError, RecursionError, OSError) as error:
-        raise InvalidData(f"this cannot be told in JSON: {error}") from error
+        raise InvalidData(f"the value cannot be converted to JSON: {error}") from error
 
 
 def decode_json(text: str, annotation: Any) -> Any:
-    """Read an argument that came as JSON into what `annotation` says; InvalidData when it does not fit."""
+    """Convert an argument from JSON text to the type `annotation`.
+
+    Raises:
+        InvalidData: The text does not have that type.
+    """
     try:
         return msgspec.json.decode(text, type=annotation)
     except (msgspec.MsgspecError, TypeError, ValueError, RecursionError) as error:
-        raise InvalidData(f"{text[:80]} does not fit: {error}") from error
+        raise InvalidData(f"{text[:80]} has the wrong type: {error}") from error
 
 
 def decode_picture(text: str) -> Any:
-    """Read a picture that came as JSON; InvalidData when it is none."""
-    from PIL import Image, UnidentifiedImageError  # only types with pictures need Pillow
+    """Convert an image from JSON text.
+
+    Raises:
+        InvalidData: It is not an image.
+    """
+    from PIL import Image, UnidentifiedImageError  # imported here because only types with images need Pillow
 
     try:
         picture = Image.open(io.BytesIO(msgspec.json.decode(text, type=str).encode("latin-1")))
         picture.load()
     except (msgspec.MsgspecError, UnicodeEncodeError, UnidentifiedImageError, OSError) as error:
-        raise InvalidData(f"this is no picture: {error}") from error
+        raise InvalidData(f"the value is not an image: {error}") from error
     return picture

@@ -1,4 +1,4 @@
-"""The mark that makes a method of an object type an action."""
+"""The decorator that marks a method of an object type as an action."""
 
 import builtins
 import enum
@@ -9,10 +9,10 @@ from typing import Final, TypeVar, overload
 from arcor2_hw.data.object_type import ActionMetadata
 
 DEFAULT_DEADLINE: Final = 120.0
-"""Seconds after which a call that has not returned is given up; longer than any single motion of the demo cell."""
+"""Time limit of an action, s; longer than any single motion of the demo cell."""
 
 OLDER_DEADLINE: Final = 3600.0
-"""Seconds for an action marked in the older way, which says nothing of its own: the peer waits for ever."""
+"""Time limit of an action marked in the older way, s, which has no time limit of its own."""
 
 NOTHING_RENAMED: Final[Mapping[str, str]] = MappingProxyType({})
 
@@ -21,7 +21,7 @@ V = TypeVar("V")
 
 
 class StrEnum(enum.StrEnum):
-    """Base of enumerations of text that an action parameter may have as its type."""
+    """Base of text enumerations that may be the type of an action parameter."""
 
     @classmethod
     def set(cls) -> builtins.set[str]:
@@ -30,7 +30,7 @@ class StrEnum(enum.StrEnum):
 
 
 class IntEnum(enum.IntEnum):
-    """Base of enumerations of numbers that an action parameter may have as its type."""
+    """Base of integer enumerations that may be the type of an action parameter."""
 
     @classmethod
     def set(cls) -> builtins.set[int]:
@@ -67,11 +67,15 @@ def action(
 ) -> F | Callable[[F], F]:
     """Mark a method as an action.
 
-    composite: it may call other actions. hidden: it is not offered to users.
-    quick: it neither waits nor moves anything and returns within 1 s, so that there is nothing to stop.
-    deadline: seconds after which the call is given up as failed; None for one that ends only when it is stopped.
-    category, icon: how the editor shows it, where that is not as its type has it.
-    renamed: present names of parameters by former names, which older projects and scripts give.
+    Args:
+        method: The method.
+        composite: Whether it may call other actions.
+        hidden: Whether it is not offered to users.
+        quick: Whether it neither waits nor moves anything and returns within 1 s, so that it need not be stopped.
+        deadline: Time limit of a call, s; None for an action that ends only when it is stopped.
+        category: Category in the editor; default: that of the type.
+        icon: Icon in the editor; default: that of the type.
+        renamed: Present names of parameters by former names, which older projects and scripts use.
     """
 
     def mark(function: F) -> F:
@@ -85,13 +89,13 @@ def action(
 
 
 def metadata_of(method: object) -> ActionMetadata | None:
-    """Give the metadata of an action, None for a method that is none."""
+    """Return the metadata of an action, None for any other method."""
     found = getattr(method, "__action__", None)
     return found if isinstance(found, ActionMetadata) else None
 
 
 def is_quick(method: object) -> bool:
-    """Tell whether an action declares that it returns within 1 s."""
+    """Return whether an action declares that it returns within 1 s."""
     return bool(getattr(method, "__quick__", False))
 
 
@@ -102,7 +106,7 @@ def with_present_names(method: object, given: Mapping[str, V]) -> dict[str, V]:
 
 
 def deadline_of(method: object) -> float | None:
-    """Give the deadline of a call of `method`, s; None: it has none."""
+    """Return the time limit of a call of `method`, s; None: no limit."""
     otherwise = DEFAULT_DEADLINE if metadata_of(method) is None else OLDER_DEADLINE
     found: float | None = getattr(method, "__deadline__", otherwise)
     return found

@@ -1,4 +1,4 @@
-"""The ten kinds of parameter an action may take: how one is read, checked, compiled and shown (protocol, 9.4)."""
+"""The ten types of action parameters: how they are read, checked, compiled and displayed (protocol, section 9.4)."""
 
 import abc
 import ast
@@ -19,23 +19,27 @@ from arcor2_hw.exceptions import Arcor2Error, InvalidData
 
 
 class ScriptNames(Protocol):
-    """By what names a script knows the things that parameters refer to. Build implements it."""
+    """Names of the parts of a project in a script, implemented by the build."""
 
     def pose(self, orientation_id: str) -> ast.expr:
-        """Give the expression for the pose of an action point with this orientation."""
+        """Return the expression for the pose of an action point with this orientation."""
 
     def position(self, action_point_id: str) -> ast.expr:
-        """Give the expression for the position of an action point."""
+        """Return the expression for the position of an action point."""
 
     def joints(self, joints_id: str) -> ast.expr:
-        """Give the expression for joints of an action point."""
+        """Return the expression for joints of an action point."""
 
     def enum_member(self, parameter: Parameter, value: str | int) -> ast.expr:
-        """Give the expression for the member with `value` of the enumeration that `parameter` takes."""
+        """Return the expression for the member with `value` of the enumeration of `parameter`."""
 
 
 def read_json(parameter: Parameter) -> Any:
-    """Give the JSON document inside `parameter.value`; InvalidData naming the parameter when it is none."""
+    """Return the JSON document in `parameter.value`.
+
+    Raises:
+        InvalidData: It is not JSON; the message names the parameter.
+    """
     try:
         return msgspec.json.decode(parameter.value)
     except (msgspec.MsgspecError, RecursionError) as error:
@@ -43,7 +47,11 @@ def read_json(parameter: Parameter) -> Any:
 
 
 def read_reference(parameter: Parameter) -> str:
-    """Give the id that `parameter.value` holds; InvalidData naming the parameter when it holds none."""
+    """Return the id in `parameter.value`.
+
+    Raises:
+        InvalidData: It is not an id; the message names the parameter.
+    """
     found = read_json(parameter)
     if not isinstance(found, str) or not found:
         raise InvalidData(f"parameter {parameter.name}: {parameter.value[:80]} is not an id")
@@ -51,9 +59,11 @@ def read_reference(parameter: Parameter) -> str:
 
 
 class ParameterType(abc.ABC):
-    """One kind of parameter.
+    """One type of parameter.
 
-    name: what the protocol calls it. annotations: the type hints that mean it, as they end in source (`Image.Image`).
+    Attributes:
+        name: Name in the protocol.
+        annotations: Type hints of this type, by the end of their source text (`Image.Image`).
     """
 
     name: ClassVar[str]
@@ -67,30 +77,48 @@ class ParameterType(abc.ABC):
         lookup: ProjectLookup | None = None,
         robot_id: str | None = None,
     ) -> None:
-        """Return when `parameter` is a sound literal of this kind; InvalidData naming it when it is not.
+        """Check that `parameter` is a valid literal of this type.
 
-        meta: what the action says of the parameter (range, allowed values); None where there is no such saying, as
-        for project parameters. lookup: where ids are looked up; without it nothing can be referred to.
-        robot_id: the robot whose action it is, which joints must belong to; None when that is not known.
+        Args:
+            parameter: The parameter.
+            meta: Declaration of the parameter (range, allowed values); None for project parameters.
+            lookup: Lookup for ids; without it, references are invalid.
+            robot_id: Robot of the action, to which joints must belong; None when unknown.
+
+        Raises:
+            InvalidData: It is invalid; the message names the parameter.
         """
 
     @abc.abstractmethod
     def value(self, parameter: Parameter, lookup: ProjectLookup | None = None) -> Any:
-        """Give what the action gets at execution: a copy of its own, geometry in the world.
+        """Return the argument at execution: a new object, with geometry in the world. An enumeration is its raw value.
 
-        An enumeration is given by its raw value. Raises InvalidData naming the parameter.
+        Raises:
+            InvalidData: It is invalid; the message names the parameter.
         """
 
     @abc.abstractmethod
     def expression(self, parameter: Parameter, names: ScriptNames) -> ast.expr:
-        """Give the expression that stands for the literal in a script. Raises InvalidData naming the parameter."""
+        """Return the expression of the literal in a script.
+
+        Raises:
+            InvalidData: It is invalid; the message names the parameter.
+        """
 
     def encode(self, result: Any) -> str:
-        """Give a value of this kind as JSON for events; InvalidData when it is not of this kind."""
+        """Convert a value of this type to JSON for events.
+
+        Raises:
+            InvalidData: It is not of this type.
+        """
         return encode(result)
 
     def decode_json(self, text: str, annotation: Any) -> Any:
-        """Read a value that travelled as JSON into what `annotation` says; InvalidData when it does not fit."""
+        """Convert a value from JSON to the type `annotation`.
+
+        Raises:
+            InvalidData: It does not have that type.
+        """
         return decode_json(text, annotation)
 
     def _check_type(self, parameter: Parameter, meta: ParameterMeta | None) -> None:
@@ -100,7 +128,7 @@ class ParameterType(abc.ABC):
 
 
 class Extra(Data, frozen=True):
-    """What an action says of a parameter beside its type: an inclusive range and the unit, or a closed list."""
+    """Declaration of a parameter in addition to its type: an inclusive range and a unit, or a list of values."""
 
     minimum: int | float | Unset = UNSET
     maximum: int | float | Unset = UNSET
@@ -109,13 +137,17 @@ class Extra(Data, frozen=True):
 
 
 def extra_of(meta: ParameterMeta | None) -> Extra:
-    """Give what `meta.extra` says; InvalidData when it is not readable."""
+    """Return the content of `meta.extra`.
+
+    Raises:
+        InvalidData: It is invalid.
+    """
     if meta is None or isinstance(meta.extra, Unset):
         return Extra()
     try:
         return msgspec.json.decode(meta.extra, type=Extra)
     except msgspec.MsgspecError as error:
-        raise InvalidData(f"parameter {meta.name}: what is said of it is not readable: {error}") from error
+        raise InvalidData(f"parameter {meta.name}: its declaration is invalid: {error}") from error
 
 
 class _Scalar(ParameterType):
@@ -126,7 +158,7 @@ class _Scalar(ParameterType):
 
     def _read(self, parameter: Parameter) -> Any:
         found = read_json(parameter)
-        # type() and not isinstance(): true is no integer, and 1 is no double.
+        # type() instead of isinstance(), because true is not an integer, and 1 is not a double.
         if type(found) is not self.python_type:
             raise InvalidData(f"parameter {parameter.name}: {parameter.value[:80]} is not {self.kind}")
         return found
@@ -138,28 +170,32 @@ class _Scalar(ParameterType):
         lookup: ProjectLookup | None = None,
         robot_id: str | None = None,
     ) -> None:
-        """Check the kind of the literal, and what the action says of it."""
+        """Check the kind of the literal, and its declared range or values."""
         self._check_type(parameter, meta)
         self._check_extra(parameter, self._read(parameter), extra_of(meta))
 
     def _check_extra(self, parameter: Parameter, found: Any, extra: Extra) -> None:
-        """Compare with what the action says; a plain scalar has nothing to compare."""
+        """Compare with the declaration. A plain scalar has none."""
 
     def value(self, parameter: Parameter, lookup: ProjectLookup | None = None) -> Any:
-        """Give the literal."""
+        """Return the literal."""
         return self._read(parameter)
 
     def expression(self, parameter: Parameter, names: ScriptNames) -> ast.expr:
-        """Give the literal as Python writes it."""
+        """Return the literal in Python syntax."""
         found = self._read(parameter)
         if isinstance(found, int | float) and not isinstance(found, bool) and math.copysign(1, found) < 0:
-            # Python has no negative literals; an AST with one would not come back from its own source.
+            # Python has no negative literals; an AST with one would differ from the AST of its source.
             return ast.UnaryOp(ast.USub(), ast.Constant(-found))
         return ast.Constant(found)
 
     def encode(self, result: Any) -> str:
-        """Give the value as JSON; InvalidData when it is of another kind."""
-        # bool is a subclass of int in Python only.
+        """Convert the value to JSON.
+
+        Raises:
+            InvalidData: It is of another kind.
+        """
+        # In Python, bool is a subclass of int.
         if not isinstance(result, self.python_type) or (isinstance(result, bool) and self.python_type is not bool):
             raise InvalidData(f"{result!r:.80} is not {self.kind}")
         return encode(self.python_type(result))
@@ -183,7 +219,7 @@ class BooleanType(_Scalar):
 
 
 class IntegerType(_Number):
-    """A whole number."""
+    """An integer."""
 
     name = "integer"
     annotations = frozenset({"int"})
@@ -200,15 +236,19 @@ class DoubleType(_Number):
     kind = "a number with a fraction or an exponent"
 
     def encode(self, result: Any) -> str:
-        """Give the number as JSON, always with a fraction; InvalidData when it is not finite."""
-        # PEP 484 lets an int stand for a float; on the wire a double needs its fraction.
+        """Convert the number to JSON, always with a fraction.
+
+        Raises:
+            InvalidData: It is not finite.
+        """
+        # By PEP 484 an int may be used as a float; on the wire a double needs its fraction.
         if isinstance(result, int) and not isinstance(result, bool):
             try:
                 result = float(result)
             except OverflowError as error:
                 raise InvalidData("an integer is too large for a double") from error
         if isinstance(result, float) and not math.isfinite(result):
-            raise InvalidData(f"{result} has no form in JSON")
+            raise InvalidData(f"{result} cannot be converted to JSON")
         return super().encode(result)
 
 
@@ -222,20 +262,20 @@ class StringType(_Scalar):
 
 
 class _Enumeration(_Scalar):
-    """A value out of a closed list; a hint means it when it names a subclass of the framework's enumeration."""
+    """A value of a list; a type hint is an enumeration if it names a subclass of our enumerations."""
 
     def _check_extra(self, parameter: Parameter, found: Any, extra: Extra) -> None:
         allowed = extra.allowed_values
         if not isinstance(allowed, Unset) and found not in allowed:
-            raise InvalidData(f"parameter {parameter.name}: {found!r} is none of {', '.join(map(repr, allowed))}")
+            raise InvalidData(f"parameter {parameter.name}: {found!r} is not one of {', '.join(map(repr, allowed))}")
 
     def expression(self, parameter: Parameter, names: ScriptNames) -> ast.expr:
-        """Give the member by its name."""
+        """Return the member by its name."""
         return names.enum_member(parameter, self._read(parameter))
 
 
 class StringEnumType(_Enumeration):
-    """Text out of a closed list."""
+    """Text of a list."""
 
     name = "string_enum"
     annotations = frozenset({"StrEnum"})
@@ -243,12 +283,12 @@ class StringEnumType(_Enumeration):
     kind = "a string"
 
     def encode(self, result: Any) -> str:
-        """Give the value of the member as JSON."""
+        """Convert the value of the member to JSON."""
         return super().encode(getattr(result, "value", result))
 
 
 class IntegerEnumType(_Enumeration):
-    """A whole number out of a closed list."""
+    """An integer of a list."""
 
     name = "integer_enum"
     annotations = frozenset({"IntEnum"})
@@ -257,19 +297,23 @@ class IntegerEnumType(_Enumeration):
 
 
 class _Reference(ParameterType):
-    """Something of the project, by its id."""
+    """A part of the project, by its id."""
 
     result_type: ClassVar[type]
     what: ClassVar[str]
 
     @abc.abstractmethod
     def _find(self, reference: str, lookup: ProjectLookup) -> Any:
-        """Give what is referred to, as it is at execution; NotFound."""
+        """Return the referenced value at execution.
+
+        Raises:
+            NotFound: The id is unknown.
+        """
 
     def _resolve(self, parameter: Parameter, lookup: ProjectLookup | None) -> Any:
         reference = read_reference(parameter)
         if lookup is None:
-            raise InvalidData(f"parameter {parameter.name}: {self.what} can be told in a project only")
+            raise InvalidData(f"parameter {parameter.name}: {self.what} is available in a project only")
         try:
             return self._find(reference, lookup)
         except Arcor2Error as error:
@@ -287,18 +331,22 @@ class _Reference(ParameterType):
         self._resolve(parameter, lookup)
 
     def value(self, parameter: Parameter, lookup: ProjectLookup | None = None) -> Any:
-        """Give a copy of what the id stands for, in the world."""
+        """Return a copy of the referenced value, in the world."""
         return copy.deepcopy(self._resolve(parameter, lookup))
 
     def encode(self, result: Any) -> str:
-        """Give the value as JSON; InvalidData when it is of another kind."""
+        """Convert the value to JSON.
+
+        Raises:
+            InvalidData: It is of another kind.
+        """
         if not isinstance(result, self.result_type):
-            raise InvalidData(f"{result!r:.80} is no {self.result_type.__name__}")
+            raise InvalidData(f"{result!r:.80} is not a {self.result_type.__name__}")
         return encode(result)
 
 
 class PoseType(_Reference):
-    """A pose: the id of an orientation, whose action point gives the position."""
+    """A pose: the id of an orientation. Its action point provides the position."""
 
     name = "pose"
     annotations = frozenset({"Pose"})
@@ -310,7 +358,7 @@ class PoseType(_Reference):
         return global_pose(lookup, point, named.orientation)
 
     def expression(self, parameter: Parameter, names: ScriptNames) -> ast.expr:
-        """Give the pose by the names of action point and orientation."""
+        """Return the pose by the names of action point and orientation."""
         return names.pose(read_reference(parameter))
 
 
@@ -326,12 +374,12 @@ class PositionType(_Reference):
         return global_pose(lookup, lookup.action_point(reference)).position
 
     def expression(self, parameter: Parameter, names: ScriptNames) -> ast.expr:
-        """Give the position by the name of its action point."""
+        """Return the position by the name of its action point."""
         return names.position(read_reference(parameter))
 
 
 class JointsType(_Reference):
-    """Joint values of the robot whose action it is, by their id."""
+    """Joint values of the action's robot, by their id."""
 
     name = "joints"
     annotations = frozenset({"ProjectRobotJoints"})
@@ -348,25 +396,25 @@ class JointsType(_Reference):
         lookup: ProjectLookup | None = None,
         robot_id: str | None = None,
     ) -> None:
-        """Check that the id is known, and that the joints are those of the robot."""
+        """Check that the id is known, and that the joints belong to the robot."""
         self._check_type(parameter, meta)
         joints = self._resolve(parameter, lookup)
         if robot_id is not None and joints.robot_id != robot_id:
             raise InvalidData(f"parameter {parameter.name}: joints {joints.name} belong to another robot")
 
     def expression(self, parameter: Parameter, names: ScriptNames) -> ast.expr:
-        """Give the joints by the names of action point and joints."""
+        """Return the joints by the names of action point and joints."""
         return names.joints(read_reference(parameter))
 
 
 class ImageType(ParameterType):
-    """A picture: comes as a result and goes on by a link, never as a literal."""
+    """An image, which can only be a result or a link to a result, never a literal."""
 
     name = "image"
     annotations = frozenset({"Image", "Image.Image"})
 
     def _refuse(self, parameter: Parameter) -> InvalidData:
-        return InvalidData(f"parameter {parameter.name}: a picture can only be linked to a result")
+        return InvalidData(f"parameter {parameter.name}: an image can only be linked to a result")
 
     def check(
         self,
@@ -375,25 +423,25 @@ class ImageType(ParameterType):
         lookup: ProjectLookup | None = None,
         robot_id: str | None = None,
     ) -> None:
-        """Refuse the literal."""
+        """Reject the literal."""
         raise self._refuse(parameter)
 
     def value(self, parameter: Parameter, lookup: ProjectLookup | None = None) -> Any:
-        """Refuse the literal."""
+        """Reject the literal."""
         raise self._refuse(parameter)
 
     def expression(self, parameter: Parameter, names: ScriptNames) -> ast.expr:
-        """Refuse the literal."""
+        """Reject the literal."""
         raise self._refuse(parameter)
 
     def encode(self, result: Any) -> str:
-        """Give the picture as the protocol carries it."""
+        """Convert the image to JSON."""
         if not is_picture(result):
-            raise InvalidData(f"{result!r:.80} is no picture")
+            raise InvalidData(f"{result!r:.80} is not an image")
         return encode(result)
 
     def decode_json(self, text: str, annotation: Any) -> Any:
-        """Read a picture back."""
+        """Convert an image from JSON."""
         return decode_picture(text)
 
 
@@ -412,22 +460,26 @@ PARAMETER_TYPES: Final[dict[str, ParameterType]] = {
         ImageType(),
     )
 }
-"""Every parameter type by its name in the protocol; there is no other list of them."""
+"""Every parameter type by its name in the protocol."""
 
 _BY_ANNOTATION: Final = {hint: kind for kind in PARAMETER_TYPES.values() for hint in kind.annotations}
 
 
 def by_annotation(name: str) -> ParameterType | None:
-    """Give the parameter type that a hint means, None when it means none.
+    """Return the parameter type of a type hint, None when there is none.
 
-    A dotted hint counts by its end (`common.Pose`). For an enumeration give its framework base (StrEnum, IntEnum).
+    A dotted hint is matched by its end (`common.Pose`). For an enumeration pass its base class (StrEnum, IntEnum).
     """
     parts = name.split(".")
     return _BY_ANNOTATION.get(".".join(parts[-2:])) or _BY_ANNOTATION.get(parts[-1])
 
 
 def parameter_type(name: str) -> ParameterType:
-    """Give the parameter type of that name; InvalidData when there is none."""
+    """Return the parameter type of a name.
+
+    Raises:
+        InvalidData: There is no such type.
+    """
     try:
         return PARAMETER_TYPES[name]
     except KeyError:

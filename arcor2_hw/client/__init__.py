@@ -1,4 +1,4 @@
-"""The typed asynchronous client of the protocol: what scripts, tests and the command line use."""
+"""The typed asynchronous client of the protocol, for scripts, tests and the command line."""
 
 from arcor2_hw.client.connection import Client
 from arcor2_hw.client.errors import (
@@ -17,7 +17,7 @@ from arcor2_hw.client.errors import (
     ServerFault,
 )
 from arcor2_hw.client.rest import Rest
-from arcor2_hw.client.stream import EventStream, Told
+from arcor2_hw.client.stream import EventStream, TypedEvent
 
 __all__ = [
     "AnswerLate",
@@ -36,5 +36,5 @@ __all__ = [
     "RequestFailed",
     "Rest",
     "ServerFault",
-    "Told",
+    "TypedEvent",
 ]

@@ -1,4 +1,4 @@
-"""The client: one server, joined again after a loss, with a method for every request and streams of its events."""
+"""The client: a connection to one server that reconnects, with a method for every request and streams of events."""
 
 import asyncio
 import os
@@ -29,9 +29,9 @@ from arcor2_hw.exceptions import ConnectionLost, DeviceTimeout, InvalidData, Not
 __all__ = ["Client", "RequestFailed"]
 
 ANSWER_TIMEOUT: Final = 30.0
-"""Seconds to wait for an answer: what existing clients wait."""
+"""Time to wait for an answer, s, as in existing clients."""
 FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
-"""Seconds between attempts to connect again: doubled each time, and spread so that many clients don't come at once."""
+"""Pauses between attempts to reconnect, s: doubled each time, and randomized so that clients reconnect one by one."""
 READING: Final = frozenset(
     {
         *("GetActions", "GetObjectTypes", "GetProject", "GetRobotMeta", "GetScene", "History"),
@@ -39,22 +39,30 @@ READING: Final = frozenset(
         *("ListProjects", "ListScenes", "ObjectTypeUsage", "ProjectsWithScene", "SceneObjectUsage", "SystemInfo"),
     }
 )
-"""Requests that change nothing and touch no device: asked again when the connection breaks before the answer. So is
-every dry run. No other request is ever sent twice."""
+"""Requests that change nothing and use no device.
+
+They, and every dry run, are sent again when the connection breaks before
+
+the answer. No other request is ever sent twice.
+"""
 
 
 class Client(Requests):
     """A connection to a server. Use it as `async with Client(url, user_name) as client`.
 
-    Every request is a method (`await client.open_scene(id)`); `events()` and `follow(...)` give what the server tells.
-    When the connection is lost the client joins again: it connects, registers its user, subscribes to what it had
-    subscribed to, and every stream raises EventsMissed. Requests wait for that within their deadline. One that had been
-    sent and not answered raises AnswerUnknown; only those of READING and dry runs are asked again.
+    Every request is a method (`await client.open_scene(id)`); `events()` and `follow(...)` return streams of events.
+    When the connection is lost, the client reconnects: it registers its user, subscribes to the same events, and every
+    stream raises EventsMissed. Requests wait for the connection within their time limit. A request that was sent but
+    not answered raises AnswerUnknown; only those of READING and dry runs are sent again.
 
-    url: ws, wss, http or https. token: by default what the variable ARCOR2_HW_TOKEN says. tls: for a certificate that
-    this machine does not trust by itself (ssl.create_default_context(cafile=...)). timeout: seconds that a request may
-    take when it does not say itself. reconnect: whether to join again; without, the first loss is the end.
-    connect_within: seconds for which a server that does not answer at first is tried again.
+    Args:
+        url: ws, wss, http or https.
+        user_name: User to register.
+        token: Access token; default: the environment variable ARCOR2_HW_TOKEN.
+        tls: TLS context for a certificate that this machine does not trust (ssl.create_default_context(cafile=...)).
+        timeout: Default time limit of a request, s.
+        reconnect: Whether to reconnect; otherwise the first connection loss closes the client.
+        connect_within: Time for which an initial connection is attempted, s.
     """
 
     def __init__(
@@ -98,25 +106,28 @@ class Client(Requests):
 
     @property
     def url(self) -> str:
-        """Where the server is (ws or wss)."""
+        """URL of the server (ws or wss)."""
         return self._url
 
     @property
     def connected(self) -> bool:
-        """Tell whether requests would be sent at once."""
+        """Return whether a request would be sent at once."""
         return self._end is None and self._joined.is_set()
 
     @property
     def rest(self) -> Rest:
-        """What the server offers over HTTP: documents, assets, packages; with the same token."""
+        """Return the client of the REST API, with the same token."""
         if self._rest is None:
             self._rest = Rest(self._url, token=self._token, tls=self._tls, timeout=self._timeout)
         return self._rest
 
     async def open(self) -> None:
-        """Connect and, when there is a user name, register it.
+        """Connect and, with a user name, register the user.
 
-        Raises ConnectionLost naming the address, NotAdmitted, RequestFailed when the user name is taken.
+        Raises:
+            ConnectionLost: The server does not answer; the message names its address.
+            NotAdmitted: The token is not valid.
+            RequestFailed: The user name is taken.
         """
         deadline = time.monotonic() + self._connect_within
         self._end = None
@@ -130,7 +141,11 @@ class Client(Requests):
                     self._end = error
                     raise
             except BaseException as error:
-                self._end = error if isinstance(error, Exception) else NotConnected("The client was not opened.")
+                self._end = (
+                    error
+                    if isinstance(error, Exception)
+                    else NotConnected("The client is not open. Call open(), or use it in `async with`.")
+                )
                 raise
             await asyncio.sleep(pause)
             pause = min(2 * pause, LONGEST_PAUSE)
@@ -138,7 +153,7 @@ class Client(Requests):
         self._keeper = asyncio.create_task(self._keep(), name="client keeper")
 
     async def close(self) -> None:
-        """Close the connection and end all streams; harmless when it is closed."""
+        """Close the connection and end all streams. It does nothing when the connection is closed."""
         self._finish(None, ConnectionLost(f"The connection to {self._url} is closed."))
         if self._keeper is not None:
             self._keeper.cancel()
@@ -152,9 +167,9 @@ class Client(Requests):
             self._rest = None
 
     def _finish(self, told: Exception | None, end: Exception) -> None:
-        """Let no more happen: streams end with `told`, requests are refused with `end`."""
+        """End all streams with `told` and refuse requests with `end`."""
         self._end = end
-        self._joined.set()  # whoever waits for the connection sees the end
+        self._joined.set()  # waiting requests see the end
         for stream in self._streams:
             stream.end(told)
 
@@ -164,7 +179,14 @@ class Client(Requests):
 
     # ------------------------------------------------------------------------------------------------ joining
     async def _join(self, gap: bool = False) -> None:
-        """Connect, and be again who we were. Raises ConnectionLost, NotAdmitted, RequestFailed, DeviceTimeout."""
+        """Connect, register and subscribe again.
+
+        Raises:
+            ConnectionLost: The server does not answer.
+            NotAdmitted: The token is not valid.
+            RequestFailed: The server refused a request.
+            DeviceTimeout: The server did not answer in time.
+        """
         seconds = time.monotonic() - self._lost_at
         held: list[Event | EventsMissed] | None = [] if gap else None
 
@@ -172,7 +194,7 @@ class Client(Requests):
             if held is None:
                 self._deliver(item)
             else:
-                held.append(item)  # until it is known that we are back, and what is missing
+                held.append(item)  # delivered after the gap is known
 
         wire = await Wire.open(self._url, self._token, self._tls, deliver)
         not_resumed: list[str] = []
@@ -180,14 +202,14 @@ class Client(Requests):
             if self._user_name is not None:
                 await self._tell(wire, "RegisterUser", RegisterUserArgs(self._user_name))
             elif self._token is not None:
-                await self._tell(wire, "SystemInfo", None)  # a wrong token is told by the answer that does not come
+                await self._tell(wire, "SystemInfo", None)  # with an invalid token this request is not answered
             if self._subscribed:
                 await self._tell(wire, "SubscribeEvents", SubscribeEventsArgs(set(self._subscribed)))
             for key, args in list(self._robots.items()):
                 try:
                     await self._tell(wire, "RegisterForRobotEvent", args)
                 except RequestFailed:
-                    del self._robots[key]  # the scene is offline now, or the robot gone
+                    del self._robots[key]  # the scene is offline now, or the robot was removed
                     not_resumed.append(f"{args.what} of {args.robot_id}")
         except BaseException:
             await wire.close()
@@ -209,7 +231,7 @@ class Client(Requests):
             raise refusal(name, message.messages, reason=message.code)
 
     async def _keep(self) -> None:
-        """Keep the client connected; what nobody foresaw is told to all who wait, and ends it."""
+        """Keep the client connected. An unexpected error is raised in all waiting calls and closes the client."""
         try:
             await self._stay_joined()
         except Exception as error:
@@ -217,7 +239,7 @@ class Client(Requests):
             raise
 
     async def _stay_joined(self) -> None:
-        """Join again whenever the connection is lost, until the client is closed or not let in any more."""
+        """Reconnect whenever the connection is lost, until the client is closed or not admitted."""
         while self._wire is not None:
             wire = self._wire
             await wire.closed.wait()
@@ -237,7 +259,7 @@ class Client(Requests):
                     self._finish(error, error)
                     return
                 except (ConnectionLost, DeviceTimeout, RequestFailed):
-                    # Refused: the server may hold our old connection for alive, and the name for taken, for a while.
+                    # Refused: the server may still hold the old connection and the user name for a while.
                     pause = min(2 * pause, LONGEST_PAUSE)
                 else:
                     break
@@ -245,11 +267,21 @@ class Client(Requests):
 
     # ------------------------------------------------------------------------------------------------ requests
     async def call(self, name: str, args: Any = None, *, dry_run: bool = False, timeout: float | None = None) -> Any:
-        """Send a request and give its data, decoded as the protocol declares it. Better use its method.
+        """Send a request and return its data, decoded as the protocol declares it. Prefer the method of the request.
 
-        Raises RequestFailed (a class of its own for each kind of reason), AnswerUnknown when the connection broke
-        after it was sent, AnswerLate when no answer came in time; NotConnected when there was no connection in time,
-        and ConnectionLost or NotAdmitted when there will be none: then nothing was sent.
+        Args:
+            name: Name of the request.
+            args: Its arguments.
+            dry_run: Whether the server only checks the request.
+            timeout: Time limit, s; default: that of the client.
+
+        Raises:
+            RequestFailed: The server refused it, with a subclass for each kind of reason.
+            AnswerUnknown: The connection broke after it was sent.
+            AnswerLate: No answer came in time.
+            NotConnected: There was no connection in time. Nothing was sent.
+            ConnectionLost: The connection is closed. Nothing was sent.
+            NotAdmitted: The token is not valid. Nothing was sent.
         """
         limit = self._timeout if timeout is None else timeout
         deadline = time.monotonic() + limit
@@ -267,7 +299,7 @@ class Client(Requests):
                     raise AnswerUnknown(name, self._url) from None
             except AnswerLate:
                 raise AnswerLate(name, limit) from None
-            await asyncio.sleep(0)  # the keeper notices, too
+            await asyncio.sleep(0)  # so that the reconnecting task runs
         data = self._data(name, message)
         if not message.result:
             raise refusal(name, message.messages, data, message.code)
@@ -275,7 +307,7 @@ class Client(Requests):
         return data
 
     async def _connection(self, name: str, deadline: float, limit: float) -> Wire:
-        """Give the connection, at once when there is one."""
+        """Return the connection, at once when there is one."""
         while self._wire is None or self._wire.closed.is_set() or not self.connected:
             try:
                 async with asyncio.timeout(max(deadline - time.monotonic(), 0.0)):
@@ -287,7 +319,7 @@ class Client(Requests):
                 ) from None
             if self._end is not None:
                 raise self._end.with_traceback(None)
-            await asyncio.sleep(0.001)  # lost this moment: the keeper is about to notice
+            await asyncio.sleep(0.001)  # just lost: the reconnecting task will notice
         return self._wire
 
     def _data(self, name: str, message: Message) -> Any:
@@ -298,10 +330,10 @@ class Client(Requests):
         try:
             return msgspec.json.decode(message.data, type=kind)
         except msgspec.ValidationError as e:
-            raise InvalidData(f"The server's answer to {name} has a wrong form.", str(e)) from e
+            raise InvalidData(f"The server's answer to {name} is invalid.", str(e)) from e
 
     def _remember(self, args: Any, dry_run: bool) -> None:
-        """Keep what has to be said again after a loss."""
+        """Remember what has to be sent again after a connection loss."""
         if dry_run:
             return
         match args:
@@ -320,7 +352,7 @@ class Client(Requests):
 
     # ------------------------------------------------------------------------------------------------ events
     def events(self) -> EventStream[Event]:
-        """Give the client's own stream: all events since it was opened (the newest 10,000 of those not taken)."""
+        """Return the client's own stream of all events since it was opened, at most the newest 10,000."""
         return self._own
 
     def _follow(self, names: frozenset[str], limit: int) -> EventStream[Any]:
@@ -331,9 +363,12 @@ class Client(Requests):
         return stream
 
     async def next_event(self, *names: str, timeout: float = ANSWER_TIMEOUT) -> Event:
-        """Give the next event of the own stream with one of the names, dropping others; any when no name is given.
+        """Return the next event of the own stream with one of the names, dropping others; any event without names.
 
-        Raises DeviceTimeout, EventsMissed, ConnectionLost when the stream ended.
+        Raises:
+            DeviceTimeout: There is no such event in time.
+            EventsMissed: Events are missing.
+            ConnectionLost: The stream has ended.
         """
         try:
             async with asyncio.timeout(timeout):

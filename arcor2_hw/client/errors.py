@@ -1,4 +1,4 @@
-"""What a client raises: why a request was refused, and what is not known after the connection was lost."""
+"""Errors of a client: refused requests, and unknown results after a connection loss."""
 
 from typing import Any, Final
 
@@ -14,9 +14,12 @@ from arcor2_hw.exceptions import (
 
 
 class RequestFailed(Arcor2Error):
-    """The server answered that it would not, or could not; the text is the server's.
+    """The server refused a request, or failed; the text is that of the server.
 
-    request: its name. reason: the server's code, empty from a server that sends none. data: what a refusal carries.
+    Attributes:
+        request: Name of the request.
+        reason: Code of the refusal, empty from a server that sends none.
+        data: Data of the refusal.
     """
 
     code = "request_failed"
@@ -29,31 +32,31 @@ class RequestFailed(Arcor2Error):
 
 
 class Forbidden(RequestFailed):
-    """The role is too low, or a token is needed."""
+    """The role is too low, or a token is required."""
 
     code = "forbidden"
 
 
 class BadRequest(RequestFailed, InvalidData):
-    """The arguments have a wrong form, or make no sense."""
+    """The arguments are invalid."""
 
     code = "bad_request"
 
 
 class NothingThere(RequestFailed, NotFound):
-    """What the request names does not exist."""
+    """An item named in the request does not exist."""
 
     code = "nothing_there"
 
 
 class InTheWay(RequestFailed, Conflict):
-    """The request stands against what is there."""
+    """The request conflicts with the present state."""
 
     code = "in_the_way"
 
 
 class LockedByOther(RequestFailed):
-    """Somebody else holds the lock that is needed."""
+    """Another user holds the required lock."""
 
     code = "locked_by_other"
 
@@ -65,25 +68,25 @@ class NotOffered(RequestFailed):
 
 
 class DeviceFailed(RequestFailed, DeviceError):
-    """A device could not, or would not."""
+    """A device failed or refused."""
 
     code = "device_failed"
 
 
 class ServerFault(RequestFailed):
-    """Something went wrong inside the server, which its log tells."""
+    """An internal error of the server; see its log."""
 
     code = "server_fault"
 
 
 class NotAdmitted(Arcor2Error):
-    """The server lets nobody in with this token: it is wrong, was revoked, or its time is over."""
+    """The server does not admit this token: it is wrong, revoked or expired."""
 
     code = "not_admitted"
 
 
 class AnswerUnknown(ConnectionLost):
-    """The connection broke before the answer came: the request may or may not have been done. It is not repeated."""
+    """The connection broke before the answer. The request may or may not have been executed; it is not repeated."""
 
     code = "answer_unknown"
 
@@ -93,7 +96,7 @@ class AnswerUnknown(ConnectionLost):
 
 
 class AnswerLate(DeviceTimeout):
-    """No answer came in time: the request may or may not be done, and a late answer is thrown away."""
+    """No answer came in time. The request may or may not have been executed; a late answer is discarded."""
 
     code = "answer_late"
 
@@ -103,11 +106,14 @@ class AnswerLate(DeviceTimeout):
 
 
 class EventsMissed(Arcor2Error):
-    """Events are missing here, in the order of a stream; it can be read on behind the gap.
+    """Events are missing at this place of a stream. The stream can be read further.
 
-    dropped: how many were thrown away because nobody took them, or could not be read. rejoined: the connection was
-    lost for `seconds`; whatever was told in that time is missing, and the server's greeting, which says what is open
-    and what runs, comes next. not_resumed: streams of robots that the server would not give again.
+    Attributes:
+        dropped: Number of events dropped because they were not read in time, or were invalid. rejoined: Whether the
+        connection was lost and restored. Events of that time are missing; the initial events
+            of the server, with what is open and running, follow.
+        seconds: Duration of the connection loss, s.
+        not_resumed: Streams of robots that the server refused to resume.
     """
 
     code = "events_missed"
@@ -124,7 +130,7 @@ class EventsMissed(Arcor2Error):
         self.not_resumed = not_resumed
 
     def joined_with(self, later: "EventsMissed") -> "EventsMissed":
-        """Give one gap for two that follow each other."""
+        """Return one gap for two consecutive ones."""
         return EventsMissed(
             self.dropped + later.dropped,
             rejoined=self.rejoined or later.rejoined,
@@ -151,7 +157,7 @@ _KINDS: Final[dict[type[RequestFailed], tuple[str, ...]]] = {
     ServerFault: ("internal", "storage"),
 }
 REASONS: Final[dict[str, type[RequestFailed]]] = {code: kind for kind, codes in _KINDS.items() for code in codes}
-"""Which error stands for which code of a refusal (docs/protocol.md); others are RequestFailed itself."""
+"""Error class by code of a refusal; other codes are RequestFailed."""
 STATUSES: Final[dict[int, type[RequestFailed]]] = {
     400: BadRequest,
     401: Forbidden,
@@ -162,9 +168,9 @@ STATUSES: Final[dict[int, type[RequestFailed]]] = {
     415: BadRequest,
     500: ServerFault,
 }
-"""Which error stands for which status of a REST answer."""
+"""Error class by status of a REST answer."""
 
 
 def refusal(request: str, messages: list[str], data: Any = None, reason: str = "") -> RequestFailed:
-    """Make the error of a refused request."""
+    """Return the error of a refused request."""
     return REASONS.get(reason, RequestFailed)(request, messages, data, reason)

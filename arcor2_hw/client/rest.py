@@ -1,4 +1,4 @@
-"""What a server offers over HTTP: saved documents, assets and packages, typed."""
+"""The client of the REST API: saved documents, assets and packages."""
 
 import os
 import re
@@ -37,7 +37,7 @@ class Listed(Data, frozen=True):
 
 
 class Asset(Data, frozen=True):
-    """What is known of an asset: a mesh, or a robot's description."""
+    """Metadata of an asset: a mesh, or a robot model."""
 
     id: str
     created: Timestamp
@@ -47,14 +47,14 @@ class Asset(Data, frozen=True):
 
 
 class ModelName(Data, frozen=True):
-    """Names a collision model and its kind."""
+    """Name and kind of a collision model."""
 
     id: str
     type: Model3dType
 
 
 class ImportedIds(Data, frozen=True):
-    """Where the content of an imported package is now."""
+    """Ids of the imported content of a package."""
 
     scene_id: str
     project_id: str
@@ -89,17 +89,20 @@ def _snaked(value: Any) -> Any:
 
 
 def _part(key: str) -> str:
-    """Write an id as a part of a path."""
+    """Encode an id for a path."""
     return quote(key, safe="")
 
 
 class Rest:
-    """Requests over HTTP. Use it as `async with Rest(url) as rest`, or take `client.rest`.
+    """A client of the REST API. Use it as `async with Rest(url) as rest`, or as `client.rest`.
 
-    url, token, tls, timeout: as of Client.
+    Arguments are as those of Client. No request is repeated automatically.
 
-    Each raises RequestFailed (a class of its own for each kind of reason), ConnectionLost, DeviceTimeout, InvalidData
-    for an answer of a wrong form. Nothing is repeated by itself.
+    Raises:
+        RequestFailed: The server refused a request, with a subclass for each kind of reason.
+        ConnectionLost: The server does not answer.
+        DeviceTimeout: The server did not answer in time.
+        InvalidData: An answer is invalid.
     """
 
     def __init__(
@@ -110,7 +113,7 @@ class Rest:
         self._http = httpx.AsyncClient(
             base_url=self._url,
             headers={} if token is None else {"Authorization": f"Bearer {token}"},
-            # Certificates take 30 ms to load, and are of no use on http.
+            # Loading certificates takes 30 ms and is not needed for http.
             verify=self._url.startswith("https:") if tls is None else tls,
             timeout=timeout,
         )
@@ -129,7 +132,7 @@ class Rest:
 
     # ------------------------------------------------------------------------------------------------ requests
     async def request(self, method: str, path: str, kind: type[T] | Any = Any, *, body: Any = UNSET, **more: Any) -> T:
-        """Ask for a path and give the JSON answer as `kind`; `body` is sent as JSON, `more` goes to httpx."""
+        """Send a request and return the JSON answer as `kind`; `body` is sent as JSON, `more` is passed to httpx."""
         if body is not UNSET:
             more["content"] = msgspec.json.encode(body)
             more["headers"] = {"Content-Type": "application/json"}
@@ -137,7 +140,7 @@ class Rest:
         try:
             return msgspec.convert(_snaked(msgspec.json.decode(answer.content)), kind)
         except msgspec.MsgspecError as error:
-            raise InvalidData(f"The answer of {self._url}{path} has a wrong form.", str(error)) from error
+            raise InvalidData(f"The answer of {self._url}{path} is invalid.", str(error)) from error
 
     async def _send(self, method: str, path: str, **more: Any) -> httpx.Response:
         try:
@@ -145,13 +148,13 @@ class Rest:
         except httpx.TimeoutException as error:
             raise DeviceTimeout(f"{self._url} did not answer {method} {path} in time.", str(error)) from error
         except (httpx.HTTPError, httpx.InvalidURL) as error:
-            raise ConnectionLost(f"No server answers at {self._url}: {error}", str(error)) from error
+            raise ConnectionLost(f"The server at {self._url} does not answer: {error}", str(error)) from error
         if not answer.is_success:
             raise _refusal(f"{method} {path}", answer.status_code, answer.content)
         return answer
 
     async def _file(self, path: str, target: Path, **more: Any) -> None:
-        """Stream an answer into a file, which appears whole or not at all."""
+        """Save an answer to a file, which is created only when it is complete."""
         partial = target.with_name(f".{target.name}.part")
         try:
             async with self._http.stream("GET", path, **more) as answer:
@@ -164,7 +167,7 @@ class Rest:
         except httpx.TimeoutException as error:
             raise DeviceTimeout(f"{self._url} did not send {path} in time.", str(error)) from error
         except httpx.HTTPError as error:
-            raise ConnectionLost(f"{self._url} did not send all of {path}: {error}", str(error)) from error
+            raise ConnectionLost(f"{self._url} sent only a part of {path}: {error}", str(error)) from error
         finally:
             partial.unlink(missing_ok=True)
 
@@ -174,11 +177,11 @@ class Rest:
         return await self.request("GET", "/scenes", list[Listed])
 
     async def scene(self, key: str) -> Scene:
-        """Give a saved scene."""
+        """Return a saved scene."""
         return await self.request("GET", f"/scenes/{_part(key)}", Scene)
 
     async def put_scene(self, scene: Scene) -> None:
-        """Save a scene, new or changed."""
+        """Save a new or changed scene."""
         await self.request("PUT", "/scenes", body=scene)
 
     async def delete_scene(self, key: str) -> None:
@@ -191,19 +194,23 @@ class Rest:
         return await self.request("GET", "/projects", list[Listed])
 
     async def project(self, key: str) -> Project:
-        """Give a saved project."""
+        """Return a saved project."""
         return await self.request("GET", f"/projects/{_part(key)}", Project)
 
     async def put_project(self, project: Project) -> None:
-        """Save a project, new or changed; its scene has to be saved."""
+        """Save a new or changed project. Its scene has to be saved before."""
         await self.request("PUT", "/projects", body=project)
 
     async def delete_project(self, key: str) -> None:
-        """Delete a saved project, with its script."""
+        """Delete a saved project and its script."""
         await self.request("DELETE", f"/projects/{_part(key)}")
 
     async def project_script(self, key: str) -> str:
-        """Give the script of a project that was written by hand. NothingThere when it has none."""
+        """Return the handwritten script of a project.
+
+        Raises:
+            NothingThere: The project has none.
+        """
         return (await self.request("GET", f"/projects/{_part(key)}/sources", _Sources)).script
 
     async def put_project_script(self, key: str, script: str) -> None:
@@ -211,52 +218,52 @@ class Rest:
         await self.request("PUT", "/projects/sources", body=_Sources(key, script))
 
     async def kept_parameters(self, key: str) -> list[ProjectParameter]:
-        """Give the parameters that are kept beside a project; those inside of it are in the project."""
+        """Return the parameters stored separately from a project; others are part of the project."""
         return await self.request("GET", f"/projects/{_part(key)}/parameters", list[ProjectParameter])
 
     async def put_kept_parameters(self, key: str, parameters: list[ProjectParameter]) -> None:
-        """Keep parameters beside a project."""
+        """Store parameters separately from a project."""
         await self.request("PUT", f"/projects/{_part(key)}/parameters", body=parameters)
 
     async def kept_overrides(self, key: str) -> list[SceneObjectOverride]:
-        """Give the overrides of objects' settings that are kept beside a project."""
+        """Return the overrides of objects' settings stored separately from a project."""
         return await self.request("GET", f"/projects/{_part(key)}/object-parameters", list[SceneObjectOverride])
 
     async def put_kept_overrides(self, key: str, overrides: list[SceneObjectOverride]) -> None:
-        """Keep overrides beside a project."""
+        """Store overrides separately from a project."""
         await self.request("PUT", f"/projects/{_part(key)}/object-parameters", body=overrides)
 
     # ------------------------------------------------------------------------------------------------ object types
     async def object_types(self) -> list[Listed]:
-        """List the object types that were brought in; installed ones are not among them."""
+        """List the uploaded object types, without installed ones."""
         return await self.request("GET", "/object-types", list[Listed])
 
     async def object_type(self, name: str) -> ObjectTypeSource:
-        """Give an object type that was brought in, without its model."""
+        """Return an uploaded object type, without its model."""
         one: _Type = await self.request("GET", f"/object-types/{_part(name)}", _Type)
         return ObjectTypeSource(one.id, one.source, one.description, created=one.created, modified=one.modified)
 
     async def put_object_type(self, name: str, source: str, model: Models | None = None) -> None:
-        """Bring in an object type, new or changed; its model has to be saved before."""
+        """Upload a new or changed object type. Its model has to be saved before."""
         named = UNSET if model is None else ModelName(name, model.type())
         await self.request("PUT", "/object-types", body=_Type(name, name, source, model=named))
 
     async def delete_object_type(self, name: str) -> None:
-        """Take an object type out."""
+        """Delete an object type."""
         await self.request("DELETE", f"/object-types/{_part(name)}")
 
     async def models(self) -> list[ModelName]:
-        """List the collision models; each is named after its object type."""
+        """List the collision models; each has the name of its object type."""
         return await self.request("GET", "/models", list[ModelName])
 
     async def model(self, name: ModelName) -> Models:
-        """Give a collision model."""
+        """Return a collision model."""
         kind = name.type.value.lower()
         given: Models = await self.request("GET", f"/models/{_part(name.id)}/{kind}", _MODELS[kind])
         return given
 
     async def put_model(self, model: Models) -> None:
-        """Save a collision model, in place of whatever has its id."""
+        """Save a collision model, replacing one of the same id."""
         await self.request("PUT", f"/models/{model.type().value.lower()}", body=model)
 
     async def delete_model(self, name: str) -> None:
@@ -269,13 +276,13 @@ class Rest:
         return await self.request("GET", "/assets/info", list[Asset])
 
     async def download_asset(self, key: str, target: Path) -> None:
-        """Write the content of an asset into a file."""
+        """Save the content of an asset to a file."""
         await self._file(f"/assets/{_part(key)}/data", target)
 
     async def upload_asset(
         self, key: str, content: Path | bytes, *, file_name: str = "", replace: bool = False
     ) -> Asset:
-        """Save an asset, streamed when it is a file; one of that id is replaced only with `replace`."""
+        """Upload an asset, streamed from a file if it is a path; an existing one is replaced only with `replace`."""
         name = file_name or (content.name if isinstance(content, Path) else key)
         query = {"id": key, "upsert": str(replace).lower()}
         asset: Asset = await self._upload("POST", "/assets", "assetData", name, content, query, Asset)
@@ -287,21 +294,25 @@ class Rest:
 
     # ------------------------------------------------------------------------------------------------ diagnosis
     async def diagnosis(self, target: Path) -> None:
-        """Write a zip of what is open, types, devices and the log's last lines, without secrets, into a file."""
+        """Save a diagnosis archive to a file: open documents, types, devices and the end of the log; no secrets."""
         await self._file("/api/diagnosis", target)
 
     # ------------------------------------------------------------------------------------------------ packages
     async def publish(self, project_id: str, target: Path, package_name: str = "") -> None:
-        """Build a saved project and write its package into a file."""
+        """Build a saved project and save its package to a file."""
         named = {"packageName": package_name} if package_name else {}
         await self._file("/project/publish", target, params={"projectId": project_id} | named)
 
     async def import_package(self, content: Path | bytes, **overwrite: bool) -> ImportedIds:
         """Save the scene, project and object types of a package.
 
-        `overwrite`: overwrite_scene, overwrite_project, overwrite_object_types, overwrite_project_sources,
-        overwrite_collision_models, update_project_from_script. Raises InTheWay naming all that differs from what is
-        saved.
+        Args:
+            content: The package. overwrite: overwrite_scene, overwrite_project, overwrite_object_types,
+            overwrite_project_sources,
+                overwrite_collision_models, update_project_from_script.
+
+        Raises:
+            InTheWay: Saved items differ; the message names all of them.
         """
         query = {name: str(value).lower() for name, value in overwrite.items()}
         ids: ImportedIds = await self._upload(
@@ -310,11 +321,11 @@ class Rest:
         return ids
 
     async def download_package(self, package_id: str, target: Path) -> None:
-        """Write a package into a file."""
+        """Save a package to a file."""
         await self._file(f"/packages/{_part(package_id)}", target)
 
     async def upload_package(self, package_id: str, content: Path | bytes) -> None:
-        """Take in a package, in place of one of that id."""
+        """Upload a package, replacing one of the same id."""
         await self._upload(
             "POST", f"/packages/{_part(package_id)}", "executionPackage", "package.zip", content, {}, Any
         )

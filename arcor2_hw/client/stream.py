@@ -1,4 +1,4 @@
-"""A stream of events: bounded, in order, and never silent about what is missing."""
+"""Streams of events: bounded, ordered, with explicit gaps."""
 
 import asyncio
 from collections import deque
@@ -11,57 +11,57 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.events import ChangeType, Event
 
 LIMIT: Final = 10_000
-"""Events that wait in a stream at most; then the oldest go, and the stream says so."""
+"""Maximum number of events waiting in a stream; above it, the oldest are dropped and reported."""
 
 D_co = TypeVar("D_co", covariant=True)
 E = TypeVar("E")
 
 
-class Told(Protocol[D_co]):
-    """An event whose data are known to be of one type."""
+class TypedEvent(Protocol[D_co]):
+    """An event with data of a known type."""
 
     @property
     def event(self) -> str:
-        """The event's name."""
+        """Name of the event."""
 
     @property
     def change_type(self) -> ChangeType | Unset:
-        """What happened to the item that it carries."""
+        """Kind of change of the item."""
 
     @property
     def parent_id(self) -> str | Unset:
-        """To what the item belongs."""
+        """Id of the parent of the item."""
 
     @property
     def data(self) -> D_co:
-        """What it carries; UNSET for an event without data."""
+        """Data of the event; UNSET for an event without data."""
 
 
 class EventStream(Generic[E]):
-    """Events as they come: `async for event in stream`, from its making until it, or the client, is closed.
+    """A stream of events: `async for event in stream`, until it, or the client, is closed. One reader at a time.
 
-    Raises EventsMissed where events are missing, because they were not taken in time or the connection was lost;
-    the stream can be read on behind that. Raises NotAdmitted when the server lets the client in no more. Ends when the
-    client is closed, or has lost its connection and does not reconnect. One reader at a time.
+    It raises EventsMissed where events are missing, because they were not read in time or the connection was lost; the
+    stream can be read further. It raises NotAdmitted when the server no longer admits the client. It ends when the
+    client is closed, or has lost its connection and does not reconnect.
     """
 
     def __init__(
         self, names: frozenset[str] = frozenset(), limit: int = LIMIT, forget: Callable[[Any], None] | None = None
     ) -> None:
         if limit < 1:
-            raise ValueError(f"a stream needs room for at least one event, not {limit}")
+            raise ValueError(f"a stream needs a limit of at least one event, not {limit}")
         self._names = names
         self._limit = limit
         self._forget = forget
         self._waiting: deque[Event | EventsMissed] = deque()
         self._gap: EventsMissed | None = None
-        """What is missing before the first that waits."""
+        """Gap before the first waiting event."""
         self._news = asyncio.Event()
         self._ended = False
         self._error: BaseException | None = None
 
     def put(self, item: Event | EventsMissed) -> None:
-        """Add what came. For the client."""
+        """Add an event or gap. Called by the client."""
         if self._ended or (isinstance(item, Event) and self._names and item.event not in self._names):
             return
         waiting = self._waiting
@@ -75,13 +75,13 @@ class EventStream(Generic[E]):
         self._news.set()
 
     def end(self, error: BaseException | None = None) -> None:
-        """Let no more come; what waits can still be taken. For the client."""
+        """End the stream; waiting events can still be read. Called by the client."""
         self._ended = True
         self._error = error
         self._news.set()
 
     def close(self) -> None:
-        """Stop following; harmless when it is closed."""
+        """Close the stream. It does nothing when the stream is closed."""
         self.end()
         self._waiting.clear()
         self._gap = None

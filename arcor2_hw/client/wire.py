@@ -1,4 +1,4 @@
-"""One websocket: requests matched to answers by id, events handed on in the order they come."""
+"""One websocket: answers matched to requests by id, events delivered in order."""
 
 import asyncio
 import contextlib
@@ -19,16 +19,19 @@ from arcor2_hw.data.events import EVENTS, ChangeType, Event
 from arcor2_hw.exceptions import ConnectionLost
 
 OPEN_TIMEOUT: Final = 10.0
-"""Seconds in which a connection has to come about."""
+"""Time limit of connecting, s."""
 PING_INTERVAL: Final = 10.0
 PING_TIMEOUT: Final = 20.0
-"""Seconds after which a server that answers no ping counts as lost: a pulled cable tells nobody."""
+"""Time without an answer to a ping after which the connection is lost, s.
+
+An unplugged cable is not reported otherwise.
+"""
 NOT_ADMITTED: Final = 4401
-"""With what the server closes when a token is not valid (docs/protocol.md)."""
+"""Close code of the server for a token that is not valid."""
 
 
 class Unsent(Exception):
-    """The connection was gone before anything was sent."""
+    """The connection was lost before anything was sent."""
 
 
 class Unanswered(Exception):
@@ -58,7 +61,7 @@ _decode_any = msgspec.json.Decoder().decode
 
 
 def _read(text: str | bytes) -> Message | Event | EventsMissed:
-    """Give an answer undecoded, an event with its data; EventsMissed for what cannot be read."""
+    """Return an answer undecoded, or an event with its data; EventsMissed for an invalid message."""
     try:
         message = _decode(text)
         if not message.event:
@@ -73,7 +76,7 @@ def _read(text: str | bytes) -> Message | Event | EventsMissed:
 
 
 class Wire:
-    """An open connection. `closed` is set once nothing comes any more."""
+    """An open connection. `closed` is set when nothing more can be received."""
 
     def __init__(self, socket: ClientConnection, url: str, deliver: Callable[[Event | EventsMissed], None]) -> None:
         self.closed = asyncio.Event()
@@ -88,7 +91,11 @@ class Wire:
     async def open(
         cls, url: str, token: str | None, tls: ssl.SSLContext | None, deliver: Callable[[Event | EventsMissed], None]
     ) -> "Wire":
-        """Connect. Raises ConnectionLost naming the address."""
+        """Connect.
+
+        Raises:
+            ConnectionLost: The server does not answer; the message names its address.
+        """
         headers = None if token is None else {"Authorization": f"Bearer {token}"}
         try:
             socket = await connect(
@@ -103,13 +110,13 @@ class Wire:
                 ping_timeout=PING_TIMEOUT,
             )
         except (OSError, TimeoutError, InvalidHandshake, InvalidURI, EOFError) as e:
-            # ssl.SSLError is an OSError: a certificate that is not trusted is named by it.
+            # ssl.SSLError is an OSError; the message names an untrusted certificate.
             why = f": {e}" if isinstance(e, ssl.SSLError | InvalidHandshake | InvalidURI) else "."
-            raise ConnectionLost(f"No server answers at {url}{why}", str(e)) from e
+            raise ConnectionLost(f"The server at {url} does not answer{why}", str(e)) from e
         return cls(socket, url, deliver)
 
     async def close(self) -> None:
-        """Close the connection; harmless when it is closed."""
+        """Close the connection. It does nothing when the connection is closed."""
         await self._socket.close()
         self._reader.cancel()
         with contextlib.suppress(asyncio.CancelledError):
@@ -117,10 +124,12 @@ class Wire:
 
     @property
     def refused(self) -> NotAdmitted | None:
-        """Tell whether the server closed because of the token."""
+        """Return the error if the server closed the connection because of the token."""
         if self._socket.close_code != NOT_ADMITTED:
             return None
-        return NotAdmitted(f"The server at {self._url} lets us not in: {self._socket.close_reason or 'no valid token'}")
+        return NotAdmitted(
+            f"The server at {self._url} does not admit this client: {self._socket.close_reason or 'no valid token'}"
+        )
 
     async def _follow(self) -> None:
         try:
@@ -138,12 +147,18 @@ class Wire:
             for future in self._waiting.values():
                 if not future.done():
                     future.set_exception(Unanswered())
-                    future.exception()  # whoever waited may have gone
+                    future.exception()  # the waiting task may be gone
             self._waiting.clear()
             self.closed.set()
 
     async def ask(self, name: str, args: Any, dry_run: bool, limit: float) -> Message:
-        """Send a request and give the answer as it came. Raises Unsent, Unanswered, AnswerLate after `limit` s."""
+        """Send a request and return the answer undecoded.
+
+        Raises:
+            Unsent: Nothing was sent.
+            Unanswered: The connection broke before the answer.
+            AnswerLate: There was no answer within `limit` s.
+        """
         if self._socket.state is not State.OPEN or self.closed.is_set():
             raise Unsent
         number = next(self._ids)

@@ -1,1 +1,1 @@
-"""What travels and what is stored, as msgspec Structs with the field names of the wire."""
+"""Protocol and storage types: msgspec Structs with the field names of the wire."""

@@ -1,4 +1,4 @@
-"""Addresses among the settings of a device. A stored secret is sent only to the hosts that it was entered for."""
+"""Addresses in the settings of a device. A stored secret is sent only to the hosts that it was entered for."""
 
 import re
 from typing import Final
@@ -16,14 +16,14 @@ _HUMP: Final = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
 
 
 def is_address_name(name: str) -> bool:
-    """Tell whether a text setting of this name says where the device is."""
+    """Return whether a text setting of this name contains the address of the device."""
     return _NAMES.search(_HUMP.sub("_", name).lower()) is not None
 
 
 def host_of(address: str) -> str:
-    """Return the host of a URL, of host:port or of a host alone, in lower case; else the address as it is.
+    """Return the host of a URL, of host:port or of a host alone, in lower case; otherwise the address unchanged.
 
-    A URL with user and password, or with anything that parsers read in different ways, is returned as it is.
+    A URL with user and password, or one that parsers interpret differently, is returned unchanged.
     """
     found = (_URL if "://" in address else _HOST_AND_PORT).fullmatch(address) if address.isprintable() else None
     return address if found is None else found[1].strip("[]").lower()

@@ -1,4 +1,4 @@
-"""The common ground of all data: omission of unset fields, identifiers and time stamps."""
+"""Base classes of all data, identifiers and time stamps."""
 
 import builtins
 import keyword
@@ -12,13 +12,13 @@ __all__ = ["UNSET", "Data", "MutableData", "Timestamp", "Unset", "is_valid_name"
 
 
 class Data(Struct, frozen=True):
-    """Base of everything that travels: immutable, an unset optional field is left out, a null is refused."""
+    """Base of all protocol data: immutable; an unset optional field is omitted, null is rejected."""
 
 
 class MutableData(Struct, dict=True):
-    """Base of the few types that existing scripts change in place (Pose, Joint and their like).
+    """Base of the few types that existing scripts modify in place (Pose, Joint and similar).
 
-    Other attributes may be set on an instance; they stay off the wire.
+    Other attributes may be set on an instance; they are not sent.
     """
 
 
@@ -26,16 +26,19 @@ class MutableData(Struct, dict=True):
 Unset = UnsetType
 
 Timestamp = Annotated[str, Meta(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?([+-]\d\d:\d\d|Z)$")]
-"""RFC 3339 with offset. Kept as text: the wire wants `+00:00`, and text of one zone sorts by time."""
+"""RFC 3339 with offset.
+
+It is stored as text, because the wire needs `+00:00`, and text in one time zone sorts by time.
+"""
 
 
 def now() -> str:
-    """Give the present as a time stamp in UTC, with microseconds."""
+    """Return the present time stamp in UTC, with microseconds."""
     return datetime.now(UTC).isoformat(timespec="microseconds")
 
 
 def new_id(prefix: str) -> str:
-    """Make an id of the form `<prefix>_<32 hex digits>` (protocol, section 4)."""
+    """Return a new id of the form `<prefix>_<32 hex digits>` (protocol, section 4)."""
     return f"{prefix}_{uuid.uuid4().hex}"
 
 
@@ -43,5 +46,5 @@ _RESERVED = frozenset(keyword.kwlist) | frozenset(dir(builtins))
 
 
 def is_valid_name(name: str) -> bool:
-    """Tell whether `name` may name an object, point, orientation, joints, flow output or parameter (section 4)."""
+    """Return whether `name` is valid for an object, point, joints, flow output, parameter or the like (section 4)."""
     return name.isidentifier() and name.isascii() and name not in _RESERVED

@@ -1,4 +1,4 @@
-"""The record that every calibration leaves, and what a later measurement says of it."""
+"""The record of a calibration, and the check of a later measurement against it."""
 
 import enum
 import hashlib
@@ -23,11 +23,11 @@ class CalibrationKind(enum.StrEnum):
     TOOL_TIP = "tool_tip"
     TOOL_ORIENTATION = "tool_orientation"
     BY_HAND = "by_hand"
-    """A pose that a person typed in."""
+    """A pose entered by a user."""
 
 
 class CalibrationInput(Data, frozen=True):
-    """Something a calibration was computed from: sha256 in hex and size in bytes; file: where it is kept, if it is."""
+    """An input of a calibration: SHA-256 in hex, size in bytes, and the path of the file if it is stored."""
 
     name: str
     sha256: str
@@ -36,18 +36,18 @@ class CalibrationInput(Data, frozen=True):
 
     @classmethod
     def of(cls, name: str, content: bytes, file: str | None = None) -> "CalibrationInput":
-        """Describe the content."""
+        """Return the description of content."""
         return cls(name, hashlib.sha256(content).hexdigest(), len(content), UNSET if file is None else file)
 
 
 class CalibrationRecord(Data, frozen=True):
     """One calibration.
 
-    person: user name of whoever did it. object_id and object_name: of the scene object whose pose, lens or tool it is;
-    parent: name of the frame in which the poses are stated ("world", a robot's base or flange). inputs: pictures and
-    tables it was computed from; parameters: what else went in (joints, markers, options), as JSON values. residual: in
-    residual_unit ("m", "rad" or "px"); result: the whole result, as JSON values. before and after: pose of the object
-    until then and since, where the result is a pose; applied: whether the object was given it.
+    person: name of the user who did it. object_id and object_name: scene object whose pose, lens or tool it is; parent:
+    name of the frame of the poses ("world", a robot's base or flange). inputs: images and tables it was computed from;
+    parameters: other inputs (joints, markers, options), as JSON values. residual: in residual_unit ("m", "rad" or
+    "px"); result: the complete result, as JSON values. before and after: pose of the object before and after, where the
+    result is a pose; applied: whether the object's pose was set.
     """
 
     kind: CalibrationKind

@@ -1,4 +1,4 @@
-"""Cameras: intrinsics and what is seen of markers."""
+"""Cameras: intrinsics and detected markers."""
 
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.geometry import Pose
@@ -22,14 +22,14 @@ class CameraParameters(Data, frozen=True):
 
 
 class EstimatedPose(Data, frozen=True):
-    """A pose with its quality, 0..1."""
+    """A pose with its quality, 0 to 1."""
 
     pose: Pose
     quality: float
 
 
 class Corner(Data, frozen=True):
-    """A point in the image, pixels."""
+    """A point in the image, px."""
 
     x: float
     y: float

@@ -1,4 +1,4 @@
-"""cell.yaml: the devices of one workplace, by name: what they are and where they are reached."""
+"""cell.yaml: the devices of one workplace by name, with their types and settings."""
 
 from collections.abc import Collection, Iterable
 from pathlib import Path
@@ -15,16 +15,16 @@ from arcor2_hw.data.secret import is_reference
 from arcor2_hw.exceptions import InvalidData, NotFound
 
 MAX_SIZE: Final = 1 << 20
-"""Bytes; a cell of hundreds of devices has some ten thousand."""
+"""Maximum size, bytes; a cell of hundreds of devices has some ten thousand."""
 
 
 class CellDevice(Data, frozen=True, forbid_unknown_fields=True):
     """One device: its name in the scene, its object type, its settings by name.
 
-    bench: for the conformance suite, `module:Class` of a bench that knows more of the device than its settings say.
-    wire: for the suite, the settings that name host and port, or the port alone, of the connection that it may cut; a
-    number is a port that the device always has. real: whether it is a real device, which the suite does not touch
-    unasked; where it is not given, whatever is not on this machine is real.
+    bench: for the conformance suite, `module:Class` of a bench with knowledge that the settings don't contain. wire:
+    for the suite, the settings with host and port, or the port alone, of the connection that it may interrupt; a number
+    is a fixed port of the device. real: whether it is a real device, which the suite uses only when asked; default:
+    whether it is on another machine.
     """
 
     name: str
@@ -37,13 +37,13 @@ class CellDevice(Data, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         if not is_valid_name(self.name):
-            raise ValueError(f"{self.name!r} is no name for an object")
+            raise ValueError(f"{self.name!r} is not a valid name of an object")
 
 
 class Cell(Data, frozen=True, forbid_unknown_fields=True):
     """The devices of a workplace; their names are unique.
 
-    calibration: which markers stand where, in the form of a file of markers (arcor2_hw.calibration.configuration).
+    calibration: markers and their poses, in the form of a marker file (arcor2_hw.calibration.configuration).
     """
 
     devices: list[CellDevice]
@@ -52,32 +52,40 @@ class Cell(Data, frozen=True, forbid_unknown_fields=True):
     def __post_init__(self) -> None:
         names = [device.name for device in self.devices]
         if twice := sorted({name for name in names if names.count(name) > 1}):
-            raise ValueError(f"named twice: {', '.join(twice)}")
+            raise ValueError(f"several devices have the same name: {', '.join(twice)}")
 
     def device(self, name: str) -> CellDevice | None:
-        """Give a device by its name, None when it is not there."""
+        """Return a device by its name, None when there is none."""
         return next((device for device in self.devices if device.name == name), None)
 
 
 def read_cell(path: Path) -> Cell:
-    """Read a cell.yaml. Raises NotFound, or InvalidData naming the file, the device and what is wrong there."""
+    """Read a cell.yaml.
+
+    Raises:
+        NotFound: There is no such file.
+        InvalidData: The file is invalid; the message names the file, the device and the error.
+    """
     try:
         if path.stat().st_size > MAX_SIZE:
-            raise InvalidData(f"{path} is larger than {MAX_SIZE} bytes: it is no cell.yaml")
+            raise InvalidData(f"{path} is larger than {MAX_SIZE} bytes, so it is not a cell.yaml")
         return msgspec.yaml.decode(path.read_bytes(), type=Cell)
     except FileNotFoundError:
         raise NotFound(f"there is no {path}") from None
     except OSError as error:
         raise InvalidData(f"{path} cannot be read: {error.strerror}") from None
-    except msgspec.DecodeError as error:  # also for a wrong value
+    except msgspec.DecodeError as error:  # also raised for a wrong value
         raise InvalidData(f"{path}: {error}") from None
 
 
 def overlay(cell: Cell, scene: Scene) -> list[SceneObjectOverride]:
-    """Give the settings that a cell lays over those of a scene's objects of the same names.
+    """Return the settings of a cell that override those of scene objects with the same names.
 
-    Poses stay the scene's: action points are taught relative to them. A device that is not in the scene is left out;
-    `strangers` gives those. Raises InvalidData naming the object when its type is another one.
+    Poses are taken from the scene, because action points are taught relative to them. Devices that are not in the scene
+    are ignored; see `strangers`.
+
+    Raises:
+        InvalidData: An object has another type; the message names it.
     """
     found = []
     for scene_object in scene.objects:
@@ -93,14 +101,14 @@ def overlay(cell: Cell, scene: Scene) -> list[SceneObjectOverride]:
 
 
 def parameters_of(device: CellDevice) -> list[Parameter]:
-    """Give the settings of a device as the parameters of a scene's object."""
+    """Return the settings of a device as parameters of a scene object."""
     return [
         Parameter(name, _kind(value), msgspec.json.encode(value).decode()) for name, value in device.settings.items()
     ]
 
 
 def exported(scene: Scene, left_out: Collection[str] = ()) -> Cell:
-    """Return the objects of a scene as a cell without secrets, besides those whose type is left out."""
+    """Return the objects of a scene, except those of excluded types, as a cell without secrets."""
     return Cell(
         [
             CellDevice(
@@ -124,13 +132,13 @@ def _values(parameters: Iterable[Parameter]) -> list[tuple[str, Any]]:
 
 
 def strangers(cell: Cell, scene: Scene) -> list[str]:
-    """Give the names in a cell that no object of the scene has: misspelt, or not used there."""
+    """Return the names in a cell that no object of the scene has: misspelt or unused."""
     names = {scene_object.name for scene_object in scene.objects}
     return [device.name for device in cell.devices if device.name not in names]
 
 
 def _kind(value: Any) -> str:
-    """Give the parameter type of the protocol for a plain value; the driver's own hints decide in the end."""
+    """Return the parameter type of the protocol for a plain value; the driver's type hints have precedence."""
     match value:
         case bool():
             return "boolean"
@@ -142,5 +150,5 @@ def _kind(value: Any) -> str:
 
 
 def write_cell(cell: Cell) -> bytes:
-    """Give the text of a cell.yaml, which `read_cell` reads."""
+    """Return the text of a cell.yaml, as `read_cell` reads it."""
     return msgspec.yaml.encode(cell)

@@ -1,4 +1,4 @@
-"""What every device tells of itself: readings, identity, connection, health and alarms."""
+"""Common data of all devices: readings, identity, connection, health and alarms."""
 
 import enum
 import time
@@ -8,14 +8,14 @@ from arcor2_hw.data.base import Data, Timestamp, now
 
 T = TypeVar("T")
 DEVICE_FILES: Final = "ARCOR2_HW_DEVICE_FILES"
-"""Environment variable with the directories, separated by `:`, in which the settings of devices may name files.
+"""Environment variable with the directories, separated by `:`, that settings of devices may refer to.
 
-The server sets it for its cell hosts. A script that is started by hand runs without it and may name any file.
+The server sets it for its cell hosts. A script that is started by hand runs without it and may use any file.
 """
 
 
 class Quality(enum.StrEnum):
-    """How far a reading can be trusted (OPC UA's good, uncertain, bad)."""
+    """Reliability of a reading (good, uncertain, bad, as in OPC UA)."""
 
     GOOD = "good"
     UNCERTAIN = "uncertain"
@@ -23,7 +23,7 @@ class Quality(enum.StrEnum):
 
 
 class Reading(Data, Generic[T], frozen=True):
-    """A value with when it was taken: UTC for people, the monotonic clock (s) for its age."""
+    """A value with its time: UTC for display, the monotonic clock (s) for its age."""
 
     value: T
     stamp: Timestamp
@@ -32,17 +32,17 @@ class Reading(Data, Generic[T], frozen=True):
 
     @classmethod
     def of(cls, value: T, quality: Quality = Quality.GOOD) -> "Reading[T]":
-        """Make a reading taken at this moment."""
+        """Return a reading taken now."""
         return cls(value, now(), time.monotonic(), quality)
 
     @property
     def age(self) -> float:
-        """Give the seconds since it was taken."""
+        """Return the age in s."""
         return time.monotonic() - self.monotonic
 
 
 class Identity(Data, frozen=True):
-    """Who a device says it is; a field it does not tell is empty."""
+    """Identity of a device; unknown fields are empty."""
 
     vendor: str = ""
     model: str = ""
@@ -51,7 +51,7 @@ class Identity(Data, frozen=True):
 
 
 class Connection(enum.StrEnum):
-    """The life of a connection."""
+    """State of a connection."""
 
     OFFLINE = "offline"
     CONNECTING = "connecting"
@@ -72,7 +72,7 @@ class Health(enum.StrEnum):
 
 
 class Severity(enum.StrEnum):
-    """How bad an alarm is."""
+    """Severity of an alarm."""
 
     INFO = "info"
     WARNING = "warning"
@@ -81,7 +81,7 @@ class Severity(enum.StrEnum):
 
 
 class Alarm(Data, frozen=True):
-    """Something a person should deal with; `remedy` says how."""
+    """A condition that needs attention; `remedy` says what to do."""
 
     code: str
     severity: Severity
@@ -91,7 +91,7 @@ class Alarm(Data, frozen=True):
 
 
 class LossKind(enum.StrEnum):
-    """What a device does when it loses us."""
+    """What a device does when it loses the connection."""
 
     STOPS_WITHIN = "stops_within"
     HOLDS = "holds"
@@ -99,22 +99,22 @@ class LossKind(enum.StrEnum):
 
 
 class LossReaction(Data, frozen=True):
-    """The declared reaction of a device to losing us; `within` in s for one that stops."""
+    """The declared reaction of a device to a connection loss; `within` in s for one that stops."""
 
     kind: LossKind
     within: float = 0.0
 
     @classmethod
     def stops_within(cls, seconds: float) -> "LossReaction":
-        """Declare that motion has ended that long after we are gone."""
+        """Declare that motion ends within that time after the connection loss, s."""
         return cls(LossKind.STOPS_WITHIN, seconds)
 
     @classmethod
     def holds(cls) -> "LossReaction":
-        """Declare that it keeps its last outputs and does nothing new."""
+        """Declare that it keeps its last outputs and starts nothing new."""
         return cls(LossKind.HOLDS)
 
     @classmethod
     def continues(cls) -> "LossReaction":
-        """Declare that it goes on with what it was doing."""
+        """Declare that it continues what it is doing."""
         return cls(LossKind.CONTINUES)

@@ -1,4 +1,4 @@
-"""What clients tell each other through the server: views, breakpoints, presence, previews, tasks (docs/protocol.md)."""
+"""Data that clients share through the server: view states, breakpoints, presence, previews, tasks, runs."""
 
 import enum
 from typing import Annotated, Any
@@ -10,22 +10,22 @@ from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import Joint
 
 Name = Annotated[str, Meta(min_length=1, max_length=200)]
-"""A key, or an id that need not exist here."""
+"""A key, or an id that need not exist."""
 
 
 # ---------------------------------------------------------------------------------------------- view state
 class ViewScope(enum.StrEnum):
-    """Whose a part of the view state is."""
+    """Scope of a part of the view state."""
 
     USER = "user"
     SHARED = "shared"
 
 
 class ViewState(Data, frozen=True):
-    """The view state of a document, or what of it was changed: there, null stands for a value that went.
+    """The view state of a document, or a change of it, in which null is a removed value.
 
-    document: id of a scene, project or package; empty: of none. user: whose, with scope user. revision: grows with
-    every change, so that an answer and an event can be put in order.
+    document: id of a scene, project or package; empty: none. user: the user, with scope user. revision: grows with
+    every change, so that answers and events can be ordered.
     """
 
     scope: ViewScope
@@ -46,10 +46,10 @@ class ProjectBreakpoints(Data, frozen=True):
 
 # ---------------------------------------------------------------------------------------------- presence
 class Presence(Data, frozen=True):
-    """What a user looks at and edits, as his client says.
+    """What a user views and edits, as reported by the client.
 
-    document: id of the scene, project or package that he sees. selected, aimed, editing: ids in it. view: the screen
-    or view he is in, in his client's words. camera: from where he looks, in the world, as the frame of a camera.
+    document: id of the viewed scene, project or package. selected, aimed, editing: ids in it. view: name of the screen
+    or view. camera: camera pose in the world, as a camera frame.
     """
 
     document: str = ""
@@ -61,7 +61,7 @@ class Presence(Data, frozen=True):
 
 
 class UserPresenceData(Data, frozen=True):
-    """What the event UserPresence carries; without `presence` the user's client has not said anything yet."""
+    """Data of the event UserPresence; without `presence` the client of the user has not reported any yet."""
 
     user: str
     online: bool
@@ -71,9 +71,10 @@ class UserPresenceData(Data, frozen=True):
 
 # ---------------------------------------------------------------------------------------------- previews
 class MovePreview(Data, frozen=True):
-    """Where somebody drags an item just now, relative to its parent, as it would be stored.
+    """Pose of an item that a user is dragging, relative to its parent, as it would be stored.
 
-    id: of an object, action point, orientation or joints. None of position, orientation, joints: it is over.
+    id: id of an object, action point, orientation or joints. Without position, orientation and joints, dragging has
+    ended.
     """
 
     id: Name
@@ -83,14 +84,14 @@ class MovePreview(Data, frozen=True):
 
 
 class MovePreviewData(MovePreview, frozen=True, kw_only=True):
-    """What the event MovePreview carries."""
+    """Data of the event MovePreview."""
 
     user: str
 
 
 # ---------------------------------------------------------------------------------------------- tasks
 class TaskKind(enum.StrEnum):
-    """What kind of work takes its time."""
+    """Kind of a task."""
 
     SCENE_START = "scene_start"
     SCENE_STOP = "scene_stop"
@@ -102,7 +103,7 @@ class TaskKind(enum.StrEnum):
 
 
 class TaskProgress(enum.StrEnum):
-    """How a task stands."""
+    """Progress of a task."""
 
     RUNNING = "running"
     FINISHED = "finished"
@@ -111,10 +112,10 @@ class TaskProgress(enum.StrEnum):
 
 
 class TaskStateData(Data, frozen=True):
-    """What the event TaskState carries.
+    """Data of the event TaskState.
 
-    title: a sentence for people. started_by: a user's or token's name, left out where nobody asked for it.
-    progress: 0..1, left out where it is not known. message: what is being done, or why it failed.
+    title: sentence for users. started_by: name of a user or token, omitted when it was started automatically. progress:
+    0 to 1, omitted when unknown. message: present activity, or reason of the failure.
     """
 
     id: str
@@ -129,9 +130,9 @@ class TaskStateData(Data, frozen=True):
 
 # ---------------------------------------------------------------------------------------------- history
 class HistoryStep(Data, frozen=True):
-    """What Undo or Redo of a user would take back now.
+    """The edit that Undo or Redo of a user would revert.
 
-    request: what made it. text: the sentence for the button, without `Undo` or `Redo` before it.
+    request: request that made the edit. text: label of the button, without `Undo` or `Redo`.
     """
 
     number: int
@@ -140,7 +141,7 @@ class HistoryStep(Data, frozen=True):
 
 
 class HistoryChangedData(Data, frozen=True):
-    """What the event HistoryChanged carries: of the user to whom it is sent."""
+    """Data of the event HistoryChanged, for the user to whom it is sent."""
 
     revision: int
     undo: HistoryStep | Unset = UNSET
@@ -149,7 +150,7 @@ class HistoryChangedData(Data, frozen=True):
 
 # ---------------------------------------------------------------------------------------------- runs
 class RunEnd(enum.StrEnum):
-    """How a run ended: as meant, by somebody, by an error, or with the server or its host."""
+    """How a run ended: completed, stopped by a user, by an error, or with the server or its host."""
 
     RUNNING = "running"
     FINISHED = "finished"
@@ -159,7 +160,7 @@ class RunEnd(enum.StrEnum):
 
 
 class ActionOfRun(Data, frozen=True):
-    """An action that a run was in; `name` is empty where the project does not know it."""
+    """An action of a run; `name` is empty when the project does not contain it."""
 
     id: str
     name: str = ""
@@ -168,9 +169,9 @@ class ActionOfRun(Data, frozen=True):
 class Run(Data, frozen=True):
     """One run of a package.
 
-    project_modified: of the project that was built, which says its revision. temporary: run from the editor, its
-    package is gone. started_by, stopped_by: a user's or token's name. actions: how many were begun. last_action: what
-    it was in when it ended. error: what ended it, as ProjectException has it.
+    project_modified: modification time of the built project, which identifies its revision. temporary: run from the
+    editor; its package is deleted. started_by, stopped_by: name of a user or token. actions: number of started actions.
+    last_action: action that was active at the end. error: error that ended the run, as in ProjectException.
     """
 
     number: int
@@ -193,11 +194,11 @@ class Run(Data, frozen=True):
 
 
 class TraceEntry(Data, frozen=True):
-    """One action of a run, from its end: what went in, what came out, how long it took.
+    """One action of a run with its parameters, results and duration.
 
-    number: counts the actions of the run from 1, in the order in which they were announced. started: when that was.
-    duration: s, without a pause before it; left out while it runs. parameters, results: as in ActionStateBefore and
-    ActionStateAfter. error: why it failed. thread_id: left out in the script's main thread.
+    number: number of the action in the run from 1, in the order of their start. started: time of the start. duration:
+    s, without a pause before it; omitted while it runs. parameters, results: as in ActionStateBefore and
+    ActionStateAfter. error: why it failed. thread_id: omitted in the main thread of the script.
     """
 
     run: int
@@ -214,7 +215,7 @@ class TraceEntry(Data, frozen=True):
 
 # ---------------------------------------------------------------------------------------------- reachability
 class Reach(enum.StrEnum):
-    """Whether an end effector gets somewhere."""
+    """How an end effector reaches a pose."""
 
     REACHABLE = "reachable"
     NEAR_LIMIT = "near_limit"
@@ -224,7 +225,7 @@ class Reach(enum.StrEnum):
 
 
 class ReachOfItem(Data, frozen=True):
-    """Whether an end effector gets to an orientation or joints; `reason` is a sentence, where it does not."""
+    """How an end effector reaches an orientation or joints; `reason` is a sentence when it does not."""
 
     id: str
     reach: Reach
@@ -232,10 +233,10 @@ class ReachOfItem(Data, frozen=True):
 
 
 class ReachabilityData(Data, frozen=True):
-    """What Reachability answers for each end effector, and the event ReachabilityChanged carries.
+    """Answer to Reachability for each end effector, and data of the event ReachabilityChanged.
 
-    revision: of the document for which it holds. items: orientations and joints of the open project; in the event,
-    those that changed.
+    revision: revision of the document for which it holds. items: orientations and joints of the open project; in the
+    event, those that changed.
     """
 
     robot_id: str

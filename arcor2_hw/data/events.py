@@ -1,4 +1,4 @@
-"""Every event that the server sends: its data, and the least role that may receive it."""
+"""Every event that the server sends: its data, and the minimum role that receives it."""
 
 import enum
 from typing import Any, Final
@@ -39,9 +39,9 @@ from arcor2_hw.data.scene import BareScene, Scene, SceneObject
 
 
 class EventType(Struct, frozen=True):
-    """Declares one event: the type of its data (None: it has none) and the least role that gets it.
+    """Declaration of an event: the type of its data (None: no data) and the minimum role that receives it.
 
-    `additional`: it is not of the ARCOR2 protocol, and goes only to clients that subscribed to it.
+    `additional`: it is not part of the ARCOR2 protocol, and is sent only to clients that subscribed to it.
     """
 
     name: str
@@ -60,13 +60,13 @@ class Event(Data, frozen=True):
 
 
 class ActionExecutionData(Data, frozen=True):
-    """What the event ActionExecution carries."""
+    """Data of the event ActionExecution."""
 
     action_id: str = ""
 
 
 class ActionResultData(Data, frozen=True):
-    """What the event ActionResult carries."""
+    """Data of the event ActionResult."""
 
     action_id: str
     results: list[str] | Unset = UNSET
@@ -82,7 +82,7 @@ class ProcessStateEnum(enum.StrEnum):
 
 
 class ProcessStateData(Data, frozen=True):
-    """What the event ProcessState carries."""
+    """Data of the event ProcessState."""
 
     id: str
     state: ProcessStateEnum
@@ -98,28 +98,28 @@ class MainScreen(enum.StrEnum):
 
 
 class ShowMainScreenData(Data, frozen=True):
-    """What the event ShowMainScreen carries."""
+    """Data of the event ShowMainScreen."""
 
     what: MainScreen
     highlight: str | Unset = UNSET
 
 
 class LockData(Data, frozen=True):
-    """What ObjectsLocked and ObjectsUnlocked carry."""
+    """Data of the events ObjectsLocked and ObjectsUnlocked."""
 
     object_ids: list[str]
     owner: str
 
 
 class OpenProjectData(Data, frozen=True):
-    """What the event OpenProject carries."""
+    """Data of the event OpenProject."""
 
     scene: Scene
     project: Project
 
 
 class HandTeachingModeData(Data, frozen=True):
-    """What the event HandTeachingMode carries."""
+    """Data of the event HandTeachingMode."""
 
     robot_id: str
     enabled: bool
@@ -135,7 +135,7 @@ class MoveEventType(enum.StrEnum):
 
 
 class RobotMoveToActionPointJointsData(Data, frozen=True):
-    """What the event RobotMoveToActionPointJoints carries."""
+    """Data of the event RobotMoveToActionPointJoints."""
 
     move_event_type: MoveEventType
     robot_id: str
@@ -146,7 +146,7 @@ class RobotMoveToActionPointJointsData(Data, frozen=True):
 
 
 class RobotMoveToActionPointOrientationData(Data, frozen=True):
-    """What the event RobotMoveToActionPointOrientation carries."""
+    """Data of the event RobotMoveToActionPointOrientation."""
 
     move_event_type: MoveEventType
     robot_id: str
@@ -159,7 +159,7 @@ class RobotMoveToActionPointOrientationData(Data, frozen=True):
 
 
 class RobotMoveToJointsData(Data, frozen=True):
-    """What the event RobotMoveToJoints carries."""
+    """Data of the event RobotMoveToJoints."""
 
     move_event_type: MoveEventType
     robot_id: str
@@ -170,7 +170,7 @@ class RobotMoveToJointsData(Data, frozen=True):
 
 
 class RobotMoveToPoseData(Data, frozen=True):
-    """What the event RobotMoveToPose carries."""
+    """Data of the event RobotMoveToPose."""
 
     move_event_type: MoveEventType
     robot_id: str
@@ -183,7 +183,7 @@ class RobotMoveToPoseData(Data, frozen=True):
 
 
 class OpenSceneData(Data, frozen=True):
-    """What the event OpenScene carries."""
+    """Data of the event OpenScene."""
 
     scene: Scene
 
@@ -198,14 +198,14 @@ class SceneStateEnum(enum.StrEnum):
 
 
 class SceneStateData(Data, frozen=True):
-    """What the event SceneState carries."""
+    """Data of the event SceneState."""
 
     state: SceneStateEnum
     message: str | Unset = UNSET
 
 
 class RobotEefData(Data, frozen=True):
-    """What the event RobotEef carries; `time_ms` (steady clock of the cell) where StreamRobot asked for it."""
+    """Data of the event RobotEef; `time_ms` (steady clock of the cell) is set when StreamRobot asked for it."""
 
     robot_id: str
     end_effectors: list[EefPose] = field(default_factory=list)
@@ -213,7 +213,7 @@ class RobotEefData(Data, frozen=True):
 
 
 class RobotJointsData(Data, frozen=True):
-    """What the event RobotJoints carries; `time_ms` as in RobotEef."""
+    """Data of the event RobotJoints; `time_ms` as in RobotEef."""
 
     robot_id: str
     joints: list[Joint]
@@ -221,14 +221,14 @@ class RobotJointsData(Data, frozen=True):
 
 
 class ActionStateAfterData(Data, frozen=True):
-    """What the event ActionStateAfter carries."""
+    """Data of the event ActionStateAfter."""
 
     action_id: str
     results: list[str] | Unset = UNSET
 
 
 class ActionStateBeforeData(Data, frozen=True):
-    """What the event ActionStateBefore carries."""
+    """Data of the event ActionStateBefore."""
 
     action_id: str | Unset = UNSET
     parameters: list[str] | Unset = UNSET
@@ -245,14 +245,14 @@ class NotificationLevel(enum.StrEnum):
 
 
 class NotificationData(Data, frozen=True):
-    """What the event Notification carries."""
+    """Data of the event Notification."""
 
     message: str
     level: NotificationLevel
 
 
 class PackageInfoData(Data, frozen=True):
-    """What the event PackageInfo carries."""
+    """Data of the event PackageInfo."""
 
     package_id: str
     package_name: str
@@ -262,14 +262,14 @@ class PackageInfoData(Data, frozen=True):
 
 
 class PackageStateData(Data, frozen=True):
-    """What the event PackageState carries."""
+    """Data of the event PackageState."""
 
     state: PackageStateEnum = PackageStateEnum.UNDEFINED
     package_id: str | Unset = UNSET
 
 
 class ProjectExceptionData(Data, frozen=True):
-    """What the event ProjectException carries; action_id: in which action it was, beside the protocol."""
+    """Data of the event ProjectException; action_id (not in ARCOR2): the action that failed."""
 
     message: str
     type: str
@@ -278,9 +278,9 @@ class ProjectExceptionData(Data, frozen=True):
 
 
 class ObjectStateData(Data, frozen=True):
-    """What the event ObjectState carries: how the connection of an object of the scene or program in operation is.
+    """Data of the event ObjectState: the connection of an object of the online scene or the running program.
 
-    reason: why it is lost or failed, or why all ended. overlaid: the settings that come from the server's cell file.
+    reason: why it is lost or failed, or why all connections ended. overlaid: settings from the server's cell file.
     answering: false while the process that controls the devices does not answer; `state` is then the last known one.
     """
 
@@ -292,7 +292,7 @@ class ObjectStateData(Data, frozen=True):
 
 
 class ChangeType(enum.StrEnum):
-    """What happened to the item that an event carries."""
+    """Kind of change of the item in an event."""
 
     ADD = "add"
     UPDATE = "update"
@@ -356,4 +356,4 @@ EVENTS: Final = {
         EventType("ViewStateChanged", ViewState, Role.OPERATOR, additional=True),
     )
 }
-"""Every event of the protocol, and of ours beside it, by name."""
+"""Every event by name, those of the protocol and additional ones."""

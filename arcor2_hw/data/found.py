@@ -1,4 +1,4 @@
-"""What the integrator's tools find: things that are connected to a machine, and how the devices of a cell are."""
+"""Results of the integrator's commands: devices found on a machine, and the state of the devices of a cell."""
 
 from msgspec import field
 
@@ -7,7 +7,7 @@ from arcor2_hw.data.device import Alarm, Connection, Health, Identity
 
 
 class Found(Data, frozen=True):
-    """One thing that is connected: its kind, where it is (as a setting would say), what it says of itself."""
+    """A device found: its kind, its address (as in a setting), and its identity."""
 
     kind: str
     address: str
@@ -16,7 +16,7 @@ class Found(Data, frozen=True):
 
 
 class Checked(Data, frozen=True):
-    """How one device of a cell is. `seconds` to connect. problem: what went wrong, empty when nothing did."""
+    """State of one device of a cell. seconds: time to connect, s. problem: what went wrong, or empty."""
 
     name: str
     type: str
@@ -31,5 +31,5 @@ class Checked(Data, frozen=True):
 
     @property
     def fit(self) -> bool:
-        """Tell whether it is there and fit for work."""
+        """Return whether the device is connected and works."""
         return not self.problem and self.health not in (Health.FAILURE, Health.OFF_SPEC)

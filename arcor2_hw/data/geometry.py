@@ -1,4 +1,4 @@
-"""Position, orientation and pose, with the algebra of rigid motion (quaternions x, y, z, w; metres)."""
+"""Position, orientation and pose with the algebra of rigid motion (quaternions x, y, z, w; lengths in m)."""
 
 import functools
 import math
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 @functools.cache
 def _quaternions() -> Any:
-    """Give transforms3d's algebra; it comes with numpy, 0.1 s that the server's start does without."""
+    """Return transforms3d's algebra, imported here because with numpy it takes 0.1 s of the server's start."""
     from transforms3d import quaternions
 
     return quaternions
 
 
 class Position(MutableData):
-    """A point, or a displacement, in metres."""
+    """A point, or a displacement, m."""
 
     x: float = 0.0
     y: float = 0.0
@@ -44,18 +44,18 @@ class Position(MutableData):
         return Position(self.x - other.x, self.y - other.y, self.z - other.z)
 
     def distance_to(self, other: "Position") -> float:
-        """Give the Euclidean distance to `other`, m."""
+        """Return the Euclidean distance to `other`, m."""
         return math.dist((self.x, self.y, self.z), (other.x, other.y, other.z))
 
     def rotated(self, by: "Orientation") -> "Position":
-        """Give this vector rotated by `by`."""
+        """Return this vector rotated by `by`."""
         return Position(
             *map(float, _quaternions().rotate_vector((self.x, self.y, self.z), by.wxyz(), is_normalized=True))
         )
 
 
 class Orientation(MutableData):
-    """A unit quaternion x, y, z, w. It is normalised whenever it is constructed.
+    """A unit quaternion x, y, z, w, normalized at construction.
 
     Raises ValueError for the zero quaternion and for numbers that are not finite.
     """
@@ -68,7 +68,7 @@ class Orientation(MutableData):
     def __post_init__(self) -> None:
         square = self.x * self.x + self.y * self.y + self.z * self.z + self.w * self.w
         if not math.isfinite(square) or square < 1e-24:
-            raise ValueError("an orientation needs a finite quaternion other than zero")
+            raise ValueError("an orientation needs a finite, non-zero quaternion")
         if abs(square - 1.0) > 1e-12:
             norm = math.sqrt(square)
             self.x /= norm
@@ -86,33 +86,33 @@ class Orientation(MutableData):
         return Orientation.from_wxyz(_quaternions().qmult(self.wxyz(), other.wxyz()))
 
     def wxyz(self) -> tuple[float, float, float, float]:
-        """Give the components with the scalar first, as transforms3d wants them."""
+        """Return the components with the scalar first, as transforms3d needs them."""
         return self.w, self.x, self.y, self.z
 
     @classmethod
     def from_wxyz(cls, quaternion: "Vector | tuple[float, ...]") -> "Orientation":
-        """Make an orientation from four components, scalar first."""
+        """Create an orientation from four components, scalar first."""
         w, x, y, z = map(float, quaternion)
         return cls(x, y, z, w)
 
     def inverted(self) -> "Orientation":
-        """Give the inverse rotation."""
+        """Return the inverse rotation."""
         return Orientation.from_wxyz(_quaternions().qconjugate(self.wxyz()))
 
     def matrix(self) -> "Vector":
-        """Give the rotation matrix, shape (3, 3)."""
+        """Return the rotation matrix, shape (3, 3)."""
         import numpy as np
 
         return np.asarray(_quaternions().quat2mat(self.wxyz()), dtype=np.float64)
 
     @classmethod
     def from_matrix(cls, matrix: "Vector") -> "Orientation":
-        """Make an orientation from a rotation matrix, shape (3, 3)."""
+        """Create an orientation from a rotation matrix, shape (3, 3)."""
         return cls.from_wxyz(_quaternions().mat2quat(matrix))
 
     @classmethod
     def from_rotation_vector(cls, x: float, y: float, z: float) -> "Orientation":
-        """Make an orientation from axis times angle, rad."""
+        """Create an orientation from axis times angle, rad."""
         angle = math.sqrt(x * x + y * y + z * z)
         if angle < 1e-12:
             return cls(x / 2, y / 2, z / 2, 1.0)
@@ -120,7 +120,7 @@ class Orientation(MutableData):
         return cls(x * s, y * s, z * s, math.cos(angle / 2))
 
     def rotation_vector(self) -> tuple[float, float, float]:
-        """Give axis times angle, rad, with the angle in 0..pi."""
+        """Return axis times angle, rad, with an angle from 0 to pi."""
         sign = -1.0 if self.w < 0 else 1.0
         x, y, z, w = sign * self.x, sign * self.y, sign * self.z, sign * self.w
         s = math.sqrt(x * x + y * y + z * z)
@@ -128,7 +128,7 @@ class Orientation(MutableData):
         return x * factor, y * factor, z * factor
 
     def angle_to(self, other: "Orientation") -> float:
-        """Give the angle of the rotation between the two, rad, 0..pi."""
+        """Return the angle of the rotation between the two, rad, 0 to pi."""
         return math.hypot(*(self.inverted() * other).rotation_vector())
 
 
@@ -139,20 +139,20 @@ class Pose(MutableData):
     orientation: Orientation = field(default_factory=Orientation)
 
     def __mul__(self, other: "Pose") -> "Pose":
-        """Compose: with self = a_from_b and other = b_from_c, give a_from_c."""
+        """Compose two poses: a_from_b * b_from_c = a_from_c."""
         return Pose(
             self.position + other.position.rotated(self.orientation),
             self.orientation * other.orientation,
         )
 
     def inverted(self) -> "Pose":
-        """Give the inverse motion: of a_from_b, b_from_a."""
+        """Return the inverse motion: b_from_a for a_from_b."""
         back = self.orientation.inverted()
         p = self.position
         return Pose(Position(-p.x, -p.y, -p.z).rotated(back), back)
 
     def matrix(self) -> "Vector":
-        """Give the homogeneous matrix, shape (4, 4)."""
+        """Return the homogeneous matrix, shape (4, 4)."""
         import numpy as np
 
         result = np.eye(4)
@@ -162,15 +162,15 @@ class Pose(MutableData):
 
     @classmethod
     def from_matrix(cls, matrix: "Vector") -> "Pose":
-        """Make a pose from a homogeneous matrix, shape (4, 4)."""
+        """Create a pose from a homogeneous matrix, shape (4, 4)."""
         return cls(Position(*map(float, matrix[:3, 3])), Orientation.from_matrix(matrix[:3, :3]))
 
 
 def make_pose_abs(parent: Pose, child: Pose) -> Pose:
-    """Give the pose of `child`, stated in the frame `parent`, in the frame in which `parent` is stated."""
+    """Convert a pose from the frame `parent` to the frame in which `parent` is stated."""
     return parent * child
 
 
 def make_pose_rel(parent: Pose, child: Pose) -> Pose:
-    """Give the pose of `child` in the frame `parent`; both are stated in the same frame."""
+    """Convert a pose to the frame `parent`; both are stated in the same frame."""
     return parent.inverted() * child

@@ -25,7 +25,7 @@ class Model(Data, frozen=True):
     id: str
 
     def type(self) -> Model3dType:
-        """Give the kind of this model."""
+        """Return the kind of this model."""
         return Model3dType(self.__class__.__name__)
 
 
@@ -66,7 +66,7 @@ class Sphere(Model, frozen=True):
 
 
 class Mesh(Model, frozen=True):
-    """A mesh kept as an asset, with points by which a robot can be pointed at it."""
+    """A mesh stored as an asset, with focus points for aiming with a robot."""
 
     asset_id: str
     focus_points: list[Pose] | Unset = UNSET
@@ -91,7 +91,7 @@ class ObjectModel(Data, frozen=True):
             raise ValueError(f"a model of type {self.type.value} needs exactly the field {', '.join(wanted) or 'none'}")
 
     def model(self) -> Models:
-        """Give the model itself; ValueError when the type is None."""
+        """Return the model. Raises ValueError when the type is None."""
         for model in (self.box, self.cylinder, self.sphere, self.mesh):
             if not isinstance(model, Unset):
                 return model
@@ -107,9 +107,9 @@ class ObjectModel(Data, frozen=True):
 class ParameterMeta(Data, frozen=True):
     """One parameter of an action or setting; `extra` and `default_value` are JSON in strings.
 
-    former_names: names under which older projects give it (ours, beside the protocol).
-    secret: the value of this setting is stored by the server and never sent to clients.
-    address: whether this setting says where the device is; left out where its name decides.
+    former_names (not in ARCOR2): names in older projects. secret: the value of this setting is stored by the server and
+    never sent to clients. address: whether this setting contains the address of the device; omitted when its name
+    decides.
     """
 
     name: str
@@ -125,7 +125,7 @@ class ParameterMeta(Data, frozen=True):
 
 
 class ActionMetadata(Data, frozen=True):
-    """How an action is treated. `composite` actions may call others; `hidden` ones are not offered."""
+    """How an action is executed. `composite` actions may call others; `hidden` ones are not offered to users."""
 
     composite: bool = False
     hidden: bool = False
@@ -133,9 +133,9 @@ class ActionMetadata(Data, frozen=True):
 
 
 class ObjectAction(Data, frozen=True):
-    """One action of an object type; category, icon and former_names are ours, beside the protocol.
+    """One action of an object type; category, icon and former_names are not in ARCOR2.
 
-    former_names: names under which older projects call it.
+    former_names: names in older projects.
     """
 
     name: str
@@ -151,7 +151,7 @@ class ObjectAction(Data, frozen=True):
     former_names: list[str] | Unset = UNSET
 
     def present_name(self, parameter: str) -> str:
-        """Return the present name of a parameter that may be given by a former one."""
+        """Return the present name of a parameter given by a present or former name."""
         for each in self.parameters:
             if not isinstance(each.former_names, Unset) and parameter in each.former_names:
                 return each.name
@@ -159,7 +159,7 @@ class ObjectAction(Data, frozen=True):
 
 
 def find_action(actions: Iterable[ObjectAction], name: str) -> ObjectAction | None:
-    """Return the action that has a name, else one that had it formerly, None if there is neither."""
+    """Return the action of a name, otherwise one with that former name, None if there is neither."""
     actions = list(actions)
     present = next((action for action in actions if action.name == name), None)
     formerly = (each for each in actions if not isinstance(each.former_names, Unset) and name in each.former_names)
@@ -167,10 +167,10 @@ def find_action(actions: Iterable[ObjectAction], name: str) -> ObjectAction | No
 
 
 class ObjectTypeMeta(Data, frozen=True):
-    """What clients know of an object type; category, icon and shadows are ours, beside the protocol.
+    """Metadata of an object type; category, icon and shadows are not in ARCOR2.
 
     built_in: a base class or an installed type, which cannot be deleted. shadows: distribution and version of the
-    installed type of the same name that this uploaded one takes the place of.
+    installed type of the same name that this uploaded type replaces.
     """
 
     type: str
@@ -191,7 +191,7 @@ class ObjectTypeMeta(Data, frozen=True):
 
 
 class ObjectTypeSource(Data, frozen=True):
-    """A stored object type: its whole Python module and the model that belongs to it."""
+    """A stored object type: its Python module and its collision model."""
 
     id: str
     source: str

@@ -1,6 +1,6 @@
-"""What sources written for ARCOR2 import, and where the same is here (protocol, sections 9.6 and 9.2).
+"""Names that sources written for ARCOR2 import, and their replacements here (protocol, sections 9.6 and 9.2).
 
-One table for who reads such sources (`analysis`) and for who runs them (`runtime.older`).
+The table is used to read such sources (`analysis`) and to run them (`runtime.older`).
 """
 
 from typing import Final
@@ -57,18 +57,18 @@ OLDER_NAMES: Final[dict[str, dict[str, tuple[str, str]]]] = {
         f"{_OLDER}.rest", "Method", "RestException", "RestHttpException", "Timeout", "call", "get_image"
     ),
 }
-"""By module and name: module and name of ours."""
+"""By module and name: our module and name."""
 
 OLDER_PACKAGES: Final = frozenset(name for name in OLDER_NAMES if "." not in name)
 
 
 def is_older(module: str) -> bool:
-    """Tell whether a module is, or would be, one of ARCOR2."""
+    """Return whether a module belongs to ARCOR2."""
     return module.partition(".")[0] in OLDER_PACKAGES
 
 
 def not_offered(module: str, name: str | None = None) -> str | None:
-    """Say that a module of ARCOR2, or a name in it, is not to be had here; None when it is, or is none of ARCOR2."""
+    """Return a message that a module or name of ARCOR2 is not available, None when it is, or is not part of ARCOR2."""
     if not is_older(module):
         return None
     known, *rest = module.split(".")
@@ -79,12 +79,12 @@ def not_offered(module: str, name: str | None = None) -> str | None:
         if wanted not in OLDER_NAMES:
             if part in OLDER_NAMES[known] and part is rest[-1]:
                 return None
-            return f"{wanted} is not offered here; of {known} there is {', '.join(_within(known))}"
+            return f"{wanted} is not available. Available in {known}: {', '.join(_within(known))}"
         known = wanted
     return None
 
 
 def _within(module: str) -> list[str]:
-    """Give the names and modules that there are in a module."""
+    """Return the names and modules in a module."""
     below = [each.rpartition(".")[2] for each in OLDER_NAMES if each.rpartition(".")[0] == module]
     return sorted({*OLDER_NAMES[module], *below})

@@ -1,4 +1,4 @@
-"""What is told of robots and devices in operation beside the protocol: who holds a motion, health, alarms."""
+"""Data about robots and devices of an online scene that is not in ARCOR2: hold-to-run, health, alarms."""
 
 import enum
 
@@ -9,16 +9,16 @@ from arcor2_hw.data.device import Alarm, Health
 
 
 class HoldKind(enum.StrEnum):
-    """What lasts only as long as a person holds on to it."""
+    """Kind of motion that lasts only while a user holds a button."""
 
     JOG = "jog"
     HAND_TEACHING = "hand_teaching"
 
 
 class RobotHoldData(Data, frozen=True):
-    """What the event RobotHold carries: a user took hold of a robot, or the hold has ended and the robot is at rest.
+    """Data of the event RobotHold: a user started to hold a robot, or the hold ended and the robot is at standstill.
 
-    reason: why it ended, where the user did not simply let go.
+    reason: why it ended, unless the user released the button.
     """
 
     robot_id: str
@@ -30,9 +30,9 @@ class RobotHoldData(Data, frozen=True):
 
 
 class ObjectHealthData(Data, frozen=True):
-    """What the event ObjectHealth carries: condition, alarms and owner of control of an object in operation.
+    """Data of the event ObjectHealth: condition, alarms and owner of control of an object of the online scene.
 
-    control_owner: "us", another's name, or left out when nobody has control.
+    control_owner: "us", the name of another client, or omitted when nobody has control.
     """
 
     object_id: str

@@ -1,4 +1,4 @@
-"""Execution packages: what is known of one on disk, and what it announces when it runs."""
+"""Execution packages: their metadata, and what they announce when they run."""
 
 import enum
 

@@ -1,10 +1,10 @@
-"""A named value on the wire: settings of an object, parameters of an action."""
+"""Named values: settings of an object, parameters of an action."""
 
 from arcor2_hw.data.base import Data
 
 
 class Parameter(Data, frozen=True):
-    """`value` is a JSON document inside a string."""
+    """A named value; `value` is a JSON document in a string."""
 
     name: str
     type: str
@@ -12,7 +12,7 @@ class Parameter(Data, frozen=True):
 
 
 class IdValue(Data, frozen=True):
-    """A value by the id of what it belongs to."""
+    """A value with the id of its owner."""
 
     id: str
     value: str

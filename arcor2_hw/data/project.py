@@ -21,9 +21,9 @@ class FlowTypes(enum.StrEnum):
 
 
 class Flow(Data, frozen=True):
-    """Names for the results of an action; empty outputs mean that results are not kept.
+    """Names of the results of an action; without names the results are not stored.
 
-    Raises ValueError when an output name occurs twice.
+    Raises ValueError when an output name is repeated.
     """
 
     type: FlowTypes = FlowTypes.DEFAULT
@@ -31,18 +31,18 @@ class Flow(Data, frozen=True):
 
     def __post_init__(self) -> None:
         if len(self.outputs) != len(set(self.outputs)):
-            raise ValueError("the outputs of a flow need names of their own")
+            raise ValueError("the outputs of a flow need unique names")
 
 
 class ActionParameterType(enum.StrEnum):
-    """What an action parameter's `type` may be beside a parameter type's name."""
+    """Values of an action parameter's `type` in addition to the names of parameter types."""
 
     PROJECT_PARAMETER = "project_parameter"
     LINK = "link"
 
 
 class ActionParameter(Parameter, frozen=True):
-    """A literal, a project parameter or a link to a result, told apart by `type`."""
+    """A literal, a project parameter or a link to a result, depending on `type`."""
 
 
 class BareAction(Data, frozen=True):
@@ -60,14 +60,14 @@ class Action(BareAction, frozen=True):
     flows: list[Flow] = field(default_factory=list)
 
     def parse_type(self) -> tuple[str, str]:
-        """Give the object id and the method's name; ValueError when `type` is not of that form."""
+        """Return the object id and the name of the method. Raises ValueError when `type` is not of that form."""
         object_id, slash, method = self.type.partition("/")
         if not slash or not object_id or not method or "/" in method:
             raise ValueError(f"action {self.name}: type {self.type!r} is not <object id>/<action>")
         return object_id, method
 
     def outputs(self) -> list[str]:
-        """Give the names of the results in the default flow, empty when they are not kept."""
+        """Return the names of the results in the default flow, empty when they are not stored."""
         return next((flow.outputs for flow in self.flows if flow.type is FlowTypes.DEFAULT), [])
 
 
@@ -80,7 +80,7 @@ class NamedOrientation(Data, frozen=True):
 
 
 class ProjectRobotJoints(MutableData):
-    """Joint values of one robot, kept at an action point; rad, m where prismatic."""
+    """Joint values of one robot, stored at an action point; rad, m where prismatic."""
 
     name: str
     robot_id: str
@@ -117,12 +117,12 @@ class ProjectLogicIf(Data, frozen=True):
     value: str
 
     def parse_what(self) -> tuple[str, str, int]:
-        """Give action id, flow and output index; ValueError when `what` is not of that form."""
+        """Return action id, flow and output index. Raises ValueError when `what` is not of that form."""
         return parse_link(self.what)
 
 
 def parse_link(link: str) -> tuple[str, str, int]:
-    """Take `<action id>/<flow>/<output index>` apart; ValueError when it is not of that form."""
+    """Split `<action id>/<flow>/<output index>`. Raises ValueError when the text is not of that form."""
     parts = link.split("/")
     if len(parts) != 3 or not parts[0] or not parts[2].isdecimal():
         raise ValueError(f"{link!r} is not <action id>/<flow>/<output index>")
@@ -179,7 +179,7 @@ class BareProject(Data, frozen=True):
 
 
 class Project(BareProject, frozen=True):
-    """A project with all that belongs to it."""
+    """A project with its content."""
 
     action_points: list[ActionPoint] = field(default_factory=list)
     parameters: list[ProjectParameter] = field(default_factory=list)

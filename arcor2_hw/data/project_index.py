@@ -1,4 +1,4 @@
-"""A project looked up by id, with the geometry of its action points (protocol, section 10.1)."""
+"""Lookup of the parts of a project by id, and the geometry of its action points (protocol, section 10.1)."""
 
 import copy
 from collections.abc import Iterable
@@ -19,29 +19,29 @@ from arcor2_hw.exceptions import InvalidProject, NotFound
 
 
 class ProjectLookup(Protocol):
-    """What parameter types need to know of a project. Each raises NotFound for an unknown id."""
+    """Lookup of the parts of a project. Each method raises NotFound for an unknown id."""
 
     def scene_object(self, object_id: str) -> SceneObject:
-        """Give an object of the scene."""
+        """Return an object of the scene."""
 
     def action_point(self, action_point_id: str) -> BareActionPoint:
-        """Give an action point."""
+        """Return an action point."""
 
     def orientation(self, orientation_id: str) -> tuple[BareActionPoint, NamedOrientation]:
-        """Give an orientation with its action point."""
+        """Return an orientation with its action point."""
 
     def joints(self, joints_id: str) -> tuple[BareActionPoint, ProjectRobotJoints]:
-        """Give joints with their action point."""
+        """Return joints with their action point."""
 
     def action(self, action_id: str) -> tuple[BareActionPoint, Action]:
-        """Give an action with its action point."""
+        """Return an action with its action point."""
 
     def parameter(self, parameter_id: str) -> ProjectParameter:
-        """Give a project parameter."""
+        """Return a project parameter."""
 
 
 def _chain(lookup: ProjectLookup, point: BareActionPoint) -> Iterable[Pose]:
-    """Give the frames in which the point is stated, nearest first. A parent action point only translates."""
+    """Yield the parent frames of a point, nearest first. A parent action point only translates."""
     seen = {point.id}
     parent = point.parent
     while not isinstance(parent, Unset):
@@ -50,7 +50,7 @@ def _chain(lookup: ProjectLookup, point: BareActionPoint) -> Iterable[Pose]:
         except NotFound:
             obj = lookup.scene_object(parent)
             if isinstance(obj.pose, Unset):
-                raise InvalidProject(f"{obj.name} has no pose and can be no parent of {point.name}") from None
+                raise InvalidProject(f"{obj.name} has no pose and cannot be the parent of {point.name}") from None
             yield obj.pose
             return
         if above.id in seen:
@@ -61,7 +61,7 @@ def _chain(lookup: ProjectLookup, point: BareActionPoint) -> Iterable[Pose]:
 
 
 def global_pose(lookup: ProjectLookup, point: BareActionPoint, orientation: Orientation | None = None) -> Pose:
-    """Give the pose in the world of an action point with one of its orientations."""
+    """Return the pose in the world of an action point with one of its orientations."""
     pose = Pose(copy.copy(point.position), orientation if orientation is not None else Orientation())
     for frame in _chain(lookup, point):
         pose = frame * pose
@@ -69,14 +69,14 @@ def global_pose(lookup: ProjectLookup, point: BareActionPoint, orientation: Orie
 
 
 def relative_pose(lookup: ProjectLookup, point: BareActionPoint, pose: Pose) -> Pose:
-    """Give a pose in the world in the frame in which the point's position is stated."""
+    """Convert a pose in the world to the frame of the point's position."""
     for frame in reversed(list(_chain(lookup, point))):
         pose = frame.inverted() * pose
     return pose
 
 
 class ProjectIndex:
-    """Lookup over a project and its scene that do not change."""
+    """Lookup in a project and a scene that do not change."""
 
     def __init__(self, scene: Scene, project: Project) -> None:
         self.scene = scene
@@ -89,42 +89,42 @@ class ProjectIndex:
         self._parameters = {parameter.id: parameter for parameter in project.parameters}
 
     def scene_object(self, object_id: str) -> SceneObject:
-        """Give an object of the scene."""
+        """Return an object of the scene."""
         try:
             return self._objects[object_id]
         except KeyError:
             raise NotFound(f"the scene has no object {object_id}") from None
 
     def action_point(self, action_point_id: str) -> BareActionPoint:
-        """Give an action point."""
+        """Return an action point."""
         try:
             return self._points[action_point_id]
         except KeyError:
             raise NotFound(f"the project has no action point {action_point_id}") from None
 
     def orientation(self, orientation_id: str) -> tuple[BareActionPoint, NamedOrientation]:
-        """Give an orientation with its action point."""
+        """Return an orientation with its action point."""
         try:
             return self._orientations[orientation_id]
         except KeyError:
             raise NotFound(f"the project has no orientation {orientation_id}") from None
 
     def joints(self, joints_id: str) -> tuple[BareActionPoint, ProjectRobotJoints]:
-        """Give joints with their action point."""
+        """Return joints with their action point."""
         try:
             return self._joints[joints_id]
         except KeyError:
             raise NotFound(f"the project has no joints {joints_id}") from None
 
     def action(self, action_id: str) -> tuple[BareActionPoint, Action]:
-        """Give an action with its action point."""
+        """Return an action with its action point."""
         try:
             return self._actions[action_id]
         except KeyError:
             raise NotFound(f"the project has no action {action_id}") from None
 
     def parameter(self, parameter_id: str) -> ProjectParameter:
-        """Give a project parameter."""
+        """Return a project parameter."""
         try:
             return self._parameters[parameter_id]
         except KeyError:

@@ -1,4 +1,4 @@
-"""Robots: joints, kinds, features, and our fuller state."""
+"""Robots: joints, types, features, and our extended state."""
 
 import enum
 
@@ -9,14 +9,14 @@ from arcor2_hw.data.geometry import Pose
 
 
 class Joint(MutableData):
-    """A joint's value: rad, m where prismatic."""
+    """The value of a joint, rad, m where prismatic."""
 
     name: str
     value: float
 
 
 class RobotType(enum.StrEnum):
-    """Kinds of arm."""
+    """Types of robot."""
 
     ARTICULATED = "articulated"
     CARTESIAN = "cartesian"
@@ -24,7 +24,7 @@ class RobotType(enum.StrEnum):
 
 
 class RobotFeatures(Data, frozen=True):
-    """Which optional methods a robot type implements; the last three are ours, beside the protocol."""
+    """Optional methods that a robot type implements; the last three are not in ARCOR2."""
 
     move_to_pose: bool = False
     move_to_joints: bool = False
@@ -38,7 +38,7 @@ class RobotFeatures(Data, frozen=True):
 
 
 class RobotMeta(Data, frozen=True):
-    """What clients know of a robot type."""
+    """Metadata of a robot type."""
 
     type: str
     robot_type: RobotType
@@ -64,7 +64,7 @@ class RobotArg(Data, frozen=True):
 
 
 class InverseKinematicsRequest(MutableData):
-    """A question for joints that reach a pose, as older object types put it to a service of their own."""
+    """Request for joint values that reach a pose, as older object types send it to a service of their own."""
 
     pose: Pose
     start_joints: list[Joint] | None = None
@@ -82,7 +82,7 @@ class Mode(enum.StrEnum):
 
 
 class Power(enum.StrEnum):
-    """Drive power."""
+    """State of the drives' power."""
 
     OFF = "off"
     IDLE_BRAKED = "idle_braked"
@@ -90,7 +90,7 @@ class Power(enum.StrEnum):
 
 
 class Safety(enum.StrEnum):
-    """What the safety system of the controller says."""
+    """State of the controller's safety system."""
 
     NORMAL = "normal"
     REDUCED = "reduced"
@@ -104,7 +104,7 @@ class Safety(enum.StrEnum):
 
 
 class ProgramState(enum.StrEnum):
-    """What the controller runs; foreign is a program that is not ours."""
+    """State of the controller's program; foreign: a program that is not ours."""
 
     STOPPED = "stopped"
     PLAYING = "playing"
@@ -113,14 +113,14 @@ class ProgramState(enum.StrEnum):
 
 
 class Control(enum.StrEnum):
-    """Who may command: the pendant or a remote client."""
+    """Who may command the robot: the pendant or a remote client."""
 
     LOCAL = "local"
     REMOTE = "remote"
 
 
 class RobotState(Data, frozen=True):
-    """The whole state of a robot at one instant; `not_ready_because` is empty when it takes commands."""
+    """The complete state of a robot at one instant; `not_ready_because` is empty when it accepts commands."""
 
     mode: Mode
     power: Power
@@ -133,7 +133,7 @@ class RobotState(Data, frozen=True):
 
 
 class DhParameters(Data, frozen=True):
-    """One joint by Denavit and Hartenberg: theta and alpha in rad, d and a in m (classic convention)."""
+    """Denavit-Hartenberg parameters of one joint: theta and alpha in rad, d and a in m (classic convention)."""
 
     theta: float
     d: float
@@ -142,7 +142,7 @@ class DhParameters(Data, frozen=True):
 
 
 class KinematicCalibration(Data, frozen=True):
-    """What a controller knows of the very arm at it, from the base to the flange; checksum tells arms apart."""
+    """Calibrated kinematics of this robot from the base to the flange; `checksum` identifies the robot."""
 
     joints: list[DhParameters]
     checksum: str
@@ -157,7 +157,7 @@ class MoveEnd(enum.StrEnum):
 
 
 class MoveResult(Data, frozen=True):
-    """What a move really did: pose reached (world), fraction of speed used, duration in s, how it ended."""
+    """Result of a move: pose reached (world), fraction of the speed used, duration in s, how it ended."""
 
     pose: Pose
     speed: float

@@ -1,10 +1,10 @@
-"""Roles of people, as in the paper's table: each may do what the ones before may."""
+"""Roles of users. Each role may do what the previous ones may."""
 
 import enum
 
 
 class Role(enum.IntEnum):
-    """The least role is declared where a request, event or route is defined."""
+    """Roles. The minimum role is declared where a request, event or route is defined."""
 
     OPERATOR = 1
     """Runs, pauses and stops programs."""
@@ -15,4 +15,4 @@ class Role(enum.IntEnum):
     TECHNICIAN = 4
     """Sets up workplaces: objects, poses, calibration."""
     PROGRAMMER = 5
-    """Brings in object types."""
+    """Adds object types."""

@@ -1,4 +1,4 @@
-"""A scene: the objects of a workplace, where they stand and how they are set."""
+"""A scene: the objects of a workplace, their poses and settings."""
 
 from msgspec import field
 
@@ -35,7 +35,7 @@ class Scene(BareScene, frozen=True):
 
 
 class SceneObjectOverride(Data, frozen=True):
-    """Settings of one scene object that a project replaces."""
+    """Settings of one scene object that a project overrides."""
 
     id: str
     parameters: list[Parameter]

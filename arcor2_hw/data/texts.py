@@ -1,4 +1,4 @@
-"""Length limits of the texts that requests carry, all in one place, and the check that enforces them."""
+"""Length limits of the texts in requests, and the check that enforces them."""
 
 from collections.abc import Mapping
 from typing import Any, Final
@@ -23,15 +23,20 @@ LIMITS: Final[Mapping[str, int | None]] = (
     | dict.fromkeys(("value", "default_value", "extra"), VALUE)
     | dict.fromkeys(("data", "image", "source", "script", "client", "values"), None)
 )
-"""Limit by field name; None for content, whose size is limited as that of the message or where it is stored."""
+"""Limit by field name; None for content whose size is limited elsewhere."""
 SHORTEST: Final = NAME
-"""A message no longer than this, in bytes, holds no text that is too long."""
+"""A message of at most this size, in bytes, cannot contain a text that is too long."""
 
 
 def check_texts(value: Any, field: str = "") -> None:
-    """Raise TextTooLong for the first text in `value` that is longer than the limit of its field.
+    """Check the length of every text in a decoded request.
 
-    value: a decoded request, or a part of one. field: the name of the field that holds it.
+    Args:
+        value: The request, or a part of it.
+        field: Name of the field of `value`.
+
+    Raises:
+        TextTooLong: A text is longer than the limit of its field.
     """
     if isinstance(value, str):
         limit = LIMITS.get(field, OTHER)

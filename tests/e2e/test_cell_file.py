@@ -241,7 +241,7 @@ async def test_a_device_of_another_type_is_not_started(tmp_path: Path) -> None:
         (None, 9, "there is no"),
         ("devices: [", 11, "cell.yaml"),
         ("devices: [{name: a, type: T, port: 1}]", 11, "port"),
-        ("devices: [{name: a, type: T}, {name: a, type: T}]", 11, "named twice: a"),
+        ("devices: [{name: a, type: T}, {name: a, type: T}]", 11, "several devices have the same name: a"),
     ],
 )
 async def test_a_bad_cell_file_is_one_line(tmp_path: Path, text: str | None, status: int, said: str) -> None:

@@ -184,19 +184,19 @@ def test_they_are_read_as_they_are_meant() -> None:
     [
         (
             "from arcor2.data.common import Pose, Gadget",
-            "arcor2.data.common.Gadget is not offered here; of arcor2.data.common there is ActionMetadata, ",
+            "arcor2.data.common.Gadget is not available. Available in arcor2.data.common: ActionMetadata, ",
         ),
         (
             "from arcor2.clients import scene_service",
-            "arcor2.clients is not offered here; of arcor2 there is DynamicParamTuple, data, exceptions, json, ",
+            "arcor2.clients is not available. Available in arcor2: DynamicParamTuple, data, exceptions, json, ",
         ),
-        ("import arcor2.helpers", "arcor2.helpers is not offered here; of arcor2 there is "),
-        ("from arcor2 import rpc", "arcor2.rpc is not offered here; of arcor2 there is "),
+        ("import arcor2.helpers", "arcor2.helpers is not available. Available in arcor2: "),
+        ("from arcor2 import rpc", "arcor2.rpc is not available. Available in arcor2: "),
         (
             "from arcor2_web import dataclasses",
-            "arcor2_web.dataclasses is not offered here; of arcor2_web there is rest",
+            "arcor2_web.dataclasses is not available. Available in arcor2_web: rest",
         ),
-        ("from arcor2_object_types.upload import up", "arcor2_object_types.upload is not offered here"),
+        ("from arcor2_object_types.upload import up", "arcor2_object_types.upload is not available"),
     ],
 )
 def test_what_is_not_offered_is_named_by_who_reads_and_by_who_runs(host: HostProcess, line: str, words: str) -> None:
@@ -421,7 +421,7 @@ try:
 except ImportError as error:
     print(error)
 """
-    assert "arcor2.nothing is not offered here" in run_python(code, tmp_path)
+    assert "arcor2.nothing is not available" in run_python(code, tmp_path)
 
 
 def test_the_server_has_none_of_it() -> None:

@@ -1,4 +1,4 @@
-"""Every request that clients may send: arguments, answer and the least role that may use it."""
+"""Every request that clients may send: arguments, answer and the minimum role."""
 
 from typing import Final
 
@@ -361,4 +361,4 @@ RPCS: Final = {
         Rpc("WriteUnlock", WriteUnlockArgs, None, Role.STANDARD_USER),
     )
 }
-"""Every request of the protocol by name."""
+"""Every request by name."""

@@ -1,4 +1,4 @@
-"""Arguments and answers of the requests about records of calibrations (docs/protocol.md)."""
+"""Arguments and answers of requests about records of calibrations."""
 
 from typing import Annotated
 
@@ -10,7 +10,7 @@ from arcor2_hw.data.geometry import Pose
 
 
 class ListCalibrationsArgs(Data, frozen=True):
-    """Arguments of ListCalibrations: at most so many, the newest ones before a date, of an object, of a kind."""
+    """Arguments of ListCalibrations: maximum number, latest date, object, kind."""
 
     limit: Annotated[int, Meta(ge=0, le=1000)] = 100
     object_id: str | Unset = UNSET
@@ -19,15 +19,15 @@ class ListCalibrationsArgs(Data, frozen=True):
 
 
 class ListCalibrationsData(Data, frozen=True):
-    """What ListCalibrations answers: records, newest first."""
+    """Answer to ListCalibrations: records, newest first."""
 
     records: list[CalibrationRecord]
 
 
 class CheckCalibrationArgs(Data, frozen=True):
-    """Arguments of CheckCalibration: a record, a pose in its frame, and how far that may be off (m, rad).
+    """Arguments of CheckCalibration: a record, a pose in its frame, and the limits of the difference (m, rad).
 
-    pose: one that was measured, or a reference; left out, that of the object in the open scene.
+    pose: a measured pose or a reference; default: the pose of the object in the open scene.
     """
 
     id: str

@@ -1,4 +1,4 @@
-"""Arguments and answers of what the editor asks beside the protocol (docs/protocol.md)."""
+"""Arguments and answers of additional requests of the editor."""
 
 from typing import Annotated, Any
 
@@ -9,7 +9,7 @@ from arcor2_hw.data.editor import Name, Run, TraceEntry, ViewScope
 
 
 class GetViewStateArgs(Data, frozen=True):
-    """Arguments of GetViewState; `user`: whose, else the caller's."""
+    """Arguments of GetViewState; `user`: the user, by default the caller."""
 
     scope: ViewScope
     document: Annotated[str, Meta(max_length=200)] = ""
@@ -17,7 +17,7 @@ class GetViewStateArgs(Data, frozen=True):
 
 
 class SetViewStateArgs(Data, frozen=True):
-    """Arguments of SetViewState: values by their keys; null takes one away, those that are not named stay."""
+    """Arguments of SetViewState: values by key; null removes a value, other keys are unchanged."""
 
     scope: ViewScope
     values: Annotated[dict[Name, Any], Meta(min_length=1, max_length=1000)]
@@ -25,19 +25,19 @@ class SetViewStateArgs(Data, frozen=True):
 
 
 class SetViewStateData(Data, frozen=True):
-    """What SetViewState answers: the revision of the view state that there is now."""
+    """Answer to SetViewState: the new revision of the view state."""
 
     revision: int
 
 
 class GetBreakpointsArgs(Data, frozen=True):
-    """Arguments of GetBreakpoints: of which project, else of the open one."""
+    """Arguments of GetBreakpoints: the project, by default the open one."""
 
     project_id: str | Unset = UNSET
 
 
 class SetBreakpointsArgs(Data, frozen=True):
-    """Arguments of SetBreakpoints: ids of action points and actions of a project, else of the open one."""
+    """Arguments of SetBreakpoints: ids of action points and actions, and the project, by default the open one."""
 
     add: Annotated[set[Name], Meta(max_length=1000)] = field(default_factory=set)
     remove: Annotated[set[Name], Meta(max_length=1000)] = field(default_factory=set)
@@ -45,7 +45,7 @@ class SetBreakpointsArgs(Data, frozen=True):
 
 
 class ListRunsArgs(Data, frozen=True):
-    """Arguments of ListRuns: at most so many, the newest ones before that number, of a package or a project."""
+    """Arguments of ListRuns: maximum number, number before which runs are listed, package or project."""
 
     limit: Annotated[int, Meta(ge=0, le=500)] = 50
     before: int | Unset = UNSET
@@ -54,27 +54,27 @@ class ListRunsArgs(Data, frozen=True):
 
 
 class ListRunsData(Data, frozen=True):
-    """What ListRuns answers: runs, newest first."""
+    """Answer to ListRuns: runs, newest first."""
 
     runs: list[Run]
 
 
 class GetExecutionTraceArgs(Data, frozen=True):
-    """Arguments of GetExecutionTrace: at most so many actions of the present or last run, the newest first."""
+    """Arguments of GetExecutionTrace: maximum number of actions of the present or last run."""
 
     limit: Annotated[int, Meta(ge=0, le=1000)] = 100
     before: int | Unset = UNSET
 
 
 class GetExecutionTraceData(Data, frozen=True):
-    """What GetExecutionTrace answers: the run (0: there was none), and its actions, newest first."""
+    """Answer to GetExecutionTrace: the number of the run (0: none), and its actions, newest first."""
 
     run: int
     entries: list[TraceEntry]
 
 
 class ReachabilityArgs(Data, frozen=True):
-    """Arguments of Reachability: of which robot, arm and end effector, else of all; for which items, else for all.
+    """Arguments of Reachability: robot, arm and end effector, by default all; items, by default all.
 
     ids: orientations and joints of the open project.
     """

@@ -1,4 +1,4 @@
-"""The envelopes of requests and answers, and how a request is declared."""
+"""The envelopes of requests and answers, and the declaration of a request."""
 
 from typing import Any
 
@@ -9,10 +9,10 @@ from arcor2_hw.data.role import Role
 
 
 class Rpc(Struct, frozen=True):
-    """Declares one request: types of `args` and of the answer's `data` (None: there is none), and the least role.
+    """Declaration of a request: types of `args` and of the answer's `data` (None: no data), and the minimum role.
 
-    `args_optional`: the arguments may be left out. `dry_run`: the request may ask for its checks alone.
-    `additional`: it is not of the ARCOR2 protocol (docs/protocol.md).
+    `args_optional`: the arguments may be omitted. `dry_run`: the request may be only checked. `additional`: it is not
+    part of the ARCOR2 protocol.
     """
 
     name: str
@@ -27,7 +27,7 @@ class Rpc(Struct, frozen=True):
 class Request(Data, frozen=True):
     """The envelope of a request; `args` is decoded when the request is known.
 
-    `codes`: a refusal is to name its reason (docs/protocol.md).
+    `codes`: whether a refusal contains its reason.
     """
 
     id: int
@@ -38,7 +38,7 @@ class Request(Data, frozen=True):
 
 
 class Response(Data, frozen=True):
-    """The envelope of an answer. `code`: the reason of a refusal, for those who ask for it."""
+    """The envelope of an answer. `code`: the reason of a refusal, if requested."""
 
     id: int
     response: str

@@ -12,7 +12,7 @@ class BuildProjectArgs(Data, frozen=True):
 
 
 class BuildProjectData(Data, frozen=True):
-    """What BuildProject answers."""
+    """Answer to BuildProject."""
 
     package_id: str
 
@@ -33,7 +33,7 @@ class RenamePackageArgs(Data, frozen=True):
 class RunPackageArgs(IdArgs, frozen=True):
     """Arguments of RunPackage.
 
-    shared_breakpoints: beside `breakpoints`, those that the project has (SetBreakpoints).
+    shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
     """
 
     start_paused: bool = False
@@ -44,7 +44,7 @@ class RunPackageArgs(IdArgs, frozen=True):
 class TemporaryPackageArgs(Data, frozen=True):
     """Arguments of TemporaryPackage.
 
-    shared_breakpoints: beside `breakpoints`, those that the project has (SetBreakpoints).
+    shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
     """
 
     start_paused: bool = False

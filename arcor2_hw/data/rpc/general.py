@@ -1,4 +1,4 @@
-"""Arguments and answers that belong to no one subject, or to the server itself."""
+"""General arguments and answers, and those about the server itself."""
 
 from typing import Annotated
 
@@ -15,7 +15,7 @@ class AuthenticateArgs(Data, frozen=True):
 
 
 class AuthenticateData(Data, frozen=True):
-    """What Authenticate answers: whose token it is, and the role that it gives."""
+    """Answer to Authenticate: the name of the token and its role."""
 
     name: str
     role: str
@@ -62,9 +62,9 @@ class RenameArgs(Data, frozen=True):
 
 
 class SubscribeEventsArgs(Data, frozen=True):
-    """Arguments of SubscribeEvents: names of additional events, to be sent to this client or no longer.
+    """Arguments of SubscribeEvents: names of additional events to subscribe to, or to unsubscribe from.
 
-    users: whose view state ViewStateChanged tells, beside that of the user who is logged in here.
+    users: users whose view states are sent with ViewStateChanged, in addition to the user of this connection.
     """
 
     events: set[str]
@@ -73,7 +73,7 @@ class SubscribeEventsArgs(Data, frozen=True):
 
 
 class SystemInfoData(Data, frozen=True):
-    """What SystemInfo answers."""
+    """Answer to SystemInfo."""
 
     version: str
     api_version: str

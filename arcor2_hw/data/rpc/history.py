@@ -1,4 +1,4 @@
-"""Arguments and answers of Undo, Redo, RestoreRevision and History (docs/protocol.md)."""
+"""Arguments and answers of Undo, Redo, RestoreRevision and History."""
 
 from typing import Annotated
 
@@ -8,19 +8,19 @@ from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
 
 
 class UndoArgs(Data, frozen=True):
-    """Arguments of Undo: which edit of the caller, else his latest one in force."""
+    """Arguments of Undo: the edit of the caller, by default the latest one in effect."""
 
     number: int | Unset = UNSET
 
 
 class RedoArgs(Data, frozen=True):
-    """Arguments of Redo: which undo of the caller, else his latest one."""
+    """Arguments of Redo: the undo of the caller, by default the latest one."""
 
     number: int | Unset = UNSET
 
 
 class UndoData(Data, frozen=True):
-    """What Undo and Redo answer: the edit that was taken back, what had made it, and the revision there is now."""
+    """Answer to Undo and Redo: the reverted edit, the request that made it, and the new revision."""
 
     number: int
     request: str
@@ -28,26 +28,26 @@ class UndoData(Data, frozen=True):
 
 
 class RestoreRevisionArgs(Data, frozen=True):
-    """Arguments of RestoreRevision: the document as it was after the edit of that number."""
+    """Arguments of RestoreRevision: the number of the edit after which the document is restored."""
 
     revision: int
 
 
 class RestoreRevisionData(Data, frozen=True):
-    """What RestoreRevision answers: the revision there is now."""
+    """Answer to RestoreRevision: the new revision."""
 
     revision: int
 
 
 class HistoryArgs(Data, frozen=True):
-    """Arguments of History: at most so many edits, the newest ones before that number."""
+    """Arguments of History: maximum number, number before which edits are listed."""
 
     limit: Annotated[int, Meta(ge=0, le=1000)] = 100
     before: int | Unset = UNSET
 
 
 class HistoryItem(Data, frozen=True):
-    """One thing that an edit touched; `name` is empty for what has none."""
+    """One item changed by an edit; `name` is empty for items without a name."""
 
     kind: str
     id: str
@@ -56,7 +56,7 @@ class HistoryItem(Data, frozen=True):
 
 
 class HistoryEdit(Data, frozen=True):
-    """One edit. `of` is what an undo or redo took back, or the revision that was restored."""
+    """One edit. `of` is the edit that an undo or redo reverted, or the restored revision."""
 
     number: int
     time: Timestamp
@@ -70,9 +70,9 @@ class HistoryEdit(Data, frozen=True):
 
 
 class HistoryData(Data, frozen=True):
-    """What History answers: the revision there is, the oldest one that can be restored, and edits, newest first.
+    """Answer to History: the present revision, the oldest one that can be restored, and edits, newest first.
 
-    `undo` and `redo` are the edits that these requests of the caller would take back.
+    `undo` and `redo` are the edits that these requests of the caller would revert.
     """
 
     revision: int

@@ -45,7 +45,7 @@ class WriteUnlockArgs(Data, frozen=True):
 
 
 class HeldLock(Data, frozen=True):
-    """One lock: what is locked, its name if it has one, and since when. `type` is left out for a read lock."""
+    """One lock: the locked item, its name if it has one, and the time. `type` is omitted for a read lock."""
 
     object_id: str
     name: str
@@ -54,7 +54,7 @@ class HeldLock(Data, frozen=True):
 
 
 class LockHolder(Data, frozen=True):
-    """A user with locks. `left` is when the connection ended; left out while the user is connected."""
+    """A user with locks. `left` is the time of the disconnect; omitted while the user is connected."""
 
     user: str
     locks: list[HeldLock]
@@ -62,12 +62,12 @@ class LockHolder(Data, frozen=True):
 
 
 class TakeOverLocksArgs(Data, frozen=True):
-    """Arguments of TakeOverLocks: a user who left."""
+    """Arguments of TakeOverLocks: a disconnected user."""
 
     user: str
 
 
 class TakeOverLocksData(Data, frozen=True):
-    """What TakeOverLocks answers: the locks that were released."""
+    """Answer to TakeOverLocks: the released locks."""
 
     locks: list[HeldLock]

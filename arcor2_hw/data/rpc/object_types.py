@@ -24,7 +24,7 @@ class AddOverrideArgs(Data, frozen=True):
 
 
 class DeleteObjectTypesData(Data, frozen=True):
-    """What DeleteObjectTypes answers."""
+    """Answer to DeleteObjectTypes."""
 
     id: str
     error: str
@@ -44,7 +44,7 @@ class ObjectAimingAddPointArgs(Data, frozen=True):
 
 
 class ObjectAimingAddPointData(Data, frozen=True):
-    """What ObjectAimingAddPoint answers."""
+    """Answer to ObjectAimingAddPoint."""
 
     finished_indexes: list[int]
 

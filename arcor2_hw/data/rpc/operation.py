@@ -1,4 +1,4 @@
-"""Arguments and answers of the requests, beside the protocol, about devices and robots in operation."""
+"""Arguments and answers of additional requests about devices and robots of an online scene."""
 
 import enum
 from typing import Final
@@ -9,13 +9,13 @@ from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.rpc.robots import RobotEventKind
 
 LONGEST_LEASE_MS: Final = 300
-"""A hold that is not renewed ends after that long at the latest."""
+"""Maximum time after which a hold that is not renewed ends, ms."""
 FASTEST_STREAM: Final = 30
-"""Hz."""
+"""Maximum rate of a stream, Hz."""
 
 
 class JogFrame(enum.StrEnum):
-    """The frame in whose axes a jog is given; the point that moves is always the end effector's."""
+    """The frame whose axes are used for jogging. The moving point is always the end effector."""
 
     WORLD = "world"
     ROBOT = "robot"
@@ -26,10 +26,9 @@ class JogFrame(enum.StrEnum):
 class JogRobotArgs(Data, frozen=True):
     """Arguments of JogRobot: a velocity of the end effector (`linear` m/s, `angular` rad/s), or of joints (rad/s, m/s).
 
-    hold: a number for this press of the button, larger than that of the one before; renewals carry the same.
-    sent_ms: when this was sent, by the sender's own steady clock; where it begins does not matter.
-    valid_ms: 1 to 300, for how long the velocity holds unless it is renewed; 0 lets go.
-    object_id, pose: for the frame `user`: an object of the scene, or a pose in the world.
+    hold: number of this press of the button, larger than the previous one; renewals have the same number. sent_ms: time
+    of sending by the sender's own steady clock with any origin. valid_ms: 1 to 300, duration of the velocity unless it
+    is renewed; 0 ends it. object_id, pose: for the frame `user`, an object of the scene, or a pose in the world.
     """
 
     robot_id: str
@@ -47,7 +46,7 @@ class JogRobotArgs(Data, frozen=True):
 
 
 class JogRobotData(Data, frozen=True):
-    """What JogRobot answers: the fraction of the asked velocity that the robot was given, less than 1 where capped."""
+    """Answer to JogRobot: the fraction of the requested velocity that is used, less than 1 where it is limited."""
 
     scale: float
 
@@ -63,7 +62,7 @@ class HoldHandTeachingArgs(Data, frozen=True):
 
 
 class StreamRobotArgs(Data, frozen=True):
-    """Arguments of StreamRobot: RobotJoints or RobotEef of a robot, 1 to 30 times a second, or no longer."""
+    """Arguments of StreamRobot: RobotJoints or RobotEef of a robot, 1 to 30 times per second, or off."""
 
     robot_id: str
     what: RobotEventKind
@@ -80,7 +79,7 @@ class StopKind(enum.StrEnum):
 
 
 class StopOutcome(Data, frozen=True):
-    """The result of StopAll for one device, the action that is being tried, or the program.
+    """The result of StopAll for one device, the action being executed, or the program.
 
     id, name: of the scene object, the action or the package. reason: why it was not stopped.
     """
@@ -93,7 +92,7 @@ class StopOutcome(Data, frozen=True):
 
 
 class StopAllData(Data, frozen=True):
-    """Answer of StopAll: an outcome for everything to which a stop was sent, or which cannot be stopped."""
+    """Answer to StopAll: the result for everything that was stopped, or cannot be stopped."""
 
     outcomes: list[StopOutcome]
 

@@ -46,7 +46,7 @@ class CopyProjectArgs(Data, frozen=True):
 
 
 class ListProjectsData(BareProject, frozen=True):
-    """What ListProjects answers."""
+    """Answer to ListProjects."""
 
     problems: list[str] | Unset = UNSET
 
@@ -73,7 +73,7 @@ class RemoveProjectParameterArgs(Data, frozen=True):
 
 
 class RemoveActionArgs(Data, frozen=True):
-    """Arguments of RemoveAction. With `with_steps` the action is taken out of the logic first, by the same edit."""
+    """Arguments of RemoveAction. With `with_steps` the action is also removed from the logic, in the same edit."""
 
     id: str
     with_steps: bool = False

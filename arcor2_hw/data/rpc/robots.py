@@ -1,4 +1,4 @@
-"""Arguments about robots in operation."""
+"""Arguments about robots of an online scene."""
 
 import enum
 

@@ -61,7 +61,7 @@ class CopySceneArgs(Data, frozen=True):
 
 
 class ListScenesData(Data, frozen=True):
-    """What ListScenes answers."""
+    """Answer to ListScenes."""
 
     id: str
     name: str

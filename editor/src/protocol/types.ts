@@ -19,19 +19,19 @@ export interface Action {
   flows: Flow[];
 }
 
-/** What the event ActionExecution carries. */
+/** Data of the event ActionExecution. */
 export interface ActionExecutionData {
   action_id: string;
 }
 
-/** How an action is treated. `composite` actions may call others; `hidden` ones are not offered. */
+/** How an action is executed. `composite` actions may call others; `hidden` ones are not offered to users. */
 export interface ActionMetadata {
   composite: boolean;
   hidden: boolean;
   cancellable: boolean;
 }
 
-/** An action that a run was in; `name` is empty where the project does not know it. */
+/** An action of a run; `name` is empty when the project does not contain it. */
 export interface ActionOfRun {
   id: string;
   name: string;
@@ -44,7 +44,7 @@ export interface ActionParamValuesArgs {
   parent_params?: IdValue[];
 }
 
-/** A literal, a project parameter or a link to a result, told apart by `type`. */
+/** A literal, a project parameter or a link to a result, depending on `type`. */
 export interface ActionParameter {
   name: string;
   type: string;
@@ -64,20 +64,20 @@ export interface ActionPoint {
   actions: Action[];
 }
 
-/** What the event ActionResult carries. */
+/** Data of the event ActionResult. */
 export interface ActionResultData {
   action_id: string;
   results?: string[];
   error?: string;
 }
 
-/** What the event ActionStateAfter carries. */
+/** Data of the event ActionStateAfter. */
 export interface ActionStateAfterData {
   action_id: string;
   results?: string[];
 }
 
-/** What the event ActionStateBefore carries. */
+/** Data of the event ActionStateBefore. */
 export interface ActionStateBeforeData {
   action_id?: string;
   parameters?: string[];
@@ -167,7 +167,7 @@ export interface AddVirtualCollisionObjectToSceneArgs {
   model: ObjectModel;
 }
 
-/** Something a person should deal with; `remedy` says how. */
+/** A condition that needs attention; `remedy` says what to do. */
 export interface Alarm {
   code: string;
   severity: Severity;
@@ -181,7 +181,7 @@ export interface AuthenticateArgs {
   token: string;
 }
 
-/** What Authenticate answers: whose token it is, and the role that it gives. */
+/** Answer to Authenticate: the name of the token and its role. */
 export interface AuthenticateData {
   name: string;
   role: string;
@@ -240,7 +240,7 @@ export interface BuildProjectArgs {
   package_name: string;
 }
 
-/** What BuildProject answers. */
+/** Answer to BuildProject. */
 export interface BuildProjectData {
   package_id: string;
 }
@@ -269,7 +269,7 @@ export interface CalibrationCheck {
   verdict: string;
 }
 
-/** Something a calibration was computed from: sha256 in hex and size in bytes; file: where it is kept, if it is. */
+/** An input of a calibration: SHA-256 in hex, size in bytes, and the path of the file if it is stored. */
 export interface CalibrationInput {
   name: string;
   sha256: string;
@@ -283,11 +283,11 @@ export type CalibrationKind = "camera_pose" | "robot_pose" | "hand_eye" | "intri
 /**
  * One calibration.
  *
- * person: user name of whoever did it. object_id and object_name: of the scene object whose pose, lens or tool it is;
- * parent: name of the frame in which the poses are stated ("world", a robot's base or flange). inputs: pictures and
- * tables it was computed from; parameters: what else went in (joints, markers, options), as JSON values. residual: in
- * residual_unit ("m", "rad" or "px"); result: the whole result, as JSON values. before and after: pose of the object
- * until then and since, where the result is a pose; applied: whether the object was given it.
+ * person: name of the user who did it. object_id and object_name: scene object whose pose, lens or tool it is; parent:
+ * name of the frame of the poses ("world", a robot's base or flange). inputs: images and tables it was computed from;
+ * parameters: other inputs (joints, markers, options), as JSON values. residual: in residual_unit ("m", "rad" or
+ * "px"); result: the complete result, as JSON values. before and after: pose of the object before and after, where the
+ * result is a pose; applied: whether the object's pose was set.
  */
 export interface CalibrationRecord {
   kind: CalibrationKind;
@@ -331,13 +331,13 @@ export interface CameraParameters {
   dist_coefs: number[];
 }
 
-/** What happened to the item that an event carries. */
+/** Kind of change of the item in an event. */
 export type ChangeType = "add" | "update" | "remove" | "update_base";
 
 /**
- * Arguments of CheckCalibration: a record, a pose in its frame, and how far that may be off (m, rad).
+ * Arguments of CheckCalibration: a record, a pose in its frame, and the limits of the difference (m, rad).
  *
- * pose: one that was measured, or a reference; left out, that of the object in the open scene.
+ * pose: a measured pose or a reference; default: the pose of the object in the open scene.
  */
 export interface CheckCalibrationArgs {
   id: string;
@@ -364,7 +364,7 @@ export interface CollisionModels {
   meshes: Mesh[];
 }
 
-/** The life of a connection. */
+/** State of a connection. */
 export type Connection = "offline" | "connecting" | "online" | "lost" | "back" | "failed";
 
 /** Arguments of CopyActionPoint. */
@@ -385,7 +385,7 @@ export interface CopySceneArgs {
   target_name: string;
 }
 
-/** A point in the image, pixels. */
+/** A point in the image, px. */
 export interface Corner {
   x: number;
   y: number;
@@ -398,7 +398,7 @@ export interface Cylinder {
   height: number;
 }
 
-/** What DeleteObjectTypes answers. */
+/** Answer to DeleteObjectTypes. */
 export interface DeleteObjectTypesData {
   id: string;
   error: string;
@@ -417,7 +417,7 @@ export interface EefPose {
   arm_id?: string;
 }
 
-/** A pose with its quality, 0..1. */
+/** A pose with its quality, 0 to 1. */
 export interface EstimatedPose {
   pose: Pose;
   quality: number;
@@ -429,9 +429,9 @@ export interface ExecuteActionArgs {
 }
 
 /**
- * Names for the results of an action; empty outputs mean that results are not kept.
+ * Names of the results of an action; without names the results are not stored.
  *
- * Raises ValueError when an output name occurs twice.
+ * Raises ValueError when an output name is repeated.
  */
 export interface Flow {
   type: FlowTypes;
@@ -455,7 +455,7 @@ export interface FunctionReturns {
   link: string;
 }
 
-/** Arguments of GetBreakpoints: of which project, else of the open one. */
+/** Arguments of GetBreakpoints: the project, by default the open one. */
 export interface GetBreakpointsArgs {
   project_id?: string;
 }
@@ -480,13 +480,13 @@ export interface GetEndEffectorsArgs {
   arm_id?: string;
 }
 
-/** Arguments of GetExecutionTrace: at most so many actions of the present or last run, the newest first. */
+/** Arguments of GetExecutionTrace: maximum number of actions of the present or last run. */
 export interface GetExecutionTraceArgs {
   limit?: number;
   before?: number;
 }
 
-/** What GetExecutionTrace answers: the run (0: there was none), and its actions, newest first. */
+/** Answer to GetExecutionTrace: the number of the run (0: none), and its actions, newest first. */
 export interface GetExecutionTraceData {
   run: number;
   entries: TraceEntry[];
@@ -515,7 +515,7 @@ export interface GetSuctionsArgs {
   arm_id?: string;
 }
 
-/** Arguments of GetViewState; `user`: whose, else the caller's. */
+/** Arguments of GetViewState; `user`: the user, by default the caller. */
 export interface GetViewStateArgs {
   scope: ViewScope;
   document?: string;
@@ -529,7 +529,7 @@ export interface HandTeachingModeArgs {
   arm_id?: string;
 }
 
-/** What the event HandTeachingMode carries. */
+/** Data of the event HandTeachingMode. */
 export interface HandTeachingModeData {
   robot_id: string;
   enabled: boolean;
@@ -539,7 +539,7 @@ export interface HandTeachingModeData {
 /** Condition of a device (NAMUR NE 107). */
 export type Health = "normal" | "check_function" | "off_spec" | "maintenance_required" | "failure";
 
-/** One lock: what is locked, its name if it has one, and since when. `type` is left out for a read lock. */
+/** One lock: the locked item, its name if it has one, and the time. `type` is omitted for a read lock. */
 export interface HeldLock {
   object_id: string;
   name: string;
@@ -547,13 +547,13 @@ export interface HeldLock {
   type?: LockType;
 }
 
-/** Arguments of History: at most so many edits, the newest ones before that number. */
+/** Arguments of History: maximum number, number before which edits are listed. */
 export interface HistoryArgs {
   limit?: number;
   before?: number;
 }
 
-/** What the event HistoryChanged carries: of the user to whom it is sent. */
+/** Data of the event HistoryChanged, for the user to whom it is sent. */
 export interface HistoryChangedData {
   revision: number;
   undo?: HistoryStep;
@@ -561,9 +561,9 @@ export interface HistoryChangedData {
 }
 
 /**
- * What History answers: the revision there is, the oldest one that can be restored, and edits, newest first.
+ * Answer to History: the present revision, the oldest one that can be restored, and edits, newest first.
  *
- * `undo` and `redo` are the edits that these requests of the caller would take back.
+ * `undo` and `redo` are the edits that these requests of the caller would revert.
  */
 export interface HistoryData {
   revision: number;
@@ -573,7 +573,7 @@ export interface HistoryData {
   redo?: number;
 }
 
-/** One edit. `of` is what an undo or redo took back, or the revision that was restored. */
+/** One edit. `of` is the edit that an undo or redo reverted, or the restored revision. */
 export interface HistoryEdit {
   number: number;
   time: string;
@@ -586,7 +586,7 @@ export interface HistoryEdit {
   of?: number;
 }
 
-/** One thing that an edit touched; `name` is empty for what has none. */
+/** One item changed by an edit; `name` is empty for items without a name. */
 export interface HistoryItem {
   kind: string;
   id: string;
@@ -595,9 +595,9 @@ export interface HistoryItem {
 }
 
 /**
- * What Undo or Redo of a user would take back now.
+ * The edit that Undo or Redo of a user would revert.
  *
- * request: what made it. text: the sentence for the button, without `Undo` or `Redo` before it.
+ * request: request that made the edit. text: label of the button, without `Undo` or `Redo`.
  */
 export interface HistoryStep {
   number: number;
@@ -614,7 +614,7 @@ export interface HoldHandTeachingArgs {
   arm_id?: string;
 }
 
-/** What lasts only as long as a person holds on to it. */
+/** Kind of motion that lasts only while a user holds a button. */
 export type HoldKind = "jog" | "hand_teaching";
 
 /** Arguments of every RPC that takes one id. */
@@ -622,7 +622,7 @@ export interface IdArgs {
   id: string;
 }
 
-/** A value by the id of what it belongs to. */
+/** A value with the id of its owner. */
 export interface IdValue {
   id: string;
   value: string;
@@ -638,16 +638,15 @@ export interface InverseKinematicsArgs {
   arm_id?: string;
 }
 
-/** The frame in whose axes a jog is given; the point that moves is always the end effector's. */
+/** The frame whose axes are used for jogging. The moving point is always the end effector. */
 export type JogFrame = "world" | "robot" | "tool" | "user";
 
 /**
  * Arguments of JogRobot: a velocity of the end effector (`linear` m/s, `angular` rad/s), or of joints (rad/s, m/s).
  *
- * hold: a number for this press of the button, larger than that of the one before; renewals carry the same.
- * sent_ms: when this was sent, by the sender's own steady clock; where it begins does not matter.
- * valid_ms: 1 to 300, for how long the velocity holds unless it is renewed; 0 lets go.
- * object_id, pose: for the frame `user`: an object of the scene, or a pose in the world.
+ * hold: number of this press of the button, larger than the previous one; renewals have the same number. sent_ms: time
+ * of sending by the sender's own steady clock with any origin. valid_ms: 1 to 300, duration of the velocity unless it
+ * is renewed; 0 ends it. object_id, pose: for the frame `user`, an object of the scene, or a pose in the world.
  */
 export interface JogRobotArgs {
   robot_id: string;
@@ -664,18 +663,18 @@ export interface JogRobotArgs {
   arm_id?: string;
 }
 
-/** What JogRobot answers: the fraction of the asked velocity that the robot was given, less than 1 where capped. */
+/** Answer to JogRobot: the fraction of the requested velocity that is used, less than 1 where it is limited. */
 export interface JogRobotData {
   scale: number;
 }
 
-/** A joint's value: rad, m where prismatic. */
+/** The value of a joint, rad, m where prismatic. */
 export interface Joint {
   name: string;
   value: number;
 }
 
-/** Arguments of ListCalibrations: at most so many, the newest ones before a date, of an object, of a kind. */
+/** Arguments of ListCalibrations: maximum number, latest date, object, kind. */
 export interface ListCalibrationsArgs {
   limit?: number;
   object_id?: string;
@@ -683,12 +682,12 @@ export interface ListCalibrationsArgs {
   before?: string;
 }
 
-/** What ListCalibrations answers: records, newest first. */
+/** Answer to ListCalibrations: records, newest first. */
 export interface ListCalibrationsData {
   records: CalibrationRecord[];
 }
 
-/** What ListProjects answers. */
+/** Answer to ListProjects. */
 export interface ListProjectsData {
   name: string;
   scene_id: string;
@@ -701,7 +700,7 @@ export interface ListProjectsData {
   problems?: string[];
 }
 
-/** Arguments of ListRuns: at most so many, the newest ones before that number, of a package or a project. */
+/** Arguments of ListRuns: maximum number, number before which runs are listed, package or project. */
 export interface ListRunsArgs {
   limit?: number;
   before?: number;
@@ -709,12 +708,12 @@ export interface ListRunsArgs {
   project_id?: string;
 }
 
-/** What ListRuns answers: runs, newest first. */
+/** Answer to ListRuns: runs, newest first. */
 export interface ListRunsData {
   runs: Run[];
 }
 
-/** What ListScenes answers. */
+/** Answer to ListScenes. */
 export interface ListScenesData {
   id: string;
   name: string;
@@ -724,13 +723,13 @@ export interface ListScenesData {
   problems?: string[];
 }
 
-/** What ObjectsLocked and ObjectsUnlocked carry. */
+/** Data of the events ObjectsLocked and ObjectsUnlocked. */
 export interface LockData {
   object_ids: string[];
   owner: string;
 }
 
-/** A user with locks. `left` is when the connection ended; left out while the user is connected. */
+/** A user with locks. `left` is the time of the disconnect; omitted while the user is connected. */
 export interface LockHolder {
   user: string;
   locks: HeldLock[];
@@ -763,7 +762,7 @@ export interface MarkersCornersArgs {
   image: string;
 }
 
-/** A mesh kept as an asset, with points by which a robot can be pointed at it. */
+/** A mesh stored as an asset, with focus points for aiming with a robot. */
 export interface Mesh {
   id: string;
   asset_id: string;
@@ -777,9 +776,10 @@ export type Model3dType = "None" | "Box" | "Cylinder" | "Sphere" | "Mesh";
 export type MoveEventType = "start" | "end" | "failed";
 
 /**
- * Where somebody drags an item just now, relative to its parent, as it would be stored.
+ * Pose of an item that a user is dragging, relative to its parent, as it would be stored.
  *
- * id: of an object, action point, orientation or joints. None of position, orientation, joints: it is over.
+ * id: id of an object, action point, orientation or joints. Without position, orientation and joints, dragging has
+ * ended.
  */
 export interface MovePreview {
   id: string;
@@ -788,7 +788,7 @@ export interface MovePreview {
   joints?: Joint[];
 }
 
-/** What the event MovePreview carries. */
+/** Data of the event MovePreview. */
 export interface MovePreviewData {
   id: string;
   position?: Position;
@@ -851,7 +851,7 @@ export interface NewSceneArgs {
   description?: string;
 }
 
-/** What the event Notification carries. */
+/** Data of the event Notification. */
 export interface NotificationData {
   message: string;
   level: NotificationLevel;
@@ -861,9 +861,9 @@ export interface NotificationData {
 export type NotificationLevel = "Info" | "Warn" | "Error";
 
 /**
- * One action of an object type; category, icon and former_names are ours, beside the protocol.
+ * One action of an object type; category, icon and former_names are not in ARCOR2.
  *
- * former_names: names under which older projects call it.
+ * former_names: names in older projects.
  */
 export interface ObjectAction {
   name: string;
@@ -884,7 +884,7 @@ export interface ObjectAimingAddPointArgs {
   point_idx: number;
 }
 
-/** What ObjectAimingAddPoint answers. */
+/** Answer to ObjectAimingAddPoint. */
 export interface ObjectAimingAddPointData {
   finished_indexes: number[];
 }
@@ -896,9 +896,9 @@ export interface ObjectAimingStartArgs {
 }
 
 /**
- * What the event ObjectHealth carries: condition, alarms and owner of control of an object in operation.
+ * Data of the event ObjectHealth: condition, alarms and owner of control of an object of the online scene.
  *
- * control_owner: "us", another's name, or left out when nobody has control.
+ * control_owner: "us", the name of another client, or omitted when nobody has control.
  */
 export interface ObjectHealthData {
   object_id: string;
@@ -917,9 +917,9 @@ export interface ObjectModel {
 }
 
 /**
- * What the event ObjectState carries: how the connection of an object of the scene or program in operation is.
+ * Data of the event ObjectState: the connection of an object of the online scene or the running program.
  *
- * reason: why it is lost or failed, or why all ended. overlaid: the settings that come from the server's cell file.
+ * reason: why it is lost or failed, or why all connections ended. overlaid: settings from the server's cell file.
  * answering: false while the process that controls the devices does not answer; `state` is then the last known one.
  */
 export interface ObjectStateData {
@@ -931,10 +931,10 @@ export interface ObjectStateData {
 }
 
 /**
- * What clients know of an object type; category, icon and shadows are ours, beside the protocol.
+ * Metadata of an object type; category, icon and shadows are not in ARCOR2.
  *
  * built_in: a base class or an installed type, which cannot be deleted. shadows: distribution and version of the
- * installed type of the same name that this uploaded one takes the place of.
+ * installed type of the same name that this uploaded type replaces.
  */
 export interface ObjectTypeMeta {
   type: string;
@@ -954,19 +954,19 @@ export interface ObjectTypeMeta {
   shadows?: string;
 }
 
-/** What the event OpenProject carries. */
+/** Data of the event OpenProject. */
 export interface OpenProjectData {
   scene: Scene;
   project: Project;
 }
 
-/** What the event OpenScene carries. */
+/** Data of the event OpenScene. */
 export interface OpenSceneData {
   scene: Scene;
 }
 
 /**
- * A unit quaternion x, y, z, w. It is normalised whenever it is constructed.
+ * A unit quaternion x, y, z, w, normalized at construction.
  *
  * Raises ValueError for the zero quaternion and for numbers that are not finite.
  */
@@ -977,7 +977,7 @@ export interface Orientation {
   w: number;
 }
 
-/** What the event PackageInfo carries. */
+/** Data of the event PackageInfo. */
 export interface PackageInfoData {
   package_id: string;
   package_name: string;
@@ -993,7 +993,7 @@ export interface PackageMeta {
   executed?: string;
 }
 
-/** What the event PackageState carries. */
+/** Data of the event PackageState. */
 export interface PackageStateData {
   state: PackageStateEnum;
   package_id?: string;
@@ -1009,7 +1009,7 @@ export interface PackageSummary {
   project_meta?: ProjectMeta;
 }
 
-/** `value` is a JSON document inside a string. */
+/** A named value; `value` is a JSON document in a string. */
 export interface Parameter {
   name: string;
   type: string;
@@ -1019,9 +1019,9 @@ export interface Parameter {
 /**
  * One parameter of an action or setting; `extra` and `default_value` are JSON in strings.
  *
- * former_names: names under which older projects give it (ours, beside the protocol).
- * secret: the value of this setting is stored by the server and never sent to clients.
- * address: whether this setting says where the device is; left out where its name decides.
+ * former_names (not in ARCOR2): names in older projects. secret: the value of this setting is stored by the server and
+ * never sent to clients. address: whether this setting contains the address of the device; omitted when its name
+ * decides.
  */
 export interface ParameterMeta {
   name: string;
@@ -1045,7 +1045,7 @@ export interface Pose {
   orientation: Orientation;
 }
 
-/** A point, or a displacement, in metres. */
+/** A point, or a displacement, m. */
 export interface Position {
   x: number;
   y: number;
@@ -1053,10 +1053,10 @@ export interface Position {
 }
 
 /**
- * What a user looks at and edits, as his client says.
+ * What a user views and edits, as reported by the client.
  *
- * document: id of the scene, project or package that he sees. selected, aimed, editing: ids in it. view: the screen
- * or view he is in, in his client's words. camera: from where he looks, in the world, as the frame of a camera.
+ * document: id of the viewed scene, project or package. selected, aimed, editing: ids in it. view: name of the screen
+ * or view. camera: camera pose in the world, as a camera frame.
  */
 export interface Presence {
   document: string;
@@ -1067,7 +1067,7 @@ export interface Presence {
   camera?: Pose;
 }
 
-/** What the event ProcessState carries. */
+/** Data of the event ProcessState. */
 export interface ProcessStateData {
   id: string;
   state: ProcessStateEnum;
@@ -1077,7 +1077,7 @@ export interface ProcessStateData {
 /** Values of StateEnum in ProcessState. */
 export type ProcessStateEnum = "started" | "finished" | "failed";
 
-/** A project with all that belongs to it. */
+/** A project with its content. */
 export interface Project {
   name: string;
   scene_id: string;
@@ -1102,7 +1102,7 @@ export interface ProjectBreakpoints {
   user?: string;
 }
 
-/** What the event ProjectException carries; action_id: in which action it was, beside the protocol. */
+/** Data of the event ProjectException; action_id (not in ARCOR2): the action that failed. */
 export interface ProjectExceptionData {
   message: string;
   type: string;
@@ -1145,7 +1145,7 @@ export interface ProjectParameter {
   id: string;
 }
 
-/** Joint values of one robot, kept at an action point; rad, m where prismatic. */
+/** Joint values of one robot, stored at an action point; rad, m where prismatic. */
 export interface ProjectRobotJoints {
   name: string;
   robot_id: string;
@@ -1162,10 +1162,10 @@ export interface Range {
   max: number;
 }
 
-/** Whether an end effector gets somewhere. */
+/** How an end effector reaches a pose. */
 export type Reach = "reachable" | "near_limit" | "in_collision" | "out_of_reach" | "unknown";
 
-/** Whether an end effector gets to an orientation or joints; `reason` is a sentence, where it does not. */
+/** How an end effector reaches an orientation or joints; `reason` is a sentence when it does not. */
 export interface ReachOfItem {
   id: string;
   reach: Reach;
@@ -1173,7 +1173,7 @@ export interface ReachOfItem {
 }
 
 /**
- * Arguments of Reachability: of which robot, arm and end effector, else of all; for which items, else for all.
+ * Arguments of Reachability: robot, arm and end effector, by default all; items, by default all.
  *
  * ids: orientations and joints of the open project.
  */
@@ -1185,10 +1185,10 @@ export interface ReachabilityArgs {
 }
 
 /**
- * What Reachability answers for each end effector, and the event ReachabilityChanged carries.
+ * Answer to Reachability for each end effector, and data of the event ReachabilityChanged.
  *
- * revision: of the document for which it holds. items: orientations and joints of the open project; in the event,
- * those that changed.
+ * revision: revision of the document for which it holds. items: orientations and joints of the open project; in the
+ * event, those that changed.
  */
 export interface ReachabilityData {
   robot_id: string;
@@ -1208,7 +1208,7 @@ export interface ReadUnlockArgs {
   object_id: string;
 }
 
-/** Arguments of Redo: which undo of the caller, else his latest one. */
+/** Arguments of Redo: the undo of the caller, by default the latest one. */
 export interface RedoArgs {
   number?: number;
 }
@@ -1225,7 +1225,7 @@ export interface RegisterUserArgs {
   user_name: string;
 }
 
-/** Arguments of RemoveAction. With `with_steps` the action is taken out of the logic first, by the same edit. */
+/** Arguments of RemoveAction. With `with_steps` the action is also removed from the logic, in the same edit. */
 export interface RemoveActionArgs {
   id: string;
   with_steps?: boolean;
@@ -1299,12 +1299,12 @@ export interface RenameProjectArgs {
   new_name: string;
 }
 
-/** Arguments of RestoreRevision: the document as it was after the edit of that number. */
+/** Arguments of RestoreRevision: the number of the edit after which the document is restored. */
 export interface RestoreRevisionArgs {
   revision: number;
 }
 
-/** What RestoreRevision answers: the revision there is now. */
+/** Answer to RestoreRevision: the new revision. */
 export interface RestoreRevisionData {
   revision: number;
 }
@@ -1321,7 +1321,7 @@ export interface RobotArg {
   arm_id?: string;
 }
 
-/** What the event RobotEef carries; `time_ms` (steady clock of the cell) where StreamRobot asked for it. */
+/** Data of the event RobotEef; `time_ms` (steady clock of the cell) is set when StreamRobot asked for it. */
 export interface RobotEefData {
   robot_id: string;
   end_effectors: EefPose[];
@@ -1331,7 +1331,7 @@ export interface RobotEefData {
 /** Values of RegisterEnum in RegisterForRobotEvent. */
 export type RobotEventKind = "eef_pose" | "joints";
 
-/** Which optional methods a robot type implements; the last three are ours, beside the protocol. */
+/** Optional methods that a robot type implements; the last three are not in ARCOR2. */
 export interface RobotFeatures {
   move_to_pose: boolean;
   move_to_joints: boolean;
@@ -1345,9 +1345,9 @@ export interface RobotFeatures {
 }
 
 /**
- * What the event RobotHold carries: a user took hold of a robot, or the hold has ended and the robot is at rest.
+ * Data of the event RobotHold: a user started to hold a robot, or the hold ended and the robot is at standstill.
  *
- * reason: why it ended, where the user did not simply let go.
+ * reason: why it ended, unless the user released the button.
  */
 export interface RobotHoldData {
   robot_id: string;
@@ -1358,14 +1358,14 @@ export interface RobotHoldData {
   arm_id?: string;
 }
 
-/** What the event RobotJoints carries; `time_ms` as in RobotEef. */
+/** Data of the event RobotJoints; `time_ms` as in RobotEef. */
 export interface RobotJointsData {
   robot_id: string;
   joints: Joint[];
   time_ms?: number;
 }
 
-/** What clients know of a robot type. */
+/** Metadata of a robot type. */
 export interface RobotMeta {
   type: string;
   robot_type: RobotType;
@@ -1374,7 +1374,7 @@ export interface RobotMeta {
   urdf_package_filename?: string;
 }
 
-/** What the event RobotMoveToActionPointJoints carries. */
+/** Data of the event RobotMoveToActionPointJoints. */
 export interface RobotMoveToActionPointJointsData {
   move_event_type: MoveEventType;
   robot_id: string;
@@ -1384,7 +1384,7 @@ export interface RobotMoveToActionPointJointsData {
   arm_id?: string;
 }
 
-/** What the event RobotMoveToActionPointOrientation carries. */
+/** Data of the event RobotMoveToActionPointOrientation. */
 export interface RobotMoveToActionPointOrientationData {
   move_event_type: MoveEventType;
   robot_id: string;
@@ -1396,7 +1396,7 @@ export interface RobotMoveToActionPointOrientationData {
   arm_id?: string;
 }
 
-/** What the event RobotMoveToJoints carries. */
+/** Data of the event RobotMoveToJoints. */
 export interface RobotMoveToJointsData {
   move_event_type: MoveEventType;
   robot_id: string;
@@ -1406,7 +1406,7 @@ export interface RobotMoveToJointsData {
   arm_id?: string;
 }
 
-/** What the event RobotMoveToPose carries. */
+/** Data of the event RobotMoveToPose. */
 export interface RobotMoveToPoseData {
   move_event_type: MoveEventType;
   robot_id: string;
@@ -1418,15 +1418,15 @@ export interface RobotMoveToPoseData {
   arm_id?: string;
 }
 
-/** Kinds of arm. */
+/** Types of robot. */
 export type RobotType = "articulated" | "cartesian" | "scara";
 
 /**
  * One run of a package.
  *
- * project_modified: of the project that was built, which says its revision. temporary: run from the editor, its
- * package is gone. started_by, stopped_by: a user's or token's name. actions: how many were begun. last_action: what
- * it was in when it ended. error: what ended it, as ProjectException has it.
+ * project_modified: modification time of the built project, which identifies its revision. temporary: run from the
+ * editor; its package is deleted. started_by, stopped_by: name of a user or token. actions: number of started actions.
+ * last_action: action that was active at the end. error: error that ended the run, as in ProjectException.
  */
 export interface Run {
   number: number;
@@ -1448,13 +1448,13 @@ export interface Run {
   error_type?: string;
 }
 
-/** How a run ended: as meant, by somebody, by an error, or with the server or its host. */
+/** How a run ended: completed, stopped by a user, by an error, or with the server or its host. */
 export type RunEnd = "running" | "finished" | "stopped" | "failed" | "lost";
 
 /**
  * Arguments of RunPackage.
  *
- * shared_breakpoints: beside `breakpoints`, those that the project has (SetBreakpoints).
+ * shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
  */
 export interface RunPackageArgs {
   id: string;
@@ -1483,13 +1483,13 @@ export interface SceneObject {
   id: string;
 }
 
-/** Settings of one scene object that a project replaces. */
+/** Settings of one scene object that a project overrides. */
 export interface SceneObjectOverride {
   id: string;
   parameters: Parameter[];
 }
 
-/** What the event SceneState carries. */
+/** Data of the event SceneState. */
 export interface SceneStateData {
   state: SceneStateEnum;
   message?: string;
@@ -1498,7 +1498,7 @@ export interface SceneStateData {
 /** Values of StateEnum in SceneState. */
 export type SceneStateEnum = "stopped" | "starting" | "started" | "stopping";
 
-/** Arguments of SetBreakpoints: ids of action points and actions of a project, else of the open one. */
+/** Arguments of SetBreakpoints: ids of action points and actions, and the project, by default the open one. */
 export interface SetBreakpointsArgs {
   add?: string[];
   remove?: string[];
@@ -1515,22 +1515,22 @@ export interface SetEefPerpendicularToWorldArgs {
   arm_id?: string;
 }
 
-/** Arguments of SetViewState: values by their keys; null takes one away, those that are not named stay. */
+/** Arguments of SetViewState: values by key; null removes a value, other keys are unchanged. */
 export interface SetViewStateArgs {
   scope: ViewScope;
   values: Record<string, unknown>;
   document?: string;
 }
 
-/** What SetViewState answers: the revision of the view state that there is now. */
+/** Answer to SetViewState: the new revision of the view state. */
 export interface SetViewStateData {
   revision: number;
 }
 
-/** How bad an alarm is. */
+/** Severity of an alarm. */
 export type Severity = "info" | "warning" | "error" | "critical";
 
-/** What the event ShowMainScreen carries. */
+/** Data of the event ShowMainScreen. */
 export interface ShowMainScreenData {
   what: MainScreen;
   highlight?: string;
@@ -1566,7 +1566,7 @@ export interface StepRobotEefArgs {
 /** Values of What in StepRobotEef. */
 export type StepWhat = "position" | "orientation";
 
-/** Answer of StopAll: an outcome for everything to which a stop was sent, or which cannot be stopped. */
+/** Answer to StopAll: the result for everything that was stopped, or cannot be stopped. */
 export interface StopAllData {
   outcomes: StopOutcome[];
 }
@@ -1575,7 +1575,7 @@ export interface StopAllData {
 export type StopKind = "device" | "action" | "program";
 
 /**
- * The result of StopAll for one device, the action that is being tried, or the program.
+ * The result of StopAll for one device, the action being executed, or the program.
  *
  * id, name: of the scene object, the action or the package. reason: why it was not stopped.
  */
@@ -1592,7 +1592,7 @@ export interface StopRobotArgs {
   robot_id: string;
 }
 
-/** Arguments of StreamRobot: RobotJoints or RobotEef of a robot, 1 to 30 times a second, or no longer. */
+/** Arguments of StreamRobot: RobotJoints or RobotEef of a robot, 1 to 30 times per second, or off. */
 export interface StreamRobotArgs {
   robot_id: string;
   what: RobotEventKind;
@@ -1601,9 +1601,9 @@ export interface StreamRobotArgs {
 }
 
 /**
- * Arguments of SubscribeEvents: names of additional events, to be sent to this client or no longer.
+ * Arguments of SubscribeEvents: names of additional events to subscribe to, or to unsubscribe from.
  *
- * users: whose view state ViewStateChanged tells, beside that of the user who is logged in here.
+ * users: users whose view states are sent with ViewStateChanged, in addition to the user of this connection.
  */
 export interface SubscribeEventsArgs {
   events: string[];
@@ -1611,7 +1611,7 @@ export interface SubscribeEventsArgs {
   users?: string[];
 }
 
-/** What SystemInfo answers. */
+/** Answer to SystemInfo. */
 export interface SystemInfoData {
   version: string;
   api_version: string;
@@ -1619,27 +1619,27 @@ export interface SystemInfoData {
   supported_rpc_requests: string[];
 }
 
-/** Arguments of TakeOverLocks: a user who left. */
+/** Arguments of TakeOverLocks: a disconnected user. */
 export interface TakeOverLocksArgs {
   user: string;
 }
 
-/** What TakeOverLocks answers: the locks that were released. */
+/** Answer to TakeOverLocks: the released locks. */
 export interface TakeOverLocksData {
   locks: HeldLock[];
 }
 
-/** What kind of work takes its time. */
+/** Kind of a task. */
 export type TaskKind = "scene_start" | "scene_stop" | "build" | "calibration" | "upload" | "download" | "computation";
 
-/** How a task stands. */
+/** Progress of a task. */
 export type TaskProgress = "running" | "finished" | "failed" | "cancelled";
 
 /**
- * What the event TaskState carries.
+ * Data of the event TaskState.
  *
- * title: a sentence for people. started_by: a user's or token's name, left out where nobody asked for it.
- * progress: 0..1, left out where it is not known. message: what is being done, or why it failed.
+ * title: sentence for users. started_by: name of a user or token, omitted when it was started automatically. progress:
+ * 0 to 1, omitted when unknown. message: present activity, or reason of the failure.
  */
 export interface TaskStateData {
   id: string;
@@ -1655,7 +1655,7 @@ export interface TaskStateData {
 /**
  * Arguments of TemporaryPackage.
  *
- * shared_breakpoints: beside `breakpoints`, those that the project has (SetBreakpoints).
+ * shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
  */
 export interface TemporaryPackageArgs {
   start_paused?: boolean;
@@ -1664,11 +1664,11 @@ export interface TemporaryPackageArgs {
 }
 
 /**
- * One action of a run, from its end: what went in, what came out, how long it took.
+ * One action of a run with its parameters, results and duration.
  *
- * number: counts the actions of the run from 1, in the order in which they were announced. started: when that was.
- * duration: s, without a pause before it; left out while it runs. parameters, results: as in ActionStateBefore and
- * ActionStateAfter. error: why it failed. thread_id: left out in the script's main thread.
+ * number: number of the action in the run from 1, in the order of their start. started: time of the start. duration:
+ * s, without a pause before it; omitted while it runs. parameters, results: as in ActionStateBefore and
+ * ActionStateAfter. error: why it failed. thread_id: omitted in the main thread of the script.
  */
 export interface TraceEntry {
   run: number;
@@ -1688,12 +1688,12 @@ export interface TypeArgs {
   type: string;
 }
 
-/** Arguments of Undo: which edit of the caller, else his latest one in force. */
+/** Arguments of Undo: the edit of the caller, by default the latest one in effect. */
 export interface UndoArgs {
   number?: number;
 }
 
-/** What Undo and Redo answer: the edit that was taken back, what had made it, and the revision there is now. */
+/** Answer to Undo and Redo: the reverted edit, the request that made it, and the new revision. */
 export interface UndoData {
   number: number;
   request: string;
@@ -1824,7 +1824,7 @@ export interface UploadPackageArgs {
   data: string;
 }
 
-/** What the event UserPresence carries; without `presence` the user's client has not said anything yet. */
+/** Data of the event UserPresence; without `presence` the client of the user has not reported any yet. */
 export interface UserPresenceData {
   user: string;
   online: boolean;
@@ -1832,14 +1832,14 @@ export interface UserPresenceData {
   presence?: Presence;
 }
 
-/** Whose a part of the view state is. */
+/** Scope of a part of the view state. */
 export type ViewScope = "user" | "shared";
 
 /**
- * The view state of a document, or what of it was changed: there, null stands for a value that went.
+ * The view state of a document, or a change of it, in which null is a removed value.
  *
- * document: id of a scene, project or package; empty: of none. user: whose, with scope user. revision: grows with
- * every change, so that an answer and an event can be put in order.
+ * document: id of a scene, project or package; empty: none. user: the user, with scope user. revision: grows with
+ * every change, so that answers and events can be ordered.
  */
 export interface ViewState {
   scope: ViewScope;
