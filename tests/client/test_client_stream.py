@@ -91,5 +91,5 @@ async def test_why_it_ended_is_raised_after_what_still_waits() -> None:
 
 
 def test_a_stream_without_room_makes_no_sense() -> None:
-    with pytest.raises(ValueError, match="room"):
+    with pytest.raises(ValueError, match="limit of at least one"):
         stream(limit=0)

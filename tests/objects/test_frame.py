@@ -61,5 +61,5 @@ def test_a_depth_picture_keeps_its_note_on_the_wire() -> None:
     with pytest.raises(InvalidData, match="has no note on how it was taken"):
         PictureNote.of(Image.fromarray(depth))
     back.info["arcor2_view"] = "{}"
-    with pytest.raises(InvalidData, match="not readable"):
+    with pytest.raises(InvalidData, match="taken is invalid"):
         PictureNote.of(back)

@@ -103,7 +103,7 @@ def test_an_object_of_the_scene_moves_with_the_tool(arm: Any, around: Around, cl
     around.things[-1].pose.orientation = board.pose.orientation
     with pytest.raises(NotFound, match="no object lid"):
         claw.set_part_object("lid")
-    with pytest.raises(NotFound, match="plain: it is no collision object"):
+    with pytest.raises(NotFound, match="plain: the scene has no collision object"):
         claw.set_part_object("plain")
     claw.set_part_object("board")
     claw.grip(0.0, 1.0, 1.0)
