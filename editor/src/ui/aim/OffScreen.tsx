@@ -27,7 +27,15 @@ export function OffScreen({ engine }: { engine: Engine }) {
       button.current.style.setProperty("--turned", `${Math.round(angle)}deg`);
     };
     look();
-    return engine.watch(look);
+    const end = engine.watch(look);
+    // A new size is drawn some frames later: until then the arrow would be beyond the edge.
+    const resized = new ResizeObserver(look);
+    const around = button.current?.closest(".view");
+    if (around) resized.observe(around);
+    return () => {
+      resized.disconnect();
+      end();
+    };
   }, [engine, id, away]);
   if (!away) return null;
   return (
