@@ -2,11 +2,10 @@
   // What is wrong with where things are: too small to be touched, covered, off the screen, overlapping.
   const faults = [];
   const shown = (element) => {
-    const style = getComputedStyle(element);
     const box = element.getBoundingClientRect();
     return (
-      style.visibility !== "hidden" &&
-      style.display !== "none" &&
+      // False in a closed <details>, too, whose content has a box.
+      element.checkVisibility({ visibilityProperty: true }) &&
       box.width > 1 &&
       box.height > 1 &&
       !element.closest(".hidden-but-read") &&
