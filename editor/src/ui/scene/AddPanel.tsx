@@ -77,6 +77,11 @@ export default function AddPanel() {
                       <span className={`small ${each.disabled ? "error" : "quiet"}`}>
                         {each.disabled ? each.problem : first(each.description)}
                       </span>
+                      {each.shadows && (
+                        <span className="small">
+                          replaces the installed type {each.type} ({each.shadows})
+                        </span>
+                      )}
                     </span>
                   </button>
                 </li>
