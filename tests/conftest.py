@@ -16,32 +16,23 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if config.getoption("once_more"):
         _keep_what_failed(config, items)
     elif hasattr(config, "workerinput"):
-        items[:] = _spread(items)
+        items[:] = _in_order(items)
 
 
 TIMED = ("tests/drivers/", "tests/fakes/", "tests/objects/", "tests/runtime/", "tests/testing/", "tests/e2e/")
 HEAVY = "tests/editor/"
 
 
-def _spread(items: list[pytest.Item]) -> list[pytest.Item]:
-    """Put first what keeps times of a tenth of a second; spread the browsers over the others, none of them last."""
-    first = [each for each in items if each.nodeid.startswith(TIMED)]
-    modules: dict[str, list[pytest.Item]] = {}
-    others = []
-    for each in items:
-        if each.nodeid.startswith(HEAVY):
-            modules.setdefault(each.nodeid.partition("::")[0], []).append(each)
-        elif not each.nodeid.startswith(TIMED):
-            others.append(each)
-    spread: list[pytest.Item] = []
-    done = 0
-    for number, module in enumerate(modules.values()):
-        until = len(others) * number // (len(modules) + 3)
-        while 0 < until < len(others) and _scope(others[until].nodeid) == _scope(others[until - 1].nodeid):
-            until += 1
-        spread += others[done:until] + module
-        done = until
-    return first + spread + others[done:]
+def _in_order(items: list[pytest.Item]) -> list[pytest.Item]:
+    """Put tests that depend on tenths of a second first, then the browser tests, so that none of these comes last.
+
+    The browser tests stay together: their browser, server and fakes run as long as a worker runs browser tests.
+    """
+
+    def place(item: pytest.Item) -> int:
+        return 0 if item.nodeid.startswith(TIMED) else 1 if item.nodeid.startswith(HEAVY) else 2
+
+    return sorted(items, key=place)
 
 
 def _scope(nodeid: str) -> str:

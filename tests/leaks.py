@@ -5,11 +5,12 @@ meanwhile; everything else must be gone, at the latest GRACE seconds after the t
 """
 
 import asyncio
+import contextlib
 import gc
 import inspect
 import threading
 import time
-from collections.abc import AsyncIterator, Generator
+from collections.abc import AsyncIterator, Generator, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -80,8 +81,15 @@ def pytest_fixture_setup(fixturedef: Any) -> Generator[None, object, object]:
     """Allow what a fixture of module, class, package or session scope brings up."""
     if fixturedef.scope == "function":
         return (yield)
+    with outliving_the_test():
+        return (yield)
+
+
+@contextlib.contextmanager
+def outliving_the_test() -> Iterator[None]:
+    """Allow what is started inside to outlive the test: a part of a fixture of wider scope that is started again."""
     before = Holdings.now()
-    result = yield
+    yield
     after = Holdings.now()
     _allowed.add(
         Holdings(
@@ -90,7 +98,6 @@ def pytest_fixture_setup(fixturedef: Any) -> Generator[None, object, object]:
             after.sockets - before.sockets,
         )
     )
-    return result
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)

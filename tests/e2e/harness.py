@@ -8,6 +8,7 @@ import time
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import msgspec
 import psutil
@@ -20,6 +21,7 @@ from arcor2_hw.data.scene import Scene
 from arcor2_server.demo.fakes import free_loopback_address
 from arcor2_server.demo.processes import Child, python_module
 from arcor2_server.demo.workplace import Creation, Scalar, Workplace, load
+from tests.leaks import outliving_the_test
 
 WORKPLACE = Path(__file__).parent / "workplace" / "three_devices.toml"
 
@@ -88,6 +90,24 @@ class Cell:
             python_module("arcor2_server.cli.main", "serve", "--port", str(port), "--data-dir", str(self.data_dir)),
         )
 
+    async def restart_server(self) -> None:
+        """Start the server again, which was killed, on the same port and data directory."""
+        with outliving_the_test():
+            await self.start_server(urlsplit(self.url).port or 0)
+
+    async def renew_server(self) -> None:
+        """End the server if it runs, and start it on an empty data directory."""
+        await self.children["server"].stop()
+        self.data_dir = self.directory / f"data-{len(list(self.directory.glob('data*')))}"
+        with outliving_the_test():
+            await self.start_server()
+
+    async def renew_robot(self) -> None:
+        """Start the simulated robot again, at the same address."""
+        await self.children["robot"].stop()
+        with outliving_the_test():
+            await self.start_robot()
+
     async def kill(self, name: str) -> None:
         """End a process as a power cut would."""
         process = self.children[name]._process
@@ -105,15 +125,18 @@ class Cell:
             return sorted(found, key=lambda p: p.create_time())
         return []
 
-    async def stop(self) -> None:
+    async def close_clients(self) -> None:
         await self._exit.aclose()
+
+    async def stop(self) -> None:
+        await self.close_clients()
         # The server first, which holds the devices; the world before the fakes that it follows.
         for name in sorted(self.children, key=lambda name: {"server": 0, "world": 1}.get(name, 2)):
             await self.children[name].stop()
 
     # ------------------------------------------------------------------------------------------------ hands
     async def client(self, name: str) -> Client:
-        """A connected, registered client that is closed with the cell."""
+        """A connected, registered client that is closed with the cell, or by `close_clients`."""
         return await self._exit.enter_async_context(Client(self.url, name, reconnect=False))
 
     async def tell(self, name: str, do: str, **arguments: Any) -> Any:

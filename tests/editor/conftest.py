@@ -1,4 +1,4 @@
-"""The whole workplace and a browser, one of each per module."""
+"""One browser, one server and one set of fakes per worker; each test gets an empty workplace with healthy devices."""
 
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -9,6 +9,7 @@ from playwright.async_api import Browser
 
 from arcor2_server.web.editor import FILES
 from tests.e2e.harness import Cell, running_cell
+from tests.editor.reset import reset
 from tests.editor.screen import running_browser
 
 
@@ -18,14 +19,31 @@ def built_editor() -> Path:
     return FILES
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def cell(tmp_path_factory: pytest.TempPathFactory, built_editor: Path) -> AsyncIterator[Cell]:
-    """Fakes and server of the workplace of three devices."""
+@pytest_asyncio.fixture(scope="package", loop_scope="session")
+async def browser() -> AsyncIterator[Browser]:
+    """The browser of this worker while it runs editor tests. Every screen gets a browser context of its own."""
+    async with running_browser(behind=True) as running:
+        yield running
+
+
+@pytest_asyncio.fixture(scope="package", loop_scope="session")
+async def shared_cell(tmp_path_factory: pytest.TempPathFactory, built_editor: Path) -> AsyncIterator[Cell]:
+    """The server and the fakes of this worker while it runs editor tests, as the previous test left them."""
     async with running_cell(tmp_path_factory.mktemp("cell")) as running:
         yield running
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def browser() -> AsyncIterator[Browser]:
-    async with running_browser(behind=True) as running:
-        yield running
+@pytest_asyncio.fixture(loop_scope="session")
+async def cell(shared_cell: Cell) -> AsyncIterator[Cell]:
+    """The shared workplace, reset for this test. Its clients are closed afterwards."""
+    await reset(shared_cell)
+    yield shared_cell
+    await shared_cell.close_clients()
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="session")
+async def module_cell(shared_cell: Cell) -> AsyncIterator[Cell]:
+    """The shared workplace, reset once for a module whose tests share an open document."""
+    await reset(shared_cell)
+    yield shared_cell
+    await shared_cell.close_clients()

@@ -1,6 +1,6 @@
-"""Takes the pictures of the documentation anew, from the demo workplace in a fixed state.
+"""Take the pictures of the documentation from the demo workplace in a fixed state.
 
-`python -m tests.editor.pictures [DIRECTORY]` writes `editor-*.png` into docs/pictures, or where it is told.
+`python -m tests.editor.pictures [DIRECTORY]` writes `editor-*.png` into docs/pictures or the directory.
 """
 
 import asyncio
@@ -14,6 +14,7 @@ from playwright.async_api import Browser
 
 from tests.demo.running import Run, demo
 from tests.e2e.harness import until
+from tests.editor import texts
 from tests.editor.screen import Screen, running_browser, screen_of
 
 SEED: Final = 3
@@ -21,17 +22,17 @@ SEED: Final = 3
 
 async def _come_in(screen: Screen) -> None:
     await screen.page.goto(f"{screen.url}/?q=high")
-    await screen.page.get_by_label("Your name").fill("Ada")
-    await screen.press("Join")
+    await screen.page.get_by_label(texts.YOUR_NAME).fill("Ada")
+    await screen.press(texts.JOIN)
     shows = "() => document.querySelector('.home') ? 'home' : window.__engine?.ids().length > 20 && 'workplace'"
     if await screen.until(shows) == "home":
-        await screen.page.get_by_role("radio", name="Projects").click()
+        await screen.page.get_by_role("radio", name=texts.PROJECTS).click()
         await screen.page.get_by_role("button", name=re.compile("^Open ")).first.click()
         await screen.until("() => window.__engine?.ids().length > 20")
 
 
 async def _rest(screen: Screen) -> None:
-    """Wait until everything is loaded and nothing is drawn any more."""
+    """Wait until everything is loaded and drawn."""
     await screen.until(
         """() => {
             const now = performance.now(), last = window.lastDrawn;
@@ -53,17 +54,17 @@ async def _tablet(browser: Browser, run: Run, to: Path) -> None:
             (to / f"editor-{name}.png").write_bytes(await page.screenshot())
 
         await _come_in(screen)
-        await screen.press("Go online")
-        await page.get_by_role("button", name="Stop motion").wait_for(timeout=60_000)
+        await screen.press(texts.GO_ONLINE)
+        await page.get_by_role("button", name=texts.STOP_MOTION).wait_for(timeout=60_000)
         await screen.until("() => __engine.ids().some((id) => __engine.item(id).endEffectors?.length)")
         await take("workplace")
         tools = page.get_by_role("navigation")
-        await tools.get_by_role("button", name="Robot", exact=True).click()
-        await page.get_by_role("complementary").get_by_text("Hold to move").wait_for()
+        await tools.get_by_role("button", name=texts.ROBOT, exact=True).click()
+        await page.get_by_role("complementary").get_by_text(texts.HOLD_TO_MOVE).wait_for()
         await take("teach")
         await page.get_by_role("radio", name="Both", exact=True).click()
-        await tools.get_by_role("button", name="Program", exact=True).click()
-        await page.get_by_role("region", name="The program as a graph").wait_for()
+        await tools.get_by_role("button", name=texts.PROGRAM, exact=True).click()
+        await page.get_by_role("region", name=texts.GRAPH).wait_for()
         await take("program")
 
 
@@ -72,10 +73,10 @@ async def _lists(browser: Browser, run: Run, to: Path) -> None:
     assert at is not None
     async with screen_of(browser, at["url"]) as screen:
         await _come_in(screen)
-        await screen.page.get_by_role("button", name="Online. Press to go offline").click()
-        await screen.page.get_by_role("button", name="Go online").wait_for()
-        await screen.press("Close, and go to the lists")
-        await screen.page.get_by_role("radio", name="Projects").click()
+        await screen.page.get_by_role("button", name=texts.GO_OFFLINE).click()
+        await screen.page.get_by_role("button", name=texts.GO_ONLINE).wait_for()
+        await screen.press(texts.CLOSE_DOCUMENT)
+        await screen.page.get_by_role("radio", name=texts.PROJECTS).click()
         await screen.page.get_by_role("button", name=re.compile("^Open ")).first.wait_for()
         await screen.settle()
         (to / "editor-home.png").write_bytes(await screen.page.screenshot())
@@ -88,13 +89,13 @@ async def _phone(browser: Browser, run: Run, to: Path) -> None:
         await screen.join("Ben")
         await screen.until("() => window.__engine?.ids().length > 20")
         tools = screen.page.get_by_role("navigation")
-        await tools.get_by_role("button", name="Points", exact=True).click()
+        await tools.get_by_role("button", name=texts.POINTS, exact=True).click()
         await _rest(screen)
         (to / "editor-phone.png").write_bytes(await screen.page.screenshot())
 
 
 async def main(to: Path) -> None:
-    """Bring up the demo, wait until its program has run, take the pictures."""
+    """Start the demo, wait until its program has run, and take the pictures."""
     to.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="arcor2-hw-pictures-") as name:
         async with demo(Path(name), "--boards", "1", "--seed", str(SEED)) as run, running_browser() as browser:

@@ -1,9 +1,11 @@
-"""Hands for tests of the program: the project open, one person at the screen, a colleague at the protocol."""
+"""For tests of the program: a project open on a screen, and a second client that uses the protocol."""
 
+import contextlib
 import re
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from playwright.async_api import Browser, Locator
@@ -15,19 +17,22 @@ from arcor2_hw.data.events import Event
 from arcor2_hw.data.project import Action, ActionParameter, Flow, FlowTypes, Project
 from arcor2_hw.data.scene import Scene
 from tests.e2e.harness import Cell, until
-from tests.editor.screen import SEEN_WITHIN, Screen, screen_of
+from tests.editor import texts
+from tests.editor.screen import SEEN_WITHIN, VIEWPORTS, Screen, screen_of
 
 
 @dataclass
 class Work:
-    """`taps` counts what `tap_button` and `tap_in_graph` did."""
+    """A project on a screen, and a second client, "colleague". `taps` counts what `tool` and `tap_button` did."""
 
     cell: Cell
     client: Client
     scene: Scene
+    original: Project
     project: Project
     screen: Screen
     taps: int = 0
+    copies: int = 0
 
     def object(self, name: str) -> str:
         return next(each.id for each in self.scene.objects if each.name == name)
@@ -42,8 +47,44 @@ class Work:
     def panel(self) -> Locator:
         return self.screen.page.get_by_role("complementary")
 
+    async def start(self) -> None:
+        """Open a fresh copy of the project, with the screen as every test finds it: offline, 3D view, panels closed."""
+        await self.screen.page.set_viewport_size(VIEWPORTS["tablet"])  # type: ignore[arg-type]
+        self.copies += 1
+        name = f"{self.original.name} {self.copies}"
+        await self.client.copy_project(source_id=self.original.id, target_name=name)
+        copy = next(each for each in await self.client.list_projects() if each.name == name)
+
+        async def opened() -> bool:
+            """Stop and close what a test has left, and open the copy."""
+            for request in (
+                self.client.stop_package,
+                self.client.stop_scene,
+                partial(self.client.close_project, force=True),
+                partial(self.client.open_project, copy.id),
+            ):
+                with contextlib.suppress(RequestFailed):
+                    await request()
+            return await self._open_id() == copy.id
+
+        await until(opened, f"{name} is open", 30)
+        # Events of earlier tests are dropped with this.
+        await self.told("OpenProject", lambda event: event.data.project.id == copy.id)
+        self.project = await self.client.get_project(copy.id)
+        await self.screen.page.get_by_role("heading", name=name, exact=True).wait_for()
+        await self.screen.item(self.project.action_points[0].id)
+        await self.screen.close_panels()
+        await self.mode("3D")
+        self.taps = 0
+
+    async def _open_id(self) -> str:
+        """The id of the open project, as a client that connects now is told."""
+        async with Client(self.cell.url, "observer", reconnect=False) as observer:
+            event = await observer.next_event("OpenProject", "OpenScene", "ShowMainScreen", timeout=10)
+            return str(event.data.project.id) if event.event == "OpenProject" else ""
+
     async def tool(self, name: str) -> None:
-        """Open a tool of the rail, unless it is open; one tap."""
+        """Open a tool of the rail unless it is open; counts as one tap."""
         self.taps += 1
         button = self.screen.page.get_by_role("navigation").get_by_role("button", name=name, exact=True)
         if await button.get_attribute("aria-pressed") != "true":
@@ -57,21 +98,21 @@ class Work:
         await self.screen.page.get_by_role("radio", name=re.compile(rf"^{name}( \d+)?$")).click()
 
     async def select(self, name: str) -> None:
-        """Choose an action, from the list of actions."""
-        await self.tool("Program")
+        """Select an action in the list of actions."""
+        await self.tool(texts.PROGRAM)
         await self.mode("Actions")
         await self.panel.locator(".step-name").get_by_text(name, exact=True).click()
         await self.panel.get_by_role("heading", name=name, exact=True).wait_for()
 
     async def told(self, name: str, wanted: Any = lambda event: True) -> Event:
-        """The next event of that name for which `wanted` holds, as the colleague is told it."""
+        """Return the next event of that name that is wanted, as the second client receives it."""
         while True:
             event = await self.client.next_event(name, timeout=SEEN_WITHIN)
             if wanted(event):
                 return event
 
     async def add(self, name: str, kind: str, point: str, *results: str, **values: ActionParameter) -> str:
-        """Add an action by the protocol; `kind` is `<object>/<action>`, `results` what its results are called."""
+        """Add an action by the protocol. `kind` is `<object>/<action>`, `results` are names of its results."""
         owner, _, method = kind.partition("/")
         flows, parameters = [Flow(FlowTypes.DEFAULT, list(results))], list(values.values())
         args = rpc.AddActionArgs(self.point(point), name, f"{self.object(owner)}/{method}", parameters, flows)
@@ -81,7 +122,7 @@ class Work:
         return added_id
 
     async def saved(self) -> Project:
-        """The project as the server has it."""
+        """Save the project and return it."""
         await until(self._saved, "nobody holds anything, so that the project can be saved")
         stored: Project = await self.client.call("GetProject", rpc.IdArgs(self.project.id))
         return stored
@@ -89,14 +130,14 @@ class Work:
     async def _saved(self) -> bool:
         try:
             await self.client.call("SaveProject")
-        except LockedByOther:  # the screen has not given its lock back yet
+        except LockedByOther:  # the screen still holds its lock
             return False
         except RequestFailed as refused:
             return "no changes to save" in str(refused)
         return True
 
     async def parameters(self, action_id: str) -> dict[str, ActionParameter]:
-        """What the server knows that an action is told."""
+        """Return the stored parameters of an action."""
         stored = await self.saved()
         actions = (action for point in stored.action_points for action in point.actions)
         return {each.name: each for each in next(one for one in actions if one.id == action_id).parameters}
@@ -104,7 +145,7 @@ class Work:
 
 @asynccontextmanager
 async def at_work(cell: Cell, browser: Browser, *extra: tuple[str, str]) -> AsyncIterator[Work]:
-    """The project open on a screen; `extra` are names and types of objects that the scene gets besides."""
+    """The project open on a screen. `extra` are names and types of objects to add to the scene."""
     client = await cell.client("colleague")
     scene, project = await cell.open(client)
     await client.call("CloseProject")
@@ -119,4 +160,4 @@ async def at_work(cell: Cell, browser: Browser, *extra: tuple[str, str]) -> Asyn
     async with screen_of(browser, cell.url, touch=True) as screen:
         await screen.join("Eva")
         await screen.item("START")
-        yield Work(cell, client, scene, project, screen)
+        yield Work(cell, client, scene, project, project, screen)

@@ -1,14 +1,17 @@
-"""A person at a browser: Chromium on the real server's page, what stands on the screen, and what is wrong with it."""
+"""A user at a browser: Chromium with the server's page, what it shows, and its layout faults."""
 
 import contextlib
 import os
 import shutil
+from base64 import b64encode
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any, Final
 
 from playwright.async_api import Browser, ConsoleMessage, Error, Page, async_playwright, expect
+
+from tests.editor import texts
 
 ARGUMENTS: Final = [
     "--no-sandbox",  # containers seldom allow one
@@ -25,15 +28,23 @@ VIEWPORTS: Final = {
     "phone": {"width": 390, "height": 844},
 }
 PICTURES: Final = os.environ.get("ARCOR2_HW_PICTURES")
-"""Directory into which `Screen.picture` writes, for somebody who wants to look; none: nowhere."""
+"""Directory for the screenshots of `Screen.picture`. Unset: none are taken."""
 SEEN_WITHIN: Final = 30.0
-"""Seconds for something to be on the screen: software rendering on a busy machine is slow."""
+"""Timeout for something to appear on the screen, s. Software rendering on a busy machine is slow."""
 SMALLEST: Final = 44
-"""CSS pixels of the smaller side of what is touched."""
+"""Smallest side of a control, CSS pixels."""
+USERS: Final = set[str]()
+"""Names of the users who have joined since the workplace was reset."""
 
+FONTS: Final = {"narrow": "62%", "wide": "125%"}
+"""Two fonts for layout tests, by their width: narrower and wider than the usual fonts of machines."""
+
+_NODE_MODULES: Final = Path(__file__).resolve().parents[2] / "editor" / "node_modules"
+_ARCHIVO: Final = _NODE_MODULES / "@fontsource-variable" / "archivo" / "files" / "archivo-latin-wdth-normal.woff2"
+_FONT: Final = Path(__file__).with_name("font.js").read_text()
 _BEHIND: Final = Path(__file__).with_name("behind.sh")
 _LAYOUT: Final = Path(__file__).with_name("layout.js").read_text()
-_AXE: Final = Path(__file__).resolve().parents[2] / "editor" / "node_modules" / "axe-core" / "axe.min.js"
+_AXE: Final = _NODE_MODULES / "axe-core" / "axe.min.js"
 _RULES: Final = """async () => {
   const tags = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"];
   const { violations } = await axe.run(document, { runOnly: tags, resultTypes: ["violations"] });
@@ -52,7 +63,7 @@ def chromium() -> str:
 
 @asynccontextmanager
 async def running_browser(*, behind: bool = False) -> AsyncIterator[Browser]:
-    """Chromium; `behind`: what it draws in software waits for others that are at work."""
+    """Run Chromium. `behind`: with a low priority, so that software rendering does not delay drivers and fakes."""
     async with async_playwright() as playwright:
         path = _BEHIND if behind else chromium()
         browser = await playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
@@ -63,7 +74,7 @@ async def running_browser(*, behind: bool = False) -> AsyncIterator[Browser]:
 
 
 class Screen:
-    """One page. `errors` are what the page reported; a test ends by looking that there are none (`screen_of` does)."""
+    """One page. `errors` collects the page's errors; `screen_of` fails a test that leaves unexpected ones."""
 
     def __init__(self, page: Page, url: str) -> None:
         self.page = page
@@ -78,11 +89,12 @@ class Screen:
         if message.type == "error":
             self.errors.append(message.text)
 
-    async def join(self, name: str) -> None:
-        """Open the page and come in under a name."""
-        await self.page.goto(f"{self.url}/?q=low")
-        await self.page.get_by_label("Your name").fill(name)
-        await self.press("Join")
+    async def join(self, name: str, address: str = "/?q=low") -> None:
+        """Open the page and join under a name."""
+        USERS.add(name)
+        await self.page.goto(f"{self.url}{address}")
+        await self.page.get_by_label(texts.YOUR_NAME).fill(name)
+        await self.press(texts.JOIN)
 
     async def press(self, name: str) -> None:
         await self.page.get_by_role("button", name=name, exact=True).click()
@@ -91,18 +103,18 @@ class Screen:
         await expect(self.page.get_by_text(text).first).to_be_visible(timeout=SEEN_WITHIN * 1000)
 
     async def until(self, expression: str, argument: Any = None) -> Any:
-        """Wait until a JavaScript expression or function gives something true; gives that."""
+        """Wait until a JavaScript expression or function returns a true value, and return it."""
         handle = await self.page.wait_for_function(expression, arg=argument, timeout=SEEN_WITHIN * 1000)
         return await handle.json_value()
 
     async def item(self, item_id: str) -> dict[str, Any]:
-        """What the 3D view shows of a thing, once it does."""
+        """Wait until the 3D view shows an item, and return its state."""
         await self.until("id => window.__engine?.item(id) !== undefined", item_id)
         found: dict[str, Any] = await self.page.evaluate("id => window.__engine.item(id)", item_id)
         return found
 
     async def tap(self, item_id: str) -> None:
-        """Tap where a thing is drawn."""
+        """Tap the place where an item is drawn."""
         await self.item(item_id)
         at = await self.until("id => window.__engine.item(id).visible && window.__engine.item(id).screen", item_id)
         box = await self.page.locator(".view canvas").bounding_box()
@@ -110,24 +122,50 @@ class Screen:
         await self.page.mouse.click(box["x"] + at["x"], box["y"] + at["y"])
 
     async def settle(self) -> None:
-        """Let the page lay itself out and draw, and colours that change have changed."""
+        """Wait until the page is laid out, the 3D view is drawn at its present size, and animations have ended."""
         await self.page.evaluate(
             """async () => {
-                await new Promise((done) => setTimeout(() => requestAnimationFrame(done), 60));
+                const frame = () => new Promise((done) => requestAnimationFrame(done));
+                await new Promise((done) => setTimeout(done, 60));
+                await frame();
+                await frame();
+                const drawn = window.__engine?.frames;
+                while (window.__engine?.scheduled && __engine.frames < drawn + 2) await frame();
                 const ends = (each) => each.effect.getComputedTiming().endTime !== Infinity;
                 await Promise.allSettled(document.getAnimations().filter(ends).map((each) => each.finished));
             }"""
         )
 
+    async def close_panels(self) -> None:
+        """Close the panels of the tool and of the selection."""
+        close = self.page.get_by_role("button", name=texts.CLOSE_PANEL)
+        while await close.count():
+            await close.first.click()
+            await self.settle()
+
     async def frames(self) -> int:
         return int(await self.page.evaluate("window.__engine.frames"))
 
     async def faults(self) -> list[str]:
-        """What is too small, off the screen, covered or overlapping."""
+        """Return which controls are too small, off the screen, covered or overlapping."""
         return list(await self.page.evaluate(_LAYOUT, SMALLEST))
 
+    async def faults_with_any_font(self) -> list[str]:
+        """Return the faults with a narrow and with a wide font, so that they do not depend on the machine's fonts."""
+        found = []
+        for name, stretch in FONTS.items():
+            await self._use_font(name, stretch)
+            found += [f"{fault} ({name} font)" for fault in await self.faults()]
+        await self._use_font("", "")
+        return found
+
+    async def _use_font(self, name: str, stretch: str) -> None:
+        content = b64encode(_ARCHIVO.read_bytes()).decode() if name else ""
+        await self.page.evaluate(_FONT, [content, name, stretch])
+        await self.settle()
+
     async def barriers(self) -> list[str]:
-        """What axe calls serious or critical for somebody who sees, hears or moves otherwise (WCAG 2.2, A and AA)."""
+        """Return the serious and critical accessibility violations that axe finds (WCAG 2.2, A and AA)."""
         if not await self.page.evaluate("() => 'axe' in window"):
             await self.page.evaluate(_AXE.read_text())
         return list(await self.page.evaluate(_RULES))
@@ -152,7 +190,7 @@ async def screen_of(
     reduced_motion: bool = False,
     text_scale: float = 1.0,
 ) -> AsyncIterator[Screen]:
-    """A browser of somebody's own: no other's cookies or memory. `url` is that of the server, as ws or http."""
+    """Open a page in a browser context of its own. `url` is that of the server, ws or http."""
     context = await browser.new_context(
         viewport=VIEWPORTS[viewport],  # type: ignore[arg-type]
         color_scheme="dark" if dark else "light",
@@ -173,5 +211,5 @@ async def screen_of(
             raise
         assert not (told := screen.unexpected()), f"the page told errors: {told}"
     finally:
-        with contextlib.suppress(Error):  # the browser is gone, which the test has told
+        with contextlib.suppress(Error):  # the browser has crashed; the test fails already
             await context.close()

@@ -1,7 +1,6 @@
-"""Where things stand, told by the robot and by a camera that sees it; in Chromium on the fakes of both."""
+"""Object poses from the robot's tool and from a camera, with simulated devices."""
 
 import asyncio
-import contextlib
 import functools
 import math
 import re
@@ -15,7 +14,7 @@ import pytest_asyncio
 from msgspec import UNSET
 from playwright.async_api import Browser, expect
 
-from arcor2_hw.client import Client, RequestFailed
+from arcor2_hw.client import Client
 from arcor2_hw.client.errors import LockedByOther
 from arcor2_hw.data import rpc
 from arcor2_hw.data.events import SceneStateEnum
@@ -25,15 +24,16 @@ from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.scene import Scene, SceneObject
 from tests.e2e.harness import Cell, scene_state, until
 from tests.e2e.seen_workplace import CAMERA, MARKERS, ROBOT, SIZE, Q, in_view, off, pose, tilted
+from tests.editor import texts
 from tests.editor.screen import VIEWPORTS, Screen, screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(180)]
+pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(180)]
 
 
 async def _unlocked_and_saved(client: Client) -> bool:
     try:
         await client.call("SaveScene")
-    except LockedByOther:  # the screen has not given its locks back yet
+    except LockedByOther:  # the screen still holds its locks
         return False
     return True
 
@@ -48,12 +48,12 @@ async def _tool(screen: Screen, robot: str) -> Position:
     return Position(**(await screen.item(robot))["endEffectors"][0]["position"])
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
+@pytest_asyncio.fixture(loop_scope="session")
 async def colleague(cell: Cell) -> AsyncIterator[Client]:
     yield await cell.client("colleague")
 
 
-async def test_an_object_is_put_where_the_robot_touches_it(cell: Cell, colleague: Client, browser: Browser) -> None:
+async def test_object_is_placed_at_the_tool(cell: Cell, colleague: Client, browser: Browser) -> None:
     client = colleague
     scene, _ = await cell.open(client)
     await client.call("CloseProject")
@@ -61,13 +61,13 @@ async def test_an_object_is_put_where_the_robot_touches_it(cell: Cell, colleague
     robot = next(each.id for each in scene.objects if each.name == "robot")
     async with screen_of(browser, cell.url) as screen:
         page = screen.page
-        screen.expected_errors = ("409 (Conflict)",)  # what a browser says of a refusal over REST
+        screen.expected_errors = ("409 (Conflict)",)  # the browser's message for a refused REST request
         await screen.join("Eva")
         await screen.item(robot)
         await client.call("StartSceneKeepGoing")
         await scene_state(client, SceneStateEnum.STARTED, 60)
         await screen.until("id => window.__engine?.item(id)?.endEffectors?.length > 0", robot)
-        await page.get_by_role("navigation").get_by_role("button").filter(has_text="Things").click()
+        await page.get_by_role("navigation").get_by_role("button").filter(has_text=texts.OBJECTS).click()
         await page.get_by_role("complementary").get_by_text("tester", exact=True).first.click()
         await page.get_by_role("radio", name="Its middle").click()
         await page.get_by_role("button", name="It stands where the tool is", exact=True).click()
@@ -82,11 +82,11 @@ async def test_an_object_is_put_where_the_robot_touches_it(cell: Cell, colleague
         saved = await _saved(client, scene.id, "tester")
         assert math.dist(tuple(saved.pose.position), tuple(touched)) < 1e-3  # type: ignore[union-attr]
 
-        # Three points at one place are no frame: refused with the reason, and nothing is moved.
+        # Three points at the same place define no frame: refused with the reason; nothing moves.
         await page.get_by_text("By three points of its frame").click()
         for name in ("Origin", "On its x axis", "In its xy plane"):
             await page.get_by_role("button", name=re.compile(name)).click()
-        await page.get_by_role("button", name="Put it there", exact=True).click()
+        await page.get_by_role("button", name=texts.PUT_IT_THERE, exact=True).click()
         await expect(page.get_by_role("complementary").get_by_role("alert")).to_be_visible(timeout=15_000)
         assert await there()
         await client.call("StopScene")
@@ -100,11 +100,11 @@ TOUCHES = (
     (0.4, -1.1, 1.5, -1.2, -1.2, 0.3),
     (0.7, -1.2, 1.3, -1.2, -1.2, 0.3),
 )
-"""Joints in which the tool touches the part, one after the other."""
+"""Joints at which the tool touches the points of the part, rad."""
 PART = Pose(Position(0.3, 0.2, 0.1), Orientation.from_rotation_vector(0.1, -0.2, 0.7))
-"""Where the part really stands."""
+"""Real pose of the part."""
 BESIDE = 0.004
-"""By how much the last point is missed, m."""
+"""Error of the last touched point, m."""
 FACES = (((0, 0, 0), (0, 0.1, 0), (0.1, 0, 0)), ((0, 0, 0), (0.1, 0, 0), (0, 0, 0.1)))
 STL = "".join(
     f"facet normal 0 0 0\nouter loop\n{''.join(f'vertex {x} {y} {z}' + chr(10) for x, y, z in face)}endloop\nendfacet\n"
@@ -116,16 +116,21 @@ def setting(name: str, value: str | float) -> Parameter:
     return Parameter(name, "string" if isinstance(value, str) else "double", msgspec.json.encode(value).decode())
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def seen(cell: Cell) -> AsyncIterator[tuple[Client, dict[str, str]]]:
-    """A camera that looks at an arm and at markers, in a scene that does not know where they really stand."""
-    await cell.start_fake("camera", "arcor2_fakes.oak_d", "--width", "1280", "--height", "720", "--fps", "5")
+@pytest_asyncio.fixture(scope="module", loop_scope="session")
+async def camera(shared_cell: Cell) -> AsyncIterator[None]:
+    """A simulated camera in the shared workplace."""
+    await shared_cell.start_fake("camera", "arcor2_fakes.oak_d", "--width", "1280", "--height", "720", "--fps", "5")
+    yield
+    await shared_cell.children.pop("camera").stop()
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def seen(cell: Cell, camera: None) -> AsyncIterator[tuple[Client, dict[str, str]]]:
+    """A camera that sees a robot and markers, in a scene whose poses of camera and robot are wrong."""
     await cell.tell("camera", "scene", things=in_view())
     await cell.tell("camera", "camera", pose=pose(CAMERA))
     await cell.tell("robot", "place", q=Q)
     client = await cell.client("helper")
-    with contextlib.suppress(RequestFailed):  # nothing is open when these tests run alone
-        await client.close_scene(force=True)
     await client.new_scene("by pictures")
     near = Pose(CAMERA.position + Position(0.1, -0.05, 0.08), CAMERA.orientation)
     wrong = Pose(ROBOT.position + Position(0.02, -0.015, 0.01), ROBOT.orientation * tilted(0.03))
@@ -157,14 +162,14 @@ async def _on_a_phone_in_the_dark(screen: Screen, name: str) -> None:
 
 async def _choose(screen: Screen, name: str) -> None:
     page = screen.page
-    tool = page.get_by_role("navigation").get_by_role("button").filter(has_text="Things")
+    tool = page.get_by_role("navigation").get_by_role("button").filter(has_text=texts.OBJECTS)
     if await tool.get_attribute("aria-pressed") != "true":
         await tool.click()
     await page.get_by_role("complementary").get_by_text(name, exact=True).first.click()
     await page.get_by_role("complementary").get_by_role("heading", name=name, exact=True).wait_for()
 
 
-async def test_camera_and_robot_are_found_by_what_is_seen(
+async def test_camera_and_robot_are_calibrated_from_pictures(
     cell: Cell, seen: tuple[Client, dict[str, str]], browser: Browser
 ) -> None:
     client, ids = seen
@@ -172,11 +177,11 @@ async def test_camera_and_robot_are_found_by_what_is_seen(
         page = screen.page
         await screen.join("Eva")
         await screen.item(ids["arm"])
-        panel, tray = page.get_by_role("complementary"), page.get_by_role("region", name="Tasks and messages")
-        await page.get_by_role("button", name="Go online").click()
+        panel, tray = page.get_by_role("complementary"), page.get_by_role("region", name=texts.TRAY)
+        await page.get_by_role("button", name=texts.GO_ONLINE).click()
         await tray.locator(".task").filter(has_text="Starting the scene by pictures · Eva").wait_for()
         await scene_state(client, SceneStateEnum.STARTED, 60)
-        # What the server has to tell of a robot is told.
+        # The server's notification about the robot is shown.
         await tray.locator(".notice.info").filter(has_text="arm: kinematics are from now on those").wait_for()
 
         await _choose(screen, "eye")
@@ -184,8 +189,8 @@ async def test_camera_and_robot_are_found_by_what_is_seen(
         picture = page.get_by_role("img", name="What the camera sees")
         await picture.wait_for()
         assert await picture.evaluate("image => image.decode().then(() => image.naturalWidth)") == 1280
-        await screen.press("Find where it stands by markers")
-        # In the tray and where it was asked for: the reason, in the server's words.
+        await screen.press(texts.FIND_BY_MARKERS)
+        # The tray and the panel show the server's reason.
         failed = tray.locator(".task[data-state=failed]")
         await failed.filter(has_text="No markers are configured").wait_for()
         await panel.get_by_text("It failed: No markers are configured").wait_for()
@@ -195,10 +200,8 @@ async def test_camera_and_robot_are_found_by_what_is_seen(
         async with httpx.AsyncClient(base_url=cell.url.replace("ws", "http", 1)) as rest:
             assert (await rest.put("/api/calibration/markers", json=configured)).status_code == 200
         before = await _stands(screen, ids["eye"])
-        # What failed before does not stand in the way of what is under way now.
-        await asyncio.gather(
-            panel.get_by_text("Under way: ").wait_for(), screen.press("Find where it stands by markers")
-        )
+        # The failed attempt does not hide the running one.
+        await asyncio.gather(panel.get_by_text("Under way: ").wait_for(), screen.press(texts.FIND_BY_MARKERS))
         await panel.get_by_role("list", name="How it was calibrated").get_by_text("known to").wait_for()
         millimetres, degrees = off(await _stands(screen, ids["eye"]), CAMERA)
         assert millimetres < 2.0
@@ -209,11 +212,11 @@ async def test_camera_and_robot_are_found_by_what_is_seen(
         assert abs(float(told[1]) - off(before, CAMERA)[0]) < 2.0
         assert await screen.faults() == []
         await screen.picture("calibrated camera")
-        # Put back, and found again.
+        # Undo the calibration, and repeat it.
         await change.get_by_role("button", name="Put it back").click()
         await expect(change).to_have_count(0)
         assert off(await _stands(screen, ids["eye"]), before)[0] < 0.01
-        await screen.press("Find where it stands by markers")
+        await screen.press(texts.FIND_BY_MARKERS)
         await change.get_by_role("button", name="Keep the new place").click()
         await expect(change).to_have_count(0)
 
@@ -226,7 +229,7 @@ async def test_camera_and_robot_are_found_by_what_is_seen(
         millimetres, degrees = off(await _stands(screen, ids["arm"]), ROBOT)
         assert millimetres < 2.5
         assert degrees < 0.2
-        # Where it stood is seen through, until somebody says that it is well; it cannot be put back while online.
+        # The old place is a ghost until the user accepts the new one. Undo is disabled while online.
         assert (await screen.item(ids["arm"]))["ghost"]
         await screen.picture("calibrated robot")
         await _on_a_phone_in_the_dark(screen, "calibrated robot phone")
@@ -239,7 +242,7 @@ async def test_camera_and_robot_are_found_by_what_is_seen(
         await scene_state(client, SceneStateEnum.STOPPED, 30)
 
 
-async def test_a_part_is_aimed_at_and_what_fits_is_told_on_the_way(
+async def test_aiming_wizard_shows_how_well_the_points_fit(
     cell: Cell, seen: tuple[Client, dict[str, str]], browser: Browser
 ) -> None:
     client, ids = seen
@@ -270,16 +273,16 @@ async def test_a_part_is_aimed_at_and_what_fits_is_told_on_the_way(
         await scene_state(client, SceneStateEnum.STARTED, 60)
         await screen.until("id => window.__engine?.item(id)?.endEffectors?.length > 0", ids["arm"])
         await _choose(screen, "part")
-        # Shown on the tool, as it would be put there, and nobody is asked.
+        # A preview on the tool; no request is sent.
         tool = await _tool(screen, ids["arm"])
         place = panel.get_by_role("region", name="Place by the robot")
         await place.get_by_role("radio", name="Its top").click()
-        await place.get_by_text("Show it on the tool first").click()
+        await place.get_by_text(texts.SHOW_ON_TOOL).click()
         await place.get_by_role("alert").filter(has_text="use the middle").wait_for()
         await place.get_by_role("radio", name="Its middle").click()
         await until(lambda: _near(screen, part, tool, 1e-3), "shown on the tool", 15)
         await screen.picture("on the tool")
-        await place.get_by_text("Show it on the tool first").click()
+        await place.get_by_text(texts.SHOW_ON_TOOL).click()
         await until(lambda: _near(screen, part, Position(), 1e-3), "where it stands", 15)
 
         await screen.press("Begin to aim")
@@ -288,11 +291,11 @@ async def test_a_part_is_aimed_at_and_what_fits_is_told_on_the_way(
             await until(functools.partial(_tool_at, screen, ids["arm"], at), "the tool is seen there", 15)
             await screen.press(f"The tool is on point {number}")
             await panel.get_by_role("button", name=f"Take point {number} again").wait_for()
-        # Four points, of which one is missed by 4 mm: told before anything is placed.
+        # Four points, one with an error of 4 mm: the fit is shown before anything is placed.
         fit = panel.get_by_text(re.compile(r"The points fit within [0-2]\.\d mm"))
         await fit.wait_for()
         await screen.picture("aimed")
-        await screen.press("Put it there")
+        await screen.press(texts.PUT_IT_THERE)
         await screen.sees("It stands where its points were found.")
         saved = await _saved(client, ids["scene"], "part")
         assert saved.pose is not UNSET
@@ -304,7 +307,7 @@ async def test_a_part_is_aimed_at_and_what_fits_is_told_on_the_way(
 
 
 async def _touch(cell: Cell, client: Client, arm: str, q: tuple[float, ...]) -> Position:
-    """Put the fake arm there; gives where its tool is then."""
+    """Put the simulated robot at these joints and return the position of its tool."""
     await cell.tell("robot", "place", q=q)
 
     async def there() -> bool:

@@ -1,4 +1,4 @@
-"""Something is looked for in the workplace: by the cross, in the list, at the edge of the view, behind other things."""
+"""Finding objects: with the crosshair, in the list, outside the view and behind other objects."""
 
 import re
 from collections.abc import AsyncIterator, Callable
@@ -16,9 +16,10 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.project import ActionPoint, Project
 from arcor2_hw.data.scene import Scene
 from tests.e2e.harness import Cell, until
+from tests.editor import texts
 from tests.editor.screen import VIEWPORTS, Screen, screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(120)]
 
 
 @dataclass
@@ -35,9 +36,9 @@ class Place:
         return next(each for each in self.project.action_points if each.name == name)
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
+@pytest_asyncio.fixture(loop_scope="session")
 async def place(cell: Cell) -> AsyncIterator[Place]:
-    """The project is open; who comes in stands before it. Each test is somebody else's, with views of his own."""
+    """The project is open. Each test joins as another user."""
     client = await cell.client("colleague")
     yield Place(cell, client, *await cell.open(client))
 
@@ -53,11 +54,11 @@ async def _tool(screen: Screen, name: str) -> None:
 
 
 async def _headed(screen: Screen, name: str) -> None:
-    """The panel is about a thing of this name."""
+    """Wait until the panel shows the object of this name."""
     await screen.page.get_by_role("complementary").get_by_role("heading", name=name, exact=True).wait_for()
 
 
-async def test_the_cross_picks_what_it_is_near_and_what_is_behind(place: Place, browser: Browser) -> None:
+async def test_crosshair_selects_near_and_hidden_objects(place: Place, browser: Browser) -> None:
     client = place.client
     await client.call("SubscribeEvents", rpc.SubscribeEventsArgs({"UserPresence"}))
     point = place.point("feeder")
@@ -65,18 +66,18 @@ async def test_the_cross_picks_what_it_is_near_and_what_is_behind(place: Place, 
         page = screen.page
         await _came_in(screen, "Iris", place)
         await page.keyboard.press("x")
-        bar = page.get_by_role("group", name="At the cross")
-        # From below, through the table: what is aimed at need not be in front.
+        bar = page.get_by_role("group", name=texts.AT_CROSSHAIR)
+        # From below, through the table: the target may be hidden.
         at = (await screen.item(point.id))["pose"]["position"]
         below = [[at["x"] - 0.5, at["y"] - 0.5, at["z"] - 0.5], [at["x"], at["y"], at["z"]]]
         await page.evaluate("([from, to]) => __engine.view.set(from, to)", below)
         await bar.get_by_role("button", name="Select feeder", exact=True).wait_for()
-        # The others are told what is aimed at, before anything is selected.
+        # Other users are notified of the target before anything is selected.
         told = await _presence(client, lambda told: told.aimed == point.id)
         assert list(told.selected) == []
         assert await page.evaluate(_UNDER_THE_MIDDLE) != point.id, "nothing is in front"
 
-        # Two keys select what is next best; the same as taps.
+        # Two keys select the next best target; taps do the same.
         await page.keyboard.press("n")
         await bar.get_by_role("button", name=re.compile(r"^Next 2.[3-8], of what is at the cross$")).wait_for()
         select = bar.get_by_role("button", name=re.compile("^Select "))
@@ -93,26 +94,26 @@ async def test_the_cross_picks_what_it_is_near_and_what_is_behind(place: Place, 
         await page.keyboard.press("x")
         await bar.wait_for(state="detached")
 
-        # The list of the same, best first; what is hidden is not in it.
-        await _tool(screen, "Things")
-        await page.get_by_role("radio", name="At the cross").click()
-        listed = page.get_by_role("listbox", name="At the cross").get_by_role("option")
+        # The list of targets, best first, without hidden objects.
+        await _tool(screen, texts.OBJECTS)
+        await page.get_by_role("radio", name=texts.AT_CROSSHAIR).click()
+        listed = page.get_by_role("listbox", name=texts.AT_CROSSHAIR).get_by_role("option")
         await expect(listed.first).to_contain_text("feederAction point")
         near = listed.filter(has_text="feeder_box")
         await near.wait_for()
         await near.click()
-        await page.get_by_role("complementary").get_by_text("Hide it, and aim through it").click()
-        await _tool(screen, "Things")
-        await page.get_by_role("radio", name="At the cross").click()
+        await page.get_by_role("complementary").get_by_text(texts.HIDE).click()
+        await _tool(screen, texts.OBJECTS)
+        await page.get_by_role("radio", name=texts.AT_CROSSHAIR).click()
         await expect(listed.first).to_contain_text("feederAction point")
         assert await near.count() == 0
         await listed.nth(1).click()
-        await page.get_by_role("radio", name="At the cross").wait_for(state="detached")
+        await page.get_by_role("radio", name=texts.AT_CROSSHAIR).wait_for(state="detached")
         assert not await screen.faults()
 
 
 async def _presence(client: Client, fits: Callable[[Any], bool]) -> Any:
-    """Wait until a user tells that he is at something that fits; gives what he told."""
+    """Return the next presence of a user that fits."""
     while not ((told := (await client.next_event("UserPresence", timeout=10)).data.presence) and fits(told)):
         pass
     return told
@@ -124,7 +125,7 @@ _UNDER_THE_MIDDLE = """() => {
 }"""
 
 
-async def test_the_list_is_narrowed_folded_and_gone_through(place: Place, browser: Browser) -> None:
+async def test_object_list_is_filtered_folded_and_stepped_through(place: Place, browser: Browser) -> None:
     client = place.client
     actions = [action.name for point in place.project.action_points for action in point.actions]
 
@@ -135,16 +136,16 @@ async def test_the_list_is_narrowed_folded_and_gone_through(place: Place, browse
     async with screen_of(browser, place.cell.url) as screen:
         page = screen.page
         await _came_in(screen, "Ida", place)
-        await _tool(screen, "Things")
-        tree = page.get_by_role("treegrid", name="Things")
-        # What has no place stands by itself, below a heading that says so.
+        await _tool(screen, texts.OBJECTS)
+        tree = page.get_by_role("treegrid", name=texts.OBJECTS)
+        # Objects without a pose are listed below a heading of their own.
         await page.get_by_role("heading", name="Without a place").wait_for()
         unplaced = page.get_by_role("treegrid", name="Without a place").get_by_role("row")
         without = sorted(each.name for each in place.scene.objects if not isinstance(each.pose, Pose))
         assert without
         assert [row.split()[0] for row in await _labels(unplaced)] == without
 
-        # Only actions, with what they are on: and so on the next tablet.
+        # A filter shows only actions and their points; the server stores it.
         chips = page.get_by_role("toolbar", name="Only these kinds")
         robots = chips.get_by_role("button", name="Robots 1")
         await robots.wait_for()
@@ -158,11 +159,11 @@ async def test_the_list_is_narrowed_folded_and_gone_through(place: Place, browse
         assert "robot UR5e" not in shown
         await until(lambda: _is(kept, "filters", ["actions"]), "the server keeps the filter")
         await page.get_by_label("Search").fill("pick")
-        await expect(tree.get_by_role("row")).to_have_count(2)  # and the point that it is on
+        await expect(tree.get_by_role("row")).to_have_count(2)  # and its point
         await page.get_by_label("Search").fill("")
         await chips.get_by_role("button", name=f"Actions {len(actions)}").click()
 
-        # Folded by its key, and so when the page is read anew.
+        # Folded by a key, also after a reload.
         tester = tree.get_by_role("row", name="tester FunctionalTester")
         await tester.focus()
         await page.keyboard.press("ArrowLeft")
@@ -171,7 +172,7 @@ async def test_the_list_is_narrowed_folded_and_gone_through(place: Place, browse
         await until(lambda: _is(kept, "collapsed", [place.object("tester")]), "the server keeps what is folded")
         await page.reload()
         await screen.item(place.object("robot"))
-        await _tool(screen, "Things")
+        await _tool(screen, texts.OBJECTS)
         await tester.wait_for()
         assert await tester.get_attribute("aria-expanded") == "false"
         assert await tree.get_by_role("row", name="fixture Action point").count() == 0
@@ -180,14 +181,14 @@ async def test_the_list_is_narrowed_folded_and_gone_through(place: Place, browse
         assert not await screen.faults()
         assert not await screen.barriers()
 
-        # From one to the next in the panel, and back to where it was; narrowed, to the next of that kind.
+        # Step to the next and the previous object; with a filter, to the next of that kind.
         await tree.get_by_role("row", name="robot UR5e").click()
         await _headed(screen, "robot")
         await screen.press("To the thing after, table")
         await _headed(screen, "table")
         await screen.press("To the thing before, robot")
         await _headed(screen, "robot")
-        await _tool(screen, "Things")
+        await _tool(screen, texts.OBJECTS)
         await chips.get_by_role("button", name="Points").click()
         await tree.get_by_role("row", name="fixture Action point").click()
         await screen.press("To the thing after, feeder")
@@ -202,27 +203,27 @@ async def _is(ask: Any, key: str, expected: Any) -> bool:
     return bool(await ask(key) == expected)
 
 
-async def test_the_selected_is_found_again_and_things_are_seen_through(place: Place, browser: Browser) -> None:
+async def test_selection_out_of_view_is_found_and_objects_are_faded(place: Place, browser: Browser) -> None:
     point, table = place.point("fixture"), place.object("table")
     async with screen_of(browser, place.cell.url, touch=True) as screen:
         page = screen.page
         await _came_in(screen, "Olga", place)
-        # A point stays as large as is seen, from anywhere, and as large as the user likes.
+        # Points have the same size on the screen from any distance, scaled by the user.
         at = list((await screen.item(point.id))["pose"]["position"].values())
         far, near = [[0, -9, 5], [0, 0, 0]], [[at[0] + 0.3, at[1] - 0.3, at[2] + 0.3], at]
         assert await _drawn(screen, point.id, far) > 3 * await _drawn(screen, point.id, near)
-        # Names of points and actions come with nearness, the nearest eight at most.
+        # Labels of points and actions appear when near, at most eight.
         close_by = {action.name for each in place.project.action_points for action in each.actions}
         assert close_by & set(await _names(screen))
         await _drawn(screen, point.id, far)
         assert not close_by & set(await _names(screen))
         before = await _drawn(screen, point.id, near)
-        await _tool(screen, "Points")
+        await _tool(screen, texts.POINTS)
         await page.get_by_role("slider", name="Size of points in the view").press("End")
         await screen.until(_SCALE_OVER, [point.id, 3.9 * before])
 
-        # All that is not looked for fades, and objects are seen through: drawn so, not only told.
-        await _tool(screen, "Things")
+        # Other kinds fade and objects become transparent, in the drawn picture, too.
+        await _tool(screen, texts.OBJECTS)
         assert await page.evaluate("__engine.ties.count") == 0
         await page.get_by_text("Lines from points to what they hang on").click()
         hanging = sum(1 for each in place.project.action_points if each.parent)
@@ -252,7 +253,7 @@ async def test_the_selected_is_found_again_and_things_are_seen_through(place: Pl
         kept = await place.client.call("GetViewState", rpc.GetViewStateArgs(ViewScope.USER, place.project.id, "Olga"))
         assert (kept.values["hide_steps"], kept.values["hide_orientations"]) == (True, True)
 
-        # What is selected and out of the view: an arrow at the edge, and a tap looks there.
+        # For a selection outside the view there is an arrow at the edge; a tap turns the view.
         await page.get_by_role("row", name=f"{point.name} Action point").click()
         arrow = page.get_by_role("button", name=f"Look at {point.name}, which is out of the view")
         assert await arrow.count() == 0
@@ -262,7 +263,7 @@ async def test_the_selected_is_found_again_and_things_are_seen_through(place: Pl
                 await page.evaluate("([from, to]) => __engine.view.set(from, to)", away)
                 await arrow.wait_for()
                 await screen.settle()
-                assert not await screen.faults(), (size, away)
+                assert not await screen.faults_with_any_font(), (size, away)
         await arrow.click()
         await arrow.wait_for(state="detached")
         assert (await screen.item(point.id))["visible"]
@@ -281,14 +282,14 @@ _SCALE_OVER = f"([id, least]) => ({_SCALE})(id) > least"
 
 
 async def _names(screen: Screen) -> list[str]:
-    """The names that stand in the view."""
+    """Return the labels in the view."""
     names = await screen.page.locator(".view-label:visible > span").all_inner_texts()
     assert 0 < len(names) <= 8
     return names
 
 
 async def _drawn(screen: Screen, item: str, view: Any) -> float:
-    """How large a point is drawn, of what it is by itself, from somewhere."""
+    """Return the scale at which a point is drawn from a viewpoint."""
     frames = await screen.frames()
     await screen.page.evaluate("([from, to]) => __engine.view.set(from, to)", view)
     await screen.until("frames => __engine.frames > frames", frames)
@@ -296,7 +297,7 @@ async def _drawn(screen: Screen, item: str, view: Any) -> float:
 
 
 async def _colour_of(screen: Screen, item: str) -> list[int]:
-    """The colour of the picture at a free corner of a thing that lies flat, seen from above."""
+    """Return the colour of a flat object at a free corner, seen from above."""
     return list(
         await screen.page.evaluate(
             """async (id) => {

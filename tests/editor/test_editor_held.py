@@ -1,10 +1,9 @@
-"""A motion that is held in the page ends with whatever takes the hand from it, and no other begins by itself."""
+"""Hold-to-move ends with the release of the button and with every loss of the page or the server."""
 
 import asyncio
 import contextlib
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable
-from urllib.parse import urlsplit
 
 import psutil
 import pytest
@@ -14,14 +13,15 @@ from playwright.async_api import Browser, CDPSession, Error
 from arcor2_hw.client import Client
 from arcor2_hw.data.events import SceneStateEnum
 from tests.e2e.harness import Cell, scene_state
+from tests.editor import texts
 from tests.editor.screen import Screen, screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(150), pytest.mark.alone]
+pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(150), pytest.mark.alone]
 
 RESTS_WITHIN = 0.5
-"""Seconds from what took the hand away."""
+"""Longest time from the release or loss until the robot is at standstill, s."""
 STAYS = 0.6
-"""Seconds to look whether it stays at rest."""
+"""Time for which the robot must stay at standstill afterwards, s."""
 HOLD = "Move along +Z, as long as it is held"
 
 Loss = Callable[[Screen, CDPSession], Awaitable[object]]
@@ -36,13 +36,13 @@ async def lose_focus(screen: Screen) -> None:
 
 
 def _renderers() -> list[psutil.Process]:
-    """The processes of this test's browser in which pages run."""
+    """Return the renderer processes of the browser."""
     below = psutil.Process().children(recursive=True)
     return [each for each in below if "--type=renderer" in each.cmdline()]
 
 
 async def freeze(_: Screen, __: CDPSession) -> None:
-    """The page's process stands still and says nothing; its connection stays."""
+    """Suspend the renderer process; its connection stays open."""
     for each in _renderers():
         each.suspend()
 
@@ -52,13 +52,13 @@ async def close(screen: Screen, _: CDPSession) -> None:
 
 
 async def crash(_: Screen, devtools: CDPSession) -> None:
-    """The page's process is gone without a word."""
-    with contextlib.suppress(Error, TimeoutError):  # there is nobody left who could answer
+    """Crash the renderer process."""
+    with contextlib.suppress(Error, TimeoutError):  # the crashed page does not answer
         await asyncio.wait_for(devtools.send("Page.crash"), 0.05)
 
 
 async def panel_away(screen: Screen) -> None:
-    """The panel goes with the button that is under the finger."""
+    """Close the panel that contains the held button."""
     await screen.page.evaluate("() => document.querySelector('.rail [aria-pressed=true]').click()")
 
 
@@ -68,7 +68,7 @@ async def moving(cell: Cell) -> bool:
 
 
 async def rests(cell: Cell, since: float) -> float:
-    """Wait until it rests; gives the seconds since then. Fails when it begins again."""
+    """Wait for standstill and return the seconds since `since`. Fails if the robot moves again."""
     while await moving(cell):
         assert time.monotonic() - since < 5, "it does not stop"
     took = time.monotonic() - since
@@ -78,7 +78,7 @@ async def rests(cell: Cell, since: float) -> float:
     return took
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
+@pytest_asyncio.fixture(loop_scope="session")
 async def online(cell: Cell) -> AsyncIterator[Client]:
     client = await cell.client("colleague")
     await cell.open(client)
@@ -89,8 +89,8 @@ async def online(cell: Cell) -> AsyncIterator[Client]:
 
 async def panel(screen: Screen) -> None:
     await screen.join("Eva")
-    await screen.press("Robot")
-    await screen.page.get_by_role("complementary").get_by_role("radio", name="Hold to move").click()
+    await screen.press(texts.ROBOT)
+    await screen.page.get_by_role("complementary").get_by_role("radio", name=texts.HOLD_TO_MOVE).click()
 
 
 async def hold(screen: Screen, cell: Cell) -> None:
@@ -110,7 +110,7 @@ async def hold(screen: Screen, cell: Cell) -> None:
         await screen.settle()
 
 
-async def test_the_arm_rests_when_the_hand_lets_go(online: Client, cell: Cell, browser: Browser) -> None:
+async def test_robot_stops_when_the_button_is_released(online: Client, cell: Cell, browser: Browser) -> None:
     async with screen_of(browser, cell.url) as screen:
         await panel(screen)
         for release in (let_go, lose_focus, panel_away):
@@ -122,7 +122,7 @@ async def test_the_arm_rests_when_the_hand_lets_go(online: Client, cell: Cell, b
 
 
 @pytest.mark.parametrize("loss", [freeze, close, crash], ids=["freeze", "close", "crash"])
-async def test_the_arm_rests_when_the_page_is_gone(loss: Loss, online: Client, cell: Cell, browser: Browser) -> None:
+async def test_robot_stops_when_the_page_is_gone(loss: Loss, online: Client, cell: Cell, browser: Browser) -> None:
     async with screen_of(browser, cell.url) as screen:
         await panel(screen)
         devtools = await screen.page.context.new_cdp_session(screen.page)
@@ -137,22 +137,20 @@ async def test_the_arm_rests_when_the_page_is_gone(loss: Loss, online: Client, c
                     each.resume()
 
 
-async def test_a_server_that_dies_ends_it_and_when_it_is_back_nothing_moves(
+async def test_robot_stops_when_the_server_is_killed_and_stays_stopped(
     online: Client, cell: Cell, browser: Browser
 ) -> None:
     async with screen_of(browser, cell.url) as screen:
         screen.expected_errors = ("WebSocket connection to", "net::ERR_CONNECTION_")
         await panel(screen)
         await hold(screen, cell)
-        port = urlsplit(cell.url).port
-        assert port is not None
         since = time.monotonic()
         await cell.kill("server")
         assert await rests(cell, since) < RESTS_WITHIN
-        # The finger is still on the button.
-        await screen.sees("No connection to the server.")
-        await cell.start_server(port)
+        # The button is still held.
+        await screen.sees(texts.NO_CONNECTION)
+        await cell.restart_server()
         await screen.until("() => !document.querySelector('.lost')")
         assert await rests(cell, time.monotonic()) < RESTS_WITHIN
-        await screen.sees("Go online")
+        await screen.sees(texts.GO_ONLINE)
         assert await screen.page.locator("[data-held=true]").count() == 0

@@ -1,4 +1,4 @@
-"""The home screen: lists that follow the server, names where they stand, what a deletion needs, packages as files."""
+"""The home screen: live lists, renaming in place, deletion with dependencies, packages as files."""
 
 import asyncio
 import io
@@ -19,14 +19,15 @@ from arcor2_hw.data.project import Project
 from arcor2_hw.data.rpc import ListScenesData
 from arcor2_hw.data.scene import Scene
 from tests.e2e.harness import Cell, until
+from tests.editor import texts
 from tests.editor.screen import VIEWPORTS, Screen, screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(120)]
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
+@pytest_asyncio.fixture(loop_scope="session")
 async def made(cell: Cell) -> AsyncIterator[tuple[Client, Scene, Project]]:
-    """A scene and a project on it, both closed, and a second person."""
+    """A scene and a project, both closed, and a second client."""
     client = await cell.client("colleague")
     scene, project = await cell.open(client)
     await client.call("CloseProject")
@@ -46,24 +47,24 @@ async def names(screen: Screen) -> list[str]:
     return await screen.page.locator(".card h2").all_inner_texts()
 
 
-async def test_scenes_are_made_named_described_copied_and_deleted(
+async def test_scenes_are_created_renamed_described_copied_and_deleted(
     made: tuple[Client, Scene, Project], cell: Cell, browser: Browser
 ) -> None:
     client, scene, project = made
     async with screen_of(browser, cell.url) as screen:
         await screen.join("Eva")
-        await tab(screen, "Scenes")
-        await screen.press("New scene")
+        await tab(screen, texts.SCENES)
+        await screen.press(texts.NEW_SCENE)
         await screen.page.get_by_label("Name").fill("Second cell")
-        await screen.press("Make and open")
+        await screen.press(texts.CREATE)
         await screen.page.get_by_role("heading", name="Second cell").wait_for()
-        await screen.press("Save")
+        await screen.press(texts.SAVE)
         await screen.sees("scene · saved")
-        await screen.press("Close, and go to the lists")
-        await tab(screen, "Scenes")
+        await screen.press(texts.CLOSE_DOCUMENT)
+        await tab(screen, texts.SCENES)
         await screen.page.get_by_role("heading", name="Second cell").wait_for()
 
-        # A name that is taken is told where it is typed, before anything is asked.
+        # A name in use is reported in the field, before a request is sent.
         await more(screen, "Second cell", "Rename…")
         field = screen.page.get_by_label("New name of Second cell")
         await field.fill(scene.name)
@@ -82,10 +83,10 @@ async def test_scenes_are_made_named_described_copied_and_deleted(
 
         await more(screen, "Cell 2", "Duplicate…")
         await screen.page.get_by_label("Name").fill("Cell 10")
-        await screen.press("Duplicate")
+        await screen.press(texts.DUPLICATE)
         await screen.page.get_by_role("heading", name="Cell 10").wait_for()
 
-        # Sorted as people sort; searched also by description; the star is the user's on every screen.
+        # Natural sorting; search includes descriptions; favorites are stored per user.
         await screen.page.get_by_label("Sort by").select_option("name")
         await until(lambda: _are(screen, ["Cell 2", "Cell 10", scene.name]), "sorted by name")
         await screen.page.get_by_label("Search").fill("tries")
@@ -94,12 +95,12 @@ async def test_scenes_are_made_named_described_copied_and_deleted(
         await screen.press("Give Cell 2 a star")
         await screen.press("Only what has a star")
         await until(lambda: _are(screen, ["Cell 2"]), "the star alone")
-        # The server keeps it: the page has forgotten everything.
+        # The server stores it: the reloaded page has no memory.
         await screen.page.reload()
-        await tab(screen, "Scenes")
+        await tab(screen, texts.SCENES)
         await screen.page.get_by_role("button", name="Take the star of Cell 2 away").wait_for()
 
-        # What is deleted elsewhere goes here by itself.
+        # Deletions by other users are shown.
         await client.call("DeleteScene", rpc.IdArgs(second.id))
         await expect(screen.page.get_by_role("heading", name="Cell 2")).to_have_count(0)
         await more(screen, "Cell 10", "Delete…")
@@ -107,14 +108,14 @@ async def test_scenes_are_made_named_described_copied_and_deleted(
         await until(lambda: _are(screen, [scene.name]), "deleted")
         assert [each.name for each in await client.call("ListScenes")] == [scene.name]
 
-        # A scene that is needed says by what, and leads there.
+        # A scene in use names its projects and leads to them.
         await more(screen, scene.name, "Delete…")
         await screen.sees("have to be deleted first")
         await screen.picture("home deletion")
-        await screen.press(f"Open {project.name}")
+        await screen.press(texts.open_document(project.name))
         await screen.page.get_by_role("heading", name=project.name).wait_for()
-        await screen.press("Close, and go to the lists")
-        await screen.page.get_by_role("radio", name="Projects").wait_for()
+        await screen.press(texts.CLOSE_DOCUMENT)
+        await screen.page.get_by_role("radio", name=texts.PROJECTS).wait_for()
 
 
 async def _described(client: Client, text: str) -> bool:
@@ -125,32 +126,32 @@ async def _are(screen: Screen, wanted: list[str]) -> bool:
     return await names(screen) == wanted
 
 
-async def test_what_belongs_together_is_found_and_a_saved_workplace_has_a_picture(
+async def test_projects_of_a_scene_pictures_and_templates(
     made: tuple[Client, Scene, Project], cell: Cell, browser: Browser
 ) -> None:
     client, scene, project = made
     async with screen_of(browser, cell.url) as screen:
         await screen.join("Eva")
-        await tab(screen, "Scenes")
+        await tab(screen, texts.SCENES)
         await screen.press(f"Projects on {scene.name}")
         await screen.sees(f"on {scene.name}")
         assert await names(screen) == [project.name]
-        await screen.press(f"Open {project.name}")
+        await screen.press(texts.open_document(project.name))
         await screen.item(scene.objects[0].id)
         await client.call("AddActionPoint", rpc.AddActionPointArgs("here", project.action_points[0].position))
-        await screen.sees("not saved")
-        await screen.press("Save")
-        await screen.press("Close, and go to the lists")
+        await screen.sees(texts.NOT_SAVED)
+        await screen.press(texts.SAVE)
+        await screen.press(texts.CLOSE_DOCUMENT)
         picture = screen.page.locator(f".card[data-id='{project.id}'] img")
         await picture.wait_for()
         assert await picture.evaluate(
             "image => image.decode().then(() => [image.naturalWidth, image.naturalHeight])"
         ) == [320, 180]
-        # Others have it, too.
+        # Other users see it, too.
         kept = await client.call("GetViewState", rpc.GetViewStateArgs(ViewScope.SHARED, project.id))
         assert kept.values["thumbnail"].startswith("data:image/")
 
-        # One's own picture takes its place for all, also when it is saved again, until it is taken away.
+        # An uploaded picture replaces it for all users, also after the next save, until it is removed.
         red = Image.new("RGB", (640, 480), (200, 30, 30))
         with io.BytesIO() as content:
             red.save(content, "PNG")
@@ -166,34 +167,34 @@ async def test_what_belongs_together_is_found_and_a_saved_workplace_has_a_pictur
         await more(screen, project.name, "Its picture from the view again")
         await screen.until(f"([id, taken]) => ({shown})(id) === taken", [project.id, kept.values["thumbnail"]])
 
-        # What serves as a template is offered to everybody as a beginning.
+        # Templates are offered for new projects.
         await more(screen, project.name, "Use as a template")
         await screen.page.locator(f".card[data-id='{project.id}']").get_by_text("template", exact=True).wait_for()
-        await screen.press("New project")
+        await screen.press(texts.NEW_PROJECT)
         await screen.page.get_by_label("Start from").select_option(label=f"a copy of {project.name}")
         await screen.page.get_by_label("Name").fill("From a template")
         await screen.picture("home template")
-        await screen.press("Make and open")
+        await screen.press(texts.CREATE)
         await screen.page.get_by_role("heading", name="From a template").wait_for()
         made_of_it = next(each for each in await client.call("ListProjects") if each.name == "From a template")
         copy = await client.call("GetProject", rpc.IdArgs(made_of_it.id))
         source = await client.call("GetProject", rpc.IdArgs(project.id))
         assert [each.name for each in copy.action_points] == [each.name for each in source.action_points]
-        await screen.press("Close, and go to the lists")
+        await screen.press(texts.CLOSE_DOCUMENT)
         await screen.page.get_by_label("Sort by").select_option("recent")
         await until(lambda: _are(screen, ["From a template", project.name]), "the last opened first")
         await client.call("DeleteProject", rpc.IdArgs(made_of_it.id))
         await until(lambda: _are(screen, [project.name]), "deleted")
 
         await screen.press(f"Scene of {project.name}")
-        await screen.page.get_by_role("button", name=f"Open {scene.name}").wait_for()
+        await screen.page.get_by_role("button", name=texts.open_document(scene.name)).wait_for()
         await more(screen, scene.name, "New project on it…")
         await screen.page.get_by_label("Name").fill("From the scene")
-        await screen.press("Make and open")
+        await screen.press(texts.CREATE)
         await screen.sees(f"on {scene.name} ·")
-        await screen.press("Close, and go to the lists")
-        await screen.press("Throw the changes away")
-        await screen.page.get_by_role("radio", name="Projects").wait_for()
+        await screen.press(texts.CLOSE_DOCUMENT)
+        await screen.press(texts.DISCARD_CHANGES)
+        await screen.page.get_by_role("radio", name=texts.PROJECTS).wait_for()
 
 
 _COLOUR = """async (address) => {
@@ -204,7 +205,7 @@ _COLOUR = """async (address) => {
   context.drawImage(image, 0, 0, 1, 1);
   return [...context.getImageData(0, 0, 1, 1).data].slice(0, 3);
 }"""
-"""The colour of a picture, in the middle of it all."""
+"""Average colour of a picture."""
 
 
 async def _own_is_shown(client: Client, screen: Screen, document: str, shown: str) -> bool:
@@ -213,23 +214,23 @@ async def _own_is_shown(client: Client, screen: Screen, document: str, shown: st
     return own is not None and await screen.page.evaluate(shown, document) == own
 
 
-async def test_packages_come_live_and_go_as_files(
+async def test_packages_are_listed_live_downloaded_uploaded_and_run(
     made: tuple[Client, Scene, Project], cell: Cell, browser: Browser
 ) -> None:
     client, _, project = made
     async with screen_of(browser, cell.url) as screen:
         await screen.join("Eva")
-        await tab(screen, "Packages")
+        await tab(screen, texts.PACKAGES)
         await screen.sees("No package yet")
         await client.call("OpenProject", rpc.IdArgs(project.id))
-        # What a colleague builds is under way in the tray of everybody, whichever screen is shown.
-        tray = screen.page.get_by_role("region", name="Tasks and messages")
+        # Builds of other users are shown in the tray on every screen.
+        tray = screen.page.get_by_role("region", name=texts.TRAY)
         await asyncio.gather(
             client.call("BuildProject", rpc.BuildProjectArgs(project.id, "sorting 1"), timeout=60),
             tray.locator(".task").filter(has_text="Building the package sorting 1 · colleague").wait_for(),
         )
         await client.call("CloseProject")
-        await tab(screen, "Packages")
+        await tab(screen, texts.PACKAGES)
         await screen.page.get_by_role("heading", name="sorting 1").wait_for()
         await screen.sees("not run yet")
         async with screen.page.expect_download() as downloading:
@@ -253,19 +254,19 @@ async def test_packages_come_live_and_go_as_files(
         await until(lambda: _packages(client, 1), "it is deleted")
         await expect(screen.page.locator(".card")).to_have_count(1)
 
-        # It is run from its tile: here to look first. Afterwards the tile says that it has.
-        await more(screen, "sorting 1", "Start paused")
-        program = screen.page.get_by_role("group", name="The program")
+        # It is started paused from its tile. Afterwards the tile shows the last run.
+        await more(screen, "sorting 1", texts.START_PAUSED)
+        program = screen.page.get_by_role("group", name=texts.PROGRAM_STATE)
         await program.get_by_text("Paused").wait_for()
         await screen.picture("home package paused")
-        await program.get_by_role("button", name="Stop").click()
-        await screen.page.get_by_role("radio", name="Packages").wait_for()
-        await tab(screen, "Packages")
+        await program.get_by_role("button", name=texts.STOP).click()
+        await screen.page.get_by_role("radio", name=texts.PACKAGES).wait_for()
+        await tab(screen, texts.PACKAGES)
         await screen.sees("last run just now: stopped")
         (run,) = (await client.call("ListRuns")).runs
         assert (run.package_name, run.started_by, run.stopped_by) == ("sorting 1", "Eva", "Eva")
 
-        # What is no package is refused with the server's sentence, and stays told.
+        # A file that is not a package is refused with the server's message, which stays.
         screen.expected_errors = ("Failed to load resource",)
         await screen.page.locator("input[type=file]").set_input_files(
             {"name": "letter.zip", "mimeType": "application/zip", "buffer": b"no zip at all"}
@@ -283,7 +284,7 @@ class %s(GenericWithPose):
 """
 
 
-async def test_what_is_wrong_stands_on_the_tiles_and_is_mended_from_there(
+async def test_problems_are_shown_on_tiles_and_fixed_from_there(
     made: tuple[Client, Scene, Project], cell: Cell, browser: Browser
 ) -> None:
     client, _, _ = made
@@ -301,10 +302,10 @@ async def test_what_is_wrong_stands_on_the_tiles_and_is_mended_from_there(
         await client.call("SaveScene")
         await until(lambda: _listed(client, "lamps"), "saved")
         async with screen_of(browser, cell.url) as screen:
-            # A kind that nothing uses goes with what is known of it; of others it is said where they are.
+            # An unused type can be deleted; others name the scenes that use them.
             await screen.join("Eva")
             panel = screen.page.get_by_role("complementary")
-            await screen.page.get_by_role("navigation").get_by_role("button", name="Add").click()
+            await screen.page.get_by_role("navigation").get_by_role("button", name=texts.ADD).click()
             await panel.get_by_role("button", name="Torch").click()
             await screen.sees("Used in lamps.")
             delete = panel.get_by_role("button", name="Delete this kind")
@@ -322,11 +323,11 @@ async def test_what_is_wrong_stands_on_the_tiles_and_is_mended_from_there(
             await client.call("NewProject", rpc.NewProjectArgs(scene.id, "lighting"))
             await client.call("SaveProject")
             await client.call("CloseProject")
-            await tab(screen, "Projects")
+            await tab(screen, texts.PROJECTS)
             await screen.page.get_by_role("heading", name="lighting").wait_for()
             for kind in ("Lamp", "Torch"):
                 assert (await rest.delete(f"/object-types/{kind}")).status_code == 200
-            # All that is wrong, not the first, and by itself; and a project says that it is its scene.
+            # All problems are listed without a reload; the project refers to its scene.
             card = screen.page.locator(".card").filter(has=screen.page.get_by_role("heading", name="lighting"))
             await card.get_by_text("2 problems").click()
             await card.get_by_text("lamp: the object type Lamp is not known.").wait_for()
@@ -352,12 +353,12 @@ async def test_what_is_wrong_stands_on_the_tiles_and_is_mended_from_there(
             stored = {each.name: each for each in await client.call("ListScenes")}
             assert not stored["lamps"].problems
             assert len(stored["lamps as it was"].problems) == 2
-            await tab(screen, "Projects")
+            await tab(screen, texts.PROJECTS)
             await screen.page.get_by_label("Search").fill("")
             await screen.press("Open lighting")
             await screen.page.get_by_role("heading", name="lighting").wait_for()
-            await screen.press("Close, and go to the lists")
-            await screen.page.get_by_role("radio", name="Projects").wait_for()
+            await screen.press(texts.CLOSE_DOCUMENT)
+            await screen.page.get_by_role("radio", name=texts.PROJECTS).wait_for()
 
 
 async def _listed(client: Client, name: str) -> ListScenesData | None:

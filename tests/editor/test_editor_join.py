@@ -1,4 +1,4 @@
-"""Coming in: by a name that is free, with a token where one is asked for, and in the role that it gives."""
+"""Joining: unique names, tokens and roles."""
 
 import asyncio
 import hashlib
@@ -7,6 +7,7 @@ import re
 import ssl
 import zipfile
 from collections.abc import AsyncIterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import cv2
@@ -17,15 +18,16 @@ from playwright.async_api import Browser, expect
 
 from arcor2_hw.data.role import Role
 from arcor2_server.access.tokens import TokenFile
+from tests.editor import texts
 from tests.editor.screen import VIEWPORTS, Screen, screen_of
 from tests.server.core.serving import ServerProcess, running
 
-pytestmark = pytest.mark.asyncio(loop_scope="module")
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
+@pytest_asyncio.fixture(scope="module", loop_scope="session")
 async def server(tmp_path_factory: pytest.TempPathFactory, built_editor: Path) -> AsyncIterator[ServerProcess]:
-    """A server that asks everybody for a token."""
+    """A server that requires tokens."""
     data_dir = tmp_path_factory.mktemp("join") / "data"
     TokenFile(data_dir).add("first", Role.TECHNICIAN)
     async with running(data_dir) as process:
@@ -38,21 +40,19 @@ def secret(server: ServerProcess, role: Role) -> str:
 
 
 async def home(screen: Screen) -> None:
-    await screen.page.get_by_role("radio", name="Projects").wait_for()
+    await screen.page.get_by_role("radio", name=texts.PROJECTS).wait_for()
 
 
-async def test_a_token_is_asked_for_taken_remembered_and_no_longer_valid(
-    server: ServerProcess, browser: Browser
-) -> None:
+async def test_token_is_requested_remembered_and_revoked(server: ServerProcess, browser: Browser) -> None:
     async with screen_of(browser, server.url) as screen:
         await screen.join("Eva")
         field = screen.page.get_by_label("Token")
         await field.fill("not-a-token")
-        await screen.press("Join")
+        await screen.press(texts.JOIN)
         await screen.sees("The token is not valid")
         made, key = TokenFile(server.data_dir).add("Eva's tablet", Role.TECHNICIAN)
         await field.fill(key)
-        await screen.press("Join")
+        await screen.press(texts.JOIN)
         await home(screen)
         await screen.page.reload()
         await home(screen)
@@ -61,52 +61,48 @@ async def test_a_token_is_asked_for_taken_remembered_and_no_longer_valid(
         await field.wait_for()
 
 
-async def test_a_token_in_the_address_lets_in_and_is_not_left_there(server: ServerProcess, browser: Browser) -> None:
+async def test_token_in_the_address_is_used_and_removed(server: ServerProcess, browser: Browser) -> None:
     async with screen_of(browser, server.url) as screen:
-        await screen.page.goto(f"{screen.url}/?token={secret(server, Role.OPERATOR)}&q=low")
-        await screen.page.get_by_label("Your name").fill("Operator")
-        await screen.press("Join")
+        await screen.join("Operator", f"/?token={secret(server, Role.OPERATOR)}&q=low")
         await home(screen)
         assert "token" not in screen.page.url
-        # An operator makes no scenes, and is shown so.
-        await screen.page.get_by_role("radio", name="Scenes").click()
-        await expect(screen.page.get_by_role("button", name="New scene")).to_be_disabled()
+        # An operator cannot create scenes; the button is disabled.
+        await screen.page.get_by_role("radio", name=texts.SCENES).click()
+        await expect(screen.page.get_by_role("button", name=texts.NEW_SCENE)).to_be_disabled()
 
 
-async def test_a_name_that_somebody_has_is_refused_with_the_reason(server: ServerProcess, browser: Browser) -> None:
+async def test_name_in_use_is_refused_and_returning_users_join_by_one_tap(
+    server: ServerProcess, browser: Browser
+) -> None:
     key = secret(server, Role.TECHNICIAN)
     async with screen_of(browser, server.url) as one, screen_of(browser, server.url) as two:
         for screen in (one, two):
-            await screen.page.goto(f"{screen.url}/?token={key}&q=low")
-            await screen.page.get_by_label("Your name").fill("Adam")
-            await screen.press("Join")
+            await screen.join("Adam", f"/?token={key}&q=low")
             if screen is one:
                 await home(one)
         await two.sees("The user name 'Adam' is already in use.")
-        await two.page.get_by_label("Your name").fill("Berta")
-        await two.press("Join")
+        await two.page.get_by_label(texts.YOUR_NAME).fill("Berta")
+        await two.press(texts.JOIN)
         await home(two)
         await one.page.get_by_role("img", name="Berta").wait_for()
         assert await one.page.get_by_role("img", name="Adam (you)").is_visible()
-        # Who shares a tablet chooses his name from those that were here, by one tap.
-        await two.press("Settings")
+        # On a shared tablet, returning users join with one tap.
+        await two.press(texts.SETTINGS)
         await two.page.get_by_role("menuitem", name="Leave (you are Berta)").click()
         people = two.page.get_by_role("group", name="Who was here with this device")
-        assert await people.get_by_role("button").all_inner_texts() == ["Berta"]  # and not who was refused
+        assert await people.get_by_role("button").all_inner_texts() == ["Berta"]  # not the refused name
         assert await two.faults() == []
         await two.picture("who was here")
         await two.press("Join as Berta")
         await home(two)
 
 
-async def test_a_file_for_diagnosis_is_saved_by_one_press(server: ServerProcess, browser: Browser) -> None:
+async def test_diagnosis_file_is_saved(server: ServerProcess, browser: Browser) -> None:
     async with screen_of(browser, server.url) as screen:
         key = secret(server, Role.TECHNICIAN)
-        await screen.page.goto(f"{screen.url}/?token={key}&q=low")
-        await screen.page.get_by_label("Your name").fill("Dora")
-        await screen.press("Join")
+        await screen.join("Dora", f"/?token={key}&q=low")
         await home(screen)
-        await screen.page.get_by_role("radio", name="Scenes").click()
+        await screen.page.get_by_role("radio", name=texts.SCENES).click()
         await screen.page.keyboard.press("?")
         await screen.sees("Only this machine reaches the server")
         async with screen.page.expect_download() as downloading:
@@ -118,17 +114,17 @@ async def test_a_file_for_diagnosis_is_saved_by_one_press(server: ServerProcess,
             assert {"README.txt", "about.json", "types.json", "log.jsonl"} <= set(files.namelist())
             assert all(key.encode() not in files.read(name) for name in files.namelist())
         assert (told["user"], told["status"]) == ("Dora", "ready")
-        # What the page has seen: that it came in, and the first that it was told.
+        # The log of the page: the connection and the first event.
         assert {"event ShowMainScreen", "connection open"} <= {
             f"{e['what']} {e['text'].split()[0]}" for e in told["seen"]
         }
         assert await screen.barriers() == []
 
 
-async def test_over_tls_with_a_certificate_made_here_whose_fingerprint_is_told(
+async def test_invitation_shows_the_fingerprint_of_the_tls_certificate(
     tmp_path: Path, built_editor: Path, browser: Browser
 ) -> None:
-    """What a tablet on the network gets, but for the address; and what invites the next one."""
+    """As for a tablet on the network, except for the address."""
     data_dir = tmp_path / "data"
     key = TokenFile(data_dir).add("tablet", Role.TECHNICIAN)[1]
     async with running(data_dir, "--host", "0.0.0.0") as server:
@@ -139,8 +135,8 @@ async def test_over_tls_with_a_certificate_made_here_whose_fingerprint_is_told(
             screen = Screen(await context.new_page(), address)
             await screen.page.goto(f"{address}/?token={key}&q=low")
             assert await screen.page.evaluate("window.isSecureContext")
-            await screen.page.get_by_label("Your name").fill("Tess")
-            await screen.press("Join")
+            await screen.page.get_by_label(texts.YOUR_NAME).fill("Tess")
+            await screen.press(texts.JOIN)
             await home(screen)
             await screen.page.keyboard.press("?")
             about = screen.page.get_by_role("dialog", name="About")
@@ -148,7 +144,7 @@ async def test_over_tls_with_a_certificate_made_here_whose_fingerprint_is_told(
             shown = (await invitation.locator(".fingerprint code").inner_text()).replace(":", "")
             told = await _joining(screen)
             code = invitation.get_by_role("img")
-            if told["addresses"]:  # this machine is on a network
+            if told["addresses"]:  # the machine is on a network
                 picture = cv2.imdecode(np.frombuffer(await code.screenshot(), np.uint8), cv2.IMREAD_COLOR)
                 assert picture is not None
                 read, _, _ = cv2.QRCodeDetector().detectAndDecode(picture)
@@ -166,16 +162,18 @@ async def test_over_tls_with_a_certificate_made_here_whose_fingerprint_is_told(
             assert screen.unexpected() == []
         finally:
             await context.close()
-        # The one that a browser shows of the certificate is the one that the server told.
+        # The fingerprint is that of the served certificate, and the server has logged it.
         host, _, port = address.removeprefix("https://").rstrip("/").rpartition(":")
-        seen = ssl.PEM_cert_to_DER_cert(await asyncio.to_thread(ssl.get_server_certificate, (host, int(port))))
+        with ThreadPoolExecutor(1) as threads:
+            ask = asyncio.get_running_loop().run_in_executor(threads, ssl.get_server_certificate, (host, int(port)))
+            seen = ssl.PEM_cert_to_DER_cert(await ask)
         logged = re.sub(r"[^0-9A-F]", "", server.log.read_text().upper())
         assert hashlib.sha256(seen).hexdigest().upper() == shown
         assert shown in logged
 
 
 async def _joining(screen: Screen) -> dict[str, list[str]]:
-    """What the server says of how others join."""
+    """Return how others can join, as the server answers."""
     ask = "key => fetch('/api/joining', {headers: {Authorization: `Bearer ${key}`}}).then(found => found.json())"
     key = await screen.page.evaluate("localStorage.getItem('arcor2-hw.token')")
     found: dict[str, list[str]] = await screen.page.evaluate(ask, key)

@@ -1,7 +1,6 @@
-"""The robot's panel says whether poses are computed with what the controller told of its very arm."""
+"""The robot panel shows which kinematics are in force: nominal, or the calibration of this robot (by serial number)."""
 
 import re
-from pathlib import Path
 
 import msgspec
 import pytest
@@ -14,32 +13,24 @@ from arcor2_hw.data.parameter import Parameter
 from tests.e2e.harness import Cell, scene_state
 from tests.editor.screen import screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(180)]
+pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(180)]
 
 
-async def test_which_kinematics_are_in_force_is_said_beside_the_robot(
-    browser: Browser, built_editor: Path, tmp_path: Path
-) -> None:
-    cell = Cell(tmp_path)
-    try:
-        await cell.start_robot()
-        await cell.start_server()
-        client = await cell.client("maker")
-        await client.call("NewScene", rpc.NewSceneArgs("cell"))
-        host = Parameter("host", "string", msgspec.json.encode(cell.robot_host).decode())
-        await client.call("AddObjectToScene", rpc.AddObjectToSceneArgs("arm", "UR5e", Pose(), [host]))
-        async with screen_of(browser, cell.url) as screen:
-            await screen.join("Eva")
-            await screen.page.get_by_role("button", name=re.compile("^Active robot")).click()
-            await screen.sees("Computed as arms of this type are, off by some millimetres")
-            await client.call("StartScene")
-            await scene_state(client, SceneStateEnum.STARTED)
-            await screen.sees("Computed with this arm's own calibration, read")
-            await screen.sees("arm: kinematics are from now on those of the calibration in its controller.")
-            await screen.settle()
-            await screen.picture("kinematics")
-            await client.call("StopScene")
-            await scene_state(client, SceneStateEnum.STOPPED)
-            await screen.sees("Computed with this arm's own calibration, read")
-    finally:
-        await cell.stop()
+async def test_the_robot_panel_names_the_kinematics_in_force(browser: Browser, cell: Cell) -> None:
+    client = await cell.client("maker")
+    await client.call("NewScene", rpc.NewSceneArgs("cell"))
+    host = Parameter("host", "string", msgspec.json.encode(cell.robot_host).decode())
+    await client.call("AddObjectToScene", rpc.AddObjectToSceneArgs("arm", "UR5e", Pose(), [host]))
+    async with screen_of(browser, cell.url) as screen:
+        await screen.join("Eva")
+        await screen.page.get_by_role("button", name=re.compile("^Active robot")).click()
+        await screen.sees("Computed as arms of this type are, off by some millimetres")
+        await client.call("StartScene")
+        await scene_state(client, SceneStateEnum.STARTED)
+        await screen.sees("Computed with this arm's own calibration, read")
+        await screen.sees("arm: kinematics are from now on those of the calibration in its controller.")
+        await screen.settle()
+        await screen.picture("kinematics")
+        await client.call("StopScene")
+        await scene_state(client, SceneStateEnum.STOPPED)
+        await screen.sees("Computed with this arm's own calibration, read")

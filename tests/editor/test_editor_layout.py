@@ -1,7 +1,7 @@
-"""Every screen in every size, light and dark, with large text: nothing too small, covered, off the screen, unreadable.
+"""Layout of every screen in all sizes, light and dark, with large text, a narrow and a wide font.
 
-What is too small, covered, off the screen or overlapping is looked for in all sizes, and what stands in the way of who
-sees, hears or moves otherwise (axe) once light and once dark.
+Controls that are too small, covered, off the screen or overlapping are searched for in all sizes, accessibility
+violations (axe) once in light and once in dark.
 """
 
 from collections.abc import AsyncIterator, Iterable
@@ -12,12 +12,13 @@ from playwright.async_api import Browser
 
 from arcor2_hw.data.project import Project
 from tests.e2e.harness import Cell
+from tests.editor import texts
 from tests.editor.screen import VIEWPORTS, Screen, screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(300)]
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
+@pytest_asyncio.fixture(loop_scope="session")
 async def project(cell: Cell) -> AsyncIterator[Project]:
     """The project of three devices, saved and closed."""
     client = await cell.client("colleague")
@@ -27,11 +28,11 @@ async def project(cell: Cell) -> AsyncIterator[Project]:
 
 
 FEW = ("phone", "tablet")
-"""What differs from another screen by its panel alone: that is a sheet from below, or stands at the side."""
+"""Sizes for screens that differ by their panel alone: a sheet from below, or at the side."""
 
 
 class Looks:
-    """What is wrong with each screen that was looked at."""
+    """Collects the faults of each screen."""
 
     def __init__(self, screen: Screen) -> None:
         self.screen = screen
@@ -39,25 +40,25 @@ class Looks:
         self._dark = False
 
     async def at(self, what: str, sizes: Iterable[str] = VIEWPORTS) -> None:
-        """Look at what is on the screen, in every size, or in these."""
+        """Check the screen in every size, or in these."""
         page = self.screen.page
         self._dark = not self._dark
         await page.emulate_media(color_scheme="dark" if self._dark else "light")
         for name in sizes:
             await page.set_viewport_size(VIEWPORTS[name])  # type: ignore[arg-type]
             await self.screen.settle()
-            await self._note(f"{what}, {name}", await self.screen.faults())
+            await self._note(f"{what}, {name}", await self.screen.faults_with_any_font())
             await self.screen.picture(f"{what} {name}{' dark' if self._dark else ''}")
         await page.set_viewport_size(VIEWPORTS["tablet"])  # type: ignore[arg-type]
         await self.screen.settle()
         await self._note(f"{what}, {'dark' if self._dark else 'light'}", await self.screen.barriers())
 
     async def with_large_text(self, what: str) -> None:
-        """Look again with letters twice as large."""
+        """Check the screen with text of twice the size."""
         page = self.screen.page
         await page.evaluate("() => { document.documentElement.style.fontSize = '200%'; }")
         await self.screen.settle()
-        await self._note(f"{what}, large text", await self.screen.faults())
+        await self._note(f"{what}, large text", await self.screen.faults_with_any_font())
         await self.screen.picture(f"{what} large text")
         await page.evaluate("() => { document.documentElement.style.fontSize = ''; }")
 
@@ -70,35 +71,35 @@ class Looks:
 
 
 async def at_the_project(screen: Screen, name: str, project: Project) -> None:
-    """Come in, and open the project where nobody has."""
+    """Join, and open the project unless it is open."""
     await screen.join(name)
     if await screen.until("() => document.querySelector('.home, .workplace')?.className") == "home":
-        await screen.press(f"Open {project.name}")
+        await screen.press(texts.open_document(project.name))
     await screen.item(project.action_points[0].id)
 
 
-async def test_joining_and_the_lists(cell: Cell, project: Project, browser: Browser) -> None:
+async def test_join_and_home(cell: Cell, project: Project, browser: Browser) -> None:
     async with screen_of(browser, cell.url, touch=True) as screen:
         looks = Looks(screen)
         page = screen.page
         await page.goto(f"{screen.url}/?q=low")
-        await page.get_by_label("Your name").wait_for()
+        await page.get_by_label(texts.YOUR_NAME).wait_for()
         await looks.at("join")
         await looks.with_large_text("join")
-        await page.get_by_label("Your name").fill("colleague")
-        await screen.press("Join")
+        await page.get_by_label(texts.YOUR_NAME).fill("colleague")
+        await screen.press(texts.JOIN)
         await screen.sees("already in use")
         await looks.at("join refused", FEW)
         await screen.join("Eva")
         await screen.sees("on PCB testing")
         await looks.at("home")
         await looks.with_large_text("home")
-        await page.get_by_role("radio", name="Scenes").click()
-        await screen.press("New scene")
+        await page.get_by_role("radio", name=texts.SCENES).click()
+        await screen.press(texts.NEW_SCENE)
         await page.get_by_role("dialog").wait_for()
         await looks.at("dialog", FEW)
         await page.keyboard.press("Escape")
-        await page.get_by_role("radio", name="Packages").click()
+        await page.get_by_role("radio", name=texts.PACKAGES).click()
         await looks.at("empty list", FEW)
         assert not looks.found, looks.told()
 
@@ -108,24 +109,27 @@ async def test_the_workplace(cell: Cell, project: Project, browser: Browser) -> 
         looks = Looks(screen)
         page = screen.page
         await screen.join("Adam")
-        await screen.press(f"Open {project.name}")
+        await screen.press(texts.open_document(project.name))
         await screen.item(project.action_points[0].id)
         await looks.at("workplace")
         await looks.with_large_text("workplace")
         tools = page.get_by_role("navigation").get_by_role("button")
-        for name in ("Things", "Points", "Program", "Run", "Robot", "Devices"):
+        for name in texts.TOOLS:
             await tools.filter(has_text=name).click()
             await page.get_by_role("complementary").get_by_role("heading", name=name, exact=True).wait_for()
             await looks.at(name.lower(), FEW)
-        await tools.filter(has_text="Things").click()
+        await tools.filter(has_text=texts.OBJECTS).click()
         action = project.action_points[0].actions[0].name
-        for name, what in ((f"{project.action_points[0].name} Action point", "point"), (f"{action} Action", "action")):
-            await page.get_by_role("row", name=name, exact=True).click()
+        point = project.action_points[0].name
+        for name, kind, what in ((point, "Action point", "point"), (action, "Action", "action")):
+            await page.get_by_role("row", name=f"{name} {kind}", exact=True).click()
+            await page.get_by_role("complementary").get_by_role("heading", name=name, exact=True).wait_for()
+            await page.evaluate("document.querySelectorAll('details').forEach((each) => { each.open = true; })")
             await looks.at(f"{what} selected", FEW)
-            await screen.press("Close the panel")
-            await tools.filter(has_text="Things").click()
-        await screen.press("Close the panel")
-        # Everything is found by its name.
+            await screen.press(texts.CLOSE_PANEL)
+            await tools.filter(has_text=texts.OBJECTS).click()
+        await screen.press(texts.CLOSE_PANEL)
+        # Search by name.
         await page.keyboard.press("/")
         search = page.get_by_role("dialog", name="Find a command or a thing")
         await search.get_by_role("option", name="Show all in the view").wait_for()
@@ -135,46 +139,45 @@ async def test_the_workplace(cell: Cell, project: Project, browser: Browser) -> 
         await page.keyboard.press("ArrowDown")
         await page.keyboard.press("Enter")
         await page.get_by_role("complementary").get_by_role("heading", name=action, exact=True).wait_for()
-        await screen.press("Close the panel")
+        await screen.press(texts.CLOSE_PANEL)
         for name in ("Flow", "Code", "3D"):
             await page.get_by_role("radio", name=name, exact=True).click()
             await screen.settle()
             await looks.at(f"shown as {name}", FEW)
-        await screen.press("Go online")
-        await page.get_by_role("button", name="Stop motion").wait_for(timeout=60_000)
-        await tools.filter(has_text="Robot").click()
+        await screen.press(texts.GO_ONLINE)
+        await page.get_by_role("button", name=texts.STOP_MOTION).wait_for(timeout=60_000)
+        await tools.filter(has_text=texts.ROBOT).click()
         await looks.at("online")
-        await screen.press("Settings")
+        await screen.press(texts.SETTINGS)
         await page.get_by_role("menuitem", name="Controls for the left hand").click()
         await looks.at("left hand")
         await page.set_viewport_size(VIEWPORTS["phone"])  # type: ignore[arg-type]
-        await screen.press("Make the panel larger")
+        await screen.press(texts.LARGER_PANEL)
         await looks.at("large panel", ("phone", "portrait"))
         await page.set_viewport_size(VIEWPORTS["phone"])  # type: ignore[arg-type]
-        await page.get_by_role("button", name="Make the panel smaller").click(trial=True)
-        await page.get_by_role("button", name="Stop motion").click(trial=True)
+        await page.get_by_role("button", name=texts.SMALLER_PANEL).click(trial=True)
+        await page.get_by_role("button", name=texts.STOP_MOTION).click(trial=True)
         await page.get_by_role("button", name="Views", exact=True).click(trial=True)
         assert not looks.found, looks.told()
 
 
-async def test_nothing_moves_for_who_wants_no_motion(cell: Cell, project: Project, browser: Browser) -> None:
+async def test_reduced_motion_stops_animations(cell: Cell, project: Project, browser: Browser) -> None:
     async with screen_of(browser, cell.url, reduced_motion=True) as screen:
         await at_the_project(screen, "Berta", project)
-        await screen.press("Things")
-        # What turns slowly while something is awaited stays.
+        await screen.press(texts.OBJECTS)
+        # Spinners are exempt.
         running = """() => document.getAnimations()
             .filter((each) => each.playState === "running" && !each.effect.target.matches(".spinner")).map(String)"""
         assert await screen.page.evaluate(running) == []
 
 
-async def test_without_the_server(cell: Cell, project: Project, browser: Browser) -> None:
-    """Last: it ends the server."""
+async def test_lost_server(cell: Cell, project: Project, browser: Browser) -> None:
     async with screen_of(browser, cell.url, touch=True) as screen:
         screen.expected_errors = ("WebSocket connection to", "net::ERR_CONNECTION_")
         await at_the_project(screen, "Cecil", project)
-        await screen.page.wait_for_load_state("networkidle")  # all parts of the page are there
+        await screen.page.wait_for_load_state("networkidle")  # all lazily loaded parts are loaded
         await cell.kill("server")
-        await screen.sees("No connection to the server.")
+        await screen.sees(texts.NO_CONNECTION)
         looks = Looks(screen)
         await looks.at("lost server")
         assert not looks.found, looks.told()

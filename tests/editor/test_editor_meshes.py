@@ -1,10 +1,9 @@
-"""Uploaded meshes and robots appear in the 3D view; what cannot be shown says why. In Chromium, on the real server."""
+"""Uploaded meshes and robots in the 3D view, and the reason for what cannot be shown."""
 
 import io
 import zipfile
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import httpx
 import numpy as np
@@ -18,14 +17,14 @@ from arcor2_hw.data.geometry import Pose, Position
 from tests.e2e.harness import Cell
 from tests.editor.screen import screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(180)]
+pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(180)]
 
 OBJECT = '''
 from arcor2_hw.objects import CollisionObject
 
 
 class {name}(CollisionObject):
-    """Something of a shape."""
+    """An object with a shape."""
 
     _ABSTRACT = False
 '''
@@ -55,7 +54,7 @@ URDF = """<robot name="turner">
     <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
 </robot>"""
 VISE_TRIANGLES = 13_856
-"""Of the 20,480 that are uploaded: what a thing of 0.17 m may have."""
+"""Triangles shown of the 20,480 that are uploaded: the limit for an object of 0.17 m."""
 
 
 def exported(mesh: trimesh.Trimesh, kind: str) -> bytes:
@@ -64,7 +63,7 @@ def exported(mesh: trimesh.Trimesh, kind: str) -> bytes:
 
 
 def vise() -> bytes:
-    """A ball, blue above."""
+    """Return a PLY ball whose upper half is blue."""
     ball = trimesh.creation.icosphere(subdivisions=5, radius=0.05)
     above = ball.triangles_center[:, 2:] > 0
     colours = np.where(above, [[30, 60, 200, 255]], [[230, 230, 230, 255]]).astype(np.uint8)
@@ -90,52 +89,48 @@ class Place:
     ids: dict[str, str]
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def place(tmp_path_factory: pytest.TempPathFactory, built_editor: Path) -> AsyncIterator[Place]:
-    """A scene of meshes that were uploaded: three that can be shown and one that cannot, and robots likewise."""
-    cell = Cell(tmp_path_factory.mktemp("cell"))
-    try:
-        await cell.start_server()
-        client = await cell.client("maker")
-        async with httpx.AsyncClient(base_url=cell.url.replace("ws", "http", 1)) as http:
-            stl = exported(trimesh.creation.box((0.2, 0.1, 0.05)), "stl")
-            for key, content in {
-                "vise.ply": vise(), "block.stl": stl, "broken.stl": b"solid nothing",
-                "turner.zip": turner(), "ruin.zip": b"PK\3\4 but no archive",
-            }.items():  # fmt: skip
-                sent = await http.post("/assets", params={"id": key}, files={"assetData": (key, content)})
-                assert sent.status_code == 200, sent.text
-            for name, asset in {"Vise": "vise.ply", "Block": "block.stl", "Broken": "broken.stl"}.items():
-                sent = await http.put("/models/mesh", json={"id": name, "assetId": asset})
-                assert sent.status_code == 200, sent.text
-                model = {"id": name, "type": "Mesh"}
-                source = {"id": name, "name": name, "source": OBJECT.format(name=name), "model": model}
-                sent = await http.put("/object-types", json=source)
-                assert sent.status_code == 200, sent.text
-            for name, asset in {"Turner": "turner.zip", "Ruin": "ruin.zip"}.items():
-                source = {"id": name, "name": name, "source": ROBOT.format(name=name, asset=asset)}
-                sent = await http.put("/object-types", json=source)
-                assert sent.status_code == 200, sent.text
-        await client.call("NewScene", rpc.NewSceneArgs("meshes"))
-        ids = {}
-        for number, kind in enumerate(("Vise", "Block", "Broken", "Turner", "Ruin")):
-            pose = Pose(Position(0.45 * number - 0.9, 0.0, 0.1 if number < 3 else 0.0))
-            await client.call("AddObjectToScene", rpc.AddObjectToSceneArgs(kind.lower(), kind, pose))
-            ids[kind] = (await client.next_event("SceneObjectChanged", timeout=10)).data.id
-        yield Place(cell, ids)
-    finally:
-        await cell.stop()
+@pytest_asyncio.fixture(scope="module", loop_scope="session")
+async def place(module_cell: Cell) -> AsyncIterator[Place]:
+    """A scene of uploaded meshes and robots, of which two cannot be shown and one only in part."""
+    cell = module_cell
+    client = await cell.client("maker")
+    async with httpx.AsyncClient(base_url=cell.url.replace("ws", "http", 1)) as http:
+        stl = exported(trimesh.creation.box((0.2, 0.1, 0.05)), "stl")
+        for key, content in {
+            "vise.ply": vise(), "block.stl": stl, "broken.stl": b"solid nothing",
+            "turner.zip": turner(), "ruin.zip": b"PK\3\4 but no archive",
+        }.items():  # fmt: skip
+            sent = await http.post("/assets", params={"id": key}, files={"assetData": (key, content)})
+            assert sent.status_code == 200, sent.text
+        for name, asset in {"Vise": "vise.ply", "Block": "block.stl", "Broken": "broken.stl"}.items():
+            sent = await http.put("/models/mesh", json={"id": name, "assetId": asset})
+            assert sent.status_code == 200, sent.text
+            model = {"id": name, "type": "Mesh"}
+            source = {"id": name, "name": name, "source": OBJECT.format(name=name), "model": model}
+            sent = await http.put("/object-types", json=source)
+            assert sent.status_code == 200, sent.text
+        for name, asset in {"Turner": "turner.zip", "Ruin": "ruin.zip"}.items():
+            source = {"id": name, "name": name, "source": ROBOT.format(name=name, asset=asset)}
+            sent = await http.put("/object-types", json=source)
+            assert sent.status_code == 200, sent.text
+    await client.call("NewScene", rpc.NewSceneArgs("meshes"))
+    ids = {}
+    for number, kind in enumerate(("Vise", "Block", "Broken", "Turner", "Ruin")):
+        pose = Pose(Position(0.45 * number - 0.9, 0.0, 0.1 if number < 3 else 0.0))
+        await client.call("AddObjectToScene", rpc.AddObjectToSceneArgs(kind.lower(), kind, pose))
+        ids[kind] = (await client.next_event("SceneObjectChanged", timeout=10)).data.id
+    yield Place(cell, ids)
 
 
-async def test_meshes_appear_as_they_were_uploaded(browser: Browser, place: Place) -> None:
+async def test_uploaded_meshes_are_shown(browser: Browser, place: Place) -> None:
     async with screen_of(browser, place.cell.url) as screen:
-        # The browser's own words for the two answers that refuse.
+        # The browser's message for the two refused requests.
         screen.expected_errors = ("the server responded with a status of 400",)
         await screen.join("Eva")
         shown = "([id, count]) => window.__engine?.item(id)?.triangles === count"
         await screen.until(shown, [place.ids["Vise"], VISE_TRIANGLES])
         await screen.until(shown, [place.ids["Block"], 12])
-        # A cylinder and a box; the third mesh is broken, and what is whole is shown all the same.
+        # A cylinder and a box; the third mesh is broken, the others are shown.
         turner_mesh = (
             "id => window.__engine.item(id).problem.includes('cover.stl') && window.__engine.item(id).triangles"
         )
@@ -148,7 +143,7 @@ async def test_meshes_appear_as_they_were_uploaded(browser: Browser, place: Plac
         await screen.picture("meshes")
 
 
-async def test_what_cannot_be_shown_stands_there_with_its_reason(browser: Browser, place: Place) -> None:
+async def test_broken_meshes_are_replaced_with_the_reason(browser: Browser, place: Place) -> None:
     async with screen_of(browser, place.cell.url) as screen:
         screen.expected_errors = ("the server responded with a status of 400",)
         await screen.join("Eva")

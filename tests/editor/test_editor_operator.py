@@ -1,4 +1,4 @@
-"""The operator's screen in Chromium on the real server: packages, start, pause, stop, results of runs."""
+"""The operator's screen: packages, start, pause, stop and results of runs."""
 
 import re
 from collections.abc import AsyncIterator
@@ -10,28 +10,34 @@ from playwright.async_api import Browser, expect
 from arcor2_hw.client import Client
 from arcor2_hw.data import rpc
 from arcor2_hw.data.geometry import Position
-from arcor2_hw.data.package import PackageStateEnum
+from arcor2_hw.data.package import PackageStateEnum, PackageSummary
 from tests.e2e.harness import Cell
+from tests.editor import texts
 from tests.editor.screen import VIEWPORTS, Screen, screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(240)]
 
 BEGUN = 60_000
 """Time until a started program is shown, ms."""
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
+@pytest_asyncio.fixture(loop_scope="session")
 async def colleague(cell: Cell) -> AsyncIterator[Client]:
     yield await cell.client("colleague")
 
 
 async def at_the_machine(screen: Screen, kiosk: bool = False) -> None:
-    await screen.page.goto(f"{screen.url}/?q=low#/operator{'?kiosk' if kiosk else ''}")
-    await screen.page.get_by_label("Your name").fill("Olga")
-    await screen.press("Join")
+    await screen.join("Olga", f"/?q=low#/operator{'?kiosk' if kiosk else ''}")
 
 
-async def test_what_is_built_appears_is_run_and_its_error_is_plain(
+async def built(cell: Cell, colleague: Client) -> PackageSummary:
+    """Build the package of the project and close the project."""
+    _, project = await cell.open(colleague)
+    package_id = await cell.build(colleague, project)
+    return next(each for each in await colleague.list_packages() if each.id == package_id)
+
+
+async def test_built_package_appears_runs_and_its_error_is_shown(
     cell: Cell, colleague: Client, browser: Browser
 ) -> None:
     async with screen_of(browser, cell.url, touch=True) as screen:
@@ -39,12 +45,12 @@ async def test_what_is_built_appears_is_run_and_its_error_is_plain(
         await at_the_machine(screen, kiosk=True)
         await screen.sees("There is no package yet.")
         assert await page.get_by_role("button", name="To the editor").count() == 0
-        # A colleague builds one: it is there without anything being pressed.
+        # A package built by another user appears by itself.
         _, project = await cell.open(colleague)
         await cell.build(colleague, project)
         await page.get_by_role("radio", name=project.name).wait_for()
         await screen.press("Start")
-        await page.get_by_role("button", name="Stop motion").wait_for(timeout=BEGUN)
+        await page.get_by_role("button", name=texts.STOP_MOTION).wait_for(timeout=BEGUN)
         # There is no board, so the reader finds no code.
         state = page.get_by_role("status", name="State")
         await expect(state).to_contain_text("Run failed in scan", timeout=25_000)
@@ -60,14 +66,14 @@ async def test_what_is_built_appears_is_run_and_its_error_is_plain(
 async def test_failed_run_is_shown_on_every_screen_until_it_is_dismissed(
     cell: Cell, colleague: Client, browser: Browser
 ) -> None:
-    (package,) = await colleague.call("ListPackages")
+    package = await built(cell, colleague)
     async with screen_of(browser, cell.url) as watcher, screen_of(browser, cell.url) as operator:
-        # A user of the editor watches a run that someone else starts, until the server shows the lists again.
+        # A user of the editor watches a run of another user until the server shows the lists again.
         await watcher.join("Wendy")
         await colleague.call("RunPackage", rpc.RunPackageArgs(package.id, start_paused=True))
         await watcher.page.get_by_text("before more_boards").wait_for(timeout=BEGUN)
         await colleague.call("ResumePackage")
-        await watcher.page.get_by_role("heading", name="Workplace").wait_for()
+        await watcher.page.get_by_role("heading", name=texts.HOME_HEADING).wait_for()
         banner = watcher.page.get_by_role("alert").filter(has_text="Run failed in scan")
         await expect(banner).to_contain_text("no code was read")
         await expect(banner).to_contain_text(package.package_meta.name)
@@ -81,7 +87,7 @@ async def test_failed_run_is_shown_on_every_screen_until_it_is_dismissed(
             await expect(state).to_contain_text("Run failed in scan")
             await expect(state).not_to_contain_text("Ready")
             await operator.page.reload()
-        await state.get_by_role("button", name="Dismiss").click()
+        await state.get_by_role("button", name=texts.DISMISS).click()
         for _ in ("dismissed", "reloaded"):
             await expect(state).to_contain_text("Ready")
             await expect(state).to_contain_text("failed")
@@ -90,30 +96,30 @@ async def test_failed_run_is_shown_on_every_screen_until_it_is_dismissed(
         # Each user dismisses it for themselves. The open project keeps the result of its last run.
         await expect(banner).to_be_visible()
         await colleague.call("OpenProject", rpc.IdArgs((await colleague.call("ListProjects"))[0].id))
-        await watcher.page.get_by_role("navigation").get_by_role("button", name="Run", exact=True).click()
+        await watcher.page.get_by_role("navigation").get_by_role("button", name=texts.RUN, exact=True).click()
         last = watcher.page.get_by_role("region", name="Last run")
         await expect(last).to_contain_text("Run failed in scan")
         await watcher.picture("run failed, project")
         await watcher.press("Dismiss the result")
         await expect(banner).to_have_count(0)
         await watcher.page.reload()
-        await watcher.page.get_by_role("navigation").get_by_role("button", name="Run", exact=True).click()
+        await watcher.page.get_by_role("navigation").get_by_role("button", name=texts.RUN, exact=True).click()
         await expect(last).to_contain_text("no code was read")
         await expect(banner).to_have_count(0)
         await colleague.call("CloseProject")
 
 
 async def test_pause_step_and_stop(cell: Cell, colleague: Client, browser: Browser) -> None:
-    (package,) = await colleague.call("ListPackages")
+    package = await built(cell, colleague)
     async with screen_of(browser, cell.url) as screen:
         page = screen.page
         await at_the_machine(screen)
         # A run that another user has started paused can be stepped and stopped from here.
         await colleague.call("RunPackage", rpc.RunPackageArgs(package.id, start_paused=True))
         await page.get_by_text("before more_boards").wait_for(timeout=BEGUN)
-        await screen.press("Step")
+        await screen.press(texts.STEP)
         await page.get_by_text("before scan").wait_for()
-        await screen.press("Stop")
+        await screen.press(texts.STOP)
         while (await colleague.next_event("PackageState", timeout=20)).data.state is not PackageStateEnum.STOPPED:
             pass
         await page.get_by_role("button", name="Start", exact=True).wait_for()
@@ -121,13 +127,14 @@ async def test_pause_step_and_stop(cell: Cell, colleague: Client, browser: Brows
         run = (await colleague.call("ListRuns")).runs[0]
         assert (run.end.value, run.stopped_by) == ("stopped", "Olga")
         await screen.press("To the editor")
-        await page.get_by_role("heading", name="Workplace").wait_for()
+        await page.get_by_role("heading", name=texts.HOME_HEADING).wait_for()
 
 
-async def test_what_a_user_left_open_and_locked_is_no_obstacle(cell: Cell, colleague: Client, browser: Browser) -> None:
+async def test_operator_takes_over_a_project_left_open_and_locked(
+    cell: Cell, colleague: Client, browser: Browser
+) -> None:
     await colleague.update_presence(view="test")  # shows no project
-    if not await colleague.call("ListPackages"):
-        await cell.build(colleague, (await cell.open(colleague))[1])
+    await built(cell, colleague)
     async with screen_of(browser, cell.url, touch=True) as screen:
         page = screen.page
         await at_the_machine(screen)
@@ -155,13 +162,13 @@ async def test_what_a_user_left_open_and_locked_is_no_obstacle(cell: Cell, colle
             await screen.settle()
             assert await screen.faults() == [], name
             await screen.picture(f"take over {name}")
-            await asked.get_by_role("button", name="Cancel").click()
+            await asked.get_by_role("button", name=texts.CANCEL).click()
         await gone.click()
         await asked.get_by_role("button", name="Take over").click()
         await screen.sees(f"You took over from Wendy: {point.name}.")
         await expect(gone).to_have_count(0)
         await screen.press("Start")
-        await page.get_by_role("button", name="Stop", exact=True).click(timeout=BEGUN)
+        await page.get_by_role("button", name=texts.STOP, exact=True).click(timeout=BEGUN)
         await screen.sees(f"{project.name} was left open in the editor.")
         async with Client(cell.url, "Wendy", reconnect=False) as wendy:
             opened = (await wendy.next_event("OpenProject", timeout=10)).data.project

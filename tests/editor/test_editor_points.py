@@ -1,7 +1,4 @@
-"""Points: added by one tap from the robot, on a surface, by numbers; hung, taught, reached; in Chromium.
-
-A session in order: each test goes on with the points that the ones before have made.
-"""
+"""Points: added from the robot, on a surface, by numbers; their parent, what is taught to them, and reachability."""
 
 import contextlib
 import math
@@ -18,18 +15,20 @@ from arcor2_hw.client import Client
 from arcor2_hw.client.errors import LockedByOther, RequestFailed
 from arcor2_hw.data import rpc
 from arcor2_hw.data.events import SceneStateEnum
-from arcor2_hw.data.geometry import Orientation
+from arcor2_hw.data.geometry import Orientation, Position
 from arcor2_hw.data.project import ActionParameter, ActionPoint, Flow, FlowTypes, Project
 from arcor2_hw.data.scene import Scene
 from tests.e2e.harness import Cell, scene_state, until
+from tests.editor import texts
+from tests.editor.reset import START, place_robot
 from tests.editor.screen import Screen, screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(180)]
+pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(180)]
 
 
 @dataclass
 class Place:
-    """The project is open and the scene online; Eva sits at the screen."""
+    """The project is open and the scene online; the user at the screen is Eva."""
 
     cell: Cell
     client: Client
@@ -39,20 +38,44 @@ class Place:
     screen: Screen
 
     async def saved(self) -> Project:
-        """The project as the server has it."""
-        with contextlib.suppress(RequestFailed):  # nothing to save, or somebody is about to change something
+        """Save the project and return it."""
+        with contextlib.suppress(RequestFailed):  # nothing to save, or locked by the screen
             await self.client.call("SaveProject")
         project: Project = await self.client.call("GetProject", rpc.IdArgs(self.project.id))
         return project
 
     async def point(self, name: str, wanted: Callable[[ActionPoint], bool] = lambda _: True) -> ActionPoint:
-        """A point as the server has it, once it is as wanted."""
+        """Return the stored point once it is as wanted."""
 
         async def look() -> ActionPoint | None:
             found = next((each for each in (await self.saved()).action_points if each.name == name), None)
             return found if found is not None and wanted(found) else None
 
         point: ActionPoint = await until(look, f"the point {name} is as wanted", 15)
+        return point
+
+    async def new_point(self, before: Project, wanted: Callable[[ActionPoint], bool] = lambda _: True) -> ActionPoint:
+        """Return the point that has been added since, once it is as wanted."""
+        known = {each.id for each in before.action_points}
+
+        async def look() -> ActionPoint | None:
+            found = [each for each in (await self.saved()).action_points if each.id not in known]
+            return found[0] if len(found) == 1 and wanted(found[0]) else None
+
+        point: ActionPoint = await until(look, "one point is added and as wanted", 15)
+        return point
+
+    async def add_point(self, name: str, position: Position, orientation: Orientation | None = None) -> ActionPoint:
+        """Add a point by the protocol, with an orientation named "down"."""
+        await self.client.call("AddActionPoint", rpc.AddActionPointArgs(name, position))
+        point = await self.point(name)
+        if orientation is not None:
+            await self.client.call("WriteLock", rpc.WriteLockArgs(point.id))
+            args = rpc.AddActionPointOrientationArgs(point.id, orientation, "down")
+            await self.client.call("AddActionPointOrientation", args)
+            await self.client.call("WriteUnlock", rpc.WriteUnlockArgs(point.id))
+            point = await self.point(name, lambda each: len(each.orientations) == 1)
+        await self.screen.item(point.id)
         return point
 
     def button(self, name: str) -> Locator:
@@ -64,54 +87,62 @@ class Place:
             await rail.click()
 
     async def select(self, name: str) -> None:
-        """Choose a thing in the list, which the keyboard can do as well."""
-        await self.tool("Things")
+        """Select an object in the list."""
+        await self.tool(texts.OBJECTS)
         page = self.screen.page
         await page.get_by_role("row").filter(has=page.get_by_text(name, exact=True)).first.click()
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def place(cell: Cell, browser: Browser) -> AsyncIterator[Place]:
-    client = await cell.client("colleague")
-    scene, project = await cell.open(client)
+@pytest_asyncio.fixture(scope="module", loop_scope="session")
+async def online(module_cell: Cell, browser: Browser) -> AsyncIterator[Place]:
+    client = await module_cell.client("colleague")
+    scene, project = await module_cell.open(client)
     robot = next(each.id for each in scene.objects if each.name == "robot")
-    async with screen_of(browser, cell.url) as screen:
+    async with screen_of(browser, module_cell.url) as screen:
         await screen.join("Eva")
         await screen.item(robot)
         await client.call("StartSceneKeepGoing")
         await scene_state(client, SceneStateEnum.STARTED, 60)
         await screen.until("id => window.__engine?.item(id)?.endEffectors?.length > 0", robot)
-        yield Place(cell, client, scene, project, robot, screen)
+        yield Place(module_cell, client, scene, project, robot, screen)
 
 
-async def test_one_tap_keeps_where_the_robot_is(place: Place) -> None:
-    before = {each.id for each in place.project.action_points}
+@pytest_asyncio.fixture(loop_scope="session")
+async def place(online: Place) -> Place:
+    """All panels are closed, and the robot is at its start position."""
+    await online.screen.close_panels()
+    await place_robot(online.cell, online.screen, online.robot)
+    return online
+
+
+async def test_point_at_the_robot_by_one_tap(place: Place) -> None:
+    before = await place.saved()
     tool = (await place.screen.item(place.robot))["endEffectors"][0]
     await place.button("Keep the robot's place as a point").click()  # the only one
-    point = await place.point("point", lambda each: len(each.orientations) == len(each.robot_joints) == 1)
-    assert point.id not in before
+    point = await place.new_point(before, lambda each: len(each.orientations) == len(each.robot_joints) == 1)
     assert math.dist(tuple(point.position), tuple(tool["position"].values())) < 1e-3
-    # It is selected, and its name can be changed where it stands.
+    # It is selected and can be renamed in the panel.
     name = place.screen.page.get_by_label("Name of the point")
     await name.fill("home place")
     await name.press("Enter")
     await place.point("home_place")
-    # Undone by one tap, which says what it does.
+    # The Undo button names what it undoes.
     await place.screen.page.get_by_role("button", name=re.compile("^Undo ")).click()
-    await place.point("point")
-    # A name that is taken is refused where it was typed.
+    await place.point(point.name)
+    # A name in use is refused at the field.
     await name.fill("feeder")
     await name.press("Enter")
     await expect(place.screen.page.get_by_role("complementary").get_by_role("alert")).to_be_visible()
     await name.press("Escape")
 
 
-async def test_a_tap_on_a_surface_adds_a_point_on_what_is_selected(place: Place) -> None:
+async def test_tap_on_a_surface_adds_a_point_to_the_selected_object(place: Place) -> None:
     page, screen = place.screen.page, place.screen
     table = next(each for each in place.scene.objects if each.name == "table")
     tester = next(each for each in place.scene.objects if each.name == "tester")
+    before = await place.saved()
     await place.select("tester")
-    await place.tool("Points")
+    await place.tool(texts.POINTS)
     await place.button("Where I tap").click()
     await page.evaluate("() => __engine.view.set([0.6, -0.5, 1.2], [0.6, -0.4, 0])")
     await screen.settle()
@@ -128,7 +159,7 @@ async def test_a_tap_on_a_surface_adds_a_point_on_what_is_selected(place: Place)
     assert box is not None
     assert spot is not None
     await page.mouse.click(box["x"] + spot["x"], box["y"] + spot["y"])
-    point = await place.point("point_2", lambda each: len(each.orientations) == 1)
+    point = await place.new_point(before, lambda each: len(each.orientations) == 1)
     assert point.parent == tester.id
     drawn = (await screen.item(point.id))["pose"]["position"]
     surface = table.pose.position.z + 0.01  # type: ignore[union-attr]
@@ -136,32 +167,32 @@ async def test_a_tap_on_a_surface_adds_a_point_on_what_is_selected(place: Place)
     assert math.hypot(drawn["x"] - 0.6, drawn["y"] + 0.4) < 0.5
 
 
-async def test_a_point_by_numbers_hangs_in_the_world_and_goes_to_a_parent_without_moving(place: Place) -> None:
+async def test_point_by_numbers_gets_a_parent_without_moving(place: Place) -> None:
     page = place.screen.page
-    await place.button("Close the panel").click()
-    await place.tool("Points")
+    before = await place.saved()
+    await place.tool(texts.POINTS)
     await page.get_by_text("By numbers").click()
     for axis, value in (("X", "400"), ("Y", "-100"), ("Z", "+250")):
         await page.get_by_label(f"{axis} mm").fill(value)
         await page.keyboard.press("Enter")
     await place.button("Add the point").click()
-    point = await place.point("point_3")
+    point = await place.new_point(before)
     assert tuple(point.position) == pytest.approx((0.4, -0.1, 0.25))
     tester = next(each for each in place.scene.objects if each.name == "tester")
     await page.get_by_label("Hangs").select_option("on tester")
-    hung = await place.point("point_3", lambda each: each.parent == tester.id)
+    hung = await place.point(point.name, lambda each: each.parent == tester.id)
     assert tuple(hung.position) == pytest.approx((-0.1, -0.25, 0.2))  # relative to its parent now
     drawn = (await place.screen.item(point.id))["pose"]["position"]
     assert tuple(drawn.values()) == pytest.approx((0.4, -0.1, 0.25))
 
 
-async def test_orientations_are_added_turned_and_told_whether_they_are_reached(place: Place) -> None:
+async def test_orientations_are_added_rotated_and_checked_for_reachability(place: Place) -> None:
     page = place.screen.page
-    point = await place.point("point_3")
-    await place.screen.until("id => window.__engine.item(id)", point.id)
+    point = await place.add_point("turned", Position(0.4, -0.1, 0.25))
+    await place.select("turned")
     await page.get_by_role("button", name="Add an orientation").click()
     await page.get_by_role("menuitem", name="Tool straight down").click()
-    added = await place.point("point_3", lambda each: len(each.orientations) == 1)
+    added = await place.point("turned", lambda each: len(each.orientations) == 1)
     orientation = added.orientations[0]
     await page.get_by_role("button", name=re.compile("^down")).first.click()
     answer = page.locator(".reaches li", has_text="robot · tcp")
@@ -170,8 +201,8 @@ async def test_orientations_are_added_turned_and_told_whether_they_are_reached(p
     yaw = page.get_by_label("Yaw °")
     await yaw.fill("90")
     await yaw.press("Enter")
-    await place.point("point_3", lambda each: abs(_yaw(each.orientations[0].orientation) - math.pi / 2) < 1e-6)
-    # An action that goes there tells it as well, by a sign on it in the view.
+    await place.point("turned", lambda each: abs(_yaw(each.orientations[0].orientation) - math.pi / 2) < 1e-6)
+    # The action that moves there shows it in the view, too.
     args = rpc.AddActionArgs(
         point.id,
         "go_there",
@@ -180,17 +211,17 @@ async def test_orientations_are_added_turned_and_told_whether_they_are_reached(p
         [Flow(FlowTypes.DEFAULT, [])],
     )
     await place.client.call("AddAction", args)
-    action = (await place.point("point_3", lambda each: len(each.actions) == 1)).actions[0].id
+    action = (await place.point("turned", lambda each: len(each.actions) == 1)).actions[0].id
     await place.screen.until("id => window.__engine.item(id)?.sign === 'reachable'", action)
-    # Moved out of reach, it is told with the reason.
+    # Out of reach, with the reason.
     await place.client.call("WriteLock", rpc.WriteLockArgs(point.id, lock_tree=True))
-    far = (await place.point("point_3")).position
+    far = (await place.point("turned")).position
     far.x += 5
     await place.client.call("UpdateActionPointPosition", rpc.UpdateActionPointPositionArgs(point.id, far))
     await place.client.call("WriteUnlock", rpc.WriteUnlockArgs(point.id))
     await expect(answer).to_contain_text("out of reach", timeout=30_000)
     await place.screen.until("id => window.__engine.item(id).sign === 'out_of_reach'", action)
-    await place.tool("Program")
+    await place.tool(texts.PROGRAM)
     await page.get_by_role("radio", name="Actions", exact=True).click()
     step = page.get_by_role("complementary").locator(".steps li", has_text="go_there")
     await expect(step.locator(".reach")).to_contain_text("out of reach")
@@ -202,10 +233,10 @@ async def test_orientations_are_added_turned_and_told_whether_they_are_reached(p
     await place.screen.picture("points action out of reach")
 
 
-async def test_a_point_goes_where_the_robot_is_by_a_tap_and_by_hand(place: Place) -> None:
-    """D-05, T-06: by hand it is put there when the arm is let go, and not before."""
+async def test_point_is_moved_to_the_robot_by_a_tap_and_by_hand_guiding(place: Place) -> None:
+    """By hand, the point is put there when the user releases the button, not before."""
     page, screen = place.screen.page, place.screen
-    point = (await place.point("point_3")).id
+    point = (await place.add_point("guided", Position(5.4, -0.1, 0.25))).id
 
     async def apart() -> float:
         drawn = (await screen.item(point))["pose"]["position"]
@@ -215,9 +246,9 @@ async def test_a_point_goes_where_the_robot_is_by_a_tap_and_by_hand(place: Place
     async def there() -> bool:
         return bool(await apart() < 1e-3)
 
-    await place.select("point_3")
+    await place.select("guided")
     assert await apart() > 1
-    await place.button("Put it where the robot is").click()
+    await place.button(texts.MOVE_POINT_TO_ROBOT).click()
     await until(there, "the point is where the robot is")
     joints = await place.client.call("GetRobotJoints", rpc.GetRobotJointsArgs(place.robot))
     goal = [each.value for each in joints]
@@ -228,7 +259,7 @@ async def test_a_point_goes_where_the_robot_is_by_a_tap_and_by_hand(place: Place
         return bool((await place.cell.tell("robot", "truth"))["freedrive"])
 
     async def guided() -> bool:
-        """By a hand that takes the button again when its hold ended by itself, as it may on a busy machine."""
+        """Guide the robot; press again if the hold has ended, as it may on a busy machine."""
         if await button.get_attribute("data-held") != "true":
             await page.mouse.up()
             await button.hover()
@@ -239,7 +270,7 @@ async def test_a_point_goes_where_the_robot_is_by_a_tap_and_by_hand(place: Place
         if max(abs(a - b) for a, b in zip(truth["q"], goal, strict=True)) < 1e-3:
             return await button.get_attribute("data-held") == "true"
         if not any(truth["qd"]):
-            with contextlib.suppress(AssertionError):  # stiff again meanwhile
+            with contextlib.suppress(AssertionError):  # hand guiding has ended meanwhile
                 await place.cell.tell("robot", "guide", q=goal, speed=0.5)
         return False
 
@@ -250,10 +281,10 @@ async def test_a_point_goes_where_the_robot_is_by_a_tap_and_by_hand(place: Place
     assert not await free()
 
 
-async def test_what_somebody_notes_about_a_point_is_seen_by_all(place: Place) -> None:
-    """D-13."""
-    point = await place.point("point_3")
-    note = place.screen.page.get_by_label("Note")
+async def test_note_on_a_point_is_shared(place: Place) -> None:
+    point = await place.add_point("noted", Position(0.3, 0.1, 0.2))
+    await place.select("noted")
+    note = place.screen.page.get_by_role("textbox", name="Note", exact=True)
     await note.fill("mind the cable")
     await note.blur()
 
@@ -267,17 +298,20 @@ async def test_what_somebody_notes_about_a_point_is_seen_by_all(place: Place) ->
     await expect(note).to_have_value("the cable is mended")
 
 
-async def test_the_robot_is_shown_at_what_is_taught_goes_there_and_turns_as_it_is(place: Place) -> None:
-    """R-07, R-04."""
+async def test_robot_is_previewed_and_moved_to_a_taught_orientation(place: Place) -> None:
     page, screen = place.screen.page, place.screen
-    point = await place.point("point_3")
+    await place_robot(place.cell, screen, place.robot, (START[0], START[1] + 0.1, *START[2:]))
+    at = (await screen.item(place.robot))["endEffectors"][0]["position"]
+    down_and_yawed = Orientation(math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)
+    point = await place.add_point("taught", Position(**at), down_and_yawed)
     down = point.orientations[0].id
+    await place.select("taught")
     await page.get_by_role("button", name=re.compile("^down")).first.click()
     before = (await screen.item(place.robot))["joints"]
     await page.get_by_text("At 25 % of its speed").click()
     await page.get_by_role("slider", name="Speed").fill("1")
     await place.button("Show robot there").click()
-    await screen.sees("It can go there: the ghost shows how.")
+    await screen.sees(texts.CAN_GO_THERE)
     ghost = await screen.until("id => window.__engine.item(id).ghost", place.robot)
     real = (await screen.item(place.robot))["joints"]
     assert max(abs(real[name] - before[name]) for name in real) < 1e-3, "it is only shown"
@@ -302,43 +336,44 @@ async def test_the_robot_is_shown_at_what_is_taught_goes_there_and_turns_as_it_i
         return not any((await place.cell.tell("robot", "truth"))["qd"])
 
     await until(rests, "the arm rests")
-    # The tool turns as another orientation, and stays where it is.
+    # The tool is rotated to another orientation at the same position.
     await place.client.call("WriteLock", rpc.WriteLockArgs(down))
     yawed = Orientation(math.cos(0.5), math.sin(0.5), 0.0, 0.0)
     await place.client.call("UpdateActionPointOrientation", rpc.UpdateActionPointOrientationArgs(down, yawed))
     await place.client.call("WriteUnlock", rpc.WriteUnlockArgs(down))
     await screen.until(f"(ids) => ({as_taught})(ids).turned > 0.1", [place.robot, down])
     await page.get_by_role("button", name=re.compile("^Active robot")).click()
-    await page.get_by_role("radiogroup", name="How to move it").get_by_role("radio", name="Tool", exact=True).click()
+    await page.get_by_role("radiogroup", name=texts.HOW_TO_MOVE).get_by_role("radio", name="Tool", exact=True).click()
     await place.button("Turn as down").click()
     await until(reached, "the tool is turned as the orientation", 20)
-    await place.button("Close the panel").click()
+    await place.button(texts.CLOSE_PANEL).click()
 
 
 def _yaw(q: Any) -> float:
     return math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y**2 + q.z**2))
 
 
-async def test_joints_of_a_moved_point_say_so_and_are_computed_anew(place: Place) -> None:
+async def test_joints_of_a_moved_point_are_invalid_until_recomputed(place: Place) -> None:
     page = place.screen.page
-    point = await place.point("point")
+    await place.client.call("AddApUsingRobot", rpc.AddApUsingRobotArgs(place.robot, "tcp", "moved"))
+    point = await place.point("moved", lambda each: len(each.robot_joints) == 1)
     await place.client.call("WriteLock", rpc.WriteLockArgs(point.id, lock_tree=True))
     point.position.z -= 0.05
     await place.client.call("UpdateActionPointPosition", rpc.UpdateActionPointPositionArgs(point.id, point.position))
     await place.client.call("WriteUnlock", rpc.WriteUnlockArgs(point.id))
-    await place.select("point")
-    await expect(page.get_by_label("Name of the point")).to_have_value("point")
+    await place.select("moved")
+    await expect(page.get_by_label("Name of the point")).to_have_value("moved")
     await page.get_by_role("button", name=re.compile("^default · robot")).click()
     await place.screen.sees("The point has moved since: these joints no longer lead to it.")
     before = point.robot_joints[0].joints
     await place.button("Compute anew").click()
-    # What was saved last is older than the move until the editor's lock is free.
-    solved = await place.point("point", lambda each: each.position == point.position and each.robot_joints[0].is_valid)
+    # The saved point is older than the move until the editor has released its lock.
+    solved = await place.point("moved", lambda each: each.position == point.position and each.robot_joints[0].is_valid)
     moved = max(abs(a.value - b.value) for a, b in zip(before, solved.robot_joints[0].joints, strict=True))
     assert 0.005 < moved < 1.0, "solved near to what they were, and not the same"
 
 
-async def test_copies_in_a_row_and_what_others_hold(place: Place) -> None:
+async def test_copies_in_a_row_and_locked_points(place: Place) -> None:
     page = place.screen.page
     source = await place.point("feeder")
     await place.select("feeder")
@@ -353,10 +388,10 @@ async def test_copies_in_a_row_and_what_others_hold(place: Place) -> None:
         return sum(each.name.startswith("feeder_copy") for each in (await place.saved()).action_points) == 2
 
     await until(both, "the second, which is made after the first")
-    # What somebody else holds cannot be changed, and says by whom.
+    # A point locked by another user cannot be changed; the button names the user.
 
     async def locked() -> bool:
-        with contextlib.suppress(LockedByOther):  # until the screen has given its own lock back
+        with contextlib.suppress(LockedByOther):  # until the screen has released its lock
             await place.client.call("WriteLock", rpc.WriteLockArgs(source.id))
             return True
         return False
@@ -365,4 +400,4 @@ async def test_copies_in_a_row_and_what_others_hold(place: Place) -> None:
     why = page.get_by_role("button", name=re.compile("^Put it where the robot is.*colleague works on it"))
     await expect(why).to_have_attribute("aria-disabled", "true")
     await place.client.call("WriteUnlock", rpc.WriteUnlockArgs(source.id))
-    await expect(place.button("Put it where the robot is")).to_be_visible()
+    await expect(place.button(texts.MOVE_POINT_TO_ROBOT)).to_be_visible()

@@ -1,4 +1,4 @@
-"""A program is written in Chromium on the real server: actions, values, steps and branches, faults, code."""
+"""Writing a program: actions, parameters, steps and branches, faults, code."""
 
 import math
 from collections.abc import AsyncIterator
@@ -15,16 +15,24 @@ from arcor2_hw.data.events import ChangeType
 from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.project import ActionParameter, Flow, FlowTypes
 from tests.e2e.harness import Cell, until
+from tests.editor import texts
 from tests.editor.programming import Work, at_work
 
-pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(180)]
+pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(180)]
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def work(cell: Cell, browser: Browser) -> AsyncIterator[Work]:
-    """One project for all tests of the module; each works on actions of its own."""
-    async with at_work(cell, browser, ("counter", "CounterActions")) as open_project:
+@pytest_asyncio.fixture(scope="module", loop_scope="session")
+async def opened(module_cell: Cell, browser: Browser) -> AsyncIterator[Work]:
+    """One project for all tests of this module. Each test adds the actions it edits."""
+    async with at_work(module_cell, browser, ("counter", "CounterActions")) as open_project:
         yield open_project
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def work(opened: Work) -> Work:
+    """The project is open in the 3D view, with all panels closed."""
+    await opened.start()
+    return opened
 
 
 def number(value: int) -> ActionParameter:
@@ -35,11 +43,11 @@ def reference(parameter: Any) -> str:
     return str(msgspec.json.decode(parameter.value))
 
 
-async def test_an_action_where_the_cross_is_takes_two_taps(work: Work) -> None:
-    """U-04, X6: the point, its orientation and the action, of which nothing was there."""
+async def test_action_at_the_crosshair_takes_two_taps(work: Work) -> None:
+    """Adds the point, its orientation and the action."""
     screen = work.screen
     work.taps = 0
-    await work.tool("Program")
+    await work.tool(texts.PROGRAM)
     await work.mode("Add")
     await screen.page.locator(".crosshair").wait_for()
     aimed = await screen.page.evaluate(
@@ -56,20 +64,20 @@ async def test_an_action_where_the_cross_is_takes_two_taps(work: Work) -> None:
     orientation = (await work.told("OrientationChanged")).data
     action = (await work.told("ActionChanged")).data
     assert math.dist(tuple(point.position), aimed) < 1e-6
-    # A tool that stands on the table: its z against the surface's normal.
+    # The tool points down on the table: its z axis is opposite to the surface normal.
     assert abs(orientation.orientation.x) == pytest.approx(1, abs=1e-3)
     assert action.type == f"{work.object('robot')}/move"
     given = await work.parameters(action.id)
     assert reference(given["pose"]) == orientation.id
     assert given["speed"].value == "0.25", "what has a default gets it"
-    # It is shown, selected, with what it is told beside it.
+    # It is shown and selected, with its parameters in the panel.
     assert (await screen.item(action.id))["kind"] == "action"
     await work.panel.get_by_role("heading", name=action.name, exact=True).wait_for()
     await work.panel.get_by_label("speed", exact=True).wait_for()
     await screen.picture("program action")
 
 
-async def test_values_are_checked_where_they_are_typed_and_by_the_server(work: Work) -> None:
+async def test_values_are_validated_by_field_and_server(work: Work) -> None:
     action = await work.add("probe", "robot/get_digital_input", "feeder", "probed", number=number(1))
     await work.select("probe")
     field = work.panel.get_by_label("number", exact=True)
@@ -80,7 +88,7 @@ async def test_values_are_checked_where_they_are_typed_and_by_the_server(work: W
     await field.press("Enter")
     await work.told("ActionChanged", lambda event: event.change_type is ChangeType.UPDATE)
     assert (await work.parameters(action))["number"] == number(3)
-    # Somebody else has it in hand: refused, said at the field, and what was typed stays.
+    # Locked by another user: refused at the field, and the typed text stays.
     await work.client.call("WriteLock", rpc.WriteLockArgs(action))
     await field.fill("4")
     await field.press("Enter")
@@ -89,7 +97,7 @@ async def test_values_are_checked_where_they_are_typed_and_by_the_server(work: W
     await field.press("Escape")
     await expect(field).to_have_value("3")
     await work.client.call("WriteUnlock", rpc.WriteUnlockArgs(action))
-    # From now on a value of the whole program, made on the spot.
+    # It becomes a new project parameter.
     await work.panel.get_by_role("radiogroup", name="Where number comes from").get_by_text("Project").click()
     await field.select_option(label="New, with the present value…")
     made = (await work.told("ProjectParameterChanged")).data
@@ -97,16 +105,16 @@ async def test_values_are_checked_where_they_are_typed_and_by_the_server(work: W
     await work.told("ActionChanged", lambda event: event.change_type is ChangeType.UPDATE)
     linked = (await work.parameters(action))["number"]
     assert (linked.type, reference(linked)) == ("project_parameter", made.id)
-    await work.tool("Program")
-    await work.mode("Values")
+    await work.tool(texts.PROGRAM)
+    await work.mode(texts.VARIABLES)
     constant = work.panel.get_by_role("region", name="number")
     await constant.get_by_role("button", name="probe", exact=True).wait_for()
-    # What is used cannot go, and says by whom.
+    # A parameter in use cannot be removed; the message names its user.
     await constant.get_by_role("button", name="Remove number").click(force=True)
     await work.screen.sees("It is used by probe.")
 
 
-async def test_a_result_of_an_earlier_action_can_be_used_and_of_a_later_one_not(work: Work) -> None:
+async def test_only_results_of_earlier_actions_can_be_used(work: Work) -> None:
     first = await work.add("count_up", "counter/increment", "feeder", "so_many")
     second = await work.add("take_off", "counter/decrement", "feeder", "left_over")
     await work.client.call("AddLogicItem", rpc.AddLogicItemArgs(first, second))
@@ -122,15 +130,15 @@ async def test_a_result_of_an_earlier_action_can_be_used_and_of_a_later_one_not(
     assert (linked.type, reference(linked)) == ("link", f"{first}/default/0")
 
 
-async def test_a_branch_takes_four_taps_and_a_step_two(work: Work) -> None:
-    """U-05, U-06: in the graph; the step that is changed stays the same one."""
+async def test_branch_takes_four_taps_and_step_two(work: Work) -> None:
+    """In the graph. A changed step keeps its id."""
     screen, page = work.screen, work.screen.page
     check = await work.add("check_input", "robot/get_digital_input", "good", "there", number=number(1))
     yes = await work.add("on_yes", "flow/wait", "good")
     no = await work.add("on_no", "flow/wait", "bad")
-    await page.get_by_role("button", name="Close the panel").click()
+    await work.screen.close_panels()
     await work.mode("Flow")
-    graph = page.get_by_role("region", name="The program as a graph")
+    graph = page.get_by_role("region", name=texts.GRAPH)
 
     async def node(name: str) -> None:
         work.taps += 1
@@ -155,11 +163,11 @@ async def test_a_branch_takes_four_taps_and_a_step_two(work: Work) -> None:
     joined = (await work.told("LogicItemChanged")).data
     assert work.taps == 2
     assert (joined.start, joined.end, joined.condition) == (yes, no, UNSET)
-    # What leads nowhere good is refused in words, and nothing is asked of the server.
+    # A loop is refused without a request.
     await work.tap_button("on_no: next", graph)
     await node("check_input")
     await screen.sees("It would close a loop.")
-    # In grey print, too, the branches look different.
+    # Branches differ by their dash pattern, not only by colour.
     await screen.until(
         """ids => {
             const lines = ids.map((id) => document.querySelector(`.react-flow__edge[data-id="${id}"] path`));
@@ -168,7 +176,7 @@ async def test_a_branch_takes_four_taps_and_a_step_two(work: Work) -> None:
         }""",
         [step.id, other.id, joined.id],
     )
-    # Lead the step elsewhere: the same one, never gone meanwhile.
+    # Redirecting a step keeps its id.
     await graph.locator(f"[data-id='{joined.id}'] .react-flow__edge-interaction").click(force=True)
     await work.tap_button("Lead elsewhere", work.panel)
     await graph.locator('.react-flow__node[data-id="END"] .flow-name').click()
@@ -178,13 +186,13 @@ async def test_a_branch_takes_four_taps_and_a_step_two(work: Work) -> None:
     await work.mode("3D")
 
 
-async def test_a_tap_on_a_graph_that_changes_meanwhile_is_not_lost(work: Work) -> None:
-    """What somebody else adds is laid out when the finger is off."""
+async def test_graph_does_not_move_under_a_tap(work: Work) -> None:
+    """Additions of other users are laid out after the release."""
     screen, page = work.screen, work.screen.page
     await work.add("surely", "robot/get_digital_input", "good", "sure", number=number(2))
-    await page.get_by_role("button", name="Close the panel").click()
+    await work.screen.close_panels()
     await work.mode("Flow")
-    graph = page.get_by_role("region", name="The program as a graph")
+    graph = page.get_by_role("region", name=texts.GRAPH)
     way = graph.get_by_role("button", name="surely: yes", exact=True)
     await way.hover()
     await page.mouse.down()
@@ -199,8 +207,7 @@ async def test_a_tap_on_a_graph_that_changes_meanwhile_is_not_lost(work: Work) -
     await page.keyboard.press("Escape")
 
 
-async def test_a_straight_run_is_folded_into_one_and_open_where_something_is_to_be_seen(work: Work) -> None:
-    """X8."""
+async def test_straight_sequences_are_folded_except_around_the_selection(work: Work) -> None:
     screen, page = work.screen, work.screen.page
     names = ("first", "second", "third")
     first, second, third = [await work.add(name, "flow/wait", "good") for name in names]
@@ -212,7 +219,7 @@ async def test_a_straight_run_is_folded_into_one_and_open_where_something_is_to_
         await work.client.call("AddLogicItem", rpc.AddLogicItemArgs(start, end))
     await work.client.call("UpdateLogicItem", rpc.UpdateLogicItemArgs(last.id, last.start, first))
     await work.mode("Flow")
-    graph = page.get_by_role("region", name="The program as a graph")
+    graph = page.get_by_role("region", name=texts.GRAPH)
     await graph.locator('.react-flow__node[aria-label^="second,"] .flow-name').click()
     await work.tap_button("Fold 4 actions in the graph", work.panel)
     one = graph.locator('.react-flow__node[aria-label="4 actions folded into one, into_bad_box, first, second, third"]')
@@ -220,25 +227,25 @@ async def test_a_straight_run_is_folded_into_one_and_open_where_something_is_to_
     inner = graph.locator('.react-flow__node[aria-label^="second,"]')
     await expect(inner).to_have_count(0)
     await screen.picture("program folded")
-    # What is selected elsewhere is seen, and folded again when it is not selected any more.
+    # A selected action is unfolded, and folded again when deselected.
     await work.select("second")
     await inner.wait_for()
     await expect(one).to_have_count(0)
-    await page.get_by_role("button", name="Close the panel").click()
+    await work.screen.close_panels()
     await one.wait_for()
-    # A step that leads there leads to its first action.
+    # A step to the folded sequence leads to its first action.
     await work.tap_button("lead: next", graph)
     await one.locator(".flow-name").click()
     step = await work.told("LogicItemChanged", lambda event: event.data.start == lead)
     assert step.data.end == head
-    # A fault is seen as well: a way out of it that was taken away.
+    # A fault is unfolded as well: here a removed step.
     out = next(each for each in (await work.saved()).logic if each.start == third)
     await work.client.call("RemoveLogicItem", rpc.RemoveLogicItemArgs(out.id))
-    await page.get_by_role("button", name="Close the panel").click()
+    await work.screen.close_panels()
     await inner.wait_for()
     await work.client.call("AddLogicItem", rpc.AddLogicItemArgs(third, "END"))
     await one.wait_for()
-    # As this user has it on all tablets, until he opens it.
+    # The folding is stored per user until it is switched off.
     await work.mode("3D")
     await work.mode("Flow")
     await one.locator(".flow-name").click()
@@ -246,8 +253,7 @@ async def test_a_straight_run_is_folded_into_one_and_open_where_something_is_to_
     await work.mode("3D")
 
 
-async def test_an_action_is_renamed_and_duplicated(work: Work) -> None:
-    """E-06."""
+async def test_action_is_renamed_and_duplicated(work: Work) -> None:
     page = work.screen.page
     look = await work.add("look_there", "robot/get_digital_input", "good", "seen", number=number(3))
     await work.select("look_there")
@@ -261,30 +267,30 @@ async def test_an_action_is_renamed_and_duplicated(work: Work) -> None:
     renamed = await work.told("ActionChanged", lambda event: event.data.name == "look_here")
     assert renamed.change_type is ChangeType.UPDATE_BASE
     await work.panel.get_by_role("heading", name="look_here", exact=True).wait_for()
-    await work.tap_button("Duplicate", work.panel)
+    await work.tap_button(texts.DUPLICATE, work.panel)
     copy = (await work.told("ActionChanged", lambda event: event.change_type is ChangeType.ADD)).data
     saved = {each.id: each for point in (await work.saved()).action_points for each in point.actions}
     assert (saved[copy.id].type, saved[copy.id].parameters) == (saved[look].type, [number(3)])
     assert saved[copy.id].flows[0].outputs not in ([], ["seen"]), "each result has a name of its own"
     await work.panel.get_by_role("heading", name=copy.name, exact=True).wait_for()
-    await work.tap_button("Remove", work.panel)
+    await work.tap_button(texts.REMOVE, work.panel)
     await work.told("ActionChanged", lambda event: event.change_type is ChangeType.REMOVE)
     await expect(page.get_by_role("option", name=f"{copy.name} Action")).to_have_count(0)
 
 
-async def test_an_action_goes_with_its_steps_and_comes_back_by_one_undo(work: Work) -> None:
-    """U-09: what led to it leads on meanwhile."""
+async def test_removed_action_is_bridged_and_restored_by_one_undo(work: Work) -> None:
+    """Meanwhile the steps to it lead to its successor."""
     page = work.screen.page
     before = await work.saved()
     close, test, after = (work.action(name).id for name in ("close", "test", "open_again"))
     await work.select("test")
-    await work.tap_button("Remove", work.panel)
-    # It is needed: who asks whether it passed is named, and nothing is gone.
+    await work.tap_button(texts.REMOVE, work.panel)
+    # It is in use by a condition: refused with the name, and nothing is removed.
     await work.screen.sees("A result of test is used by a condition of the logic")
     assert (await work.saved()).logic == before.logic
     await work.select("close")
     work.taps = 0
-    await work.tap_button("Remove", work.panel)
+    await work.tap_button(texts.REMOVE, work.panel)
     await work.told("ActionChanged", lambda event: event.change_type is ChangeType.REMOVE)
     now = await work.saved()
     assert {(each.start, each.end) for each in now.logic if each.end == test} == {(work.action("insert").id, test)}
@@ -299,11 +305,10 @@ async def test_an_action_goes_with_its_steps_and_comes_back_by_one_undo(work: Wo
     assert after in {each.end for each in before.logic}
 
 
-async def test_the_steps_are_drawn_in_the_view_or_not(work: Work) -> None:
-    """E-10."""
+async def test_steps_in_the_view_can_be_hidden(work: Work) -> None:
     step = work.project.logic[0].id
     await work.screen.item(step)
-    await work.tool("Program")
+    await work.tool(texts.PROGRAM)
     await work.mode("Actions")
     drawn = work.panel.get_by_label("Steps are drawn in the 3D view")
     await drawn.click()
@@ -313,7 +318,7 @@ async def test_the_steps_are_drawn_in_the_view_or_not(work: Work) -> None:
     await work.screen.item(step)
 
 
-async def test_a_step_in_the_view_and_a_condition_on_an_integer_with_else(work: Work) -> None:
+async def test_step_in_the_view_and_integer_condition_with_else(work: Work) -> None:
     screen, page = work.screen, work.screen.page
     await work.mode("3D")
     count = await work.add("how_many", "counter/value", "bad", "many")
@@ -321,15 +326,15 @@ async def test_a_step_in_the_view_and_a_condition_on_an_integer_with_else(work: 
     rest = await work.add("otherwise", "flow/wait", "fixture")
     await work.select("how_many")
     await work.tap_button("Connect", work.panel)
-    await page.get_by_role("status").filter(has_text="Tap what follows").wait_for()
+    await page.get_by_role("status").filter(has_text=texts.TAP_NEXT_STEP).wait_for()
     await page.keyboard.press("Escape")
-    await expect(page.get_by_role("status").filter(has_text="Tap what follows")).to_have_count(0)
+    await expect(page.get_by_role("status").filter(has_text=texts.TAP_NEXT_STEP)).to_have_count(0)
     await work.tap_button("Connect", work.panel)
     await page.evaluate("id => __engine.focus(id)", rest)
     await screen.tap(rest)
     plain = (await work.told("LogicItemChanged")).data
     assert (plain.start, plain.end, plain.condition) == (count, rest, UNSET)
-    # Beside it one that asks for a number: the first one becomes what is done otherwise.
+    # Next to it a step with a condition: the first one becomes the else branch.
     await work.select("how_many")
     await work.tap_button("Connect", work.panel)
     await work.tap_button("at_three", work.panel)
@@ -346,24 +351,24 @@ async def test_a_step_in_the_view_and_a_condition_on_an_integer_with_else(work: 
     await work.panel.get_by_text("else").wait_for()
 
 
-async def test_a_fault_is_listed_and_leads_to_where_it_is(work: Work) -> None:
+async def test_program_fault_is_listed_and_leads_to_its_action(work: Work) -> None:
     lonely = await work.add("lonely", "flow/wait", "bad")
-    await work.tool("Program")
+    await work.tool(texts.PROGRAM)
     await work.mode("Check")
     fault = work.panel.get_by_role("button", name="lonely is never run: nothing leads to it.")
     await fault.click()
     await work.panel.get_by_role("heading", name="lonely", exact=True).wait_for()
     assert (await work.screen.page.evaluate("id => __engine.item(id).visible", lonely)) is True
-    await work.tap_button("Remove", work.panel)
+    await work.tap_button(texts.REMOVE, work.panel)
     gone = await work.told("ActionChanged", lambda event: event.change_type is ChangeType.REMOVE)
     assert gone.data.id == lonely
-    await work.tool("Program")
+    await work.tool(texts.PROGRAM)
     await expect(fault).to_have_count(0)
 
 
-async def test_a_setting_of_a_device_is_replaced_in_this_project_alone(work: Work) -> None:
-    await work.tool("Program")
-    await work.mode("Values")
+async def test_device_setting_is_overridden_in_one_project(work: Work) -> None:
+    await work.tool(texts.PROGRAM)
+    await work.mode(texts.VARIABLES)
     settings = work.panel.get_by_role("region", name="Settings of devices in this project")
     await settings.get_by_label("Device").select_option(label="tester")
     field = settings.get_by_label("port", exact=True)
@@ -379,7 +384,7 @@ async def test_a_setting_of_a_device_is_replaced_in_this_project_alone(work: Wor
     await expect(field).to_have_value(scenes)
 
 
-async def test_start_stands_where_somebody_puts_it_for_all(work: Work) -> None:
+async def test_start_is_dragged_for_all_users(work: Work) -> None:
     page = work.screen.page
     await work.mode("3D")
     await page.evaluate("__engine.focus('START')")
@@ -400,11 +405,11 @@ async def test_start_stands_where_somebody_puts_it_for_all(work: Work) -> None:
     assert math.dist(kept.values["place/START"].values(), after.values()) < 1e-6
 
 
-async def test_the_code_is_what_the_server_builds_and_knows_the_actions(work: Work) -> None:
-    """E-15: of what is saved, which is said while it is older than what is shown."""
+async def test_code_view_shows_the_saved_program_and_selects_actions(work: Work) -> None:
+    """A note says that the code is older than the unsaved program."""
     page = work.screen.page
     await work.add("newer", "flow/wait", "bad")
-    await page.get_by_role("button", name="Close the panel").click()
+    await work.screen.close_panels()
     await work.mode("Code")
     code = page.get_by_role("region", name="The program as Python")
     await code.get_by_text("This is the program as it was saved.").wait_for()
@@ -417,11 +422,11 @@ async def test_the_code_is_what_the_server_builds_and_knows_the_actions(work: Wo
     await work.mode("3D")
 
 
-async def test_nothing_of_it_is_too_small_covered_or_off_the_screen(work: Work) -> None:
+async def test_program_panel_layout(work: Work) -> None:
     page, screen = work.screen.page, work.screen
     found: dict[str, list[str]] = {}
     for tab in ("Add", "Actions", "Check", "Values"):
-        await work.tool("Program")
+        await work.tool(texts.PROGRAM)
         await work.mode(tab)
         for name, size in (("tablet", (1280, 800)), ("phone", (390, 844))):
             await page.set_viewport_size({"width": size[0], "height": size[1]})
@@ -432,11 +437,9 @@ async def test_nothing_of_it_is_too_small_covered_or_off_the_screen(work: Work) 
     assert found == {}
 
 
-async def test_a_project_without_logic_has_actions_and_no_program(work: Work) -> None:
-    """E-16: its actions are run by themselves, or by a script; nothing asks for steps."""
+async def test_project_without_logic_has_no_program(work: Work) -> None:
+    """Its actions are executed one by one or by a script; the editor does not ask for steps."""
     page = work.screen.page
-    await work.screen.page.set_viewport_size({"width": 1280, "height": 800})
-    await work.saved()
     await work.client.call("CloseProject")
     await work.client.call("NewProject", rpc.NewProjectArgs(work.scene.id, "Loose actions", has_logic=False))
     await page.get_by_role("heading", name="Loose actions").wait_for()
@@ -451,9 +454,9 @@ async def test_a_project_without_logic_has_actions_and_no_program(work: Work) ->
     modes = page.get_by_role("radiogroup", name="How it is shown").get_by_role("radio")
     assert await modes.all_inner_texts() == ["3D", "Code"]
     await work.select("alone")
-    assert await work.panel.get_by_text("What follows", exact=True).count() == 0
+    assert await work.panel.get_by_text(texts.NEXT_STEP, exact=True).count() == 0
     await work.panel.get_by_role("button", name="Run to here").click(force=True)
     await work.screen.sees("The project has no program.")
-    await work.tool("Program")
+    await work.tool(texts.PROGRAM)
     await work.mode("Check")
-    await work.panel.get_by_text("Nothing is wrong: it can be run.").wait_for()
+    await work.panel.get_by_text(texts.NO_PROBLEMS).wait_for()

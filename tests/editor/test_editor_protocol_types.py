@@ -1,4 +1,4 @@
-"""The client's types are those that the server decodes with."""
+"""The generated types of the editor are up to date."""
 
 import asyncio
 import sys
@@ -7,7 +7,7 @@ from pathlib import Path
 EDITOR = Path(__file__).resolve().parents[2] / "editor"
 
 
-async def test_the_types_of_the_editor_are_those_of_the_structs() -> None:
+async def test_editor_types_match_the_structs() -> None:
     process = await asyncio.create_subprocess_exec(
         *(sys.executable, str(EDITOR / "protocol_types.py"), "--check"), stderr=asyncio.subprocess.PIPE
     )

@@ -1,4 +1,4 @@
-"""The robot in hand: stepped, held, shown as a ghost, moved, stopped, in Chromium on the fake arm."""
+"""Jogging the robot: steps, hold-to-move, previews, goals, stop, hand guiding."""
 
 import asyncio
 import contextlib
@@ -24,18 +24,21 @@ from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import DeviceTimeout
 from tests.e2e.harness import Cell, scene_state, until
+from tests.editor import texts
+from tests.editor.reset import place_robot
 from tests.editor.screen import Screen, screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(180)]
+pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(180)]
 
 AT_REST = 1e-4
-"""m between two looks at an arm that stands."""
+"""Largest distance between two readings of a robot at standstill, m."""
 
 
 @dataclass
 class Place:
-    """The project is open and the scene online; Eva sits at the screen."""
+    """The project is open and the scene online; the user at the screen is Eva."""
 
+    cell: Cell
     client: Client
     scene: Scene
     project: Project
@@ -43,16 +46,16 @@ class Place:
     screen: Screen
 
     async def tool(self) -> Position:
-        """Where the tool is, as the screen has it: a robot that somebody holds answers nobody else."""
+        """Return the tool position that the screen shows: a locked robot does not answer other clients."""
         at: dict[str, float] = (await self.screen.item(self.robot))["endEffectors"][0]["position"]
         return Position(**at)
 
     async def stands(self) -> Position:
-        """Where the tool is once it does not move any more."""
+        """Wait for standstill and return the tool position."""
 
         async def rest() -> Position | None:
             before = await self.tool()
-            await asyncio.sleep(0.4)  # several reports
+            await asyncio.sleep(0.4)  # several joint reports
             after = await self.tool()
             return after if math.dist(tuple(before), tuple(after)) < AT_REST else None
 
@@ -63,7 +66,7 @@ class Place:
         page = self.screen.page
         if not await page.get_by_role("complementary", name="Robot").count():
             await page.get_by_role("button", name=re.compile("^Active robot")).click()
-        await self.choose("How to move it", way)
+        await self.choose(texts.HOW_TO_MOVE, way)
 
     async def choose(self, group: str, what: str) -> None:
         await self.screen.page.get_by_role("radiogroup", name=group).get_by_role("radio", name=what, exact=True).click()
@@ -72,25 +75,34 @@ class Place:
         return self.screen.page.get_by_role("button", name=name, exact=True)
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def place(cell: Cell, browser: Browser) -> AsyncIterator[Place]:
-    client = await cell.client("colleague")
-    scene, project = await cell.open(client)
+@pytest_asyncio.fixture(scope="module", loop_scope="session")
+async def online(module_cell: Cell, browser: Browser) -> AsyncIterator[Place]:
+    client = await module_cell.client("colleague")
+    scene, project = await module_cell.open(client)
     robot = next(each.id for each in scene.objects if each.name == "robot")
-    async with screen_of(browser, cell.url) as screen:
+    async with screen_of(browser, module_cell.url) as screen:
         await screen.join("Eva")
         await screen.item(robot)
         await client.call("StartSceneKeepGoing")
         await scene_state(client, SceneStateEnum.STARTED, 60)
-        await screen.page.get_by_role("button", name="Stop motion").wait_for()
+        await screen.page.get_by_role("button", name=texts.STOP_MOTION).wait_for()
         await screen.until("id => window.__engine?.item(id)?.endEffectors?.length > 0", robot)
-        # The first motion takes control, and the controller takes over the tool of the settings.
+        # The first motion takes control, and the controller adopts the tool of the settings.
         here: Pose = await client.call("GetEndEffectorPose", rpc.GetEndEffectorPoseArgs(robot, "tcp"))
         await client.call(
             "MoveToPose", rpc.MoveToPoseArgs(robot, "tcp", 0.5, here.position, here.orientation, safe=False)
         )
         await _motion_over(client)
-        yield Place(client, scene, project, robot, screen)
+        yield Place(module_cell, client, scene, project, robot, screen)
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def place(online: Place) -> Place:
+    """All panels are closed, and the robot is at its start position."""
+    await online.screen.close_panels()
+    await online.stands()
+    await place_robot(online.cell, online.screen, online.robot)
+    return online
 
 
 async def _move(client: Client, robot: str, to: Pose, speed: float) -> None:
@@ -98,7 +110,7 @@ async def _move(client: Client, robot: str, to: Pose, speed: float) -> None:
 
 
 async def _motion_over(client: Client) -> str:
-    """How the motion that was begun last ended."""
+    """Wait until the last motion ends, and return how."""
     while True:
         event = await client.next_event("RobotMoveToPose", timeout=15)
         if (phase := event.data.move_event_type.value) != "start":
@@ -106,20 +118,21 @@ async def _motion_over(client: Client) -> str:
 
 
 async def _forget_events(client: Client) -> None:
-    """What was told until now is not waited for."""
+    """Drop all events received so far."""
     with contextlib.suppress(DeviceTimeout):
         while True:
             await client.next_event(timeout=0.05)
 
 
-async def test_a_press_is_a_step_and_the_panel_tells_how_it_ended(place: Place) -> None:
+async def test_step_moves_the_tool_and_shows_the_outcome(place: Place) -> None:
     before = await place.stands()
     await place.robot_panel("Tool")
+    await place.choose(texts.PRESS_MODE, "Step")
     await place.button("Move along −Z").click()
     await place.screen.sees("Reached.")
     after = await place.stands()
     assert after.z - before.z == pytest.approx(-0.01, abs=5e-4)
-    # In the frame of the tool, which points down, plus z is the same way.
+    # The tool points down, so its +Z is the same direction.
     await place.choose("Axes of", "Tool")
     await place.button("Move along +Z").click()
     await until(_lower(place, after.z - 0.009), "the tool went down")
@@ -137,7 +150,7 @@ Hand = Callable[[], Awaitable[object]]
 
 
 async def _hold(button: Locator, press: Hand, release: Hand, moved: Hand) -> None:
-    """Hold a button until the arm has moved and is still held; what ends by itself is pressed again, as a user would.
+    """Hold a button until the robot has moved and the button is still held. A hold that ended is pressed again.
 
     The first press takes control, which may last longer than a lease, and a busy machine may renew too late.
     """
@@ -154,10 +167,10 @@ async def _hold(button: Locator, press: Hand, release: Hand, moved: Hand) -> Non
     await until(look, "the arm moves while it is held", 20)
 
 
-async def test_held_it_moves_and_let_go_it_stands(place: Place) -> None:
+async def test_hold_to_move_stops_on_release(place: Place) -> None:
     before = await place.stands()
     await place.robot_panel("Tool")
-    await place.choose("A press", "Hold to move")
+    await place.choose("A press", texts.HOLD_TO_MOVE)
     hold = place.button("Move along +Z, as long as it is held")
     mouse = place.screen.page.mouse
     await hold.hover()
@@ -166,7 +179,7 @@ async def test_held_it_moves_and_let_go_it_stands(place: Place) -> None:
     await expect(hold).to_have_attribute("data-held", "false")
     rest = await place.stands()
     assert rest.z - before.z < 0.15
-    # The robot was given back: somebody else may have it.
+    # The lock is released: another user can lock the robot.
     assert await until(lambda: _free(place), "the robot is given back")
 
 
@@ -186,11 +199,11 @@ def _higher(place: Place, z: float) -> Any:
 
 
 @pytest.mark.parametrize("taken", ["blur", "hidden", "key up"])
-async def test_what_takes_the_hand_away_ends_a_hold(place: Place, taken: str) -> None:
+async def test_hold_ends_on_blur_hidden_page_and_key_up(place: Place, taken: str) -> None:
     page = place.screen.page
     before = await place.stands()
     await place.robot_panel("Tool")
-    await place.choose("A press", "Hold to move")
+    await place.choose("A press", texts.HOLD_TO_MOVE)
     hold = place.button("Move along −Z, as long as it is held")
     await hold.focus()
     press, release = partial(page.keyboard.down, " "), partial(page.keyboard.up, " ")
@@ -208,7 +221,7 @@ async def test_what_takes_the_hand_away_ends_a_hold(place: Place, taken: str) ->
     assert before.z - rest.z < 0.15
 
 
-async def test_a_joint_is_moved_within_its_limits(place: Place) -> None:
+async def test_joint_is_moved_within_its_limits(place: Place) -> None:
     await place.stands()
     await place.robot_panel("Joints")
     await place.choose("A press", "Step")
@@ -232,20 +245,20 @@ async def test_a_joint_is_moved_within_its_limits(place: Place) -> None:
     await until(turned, "the wrist turned by five degrees", 15)
 
 
-async def test_a_goal_is_shown_by_a_ghost_and_told_in_words_before_the_robot_moves(place: Place) -> None:
+async def test_goal_is_previewed_by_a_ghost_before_the_robot_moves(place: Place) -> None:
     page = place.screen.page
     before = await place.stands()
     await place.robot_panel("Go to")
     await page.get_by_label("Z mm").fill("+=30")
     await page.keyboard.press("Enter")
-    await place.screen.sees("It can go there: the ghost shows how.")
+    await place.screen.sees(texts.CAN_GO_THERE)
     ghost = await place.screen.until("id => window.__engine.item(id).ghost", place.robot)
     real = (await place.screen.item(place.robot))["joints"]
     assert max(abs(ghost[name] - real[name]) for name in real) > 0.01, "the ghost stands where the robot is"
     assert math.dist(tuple(await place.tool()), tuple(before)) < AT_REST
     await place.button("Move there").click()
     await until(_higher(place, before.z + 0.029), "it went there", 15)
-    # Out of reach: no ghost, no motion, and the reason.
+    # Out of reach: no ghost, no motion, and a reason.
     await page.get_by_label("X mm").fill("3000")
     await page.keyboard.press("Enter")
     answer = page.locator("p.error[role=status]")
@@ -257,8 +270,8 @@ async def test_a_goal_is_shown_by_a_ghost_and_told_in_words_before_the_robot_mov
     await place.screen.until("id => window.__engine.item(id).ghost === null", place.robot)
 
 
-async def test_a_goal_is_dragged_and_the_ghost_follows(place: Place) -> None:
-    """R-09: asked at most ten times a second, and of the newest goal alone; the way there is shown."""
+async def test_goal_is_dragged_and_the_ghost_follows(place: Place) -> None:
+    """Only the latest goal is checked, at most ten times a second; the path is shown."""
     page, screen = place.screen.page, place.screen
     before = await place.stands()
     await place.robot_panel("Go to")
@@ -282,7 +295,7 @@ async def test_a_goal_is_dragged_and_the_ghost_follows(place: Place) -> None:
         await page.mouse.move(handle[0], handle[1] - step)
         await asyncio.sleep(0.02)
     await page.mouse.up()
-    await screen.sees("It can go there: the ghost shows how.")
+    await screen.sees(texts.CAN_GO_THERE)
     move = place.button("Move there")
     await expect(move).to_be_enabled()
     asked = await page.evaluate("window.questions")
@@ -302,7 +315,7 @@ async def test_a_goal_is_dragged_and_the_ghost_follows(place: Place) -> None:
     await until(_higher(place, goal - 1e-3), "it went there", 15)
     await place.stands()
     assert await page.evaluate("__engine.way") is None, "there is no way left"
-    # Dragged where it cannot be: told why, the ghost stays behind, and it is given up by one tap.
+    # Dragged out of reach: the reason is shown, the ghost stays, and one tap resets the goal.
     await place.choose("Drag the goal in the view", "Move it")
     handle = await _handle(place, "axis z")
     await page.mouse.move(*handle)
@@ -320,7 +333,7 @@ async def test_a_goal_is_dragged_and_the_ghost_follows(place: Place) -> None:
 
 
 async def _handle(place: Place, name: str) -> tuple[float, float]:
-    """Where a handle of the gizmo is on the page, once it stays there."""
+    """Return where a handle of the gizmo is on the page, once it is at standstill."""
     box = await place.screen.page.locator(".view canvas").bounding_box()
     assert box is not None
     last: dict[str, float] = {}
@@ -350,7 +363,7 @@ async def test_stop_reaches_the_robot_in_mid_move(place: Place, by: str) -> None
         "MoveToPose", rpc.MoveToPoseArgs(place.robot, "tcp", 0.05, target.position, target.orientation, safe=False)
     )
     await until((_higher if up else _lower)(place, start.z + (0.005 if up else -0.005)), "it moves")
-    # From the press in the page to the request on the wire.
+    # Time from the press to the request.
     await page.evaluate(
         """() => {
             const send = WebSocket.prototype.send;
@@ -364,7 +377,7 @@ async def test_stop_reaches_the_robot_in_mid_move(place: Place, by: str) -> None
         }"""
     )
     if by == "tap":
-        await page.get_by_role("button", name="Stop motion").click()
+        await page.get_by_role("button", name=texts.STOP_MOTION).click()
     else:
         await page.keyboard.press("Escape")
         await page.keyboard.press("Escape")
@@ -377,7 +390,7 @@ async def test_stop_reaches_the_robot_in_mid_move(place: Place, by: str) -> None
     assert abs(rest.z - start.z) < 0.15, "it went on to the end"
 
 
-async def test_the_arm_is_free_as_long_as_it_is_held(place: Place) -> None:
+async def test_hand_guiding_is_active_while_held(place: Place) -> None:
     page = place.screen.page
     await place.stands()
     await place.robot_panel("By hand")

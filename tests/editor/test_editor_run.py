@@ -1,4 +1,4 @@
-"""A program is run from Chromium on the real server: breakpoints, steps, what went wrong, others who come meanwhile."""
+"""Running a program: breakpoints, steps, failures, users who join meanwhile."""
 
 from collections.abc import AsyncIterator
 from typing import Any
@@ -12,13 +12,14 @@ from arcor2_hw.data import rpc
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.data.project import ActionParameter
 from tests.e2e.harness import Cell, until
+from tests.editor import texts
 from tests.editor.programming import Work, at_work
 from tests.editor.screen import screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(240)]
 
 BEGUN = 60_000
-"""ms until a program that was started is there: it is built, and its host started, on a busy machine."""
+"""Timeout for a started program to run: it is built and its host started, on a busy machine, ms."""
 
 
 STORE = '''
@@ -27,7 +28,7 @@ from arcor2_hw.objects import Generic
 
 
 class Store(Generic):
-    """Shelves whose content is known to nobody but themselves."""
+    """Shelves whose contents only the device knows."""
 
     _ABSTRACT = False
     DYNAMIC_PARAMS = {"shelf": ("shelves", set()), "board": ("boards", {"shelf"})}
@@ -44,13 +45,30 @@ class Store(Generic):
 '''
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def work(cell: Cell, browser: Browser) -> AsyncIterator[Work]:
-    async with httpx.AsyncClient(base_url=cell.url.replace("ws", "http", 1)) as rest:
+@pytest_asyncio.fixture(scope="module", loop_scope="session")
+async def opened(module_cell: Cell, browser: Browser) -> AsyncIterator[Work]:
+    async with httpx.AsyncClient(base_url=module_cell.url.replace("ws", "http", 1)) as rest:
         answer = await rest.put("/object-types", json={"id": "Store", "name": "Store", "source": STORE})
         assert answer.status_code == 200, answer.text
-    async with at_work(cell, browser, ("store", "Store")) as open_project:
+    async with at_work(module_cell, browser, ("store", "Store")) as open_project:
         yield open_project
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def work(opened: Work) -> Work:
+    """The project is open and offline, in the 3D view, with all panels closed."""
+    await opened.start()
+    return opened
+
+
+async def go_online(work: Work) -> None:
+    await work.screen.press(texts.GO_ONLINE)
+    await work.screen.page.get_by_role("button", name=texts.STOP_MOTION).wait_for()
+
+
+async def go_offline(work: Work) -> None:
+    await work.screen.press(texts.GO_OFFLINE)
+    await work.screen.page.get_by_role("button", name=texts.GO_ONLINE, exact=True).wait_for()
 
 
 async def state(work: Work, wanted: PackageStateEnum) -> None:
@@ -62,44 +80,44 @@ async def is_broken_at(work: Work, *ids: str) -> bool:
     return list(kept.ids) == list(ids)
 
 
-async def test_runs_to_an_action_in_two_taps_steps_and_tells_where_it_failed(work: Work, browser: Browser) -> None:
-    """U-08. The reader has no code in front of it: scanning fails, which is what somebody has to understand."""
+async def test_run_to_an_action_step_and_show_the_failure(work: Work, browser: Browser) -> None:
+    """There is no code in front of the reader: the scan fails, and the user sees why."""
     screen, page = work.screen, work.screen.page
     scan = work.action("scan").id
-    # In the graph, beside the view: its run of actions is folded, until one of them runs.
+    # In the graph next to the view, a sequence is folded until one of its actions runs.
     await work.mode("Both")
-    graph = page.get_by_role("region", name="The program as a graph")
+    graph = page.get_by_role("region", name=texts.GRAPH)
     await graph.get_by_role("button", name="Fold straight runs").click()
     await graph.locator('.react-flow__node[aria-label^="8 actions folded into one, scan, open"]').wait_for()
     await work.select("scan")
     looked_from = await page.evaluate("__engine.view.camera.position.toArray()")
-    work.taps = 1  # what selected it
+    work.taps = 1  # the tap that selected it
     await work.tap_button("Run to here", work.panel)
     assert work.taps <= 2
-    bar = page.get_by_role("group", name="The program")
+    bar = page.get_by_role("group", name=texts.PROGRAM_STATE)
     await bar.get_by_text("before scan").wait_for(timeout=BEGUN)
     await state(work, PackageStateEnum.PAUSED)
     await until(lambda: is_broken_at(work, scan), "the breakpoint is everybody's")
     assert await page.evaluate("__engine.view.camera.position.toArray()") == looked_from, "the view stays where it was"
-    await work.tool("Run")
+    await work.tool(texts.RUN)
     trace = work.panel.get_by_role("region", name="What it has done")
     await trace.get_by_role("button", name="more_boards").click()
-    # What went in, and what came out.
+    # Parameters and results.
     await expect(trace).to_contain_text("times")
     await expect(trace).to_contain_text("boards_left")
     await expect(trace.get_by_role("button", name="scan")).to_contain_text("waits")
     for _ in ("the tool", "what is selected"):
-        await page.get_by_role("button", name="Close the panel").click()
+        await page.get_by_role("button", name=texts.CLOSE_PANEL).click()
     here = graph.locator('.react-flow__node[aria-label^="scan,"]')
     await expect(here).to_contain_text("next")
     await screen.picture("run paused")
-    await work.tool("Run")
+    await work.tool(texts.RUN)
 
-    # Somebody who comes now sees all of it.
+    # A user who joins now sees the same.
     async with screen_of(browser, work.cell.url) as other:
         await other.join("Bert")
-        await other.page.get_by_role("group", name="The program").get_by_text("before scan").wait_for()
-        await other.page.get_by_role("navigation").get_by_role("button", name="Run", exact=True).click()
+        await other.page.get_by_role("group", name=texts.PROGRAM_STATE).get_by_text("before scan").wait_for()
+        await other.page.get_by_role("navigation").get_by_role("button", name=texts.RUN, exact=True).click()
         seen = other.page.get_by_role("complementary")
         await seen.get_by_role("button", name="more_boards").wait_for()
         await seen.get_by_role("button", name="Do not pause at scan").wait_for()
@@ -107,7 +125,7 @@ async def test_runs_to_an_action_in_two_taps_steps_and_tells_where_it_failed(wor
         await until(lambda: is_broken_at(work), "it is gone for everybody")
     await expect(work.panel.get_by_role("button", name="Do not pause at scan")).to_have_count(0)
 
-    await work.tap_button("Step", bar)
+    await work.tap_button(texts.STEP, bar)
     fault = work.panel.get_by_role("region", name="Last run").filter(has_text="Run failed in scan")
     await fault.wait_for()
     await expect(fault).to_contain_text("no code was read")
@@ -116,34 +134,32 @@ async def test_runs_to_an_action_in_two_taps_steps_and_tells_where_it_failed(wor
     assert await page.evaluate("__engine.view.camera.position.toArray()") == looked_from
     await graph.locator('.react-flow__node[aria-label^="8 actions folded into one"]').wait_for()
     await screen.picture("run failed")
-    # It stays, and leads to the action.
+    # The result stays and leads to the action.
     await work.tap_button("Show scan", fault)
     await work.panel.get_by_role("heading", name="scan", exact=True).wait_for()
 
 
-async def test_stop_acts_at_once_and_the_project_can_be_edited_again(work: Work) -> None:
+async def test_stop_ends_the_run_and_editing_is_possible_again(work: Work) -> None:
     page = work.screen.page
-    await work.tool("Run")
-    await work.tap_button("Start paused", work.panel)
-    bar = page.get_by_role("group", name="The program")
-    await bar.get_by_role("button", name="Stop", exact=True).wait_for(timeout=BEGUN)
+    await work.tool(texts.RUN)
+    await work.tap_button(texts.START_PAUSED, work.panel)
+    bar = page.get_by_role("group", name=texts.PROGRAM_STATE)
+    await bar.get_by_role("button", name=texts.STOP, exact=True).wait_for(timeout=BEGUN)
     await bar.get_by_text("before more_boards").wait_for()
-    # Meanwhile it is not edited, and says why.
+    # Meanwhile editing is refused with the reason.
     await work.select("test")
-    await work.panel.get_by_role("button", name="Duplicate").click(force=True)
+    await work.panel.get_by_role("button", name=texts.DUPLICATE).click(force=True)
     await work.screen.sees("The program runs: stop it first.")
-    await work.tap_button("Stop", bar)
+    await work.tap_button(texts.STOP, bar)
     assert await page.get_by_role("alertdialog").count() == 0, "nobody is asked"
     await state(work, PackageStateEnum.STOPPED)
     await bar.wait_for(state="hidden")
     await work.panel.get_by_role("heading", name="test", exact=True).wait_for()
-    await expect(work.panel.get_by_role("button", name="Duplicate", exact=True)).to_be_enabled()
+    await expect(work.panel.get_by_role("button", name=texts.DUPLICATE, exact=True)).to_be_enabled()
 
 
-async def test_one_action_is_tried_with_its_result_and_another_is_cancelled(work: Work) -> None:
-    page = work.screen.page
-    await work.screen.press("Go online")
-    await page.get_by_role("button", name="Stop motion").wait_for()
+async def test_single_action_is_executed_and_another_cancelled(work: Work) -> None:
+    await go_online(work)
     present = await work.add("look_for_board", "tester/board_present", "fixture", "is_there")
     await work.select("look_for_board")
     await work.tap_button("Try it", work.panel)
@@ -155,14 +171,15 @@ async def test_one_action_is_tried_with_its_result_and_another_is_cancelled(work
     await work.add("wait_long", "flow/wait", "fixture", seconds=ActionParameter("seconds", "double", "30.0"))
     await work.select("wait_long")
     await work.tap_button("Try it", work.panel)
-    await work.tap_button("Cancel", work.panel)
+    await work.tap_button(texts.CANCEL, work.panel)
     await work.told("ActionCancelled")
     await work.panel.get_by_role("button", name="Try it").wait_for()
+    await go_offline(work)
 
 
-async def test_what_there_is_to_choose_is_asked_of_the_device_and_kept_when_it_is_offline(work: Work) -> None:
-    """E-05: the second choice depends on the first one."""
-    page = work.screen.page
+async def test_choices_come_from_the_device_and_stay_when_it_is_offline(work: Work) -> None:
+    """The second choice depends on the first one."""
+    await go_online(work)
     fetch = await work.add(
         "fetch_one",
         "store/fetch",
@@ -178,19 +195,18 @@ async def test_what_there_is_to_choose_is_asked_of_the_device_and_kept_when_it_i
     await work.told("ActionChanged", lambda event: event.data.name == "fetch_one")
     told = await work.parameters(fetch)
     assert (told["shelf"].value, told["board"].value) == ('"lower"', '"lower board 2"')
-    await work.screen.press("Online. Press to go offline")
-    await page.get_by_role("button", name="Go online", exact=True).wait_for()
+    await go_offline(work)
     await expect(work.panel.get_by_text("as the device told last")).to_have_count(2)
     assert await board.locator("option").all_inner_texts() == [f"lower board {number}" for number in range(4)]
-    # Of another shelf nobody has told anything.
+    # Nothing is known of another shelf.
     await shelf.get_by_text("cellar").click()
     await work.panel.get_by_text("go online to choose from what the device has").wait_for()
 
 
-async def test_a_package_is_built_under_the_name_that_is_proposed(work: Work) -> None:
-    """F-01: what is not saved is saved first, and that stands on the button."""
+async def test_package_is_built_under_the_proposed_name(work: Work) -> None:
+    """Unsaved changes are saved first, as the button says."""
     await work.add("late", "flow/finish", "bad")
-    await work.tool("Run")
+    await work.tool(texts.RUN)
     await work.tap_button("Build…", work.panel)
     dialog = work.screen.page.get_by_role("dialog")
     await expect(dialog.get_by_label("Name")).to_have_value(work.project.name)

@@ -1,4 +1,4 @@
-"""A scene is set up in the browser: things added, moved by hand, by steps and numbers, sized, and taken back."""
+"""Editing a scene: objects are added, dragged, placed by steps and numbers, resized and undone."""
 
 import math
 import re
@@ -17,9 +17,10 @@ from arcor2_hw.data.editor import ViewScope
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.scene import Scene, SceneObject
 from tests.e2e.harness import Cell, until
+from tests.editor import texts
 from tests.editor.screen import Screen, screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(120)]
 
 
 @dataclass
@@ -29,7 +30,7 @@ class Open:
     scene: Scene
 
     async def objects(self) -> list[SceneObject]:
-        """The objects as the server has them now, saved or not: what somebody is told who comes in."""
+        """Return the objects as the server has them now, saved or not."""
         async with Client(self.cell.url, "observer", reconnect=False) as observer:
             opened = await observer.next_event("OpenScene", timeout=10)
             found: list[SceneObject] = opened.data.scene.objects
@@ -47,21 +48,14 @@ class Open:
         return any(each.name == name for each in await self.objects())
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def made(cell: Cell) -> AsyncIterator[Open]:
+@pytest_asyncio.fixture(loop_scope="session")
+async def opened(cell: Cell) -> AsyncIterator[Open]:
+    """The scene is open and saved."""
     client = await cell.client("colleague")
     scene, _ = await cell.open(client)
     await client.call("CloseProject")
+    await client.call("OpenScene", rpc.IdArgs(scene.id))
     yield Open(cell, client, scene)
-
-
-@pytest_asyncio.fixture(loop_scope="module")
-async def opened(made: Open) -> AsyncIterator[Open]:
-    """The scene is open, with nothing changed; afterwards it is closed, whatever was done."""
-    await made.client.call("OpenScene", rpc.IdArgs(made.scene.id))
-    yield made
-    closing = rpc.CloseSceneArgs(force=True)
-    await until(lambda: _granted(made.client, "CloseScene", closing), "the scene is closed")
 
 
 async def _granted(client: Client, request: str, args: Any) -> bool:
@@ -77,7 +71,7 @@ async def tool(screen: Screen, name: str) -> None:
 
 
 async def handle(screen: Screen, name: str) -> tuple[float, float]:
-    """Move the pointer to a handle of the gizmo, and give where that is on the page.
+    """Move the pointer to a handle of the gizmo, and return where it is on the page.
 
     The panel that comes with a selection makes the view narrower, a frame later: it is there when the handle is lit
     below the pointer, twice.
@@ -103,14 +97,14 @@ async def handle(screen: Screen, name: str) -> tuple[float, float]:
 
 
 async def chosen(screen: Screen, item: str) -> None:
-    """Somebody taps an object, and its panel is there."""
+    """Tap an object and wait for its panel."""
     await screen.item(item)
     await screen.page.evaluate("id => window.__engine.focus(id)", item)
     await screen.tap(item)
-    await screen.page.get_by_role("region", name="Place", exact=True).wait_for()
+    await screen.page.get_by_role("region", name=texts.PLACE, exact=True).wait_for()
 
 
-async def test_a_thing_is_dragged_seen_by_others_and_taken_back(opened: Open, browser: Browser) -> None:
+async def test_object_is_dragged_previewed_to_others_and_undone(opened: Open, browser: Browser) -> None:
     client, tester = opened.client, next(each for each in opened.scene.objects if each.name == "tester")
     await client.call("SubscribeEvents", rpc.SubscribeEventsArgs({"MovePreview"}))
     async with screen_of(browser, opened.cell.url) as screen:
@@ -122,7 +116,7 @@ async def test_a_thing_is_dragged_seen_by_others_and_taken_back(opened: Open, br
         await mouse.move(x, y)
         await mouse.down()
         await mouse.move(x, y - 60, steps=4)
-        # The others see it on its way, and who has it in hand; the server has not been asked yet.
+        # Other users see the preview and who drags; the document is unchanged so far.
         preview = await client.next_event("MovePreview", timeout=10)
         assert (preview.data.id, preview.data.user) == (tester.id, "Eva")
         assert not await _granted(client, "WriteLock", rpc.WriteLockArgs(tester.id))
@@ -142,7 +136,7 @@ async def test_a_thing_is_dragged_seen_by_others_and_taken_back(opened: Open, br
         await until(lambda: _granted(client, "WriteLock", rpc.WriteLockArgs(tester.id)), "the lock is given back")
         await client.call("WriteUnlock", rpc.WriteUnlockArgs(tester.id))
 
-        # One edit, which the button names and the keys take back and do again.
+        # It is one edit, named on the button, undone and redone by keys.
         await screen.page.get_by_role("button", name="Undo moving the object tester").wait_for()
         await screen.page.keyboard.press("Control+z")
         await until(lambda: _is_at(opened, before.position.z), "it is taken back")
@@ -150,7 +144,7 @@ async def test_a_thing_is_dragged_seen_by_others_and_taken_back(opened: Open, br
         await screen.page.keyboard.press("Control+Shift+Z")
         await until(lambda: _is_at(opened, after.position.z), "it is done again")
 
-        # Escape in mid-drag leaves all as it was.
+        # Escape cancels a drag.
         x, y = await handle(screen, "axis x")
         await mouse.move(x, y)
         await mouse.down()
@@ -162,7 +156,7 @@ async def test_a_thing_is_dragged_seen_by_others_and_taken_back(opened: Open, br
         )
         assert await opened.pose("tester") == after
 
-        # What another has changed since is not undone, and says by whom.
+        # An edit of another user in between blocks Undo; the message names the user.
         await client.call("WriteLock", rpc.WriteLockArgs(tester.id))
         await screen.sees("colleague works on it")
         assert await screen.page.evaluate("window.__engine.gizmo.shown") is False
@@ -182,15 +176,15 @@ async def _is_at(opened: Open, z: float) -> bool:
     return abs(pose.position.z - z) < 1e-9
 
 
-async def test_steps_and_typed_amounts_put_it_exactly(opened: Open, browser: Browser) -> None:
+async def test_steps_and_typed_numbers_place_an_object_exactly(opened: Open, browser: Browser) -> None:
     feeder = next(each for each in opened.scene.objects if each.name == "feeder_box")
     async with screen_of(browser, opened.cell.url, touch=True) as screen:
         await screen.join("Eva")
         await chosen(screen, feeder.id)
-        place = screen.page.get_by_role("region", name="Place", exact=True)
+        place = screen.page.get_by_role("region", name=texts.PLACE, exact=True)
         start = await opened.pose("feeder_box")
         before = await opened.client.call("History", rpc.HistoryArgs())
-        # Two steps that come quickly are one edit: three taps from nothing selected to 20 mm up.
+        # Two quick steps are one edit.
         await place.get_by_role("button", name="Z 1 cm more").dblclick()
         await until(lambda: _at(opened, "z", start.position.z + 0.02), "two steps up")
         edits = await opened.client.call("History", rpc.HistoryArgs())
@@ -206,7 +200,7 @@ async def test_steps_and_typed_amounts_put_it_exactly(opened: Open, browser: Bro
             await place.get_by_role("textbox").fill(typed)
             await screen.page.keyboard.press("Enter")
             await until(lambda axis=axis, value=value: _at(opened, axis, value), typed)  # type: ignore[misc]
-        # By the keys on the screen alone, in another unit, as a change.
+        # With the keys on the screen, in another unit, as a relative change.
         await place.get_by_role("button", name=re.compile("^Z .*type it")).click()
         await place.get_by_role("button", name="Change by").click()
         for key in ("minus", "5", "in cm"):
@@ -215,7 +209,7 @@ async def test_steps_and_typed_amounts_put_it_exactly(opened: Open, browser: Bro
         await place.get_by_role("button", name="Set", exact=True).click()
         await until(lambda: _at(opened, "z", start.position.z + 0.02 - 0.05), "5 cm down")
 
-        # Turned by a typed angle, about its own axes, to the raster of quarter turns.
+        # Rotated by a typed angle, then squared up.
         await place.get_by_role("radio", name="Turn").click()
         await place.get_by_role("button", name=re.compile("^Yaw .*type it")).click()
         await place.get_by_role("textbox").fill("80")
@@ -245,25 +239,25 @@ async def _same(opened: Open, start: Pose) -> bool:
     )
 
 
-async def test_shapes_are_added_by_one_tap_sized_copied_and_removed(opened: Open, browser: Browser) -> None:
+async def test_shapes_are_added_resized_copied_and_removed(opened: Open, browser: Browser) -> None:
     client = opened.client
     async with screen_of(browser, opened.cell.url) as screen:
-        await screen.join("Ida")  # whose number pad is as it comes
+        await screen.join("Ida")  # a user without stored settings
         await screen.item(opened.scene.objects[0].id)
-        await tool(screen, "Add")
+        await tool(screen, texts.ADD)
         await screen.press("Cylinder")
         panel = screen.page.get_by_role("complementary")
         await panel.get_by_role("heading", name="cylinder", exact=True).wait_for()
         added = await opened.object("cylinder")
-        # It stands on what is in the middle of the view, not in it.
+        # It is on top of the object in the middle of the view.
         assert added.pose
-        place = screen.page.get_by_role("region", name="Place", exact=True)
+        place = screen.page.get_by_role("region", name=texts.PLACE, exact=True)
         await place.get_by_role("radio", name="Size").click()
         await place.get_by_role("button", name=re.compile("^Height .*type it")).click()
         await place.get_by_role("textbox").fill("25cm")
         await screen.page.keyboard.press("Enter")
         await until(lambda: _measures(client, "cylinder", 0.05, 0.25), "25 cm high")
-        # Pulled by its upper face: the lower one stays.
+        # Resized by its upper face: the lower one stays.
         low = (await opened.pose("cylinder")).position.z - 0.125
         x, y = await handle(screen, "face +z")
         await screen.page.mouse.move(x, y)
@@ -274,22 +268,22 @@ async def test_shapes_are_added_by_one_tap_sized_copied_and_removed(opened: Open
         height = await _height(client, "cylinder")
         await until(lambda: _stands(opened, low + height / 2), "its lower face has stayed")
 
-        await screen.press("Duplicate")
+        await screen.press(texts.DUPLICATE)
         await panel.get_by_role("heading", name="cylinder_2", exact=True).wait_for()
         assert await _height(client, "cylinder_2") == height
-        await screen.press("Remove")
+        await screen.press(texts.REMOVE)
         await until(lambda: _gone(opened, "cylinder_2"), "removed")
         await screen.page.get_by_role("button", name="Undo removing the object cylinder_2").click()
         await until(lambda: opened.has("cylinder_2"), "it is back")
 
-        # What is needed says by what.
-        await tool(screen, "Things")
+        # An object in use names its projects.
+        await tool(screen, texts.OBJECTS)
         await screen.page.get_by_role("row", name="tester").click()
-        await screen.press("Remove")
+        await screen.press(texts.REMOVE)
         await screen.sees("These projects use it")
-        await screen.press("Cancel")
+        await screen.press(texts.CANCEL)
         assert await opened.has("tester")
-        # A name that cannot be is refused in the server's words, where it was typed.
+        # An invalid name is refused with the server's message at the field.
         name = panel.get_by_label("Name of the object")
         await name.fill("2nd tester")
         await name.press("Enter")
@@ -298,8 +292,8 @@ async def test_shapes_are_added_by_one_tap_sized_copied_and_removed(opened: Open
         await name.press("Enter")
         await until(lambda: opened.has("tester_b"), "renamed")
 
-        # Put aside: not seen, not aimed at, and so on the user's next tablet.
-        await panel.get_by_text("Hide it, and aim through it").click()
+        # Hidden objects are neither drawn nor targeted; stored per user.
+        await panel.get_by_text(texts.HIDE).click()
         tester = await opened.object("tester_b")
         await screen.until("id => window.__engine.item(id)?.visible === false", tester.id)
         kept = await client.call("GetViewState", rpc.GetViewStateArgs(ViewScope.USER, opened.scene.id, "Ida"))
@@ -337,11 +331,11 @@ def wedge() -> bytes:
     return bytes(80) + struct.pack("<I", len(faces)) + body
 
 
-async def test_devices_by_a_form_and_meshes_with_their_unit(opened: Open, browser: Browser) -> None:
+async def test_devices_are_added_by_a_form_and_meshes_with_their_unit(opened: Open, browser: Browser) -> None:
     async with screen_of(browser, opened.cell.url) as screen:
         await screen.join("Eva")
         await screen.item(opened.scene.objects[0].id)
-        await tool(screen, "Add")
+        await tool(screen, texts.ADD)
         panel = screen.page.get_by_role("complementary")
         await panel.get_by_label("Search").fill("scale")
         await panel.get_by_role("button", name="MtSicsScale").click()
@@ -355,24 +349,24 @@ async def test_devices_by_a_form_and_meshes_with_their_unit(opened: Open, browse
         await submit.click()
         await panel.get_by_role("heading", name="kitchen_scale").wait_for()
         scale = await opened.object("kitchen_scale")
-        assert not scale.pose  # it has no place
+        assert not scale.pose  # it has no pose
         assert "127.0.0.9" in {parameter.value.strip('"') for parameter in scale.parameters}
 
-        # Settings are changed together, checked where they are typed, and saved by one request.
+        # Settings are validated in the fields and saved by one request.
         settings = panel.get_by_role("region", name="Settings")
         field = settings.get_by_label(needed[0], exact=True)
         await field.fill("127.0.0.10")
         await field.press("Enter")
-        await settings.get_by_role("button", name="Save the settings").click()
+        await settings.get_by_role("button", name=texts.SAVE_SETTINGS).click()
         await until(lambda: _setting(opened, "kitchen_scale", "127.0.0.10"), "saved")
 
-        await tool(screen, "Add")
+        await tool(screen, texts.ADD)
         await screen.press("Mesh…")
         file = panel.locator("input[type=file]")
         await file.set_input_files({"name": "letter.stl", "mimeType": "model/stl", "buffer": b"no mesh"})
         await expect(panel.get_by_role("alert")).to_contain_text("letter.stl")
         await file.set_input_files({"name": "wedge.stl", "mimeType": "model/stl", "buffer": wedge()})
-        # Nothing in a workplace is 200 m wide: it is in mm.
+        # An object of 200 m is implausible: the unit is mm.
         await screen.sees("200 × 100 × 150 mm")
         await screen.picture("mesh")
         await screen.press("Upload and add")

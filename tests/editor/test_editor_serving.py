@@ -1,4 +1,4 @@
-"""The editor's page and files as a browser asks for them."""
+"""Serving the editor's page and files."""
 
 import gzip
 import re
@@ -33,7 +33,7 @@ def browser(directory: Path) -> httpx.AsyncClient:
     return httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://127.0.0.1")
 
 
-async def test_the_page_has_a_policy_whose_nonce_is_its_own_each_time(built: Path) -> None:
+async def test_page_has_a_policy_with_a_fresh_nonce(built: Path) -> None:
     async with browser(built) as client:
         answers = [await client.get("/") for _ in range(2)]
     nonces = [re.findall(r'nonce="([\w-]+)"', answer.text)[0] for answer in answers]
@@ -49,7 +49,7 @@ async def test_the_page_has_a_policy_whose_nonce_is_its_own_each_time(built: Pat
         assert answer.text.endswith("<p>page")
 
 
-async def test_a_hashed_file_is_sent_compressed_and_kept_for_ever(built: Path) -> None:
+async def test_hashed_files_are_compressed_and_cached_forever(built: Path) -> None:
     async with browser(built) as client:
         zipped = await client.get("/editor/assets/index-abc.js", headers={"accept-encoding": "gzip, br;q=0"})
         plain = await client.get("/editor/assets/index-abc.js", headers={"accept-encoding": "identity"})
@@ -64,7 +64,7 @@ async def test_a_hashed_file_is_sent_compressed_and_kept_for_ever(built: Path) -
     assert (again.status_code, again.content) == (304, b"")
 
 
-async def test_what_has_no_hash_in_its_name_is_asked_for_again(built: Path) -> None:
+async def test_files_without_a_hash_are_not_cached(built: Path) -> None:
     async with browser(built) as client:
         icon = await client.get("/editor/favicon.svg")
     assert (icon.text, icon.headers["cache-control"]) == ("<svg/>", "no-cache")
@@ -73,7 +73,7 @@ async def test_what_has_no_hash_in_its_name_is_asked_for_again(built: Path) -> N
 @pytest.mark.parametrize(
     "path", ["assets/other.js", "index.html", "assets/../../secret", "%2e%2e/secret", ".vite/manifest.json", ""]
 )
-async def test_nothing_but_what_was_built_is_served(built: Path, path: str) -> None:
+async def test_only_built_files_are_served(built: Path, path: str) -> None:
     (built.parent / "secret").write_text("not for the web")
     async with browser(built) as client:
         answer = await client.get(f"/editor/{path}")
@@ -81,14 +81,14 @@ async def test_nothing_but_what_was_built_is_served(built: Path, path: str) -> N
     assert "not for the web" not in answer.text
 
 
-async def test_where_it_is_not_built_the_page_says_how(tmp_path: Path) -> None:
+async def test_missing_build_explains_how_to_build(tmp_path: Path) -> None:
     async with browser(tmp_path / "absent") as client:
         answer = await client.get("/")
     assert "make run" in answer.text
 
 
-async def test_the_server_gives_the_page_to_who_has_no_token_but_not_to_foreign_pages(tmp_path: Path) -> None:
-    settings = ServerSettings(data_dir=tmp_path, host="192.0.2.1")  # on a network everybody needs a token
+async def test_page_needs_no_token_but_foreign_origins_are_refused(tmp_path: Path) -> None:
+    settings = ServerSettings(data_dir=tmp_path, host="192.0.2.1")  # on a network every client needs a token
     async with running_services(settings) as services:
         transport = httpx.ASGITransport(create_app(services))
         async with httpx.AsyncClient(transport=transport, base_url="http://192.0.2.1:6789") as client:

@@ -1,15 +1,15 @@
-"""What a tablet has to load before it shows the workplace."""
+"""Size of the files that the workplace needs."""
 
 import json
 from pathlib import Path
 from typing import Any
 
 MOST = 260_000
-"""Bytes of the shell and the 3D view, compressed with gzip."""
+"""Largest size of shell and 3D view, compressed with gzip, bytes."""
 
 
 def needed(manifest: dict[str, Any], *names: str) -> set[str]:
-    """The files of these modules and of all that they import at once, styles too."""
+    """Return the files of these modules and their static imports, with styles."""
     found: set[str] = set()
     waiting, seen = list(names), set()
     while waiting:
@@ -29,6 +29,6 @@ def test_shell_and_3d_view_are_small(built_editor: Path) -> None:
     sizes = {name: (built_editor / f"{name}.gz").stat().st_size for name in files}
     assert len(sizes) >= 3
     assert sum(sizes.values()) <= MOST, sizes
-    # What few need comes only to them.
+    # Rarely used parts are loaded on demand.
     assert not needed(manifest, "src/engine/loaders/urdf.ts") <= files
     assert not needed(manifest, "src/ui/kit/menu.tsx") <= files

@@ -15,14 +15,14 @@ from arcor2_hw.data.editor import ViewScope
 from arcor2_hw.data.events import SceneStateEnum
 from arcor2_hw.data.project import Project
 from tests.e2e.harness import Cell, scene_state, until
+from tests.editor import texts
 from tests.editor.screen import VIEWPORTS, Screen, screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(240)]
 
 SIZES = ("tablet", "desktop", "ipad", "phone")
 BUTTONS = {"Tool": 6, "By hand": 1}
 """Visible buttons of the pad. How many joints are visible at once depends on the screen."""
-TOOLS = ("Things", "Robot", "Points", "Program", "Run", "Devices")
 _WATCH = Path(__file__).with_name("pad.js").read_text()
 
 
@@ -40,10 +40,10 @@ class Online:
         await self.colleague.call("SetViewState", rpc.SetViewStateArgs(ViewScope.SHARED, wish, self.project.id))
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def online(cell: Cell) -> AsyncIterator[Online]:
-    client = await cell.client("colleague")
-    scene, project = await cell.open(client)
+@pytest_asyncio.fixture(scope="module", loop_scope="session")
+async def online(module_cell: Cell) -> AsyncIterator[Online]:
+    client = await module_cell.client("colleague")
+    scene, project = await module_cell.open(client)
     await client.call("StartScene")
     await scene_state(client, SceneStateEnum.STARTED, 60)
     yield Online(client, project, next(each.id for each in scene.objects if each.name == "robot"))
@@ -60,10 +60,10 @@ async def open_tool(page: Page, name: str) -> None:
     await page.get_by_role("complementary").get_by_role("heading", name=name, exact=True).wait_for()
 
 
-async def test_no_control_reaches_into_the_stop_dock(online: Online, cell: Cell, browser: Browser) -> None:
-    async with screen_of(browser, cell.url, touch=True) as screen:
+async def test_no_control_reaches_into_the_stop_dock(online: Online, module_cell: Cell, browser: Browser) -> None:
+    async with screen_of(browser, module_cell.url, touch=True) as screen:
         page = screen.page
-        stop = page.get_by_role("button", name="Stop motion")
+        stop = page.get_by_role("button", name=texts.STOP_MOTION)
         found: dict[str, list[str]] = {}
 
         async def check(what: str, picture: bool = True) -> None:
@@ -77,13 +77,13 @@ async def test_no_control_reaches_into_the_stop_dock(online: Online, cell: Cell,
         await stop.wait_for()
         for size in SIZES:
             await resize(screen, size)
-            for tool in TOOLS:
+            for tool in texts.TOOLS:
                 await open_tool(page, tool)
-                await check(f"{tool}, {size}", tool == "Robot")
+                await check(f"{tool}, {size}", tool == texts.ROBOT)
             await page.get_by_role("button", name="Undo", exact=True).click(force=True)
             await page.get_by_text("There is nothing to undo.").first.wait_for()
             await check(f"message, {size}")
-            await screen.press("Settings")
+            await screen.press(texts.SETTINGS)
             await page.get_by_role("menu").wait_for()
             await check(f"menu, {size}")
             await page.get_by_role("menuitem", name="Messages").click()
@@ -91,8 +91,8 @@ async def test_no_control_reaches_into_the_stop_dock(online: Online, cell: Cell,
             await check(f"dialog, {size}")
             await stop.click(trial=True)
             await page.get_by_role("dialog").get_by_role("button", name="Close").click()
-        await open_tool(page, "Robot")
-        await screen.press("Make the panel larger")
+        await open_tool(page, texts.ROBOT)
+        await screen.press(texts.LARGER_PANEL)
         await check("large sheet, phone")
         await resize(screen, "tablet")
         await page.evaluate("() => { document.documentElement.style.fontSize = '200%'; }")
@@ -123,9 +123,9 @@ async def faults_during_hold(online: Online, screen: Screen, tab: str, size: str
     """Hold a button of a pad while a message arrives, and return what moved or was covered."""
     page = screen.page
     panel = page.get_by_role("complementary")
-    await panel.get_by_role("radiogroup", name="How to move it").get_by_role("radio", name=tab, exact=True).click()
+    await panel.get_by_role("radiogroup", name=texts.HOW_TO_MOVE).get_by_role("radio", name=tab, exact=True).click()
     if tab != "By hand":
-        await panel.get_by_role("radio", name="Hold to move").click()
+        await panel.get_by_role("radio", name=texts.HOLD_TO_MOVE).click()
     button = panel.locator("button.hold:not([aria-disabled])").last
     await button.hover()
     await screen.settle()
@@ -143,15 +143,15 @@ async def faults_during_hold(online: Online, screen: Screen, tab: str, size: str
     await screen.until("() => !document.querySelector('[data-held=true]')")
     await screen.settle()
     faults: list[str] = await page.evaluate("window.padFaults()")
-    await page.get_by_role("button", name="Dismiss").first.click()
+    await page.get_by_role("button", name=texts.DISMISS).first.click()
     return faults
 
 
-async def test_nothing_moves_or_is_covered_during_a_hold(online: Online, cell: Cell, browser: Browser) -> None:
-    async with screen_of(browser, cell.url) as screen:
+async def test_nothing_moves_or_is_covered_during_a_hold(online: Online, module_cell: Cell, browser: Browser) -> None:
+    async with screen_of(browser, module_cell.url) as screen:
         await screen.join("Eva")
-        await screen.page.get_by_role("button", name="Stop motion").wait_for()
-        await open_tool(screen.page, "Robot")
+        await screen.page.get_by_role("button", name=texts.STOP_MOTION).wait_for()
+        await open_tool(screen.page, texts.ROBOT)
         found = {}
         for size in SIZES:
             await resize(screen, size)

@@ -1,4 +1,4 @@
-"""What a new user does on a first day, in one go, on the demo workplace: from joining to a cable that is pulled."""
+"""The first day of a new user on the demo workplace, from joining to a disconnected cable."""
 
 import asyncio
 import re
@@ -12,18 +12,19 @@ from playwright.async_api import Browser, Locator, expect
 
 from tests.demo.running import Run, demo
 from tests.e2e.harness import until
+from tests.editor import texts
 from tests.editor.screen import Screen, screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(400), pytest.mark.alone]
+pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(400), pytest.mark.alone]
 
 SLOWLY = "0.05"
 GOOD = 3
-"""A seed whose board is good: the arm ends where nothing is beside it."""
+"""A seed with a good board: the robot ends at a place with free space around it."""
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
+@pytest_asyncio.fixture(scope="module", loop_scope="session")
 async def workplace(tmp_path_factory: pytest.TempPathFactory, built_editor: object) -> AsyncIterator[Run]:
-    """`make run`, when its program has ended and it goes on serving."""
+    """`make run` after its program has ended."""
     async with demo(tmp_path_factory.mktemp("demo"), "--boards", "1", "--seed", str(GOOD)) as run:
         await until(lambda: "serving at" in run.output or run.process.returncode is not None, "the cycle to end", 200)
         assert run.at() is not None, run.output
@@ -63,16 +64,16 @@ class User:
         return abs(height - of) < 1e-3
 
     async def online(self) -> None:
-        await self.screen.press("Go online")
-        await self.page.get_by_role("button", name="Stop motion").wait_for(timeout=40_000)
+        await self.screen.press(texts.GO_ONLINE)
+        await self.page.get_by_role("button", name=texts.STOP_MOTION).wait_for(timeout=40_000)
 
     async def add_action(self, offer: str) -> str:
-        """Add an action to the selected point; gives what it is called."""
-        await self.tool("Program")
+        """Add an action to the selected point and return its name."""
+        await self.tool(texts.PROGRAM)
         await self.mode("Add")
         await self.panel.get_by_role("radio", name=re.compile("^On ")).click()
         await self.panel.get_by_role("region", name="robot", exact=True).get_by_role("button", name=offer).first.click()
-        await self.panel.get_by_role("region", name="What it is told").wait_for()
+        await self.panel.get_by_role("region", name=texts.PARAMETERS).wait_for()
         return await self.title()
 
 
@@ -85,24 +86,24 @@ async def test_the_first_day(workplace: Run, browser: Browser) -> None:
 
         # Join; see the cell move.
         await screen.join("Newcomer")
-        # What the demo has left open is closed first.
+        # Close the project that the demo has left open.
         shows = "() => document.querySelector('.home') ? 'home' : window.__engine?.frames > 0 && 'workplace'"
         if await screen.until(shows) == "workplace":
-            await screen.press("Close, and go to the lists")
-        await page.get_by_role("radio", name="Projects").click()
-        await screen.press("New project")
+            await screen.press(texts.CLOSE_DOCUMENT)
+        await page.get_by_role("radio", name=texts.PROJECTS).click()
+        await screen.press(texts.NEW_PROJECT)
         await page.get_by_role("dialog").get_by_label("Name").fill("First day")
-        await screen.press("Make and open")
+        await screen.press(texts.CREATE)
         await user.online()
-        await user.tool("Robot")
+        await user.tool(texts.ROBOT)
         await user.panel.get_by_role("radiogroup", name="Step, mm").get_by_text("100", exact=True).click()
 
-        # A point from the robot: one tap; then away from it, on the screen as in the cell.
-        await user.tool("Points")
+        # Add a point at the robot, then move the robot away, on the screen and in the simulation.
+        await user.tool(texts.POINTS)
         await screen.press("Where the robot is")
         await user.panel.get_by_role("region", name="Orientations").wait_for()
         point = await user.title()
-        # Of the tool of the settings, as the controller tells it once control is taken.
+        # The position is that of the configured tool, known once control is taken.
         taught = await screen.until(
             """() => {
                 const items = window.__engine.ids().map((id) => window.__engine.item(id));
@@ -110,7 +111,7 @@ async def test_the_first_day(workplace: Run, browser: Browser) -> None:
                 return points.length === 1 && points[0].pose.position.z;
             }"""
         )
-        await user.tool("Robot")
+        await user.tool(texts.ROBOT)
         await screen.press("Move along +Z")
         await until(lambda: user.at_height(taught + 0.1), "the arm is 100 mm higher", 20)
         shown = """z => __engine.ids().map((id) => __engine.item(id)).some(({ kind, endEffectors }) =>
@@ -119,7 +120,7 @@ async def test_the_first_day(workplace: Run, browser: Browser) -> None:
 
         # Two actions and a branch.
         await page.get_by_role("radio", name="3D", exact=True).click()
-        await user.tool("Things")
+        await user.tool(texts.OBJECTS)
         await page.get_by_role("row", name=f"{point} Action point").click()
         move = await user.add_action("move Move the TCP to a pose.")
         speed = user.panel.get_by_label("speed", exact=True)
@@ -129,9 +130,9 @@ async def test_the_first_day(workplace: Run, browser: Browser) -> None:
         number = user.panel.get_by_label("number", exact=True)
         await number.fill("1")
         await number.press("Enter")
-        await screen.press("Close the panel")
+        await screen.press(texts.CLOSE_PANEL)
         await user.mode("Flow")
-        graph = page.get_by_role("region", name="The program as a graph")
+        graph = page.get_by_role("region", name=texts.GRAPH)
 
         async def step(way: str, to: str) -> None:
             await graph.get_by_role("button", name=way, exact=True).click()
@@ -146,34 +147,34 @@ async def test_the_first_day(workplace: Run, browser: Browser) -> None:
         await graph.locator(f'.react-flow__node[aria-label^="{move}"] .flow-name').click()
         await user.panel.get_by_role("button", name="Pause before it").click()
         await user.mode("3D")
-        await user.tool("Run")
+        await user.tool(texts.RUN)
         await screen.press("Save and run")
-        bar = page.get_by_role("group", name="The program")
+        bar = page.get_by_role("group", name=texts.PROGRAM_STATE)
         await expect(bar).to_contain_text(f"before {move}", timeout=60_000)
         await screen.picture("story paused")
-        await bar.get_by_role("button", name="Resume").click()
+        await bar.get_by_role("button", name=texts.RESUME).click()
         await until(user.moving, "the arm moves")
         tapped = time.monotonic()
-        await page.get_by_role("button", name="Stop motion").click()
+        await page.get_by_role("button", name=texts.STOP_MOTION).click()
         await until(user.resting, "the arm rests", 2)
         assert time.monotonic() - tapped < 2
         assert (await user.robot())["tcp_pose"][2] > taught + 0.005, "it had come to the end"
         await expect(bar).to_be_hidden(timeout=20_000)
         still = (await user.robot())["q"]
 
-        # A delete is taken back.
-        await user.tool("Things")
+        # Undo a removal.
+        await user.tool(texts.OBJECTS)
         await page.get_by_role("row", name=f"{move} Action").click()
-        await user.panel.get_by_role("button", name="Remove", exact=True).click()
+        await user.panel.get_by_role("button", name=texts.REMOVE, exact=True).click()
         undo = page.get_by_role("button", name=re.compile(f"^Undo .*{move}"))
         await undo.click()
-        await user.tool("Things")
+        await user.tool(texts.OBJECTS)
         await page.get_by_role("row", name=f"{move} Action").wait_for()
 
-        # A cable is pulled: it says which device, in words, and what can be done.
-        if await page.get_by_role("button", name="Go online").is_visible():
+        # Disconnect a cable: the message names the device.
+        if await page.get_by_role("button", name=texts.GO_ONLINE).is_visible():
             await user.online()
-        await user.tool("Devices")
+        await user.tool(texts.DEVICES)
         row = user.panel.get_by_role("listitem").filter(has_text="robot").filter(has_text="online")
         await row.wait_for()
         await workplace.tell("robot", "silence")

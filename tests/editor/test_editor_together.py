@@ -1,4 +1,4 @@
-"""Several people at once: what each of them sees ends as what the server has, whoever edits what and takes it back."""
+"""Several users edit at once: all of them end with the same state as the server."""
 
 import asyncio
 import math
@@ -16,12 +16,13 @@ from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
 from tests.e2e.harness import Cell, until
+from tests.editor import texts
 from tests.editor.screen import Screen, screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(120)]
 
 EDITS = 10
-"""Of each of the two at a screen, and of the third who edits by requests."""
+"""Number of edits of each user."""
 SEED = 20
 
 DRAWN = """() => Object.fromEntries(__engine.ids().map((id) => [id, __engine.item(id)])
@@ -29,7 +30,7 @@ DRAWN = """() => Object.fromEntries(__engine.ids().map((id) => [id, __engine.ite
 
 
 async def edits_at_a_screen(screen: Screen, seed: int) -> None:
-    """Moves the selected point, and takes that back, as fast as the page takes it."""
+    """Move the selected point and undo, as fast as the page allows."""
     chance = random.Random(seed)
     panel = screen.page.get_by_role("complementary")
     for _ in range(EDITS):
@@ -49,7 +50,7 @@ async def _added(client: Client, name: str) -> str:
 
 
 async def edits_by_requests(client: Client, seed: int) -> None:
-    """Adds points, renames them and removes some."""
+    """Add, rename and remove points by the protocol."""
     chance = random.Random(seed)
     own: list[str] = []
     for number in range(EDITS):
@@ -60,7 +61,7 @@ async def edits_by_requests(client: Client, seed: int) -> None:
             own.append(await _added(client, f"third_{number}"))
             continue
         point = chance.choice(own)
-        # Nobody else touches these: each request is granted, and gives the lock back by itself.
+        # Only this user edits these points: each request succeeds and releases its lock.
         await client.call("WriteLock", rpc.WriteLockArgs(point))
         if what == "rename":
             await client.call("RenameActionPoint", rpc.RenameActionPointArgs(point, f"renamed_{number}"))
@@ -70,7 +71,7 @@ async def edits_by_requests(client: Client, seed: int) -> None:
 
 
 def places(scene: Scene, project: Project) -> dict[str, tuple[str, tuple[float, float, float]]]:
-    """Names and places in the world of all points, as the documents say."""
+    """Return names and world positions of all points of the documents."""
     frames = {each.id: each.pose for each in scene.objects if isinstance(each.pose, Pose)}
     points = {each.id: each for each in project.action_points}
 
@@ -95,7 +96,7 @@ def same(drawn: dict[str, Any], wanted: dict[str, tuple[str, tuple[float, float,
     )
 
 
-async def test_two_who_edit_the_same_point_and_a_third_see_the_same_in_the_end(cell: Cell, browser: Browser) -> None:
+async def test_concurrent_edits_converge(cell: Cell, browser: Browser) -> None:
     client = await cell.client("third")
     scene, project = await cell.open(client)
     point = project.action_points[0]
@@ -103,7 +104,7 @@ async def test_two_who_edit_the_same_point_and_a_third_see_the_same_in_the_end(c
         for screen, name in ((one, "Eva"), (two, "Adam")):
             await screen.join(name)
             await screen.item(point.id)
-            await screen.press("Things")
+            await screen.press(texts.OBJECTS)
             await screen.page.get_by_role("row", name=f"{point.name} Action point").click()
         await one.page.get_by_role("img", name=f"Adam, at {point.name}").wait_for()
         async with asyncio.TaskGroup() as tasks:
@@ -112,7 +113,7 @@ async def test_two_who_edit_the_same_point_and_a_third_see_the_same_in_the_end(c
             tasks.create_task(edits_by_requests(client, SEED + 2))
 
         async def opened() -> Project:
-            """What the server tells somebody who has just come."""
+            """Return the open project as a new client receives it."""
             async with Client(cell.url, "late", reconnect=False) as late:
                 told = (await late.next_event("OpenProject", timeout=10)).data.project
                 assert isinstance(told, Project)
@@ -123,10 +124,10 @@ async def test_two_who_edit_the_same_point_and_a_third_see_the_same_in_the_end(c
             return all([same(await screen.page.evaluate(DRAWN), now) for screen in (one, two)])
 
         await until(agree, "both draw what the server has", 15)
-        # Something has happened, and nothing that was held is left held.
+        # Points were added, and all locks are released.
         assert len((await opened()).action_points) > len(project.action_points)
         await client.call("WriteLock", rpc.WriteLockArgs(point.id))
         await one.until("id => __engine.item(id).badge === 'locked by third'", point.id)
-        # Who is barred is told by whom, at once.
+        # The panel names the user who holds the lock.
         await one.page.get_by_role("complementary").get_by_text("third").first.wait_for()
         await client.call("WriteUnlock", rpc.WriteUnlockArgs(point.id))

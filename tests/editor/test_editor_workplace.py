@@ -1,4 +1,4 @@
-"""Somebody joins, opens the project, sees the robot move, stops it, selects things: in Chromium, on fakes."""
+"""The workplace: join, open the project, see the robot move, stop it, locks, devices."""
 
 import math
 import re
@@ -17,12 +17,13 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
 from tests.e2e.harness import Cell, until
+from tests.editor import texts
 from tests.editor.screen import Screen, screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(180)]
+pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(180)]
 
 SLOW = 0.05
-"""Fraction of the robot's speed at which a motion of 0.3 m lasts long enough to be stopped."""
+"""Speed fraction at which a motion of 0.3 m lasts long enough to be stopped."""
 
 
 @dataclass
@@ -34,28 +35,14 @@ class Place:
     robot: str
 
 
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
+@pytest_asyncio.fixture(loop_scope="session")
 async def place(cell: Cell) -> AsyncIterator[Place]:
-    """The project, saved and closed, and a second person who moves things from elsewhere."""
+    """The project, saved and closed, and a second client, "colleague"."""
     client = await cell.client("colleague")
     scene, project = await cell.open(client)
     await client.call("CloseProject")
     robot = next(each.id for each in scene.objects if each.name == "robot")
     yield Place(cell, client, scene, project, robot)
-
-
-@pytest_asyncio.fixture(loop_scope="module")
-async def closed(place: Place) -> AsyncIterator[Place]:
-    """Nothing is open, before and after."""
-    yield place
-    client = place.client
-    await client.call("StopScene") if await _is_online(client) else None
-    with_force = rpc.CloseProjectArgs(force=True)
-    await until(lambda: _granted(client, "CloseProject", with_force), "the project is closed")
-
-
-async def _is_online(client: Client) -> bool:
-    return await _granted(client, "StopScene", dry_run=True)
 
 
 async def _granted(client: Client, request: str, args: Any = None, **options: Any) -> bool:
@@ -85,26 +72,26 @@ async def goal(client: Client, robot: str, down: float) -> rpc.MoveToPoseArgs:
 
 async def opened_and_online(screen: Screen, place: Place) -> None:
     await screen.join("Eva")
-    await screen.press(f"Open {place.project.name}")
+    await screen.press(texts.open_document(place.project.name))
     await screen.item(place.robot)
-    await screen.press("Go online")
-    await screen.page.get_by_role("button", name="Stop motion").wait_for()
+    await screen.press(texts.GO_ONLINE)
+    await screen.page.get_by_role("button", name=texts.STOP_MOTION).wait_for()
 
 
-async def test_joins_opens_the_project_and_sees_the_robot_move(closed: Place, browser: Browser) -> None:
-    place, client = closed, closed.client
+async def test_join_open_project_and_see_the_robot_move(place: Place, browser: Browser) -> None:
+    client = place.client
     async with screen_of(browser, place.cell.url) as screen:
         await screen.join("Eva")
         await screen.sees("on PCB testing")
-        await screen.press(f"Open {place.project.name}")
+        await screen.press(texts.open_document(place.project.name))
         shown = await screen.item(place.robot)
         assert (shown["kind"], shown["name"], shown["endEffectors"]) == ("robot", "robot", [])
-        # Nothing was changed since it was saved, whoever else follows what is opened.
-        assert "not saved" not in (await screen.page.locator(".document").text_content() or "")
+        # Opening changes nothing.
+        assert texts.NOT_SAVED not in (await screen.page.locator(".document").text_content() or "")
         actions = [action for point in place.project.action_points for action in point.actions]
         ids = set(await screen.page.evaluate("window.__engine.ids()"))
         assert {action.id for action in actions} | {item.id for item in place.project.logic} <= ids
-        # A point is drawn where it is: relative to its parent, where it has one.
+        # A point is drawn relative to its parent.
         point = place.project.action_points[0]
         drawn = (await screen.item(point.id))["pose"]["position"]
         parent = next((each for each in place.scene.objects if each.id == point.parent), None)
@@ -112,8 +99,8 @@ async def test_joins_opens_the_project_and_sees_the_robot_move(closed: Place, br
         assert math.dist(drawn.values(), tuple(expected)) < 1e-6
 
         await _still(screen)
-        await screen.press("Go online")
-        await screen.page.get_by_role("button", name="Stop motion").wait_for()
+        await screen.press(texts.GO_ONLINE)
+        await screen.page.get_by_role("button", name=texts.STOP_MOTION).wait_for()
         before = await tcp(screen, place.robot)
         await _still(screen)
         await _nothing_drawn_while_heard_of(screen, place.robot)
@@ -130,7 +117,7 @@ async def test_joins_opens_the_project_and_sees_the_robot_move(closed: Place, br
 
 
 async def _still(screen: Screen) -> None:
-    """Wait until what came last is drawn: for half a second nothing was."""
+    """Wait until nothing has been drawn for half a second."""
     await screen.until(
         """() => {
             const now = performance.now(), last = window.lastDrawn;
@@ -141,7 +128,7 @@ async def _still(screen: Screen) -> None:
 
 
 async def _nothing_drawn_while_heard_of(screen: Screen, robot: str) -> None:
-    """The arm rests and goes on reporting its joints: not one frame comes of forty reports, nor of a frame another.
+    """Check that forty joint reports of a robot at standstill cause no frame, and one frame no other.
 
     Where a busy machine keeps them back for longer, the arm is shown as not heard of, and it begins anew.
     """
@@ -170,8 +157,8 @@ async def _nothing_drawn_while_heard_of(screen: Screen, robot: str) -> None:
     assert 0 < drawn <= asked
 
 
-async def test_stop_motion_ends_a_motion_of_somebody_else(closed: Place, browser: Browser) -> None:
-    place, client = closed, closed.client
+async def test_stop_motion_stops_a_motion_of_another_user(place: Place, browser: Browser) -> None:
+    client = place.client
     async with screen_of(browser, place.cell.url) as screen:
         await opened_and_online(screen, place)
         start = await tcp(screen, place.robot)
@@ -181,7 +168,7 @@ async def test_stop_motion_ends_a_motion_of_somebody_else(closed: Place, browser
             "([id, z]) => window.__engine.item(id).endEffectors[0].position.z < z - 0.005",
             [place.robot, start["position"]["z"]],
         )
-        await screen.page.get_by_role("button", name="Stop motion").click()
+        await screen.page.get_by_role("button", name=texts.STOP_MOTION).click()
         ended = await client.next_event("RobotMoveToPose", timeout=10)
         while ended.data.move_event_type.value == "start":
             ended = await client.next_event("RobotMoveToPose", timeout=10)
@@ -195,23 +182,23 @@ def _slowly(to: rpc.MoveToPoseArgs) -> rpc.MoveToPoseArgs:
     return rpc.MoveToPoseArgs(to.robot_id, to.end_effector_id, SLOW, to.position, to.orientation, safe=False)
 
 
-async def test_an_edit_of_somebody_else_is_seen_and_a_tap_selects(closed: Place, browser: Browser) -> None:
-    place, client = closed, closed.client
+async def test_edits_and_locks_of_another_user_are_shown(place: Place, browser: Browser) -> None:
+    client = place.client
     async with screen_of(browser, place.cell.url) as screen:
         await screen.join("Eva")
-        await screen.press(f"Open {place.project.name}")
+        await screen.press(texts.open_document(place.project.name))
         await screen.item(place.robot)
         await client.call("AddActionPoint", rpc.AddActionPointArgs("lonely", Pose().position))
         added = await client.next_event("ActionPointChanged", timeout=10)
         new = added.data.id
         assert (await screen.item(new))["pose"]["position"] == {"x": 0, "y": 0, "z": 0}
-        await screen.sees("not saved")
+        await screen.sees(texts.NOT_SAVED)
         await client.call("WriteLock", rpc.WriteLockArgs(new))
         await screen.until("id => window.__engine.item(id).badge === 'locked by colleague'", new)
         await client.call("SubscribeEvents", rpc.SubscribeEventsArgs({"ViewStateChanged"}))
-        await _tool(screen, "Things")
+        await _tool(screen, texts.OBJECTS)
         await screen.page.get_by_role("row", name="lonely colleague works on it").click()
-        # Who has it, since when, and that it need not be waited for in silence.
+        # The panel shows who holds the lock, since when, and a button to ask for it.
         about = screen.page.get_by_role("region", name="About", exact=True)
         await about.get_by_text("just now. It is free when colleague is done with it").wait_for()
         await screen.press("Ask colleague for it")
@@ -228,8 +215,8 @@ async def test_an_edit_of_somebody_else_is_seen_and_a_tap_selects(closed: Place,
         await screen.sees("lonely is free now.")
 
 
-async def test_what_was_held_when_a_page_died_is_free_when_its_user_is_back(closed: Place, browser: Browser) -> None:
-    place, client = closed, closed.client
+async def test_locks_of_a_lost_page_are_released_when_the_user_returns(place: Place, browser: Browser) -> None:
+    client = place.client
     await client.call("OpenProject", rpc.IdArgs(place.project.id))
     point = rpc.WriteLockArgs(place.project.action_points[0].id)
     async with Client(place.cell.url, "Kim", reconnect=False) as before:
@@ -243,21 +230,20 @@ async def test_what_was_held_when_a_page_died_is_free_when_its_user_is_back(clos
         await client.call("WriteUnlock", rpc.WriteUnlockArgs(point.object_id))
 
 
-async def test_online_without_a_device_which_is_tried_again_by_itself(closed: Place, browser: Browser) -> None:
-    place = closed
+async def test_online_without_a_device_and_retry(place: Place, browser: Browser) -> None:
     async with screen_of(browser, place.cell.url) as screen:
         page = screen.page
         await screen.join("Rita")
-        await screen.press(f"Open {place.project.name}")
+        await screen.press(texts.open_document(place.project.name))
         await screen.item(place.robot)
-        await _tool(screen, "Devices")
+        await _tool(screen, texts.DEVICES)
         await screen.sees("The workplace is offline.")
         await place.cell.tell("tester", "refuse")
         try:
-            await screen.press("Go online")
+            await screen.press(texts.GO_ONLINE)
             tester = page.get_by_role("listitem").filter(has=page.get_by_text("tester", exact=True))
             await expect(tester).to_contain_text("not reached", timeout=40_000)
-            # The others are there, and what is not stands first, with the reason.
+            # The other devices are online; the failed one is listed first, with the reason.
             robot = page.get_by_role("listitem").filter(has=page.get_by_text("robot", exact=True))
             await expect(robot).to_contain_text("online", timeout=40_000)
             await page.get_by_role("button", name="Online 1 in trouble. Press to go offline").wait_for()
@@ -268,11 +254,11 @@ async def test_online_without_a_device_which_is_tried_again_by_itself(closed: Pl
             await place.cell.tell("tester", "heal")
         await screen.press("Try tester again")
         await expect(tester).not_to_contain_text("not reached", timeout=40_000)
-        await page.get_by_role("button", name="Online. Press to go offline").wait_for()
+        await page.get_by_role("button", name=texts.GO_OFFLINE).wait_for()
         await screen.picture("devices")
 
-        # What went by itself is found again, with its time.
-        await screen.press("Settings")
+        # Past notices are listed with their time.
+        await screen.press(texts.SETTINGS)
         await page.get_by_role("menuitem", name="Messages, with times").click()
         messages = page.get_by_role("dialog", name="Messages").get_by_role("listitem")
         began = messages.filter(has_text="Starting the scene")
