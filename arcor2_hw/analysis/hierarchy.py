@@ -3,13 +3,16 @@
 import ast
 import sys
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Final
 
 from arcor2_hw.analysis.constants import constant
 from arcor2_hw.analysis.module import Binding, ClassInfo, FunctionNode, Value
 from arcor2_hw.analysis.symbols import External, Resolver, framework_name, is_framework
 
 Lineage = list["ClassInfo | External"]
+
+DRIVER_BASES: Final = ("Connected", "PointActions")
+"""Bases for drivers: mixins that implement what an object type base leaves to the driver."""
 
 
 class Hierarchy:
@@ -162,18 +165,20 @@ class Hierarchy:
         return self._offered[base]
 
     def implemented_hooks(self, info: ClassInfo) -> frozenset[str]:
-        """Give the optional methods of our bases that the type, or an ancestor of its own, really implements.
+        """Return the optional methods of our bases that the type, or an ancestor of its own, really implements.
 
-        One of our bases does so where another of them leaves it open.
+        A base for drivers implements what it defines; another of our bases, what a further one leaves open.
         """
         ours = [each for each in self.ancestors(info) if is_framework(each)]
-        offered = {name for each in ours for name in self._offers(each)}
+        for_drivers = [each for each in ours if any(self.derives_from(each, name) for name in DRIVER_BASES)]
+        offered = {name for each in ours if each not in for_drivers for name in self._offers(each)}
         result = set()
         for name in offered:
             found = self.method(info, name)
             if found is None or self.is_hook_only(found[1], found[0]):
                 continue
-            if not is_framework(found[0]) or self._fills_in(name, ours[ours.index(found[0]) + 1 :]):
+            own = not is_framework(found[0]) or found[0] in for_drivers
+            if own or self._fills_in(name, ours[ours.index(found[0]) + 1 :]):
                 result.add(name)
         return frozenset(result)
 

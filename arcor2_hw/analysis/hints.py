@@ -33,6 +33,16 @@ def without_none(hint: ast.expr, module: Module, resolver: Resolver) -> tuple[as
     return hint, False
 
 
+def unannotated(hint: ast.expr, module: Module, resolver: Resolver) -> ast.expr:
+    """Return the type X of `Annotated[X, ...]`, and any other hint as it is."""
+    hint = plain(hint, module)
+    match hint:
+        case ast.Subscript(value=value, slice=ast.Tuple(elts=[first, *_])):
+            if resolver.expression(value, module) == External("typing.Annotated"):
+                return first
+    return hint
+
+
 def _members(hint: ast.expr, module: Module, resolver: Resolver) -> list[ast.expr]:
     match hint:
         case ast.BinOp(left=left, op=ast.BitOr(), right=right):

@@ -8,7 +8,7 @@ from arcor2_hw.actions.parameter_types import Extra
 from arcor2_hw.analysis.actions import NUMBERS, ActionReader, described_parameters, unit_extra
 from arcor2_hw.analysis.constants import enum_members
 from arcor2_hw.analysis.hierarchy import Hierarchy
-from arcor2_hw.analysis.hints import meaning, parameter_type_of, plain, without_none
+from arcor2_hw.analysis.hints import meaning, parameter_type_of, plain, unannotated, without_none
 from arcor2_hw.analysis.module import ClassInfo, Value
 from arcor2_hw.analysis.source import Broken
 from arcor2_hw.analysis.symbols import External, framework_name, is_framework
@@ -118,6 +118,7 @@ class SettingsReader:
     def _setting(
         self, info: ClassInfo, name: str, hint: ast.expr, field: _Field, description: str | Unset
     ) -> ParameterMeta:
+        hint = unannotated(hint, info.module, self._resolver)
         try:
             kind, enumeration = parameter_type_of(hint, info.module, info, self._resolver)
             if kind.name not in _KINDS:

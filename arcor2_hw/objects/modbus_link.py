@@ -6,7 +6,7 @@ pymodbus is imported when a link is opened, so that a driver can be read and loa
 import contextlib
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 from arcor2_hw.data.device import Identity
@@ -96,6 +96,16 @@ class ModbusLink:
         with self._one_request:
             self._close()
             self._loss = None  # what failed just now was our own doing
+
+    @contextlib.contextmanager
+    def limited(self, timeout: float) -> Iterator[None]:
+        """Give the device at most `timeout` s for each request meanwhile."""
+        usual = self._timeout
+        self._timeout = min(usual, timeout)
+        try:
+            yield
+        finally:
+            self._timeout = usual
 
     def _open(self, timeout: float) -> None:
         try:

@@ -1,4 +1,4 @@
-"""Observing: the life of a driver's connection, kept by a thread of its own: opened, watched, lost, back."""
+"""Observing: the life cycle of a driver's connection on a thread of its own: open, watch, lose, come back."""
 
 import contextlib
 import logging
@@ -8,20 +8,23 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 from arcor2_hw.data.device import Connection
-from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected
+from arcor2_hw.exceptions import Cancelled, ConnectionLost, DeviceError, DeviceTimeout, NotConnected
+
+GoOn = Callable[[], None]
+"""A check that returns while work may go on; it raises Cancelled or ConnectionLost when it may not."""
 
 ATTEMPT_TIMEOUT: Final = 2.0
-"""Seconds an attempt to come back may take: a device on a local network answers in one."""
+"""Time an attempt to reconnect may take, s: a device on a local network answers in one."""
 FIRST_PAUSE: Final = 0.1
-"""Seconds before the first attempt: a device that resets a connection takes the next at once."""
+"""Pause before the first attempt, s: a device that resets a connection accepts the next at once."""
 LONGEST_PAUSE: Final = 2.0
-"""Seconds between attempts in the end: a device that was switched on is seen before its operator has walked back."""
+"""Longest pause between attempts, s: short enough that operators see a device soon after they switch it on."""
 STEADY: Final = 0.5
-"""Seconds after which a connection that came back counts as one; one that breaks sooner does not shorten the pauses."""
+"""Time a connection has to last before the pauses start from the shortest again, s."""
 BREATH: Final = 0.005
-"""Seconds between two calls of a watch that returns though nobody told it to."""
+"""Pause between two calls of a watch that returns by itself, s."""
 STOP_WITHIN: Final = 0.9
-"""Seconds `stop` waits for the thread; disconnect may take one."""
+"""Time `stop` waits for the thread, s; disconnect may take one."""
 
 log = logging.getLogger(__name__)
 _made_here = threading.local()
@@ -29,9 +32,9 @@ _made_here = threading.local()
 
 @contextlib.contextmanager
 def listening(changed: "Callable[[Observing], None]") -> Iterator[None]:
-    """Have `changed` called with each connection that is made on this thread meanwhile, whenever its state changes.
+    """Call `changed` whenever the state of a connection changes that was created on this thread in this context.
 
-    It is called on the thread that changed the state, right after that; it must not raise, nor wait.
+    It is called on the thread that changed the state, right after the change; it must neither raise nor wait.
     """
     before = getattr(_made_here, "changed", None)
     _made_here.changed = changed
@@ -42,22 +45,29 @@ def listening(changed: "Callable[[Observing], None]") -> Iterator[None]:
 
 
 class Observing:
-    """Keeps a connection that only observes. Control never comes back by itself; that is the driver's to take.
+    """Keeps a connection that only observes. It never takes control back after a loss.
 
-    open_(timeout): opens, raises DeviceError. watch(stopping): blocks while all is well, returns soon after `stopping`
-    is set, raises DeviceError when the connection is lost. close(): closes, harmless when closed. lost(error): told
-    once per loss, before the connection is closed.
+    Args:
+        what: Name and address of the device, for errors.
+        open_: Opens the connection within the time given (s); raises DeviceError.
+        watch: Blocks while all is well, returns soon after its event is set, raises DeviceError after a loss.
+        close: Closes the connection; does nothing when it is closed.
+        lost: Called with the error once per loss, before the connection is closed.
     """
 
     def __init__(
         self,
         what: str,
-        open_: Callable[[float], None],
+        open_: Callable[[float], object],
         watch: Callable[[threading.Event], None],
         close: Callable[[], None],
         lost: Callable[[DeviceError], None] = lambda _: None,
     ) -> None:
         self.what = what
+        self.losses = 0
+        """How often the connection was lost: work that started before a loss is over, even after a reconnect."""
+        self._loss: DeviceError | None = None
+        self._cancelled = 0
         self._open, self._watch, self._close, self._tell_lost = open_, watch, close, lost
         self._life = threading.Lock()
         self._stopping = threading.Event()
@@ -71,21 +81,21 @@ class Observing:
 
     @property
     def reason(self) -> str:
-        """Tell why the connection is lost or failed; empty when it is not."""
+        """Return why the connection is lost or failed; empty when it is neither."""
         return str(self._reason or "") if self._state in (Connection.LOST, Connection.FAILED) else ""
 
     @property
     def state(self) -> Connection:
-        """Tell how the connection is; it is "back" until `settled` is called."""
+        """Return the state of the connection; it stays "back" until `settled` is called."""
         return self._state
 
     @property
     def online(self) -> bool:
-        """Tell whether the device is observed now."""
+        """Return whether the device is observed now."""
         return self._state in (Connection.ONLINE, Connection.BACK)
 
     def settled(self) -> None:
-        """Note that somebody has taken note of the connection being back."""
+        """Change the state from "back" to "online": a client has noticed the reconnect."""
         with self._turn:
             if self._state is not Connection.BACK:
                 return
@@ -93,15 +103,40 @@ class Observing:
         self._tell_changed()
 
     def check(self) -> None:
-        """Return when the device is observed. Raises NotConnected, or ConnectionLost with what it was lost by."""
+        """Return while the device is observed. Raises NotConnected, or ConnectionLost with its cause."""
         if self.online:
             return
         if self._state is Connection.LOST:
             raise ConnectionLost(f"the connection to {self.what} is lost", str(self._reason or ""))
         raise NotConnected(f"{self.what} is not connected", str(self._reason or ""))
 
+    def begin(self, what: str) -> GoOn:
+        """Return the check for work that starts now: it raises Cancelled after `cancel`, ConnectionLost after a loss.
+
+        Args:
+            what: Name of the work, for errors.
+        """
+        cancelled, losses = self._cancelled, self.losses
+
+        def check() -> None:
+            if self._cancelled != cancelled:
+                raise Cancelled(f"{self.what}: {what} was stopped")
+            self.check_unbroken(losses)
+
+        return check
+
+    def cancel(self) -> None:
+        """End with Cancelled the work that has started."""
+        self._cancelled += 1
+
+    def check_unbroken(self, losses: int) -> None:
+        """Return while the device is observed and was since `losses` was read. Raises ConnectionLost, NotConnected."""
+        if self.losses != losses:
+            raise ConnectionLost(f"{self.what}: the connection was lost", str(self._loss or "")) from self._loss
+        self.check()
+
     def start(self, timeout: float) -> None:
-        """Open within `timeout` s and watch from then on; harmless when it was started. Raises what open_ raises."""
+        """Open within `timeout` s and watch from then on; does nothing when started. Raises what `open_` raises."""
         with self._life:
             if self._thread is not None:
                 self.check()
@@ -126,7 +161,7 @@ class Observing:
             self._thread.start()
 
     def stop(self) -> None:
-        """Close and be offline; harmless when it is. A thread that does not end in time is left to end by itself."""
+        """Close the connection; does nothing when it is closed. A thread that does not end in time ends by itself."""
         with self._life:
             thread, self._thread = self._thread, None
             self._stopping.set()
@@ -136,7 +171,7 @@ class Observing:
             self._enter(Connection.OFFLINE)
 
     def _enter(self, state: Connection, stopping: threading.Event | None = None) -> bool:
-        """Change the state, unless `stopping` says that this is over; tells whether it did."""
+        """Change the state unless `stopping` is set. Return whether it was not set."""
         with self._turn:
             if stopping is not None and stopping.is_set():
                 return False
@@ -150,7 +185,7 @@ class Observing:
             self._listener(self)
 
     def _await_former(self, timeout: float) -> None:
-        """Let a thread end that `stop` could not wait for: at its end it closes what is open."""
+        """Wait for a thread that `stop` did not wait for: it closes the former connection when it ends."""
         if self._ending is not None:
             self._ending.join(timeout)
             if self._ending.is_alive():
@@ -171,14 +206,14 @@ class Observing:
         finally:
             self._close()
 
-    def _attempt(self, work: Callable[[], None]) -> DeviceError | None:
-        """Do something of the driver's; gives what went wrong. A mistake in it is a loss too: nobody watches then."""
+    def _attempt(self, work: Callable[[], object]) -> DeviceError | None:
+        """Call a function of the driver and return its error. A programming error counts as a loss: nothing watches."""
         try:
             work()
         except DeviceError as e:
             return e
         except Exception as e:
-            if self._state is not Connection.LOST:  # else it was told, and attempts go on
+            if self._state is not Connection.LOST:  # else it is in the log already, and attempts go on
                 log.exception("%s: an error inside the driver", self.what)
             return ConnectionLost(f"{self.what}: an error inside the driver", f"{type(e).__name__}: {e}")
         return None
@@ -188,6 +223,8 @@ class Observing:
         if not self._enter(Connection.LOST, stopping):
             return
         log.warning("%s lost: %s", self.what, loss)
+        self._loss = loss
+        self.losses += 1
         self._attempt(lambda: self._tell_lost(loss))
         since = time.monotonic()
         while True:

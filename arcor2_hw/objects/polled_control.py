@@ -1,4 +1,4 @@
-"""PolledControl: connection, control, acts and stop of a device whose state is read over and over. A mixin."""
+"""PolledControl: connection, control, work and stop of a device whose state is read periodically. A mixin."""
 
 import contextlib
 import threading
@@ -7,20 +7,23 @@ import typing
 from collections.abc import Callable, Iterator
 from typing import Final, Protocol, TypeVar
 
-from arcor2_hw.data.device import Connection, Health
+from arcor2_hw.data.device import Health
 from arcor2_hw.exceptions import DeviceError, NotInControl, Refused
+from arcor2_hw.objects.connected import Connected
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
-from arcor2_hw.objects.polled import GoOn, Polled, Snapshot
+from arcor2_hw.objects.observing import GoOn
+from arcor2_hw.objects.state_observer import Snapshot, StateObserver
 
 T = TypeVar("T")
 
 US: Final = "us"
+NOBODY: Final = "nobody has control"
 STANDS_WITHIN: Final = 1.0
-"""s from a stop until the device has to stand; a driver may set another by its class data `stands_within`."""
+"""Time from a stop to standstill, s."""
 
 
 class Link(Protocol):
-    """What a connection to a device has at least: ModbusLink, or a driver's own."""
+    """What a driver needs of a connection: ModbusLink, Line, or a class of its own."""
 
     who: str
     """Name and address, for errors."""
@@ -29,177 +32,256 @@ class Link(Protocol):
         """Open within `timeout` s. Raises DeviceError."""
 
     def close(self) -> None:
-        """Close, harmless when closed; what waits for an answer fails at once."""
+        """Close; does nothing when closed. A request that waits for its answer fails at once."""
 
 
-class PolledControl(typing.Generic[T]):
-    """`class Press(Machine, PolledControl[list[int]], Generic)`: call `observe_by` at the end of `__init__`.
+class PolledControl(Connected, typing.Generic[T]):
+    """A device that is read periodically, and commanded after `take_control`; call `use_link` in `__init__`.
 
-    A driver overrides `arm` and `disarm` (what taking and giving back control writes), `send_stop` (the command that
-    stops), `is_busy`, `owner_of` and `fault_of` (read from a state). All may raise DeviceError. Control goes with the
-    connection, and when the device says that it has another owner.
+    `class Press(Machine, PolledControl[list[int]], Generic)` overrides `read_state`, and where the device has such a
+    thing `arm` and `disarm` (what taking and releasing control writes), `send_stop`, `is_busy`, `owner_of` and
+    `fault_of` (read from a state). All may raise DeviceError. Control ends when the connection is lost, and when the
+    device reports another owner.
     """
 
-    name: str
+    period: float = 0.1
+    busy_period: float = 0.02
+    fresh_for: float = 0.5
+    answers_within: float = 3.0
+    """See StateObserver."""
     stands_within: float = STANDS_WITHIN
+    """Time from a stop to standstill, s."""
+    in_control: bool = False
+    why_not: str = NOBODY
+    """Why we have no control."""
     _link: Link
 
-    def observe_by(self, link: Link, read: Callable[[], T], *, period: float = 0.1, fresh: float = 0.5) -> None:
-        """Say how the state is read: every `period` s, and how old (s) one may be that is given out."""
+    def use_link(self, link: Link, observer: StateObserver[T] | None = None) -> None:
+        """Read the state over `link`, or by an observer of the driver's own."""
         self._link = link
-        self._polled: Polled[T] = Polled(
-            link.who,
-            lambda timeout: self._first(read, timeout),
-            read,
-            link.close,
-            quiet=period,
-            busy=min(period, 0.02),
-            fresh=fresh,
-            taken=lambda snapshot: self._look(snapshot.value, snapshot.asked),
-            lost=self._lost,
-            interrupt=link.close,
-        )
-        self._ours_since: float | None = None
-        self._sending = threading.Lock()
+        self._polled = observer or _Observer(self, link.who)
+        self.keep_connection(link.who, self._polled.observing)
+        self._control_since = 0.0
+        self._taking_control, self._sending = threading.Lock(), threading.RLock()
         self._acting = threading.Lock()
         self._doing = ""
 
-    # -------------------------------------------------------------------------------- for drivers: hooks
+    def observe_by(self, link: Link, read: Callable[[], T], *, period: float = 0.1, fresh: float = 0.5) -> None:
+        """Read the state with a function; for drivers written before `read_state`."""
+        self.period, self.busy_period, self.fresh_for = period, min(period, 0.02), fresh
+        self._read = read
+        self.use_link(link)
+
+    # -------------------------------------------------------------------------------- hooks: connection and state
+    def open_link(self, timeout: float) -> Snapshot[T]:
+        """Open the connection within `timeout` s and return the first state."""
+        self._link.open(timeout)
+        return Snapshot.by(self.read_state)
+
+    def read_state(self) -> T:
+        """Read the state of the device."""
+        return self._read()
+
+    def close_link(self) -> None:
+        """Close the connection."""
+        self._link.close()
+
+    def on_state(self, snapshot: Snapshot[T]) -> None:
+        """Take a new state before others see it."""
+
+    def after_reading(self) -> None:
+        """Do what follows each reading, such as keeping a watchdog quiet."""
+
+    # -------------------------------------------------------------------------------- hooks: control
     def arm(self) -> None:
-        """Take control at the device: say how long it may go on without us, say who we are."""
+        """Take control at the device: set the time it may go on without us, write who we are."""
 
     def disarm(self) -> None:
-        """Give control back at the device."""
+        """Release control at the device."""
 
     def send_stop(self) -> None:
         """Send the command that stops."""
 
     def is_busy(self, state: T) -> bool:
-        """Tell whether an act is under way."""
+        """Return whether the device works."""
         return False
 
     def owner_of(self, state: T) -> str | None:
-        """Tell who has control by the device's own word: "us", another's name, None: nobody, or it does not say."""
-        return US if self._ours_since is not None else None
+        """Return who has control as the device reports it: "us", another's name, or None."""
+        return US if self.in_control else None
+
+    def why_control_ended(self, state: T) -> str:
+        """Return why the device does not obey us any more, asked while we have control; empty while it does."""
+        owner = self.owner_of(state)
+        return "" if owner == US else f"{owner} has control" if owner else NOBODY
 
     def fault_of(self, state: T) -> int:
-        """Give the number of the fault that the device tells; 0: none."""
+        """Return the number of the fault that the device reports; 0: none."""
         return 0
 
-    # -------------------------------------------------------------------------------- for drivers: use
+    # -------------------------------------------------------------------------------- states and commands
+    def newest(self) -> T | None:
+        """Return the newest state however old; None before the first."""
+        return self._polled.newest()
+
     def current(self) -> T:
-        """Give the newest state. Raises NotConnected, ConnectionLost, or Stale when it is too old."""
+        """Return the newest state. Raises NotConnected, ConnectionLost, or Stale when it is too old."""
         return self._polled.current().value
 
     def fresh(self) -> T:
-        """Give a state that was asked for after this call. Raises DeviceTimeout, NotConnected, ConnectionLost."""
+        """Return a state that was asked for after this call. Raises DeviceTimeout, NotConnected, ConnectionLost."""
         return self._polled.fresh().value
 
+    def wait(self, holds: Callable[[T], bool], timeout: float, what: str, go_on: GoOn | None = None) -> T:
+        """Return the first state asked for from now on for which `holds` is true. Raises Cancelled, DeviceTimeout."""
+        return self._polled.wait(holds, timeout, what, go_on).value
+
+    def require_control(self, what: str) -> None:
+        """Return when the device may be commanded. Raises NotConnected, ConnectionLost, NotInControl naming `what`."""
+        self.observing.check()
+        if not self.in_control:
+            owner = self.control_owner()
+            why = f"{owner} has control" if owner and self.why_not == NOBODY else self.why_not
+            raise NotInControl(f"{self.who}: {what} is refused: {why}")
+
     def send(self, what: str, write: Callable[[], None], go_on: GoOn | None = None) -> None:
-        """Send a command, unless a stop, or a loss, came first. Raises NotInControl naming `what`."""
+        """Send a command, unless a stop or a loss came first. Raises NotInControl naming `what`."""
         with self._sending:
             if go_on is not None:
                 go_on()
-            self._polled.observing.check()
-            if self._ours_since is None:
-                owner = self.control_owner()
-                raise NotInControl(f"{self._polled.who}: {what} needs control" + (f": {owner} has it" if owner else ""))
+            self.require_control(what)
             write()
 
     @contextlib.contextmanager
     def act(self, what: str) -> Iterator[GoOn]:
-        """Do something that takes its time, alone; gives what has to be handed to `send` and `wait`.
-
-        Raises Refused while another act is under way. A failure stops the device.
-        """
+        """Do work that takes its time; the value is for `send` and `wait`. Raises Refused while other work runs."""
         if not self._acting.acquire(blocking=False):
-            raise Refused(f"{self._polled.who} is busy ({self._doing}): {what} has to wait")
+            raise Refused(f"{self.who} is busy ({self._doing}): {what} has to wait")
         try:
             self._doing = what
-            yield self._polled.begin(what)
+            yield self.begin(what)
         finally:
             self._acting.release()
 
-    def wait(self, holds: Callable[[T], bool], timeout: float, what: str, go_on: GoOn) -> T:
-        """Give the first state asked for from now on of which `holds` is true. Raises Cancelled, DeviceTimeout."""
-        return self._polled.wait(holds, timeout, what, go_on).value
+    def stop_waiting(self) -> None:
+        """End with Cancelled the work that has started."""
+        self._polled.stop_waiting()
 
     # -------------------------------------------------------------------------------- connection
     def connect(self, timeout: float = DEFAULT_CONNECT_TIMEOUT) -> None:
-        """Begin to observe within `timeout` s; nothing is written. Raises NotConnected, DeviceTimeout, DeviceFault."""
+        """Start to observe within `timeout` s; nothing is written. Raises NotConnected, DeviceTimeout, DeviceFault."""
         self._polled.connect(timeout)
 
     def disconnect(self) -> None:
-        """Give control back when it is ours, and close; harmless when closed. An act ends with an error."""
-        if self._ours_since is not None and self._polled.observing.online:
+        """Release control when it is ours, and close; does nothing when closed. Work that runs ends with an error."""
+        if self.in_control and self.observing.online:
             with contextlib.suppress(DeviceError):  # the device's own supervision does it then
-                self.release_control()
-        self._ours_since = None
+                self.leave()
+        self.drop_control()
         self._polled.disconnect()
 
-    @property
-    def connection(self) -> Connection:
-        """Tell how the connection is."""
-        return self._polled.observing.state
+    def leave(self) -> None:
+        """Release control because we disconnect; takes at most half a second."""
+        PolledControl.release_control(self)
 
-    @property
-    def health(self) -> Health:
-        """Give the condition: failure while the device tells a fault."""
-        newest = self._polled.newest()
-        return Health.FAILURE if newest is not None and self.fault_of(newest) else Health.NORMAL
-
-    def _first(self, read: Callable[[], T], timeout: float) -> Snapshot[T]:
-        self._link.open(timeout)
-        return Snapshot.by(read)
-
-    def _lost(self, _: DeviceError) -> None:
-        self._ours_since = None
+    def condition(self) -> Health:
+        """Return failure while the device reports a fault."""
+        newest = self.newest()
+        return Health.FAILURE if newest is not None and self.fault_of(newest) else super().condition()
 
     # -------------------------------------------------------------------------------- control
     def take_control(self) -> None:
-        """Take control; harmless when it is ours. Raises NotInControl naming who has it."""
-        if self._ours_since is not None:
-            return
-        owner = self.owner_of(self.fresh())
-        if owner not in (None, US):
-            raise NotInControl(f"{self._polled.who}: {owner} has control")
-        with self._sending:
-            self._polled.observing.settled()
-            self.arm()
-            self._ours_since = time.monotonic()
+        """Take control; does nothing when it is ours. Raises NotInControl naming who has it."""
+        with self._taking_control:
+            owner = self.owner_of(self.fresh())
+            if owner not in (None, US):
+                raise NotInControl(f"{self.who}: control is refused: {owner} has it")
+            if self.in_control:
+                return
+            losses = self.observing.losses
+            with self._sending:
+                self.arm()
+                with self._polled.taking:
+                    self._control_since, self.in_control = time.monotonic(), True
+            try:
+                self.observing.check_unbroken(losses)
+            except DeviceError:
+                self.drop_control("the connection was lost")
+                raise
+            self.observing.settled()
 
     def release_control(self) -> None:
-        """Stop what is under way and give control back; harmless when it is not ours."""
+        """Stop what runs and release control; does nothing when it is not ours."""
         with self._sending:
-            ours, self._ours_since = self._ours_since, None
-            if ours is None:
+            if not self.in_control:
                 return
-            self._polled.stop_waiting()
-            newest = self._polled.newest()
+            self.drop_control()
+            newest = self.newest()
             if newest is not None and self.is_busy(newest):
+                self.stop_waiting()
                 self.send_stop()
             self.disarm()
 
     def control_owner(self) -> str | None:
-        """Tell who has control: "us", another's name, or None."""
-        if self._ours_since is not None:
+        """Return who has control: "us", another's name, or None."""
+        if self.in_control:
             return US
-        newest = self._polled.newest()
+        newest = self.newest()
         owner = None if newest is None else self.owner_of(newest)
-        return None if owner == US else owner  # an earlier session of ours, which the device has not forgotten yet
+        return None if owner == US else owner  # an earlier session of ours, which the device still remembers
 
-    def _look(self, state: T, asked: float) -> None:
-        since = self._ours_since
-        if since is not None and asked > since and self.owner_of(state) != US:
-            self._ours_since = None
+    def drop_control(self, why: str = NOBODY) -> None:
+        """Note that we have no control any more; nothing is sent."""
+        self.in_control, self.why_not = False, why
+
+    def on_lost(self, error: DeviceError) -> None:
+        """End control: a loss of the connection ends it."""
+        self.drop_control("control ended when the connection was lost")
+
+    def check_control(self, snapshot: Snapshot[T]) -> None:
+        """End control when a state asked for since it was taken says that the device does not obey us."""
+        if self.in_control and snapshot.asked > self._control_since and (why := self.why_control_ended(snapshot.value)):
+            self.drop_control(why)
 
     # -------------------------------------------------------------------------------- stop
     def stop(self) -> None:
-        """Stop what is under way, and return when the device stands. Raises DeviceTimeout when it does not."""
+        """Stop what runs, and return at standstill. Raises DeviceTimeout when the device does not stop."""
         with self._sending:
-            self._polled.stop_waiting()
-            self._polled.observing.check()
-            if self._ours_since is None:
+            self.stop_waiting()
+            self.observing.check()
+            if not self.in_control:
                 return
             self.send_stop()
         self._polled.wait(lambda state: not self.is_busy(state), self.stands_within, "stopping")
+
+
+class _Observer(StateObserver[T]):
+    """Observes the state by the hooks of a device."""
+
+    def __init__(self, device: PolledControl[T], who: str) -> None:
+        self._device = device
+        self.period, self.busy_period = device.period, device.busy_period
+        self.fresh_for, self.answers_within = device.fresh_for, device.answers_within
+        super().__init__(who)
+
+    def open(self, timeout: float) -> Snapshot[T]:
+        return self._device.open_link(timeout)
+
+    def read(self) -> T | None:
+        return self._device.read_state()
+
+    def close(self) -> None:
+        self._device.close_link()
+
+    def interrupt(self) -> None:
+        self._device.close_link()
+
+    def on_state(self, snapshot: Snapshot[T]) -> None:
+        self._device.check_control(snapshot)
+        self._device.on_state(snapshot)
+
+    def after_reading(self) -> None:
+        self._device.after_reading()
+
+    def on_lost(self, error: DeviceError) -> None:
+        self._device.on_lost(error)

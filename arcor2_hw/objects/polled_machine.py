@@ -1,37 +1,37 @@
-"""PolledMachine: a machine with the states of PackML whose state is read over and over. A mixin."""
+"""PolledMachine: a machine with the states of PackML whose state is read periodically. A mixin."""
 
 import abc
 from typing import TypeVar
 
 from arcor2_hw.exceptions import DeviceFault, Refused
 from arcor2_hw.objects.machine import ALLOWED, Machine, MachineCommand, MachineState
-from arcor2_hw.objects.polled import GoOn
+from arcor2_hw.objects.observing import GoOn
 from arcor2_hw.objects.polled_control import PolledControl
 
 T = TypeVar("T")
 
 
 class PolledMachine(PolledControl[T], Machine):
-    """`class Press(PolledMachine[list[int]], Generic)`: a driver gives `state_of` and `write_command`."""
+    """`class Press(PolledMachine[list[int]], Generic)`: a driver overrides `state_of` and `write_command`."""
 
     @abc.abstractmethod
     def state_of(self, state: T) -> MachineState:
-        """Read the state of PackML from what was read."""
+        """Return the state of PackML that the device reported."""
 
     @abc.abstractmethod
     def write_command(self, command: MachineCommand, *arguments: int) -> None:
         """Write a command. Raises DeviceError."""
 
     def machine_state(self) -> MachineState:
-        """Tell the present state. Raises NotConnected, ConnectionLost, Stale."""
+        """Return the present state. Raises NotConnected, ConnectionLost, Stale."""
         return self.state_of(self.current())
 
     def command(self, command: MachineCommand) -> None:
-        """Give a command. Raises Refused naming command and state, NotInControl."""
+        """Send a command. Raises Refused naming command and state, NotInControl."""
         self._command(command)
 
     def run(self, timeout: float, go_on: GoOn, *arguments: int) -> T:
-        """Start, from wherever a reset leads to, and give what is read when it is complete. Within an `act`.
+        """Reset where necessary, start, and return what is read when the unit is complete. Called within an `act`.
 
         Raises DeviceFault when it ends in another state than Complete or Idle, DeviceTimeout after `timeout` s.
         """
@@ -41,21 +41,21 @@ class PolledMachine(PolledControl[T], Machine):
         self._command(MachineCommand.START, *arguments, go_on=go_on)
         end = self.wait(lambda read: not self.is_busy(read), timeout, "running", go_on)
         if (state := self.state_of(end)) not in (MachineState.COMPLETE, MachineState.IDLE):
-            raise DeviceFault(f"{self._link.who} did not finish: it is {state.name}", fault_code=self.fault_of(end))
+            raise DeviceFault(f"{self.who} did not finish: it is {state.name}", fault_code=self.fault_of(end))
         return end
 
     # -------------------------------------------------------------------------------- hooks of PolledControl
     def is_busy(self, state: T) -> bool:
-        """Tell whether the unit does something: any state but those that it can stay in."""
+        """Return whether the unit does something: true in any state that it leaves by itself."""
         return self.state_of(state) not in _STAYS
 
     def send_stop(self) -> None:
-        """Stop, where the state allows it."""
+        """Send the command `stop`."""
         self.write_command(MachineCommand.STOP)
 
     def _command(self, command: MachineCommand, *arguments: int, go_on: GoOn | None = None) -> None:
         if (state := self.state_of(self.fresh())) not in ALLOWED[command]:
-            raise Refused(f"{self._link.who}: {command.name} is not allowed in {state.name}")
+            raise Refused(f"{self.who}: {command.name} is not allowed in {state.name}")
         self.send(command.name, lambda: self.write_command(command, *arguments), go_on)
 
 

@@ -5,8 +5,10 @@ URL or a file therefore goes through the checks in this module; each raises OutO
 """
 
 import dataclasses
+import math
 import os
 import stat
+import typing
 import urllib.parse
 from pathlib import Path
 
@@ -15,9 +17,27 @@ from arcor2_hw.data.device import DEVICE_FILES
 from arcor2_hw.exceptions import OutOfRange
 
 
+@dataclasses.dataclass(frozen=True)
+class Range:
+    """The range of a number setting, both limits included: `timeout: Annotated[float, Range(0.1, 5.0, "s")] = 1.0`."""
+
+    low: float
+    high: float
+    unit: str = ""
+
+
+def within(name: str, value: float, low: float, high: float, unit: str = "") -> None:
+    """Raise OutOfRange, which names the parameter, unless a number is finite and in the range."""
+    if not (math.isfinite(value) and low <= value <= high):
+        raise OutOfRange(f"{name} must be {low:g} to {high:g}{unit and ' ' + unit}, not {value!r}")
+
+
 @dataclasses.dataclass
 class Settings:
     """Base class of settings: a dataclass with fields of type bool, int, float, str or an enumeration.
+
+    The range of a number is declared in its type (see Range) and checked when the settings are made. A class that
+    checks more overrides `__post_init__` and calls `super().__post_init__()` in it.
 
     A secret is declared by its metadata: `password: str = field(default="", repr=False, metadata={"secret": True})`.
     The server stores its value separately and never sends it to clients. A str whose name indicates a secret
@@ -26,6 +46,13 @@ class Settings:
     A stored secret is sent only to the address that it was entered for. A str whose name indicates an address (`host`,
     `url`, `address`, `port`, ...) is part of it; metadata `"address": True` or `False` overrides that.
     """
+
+    def __post_init__(self) -> None:
+        hints = typing.get_type_hints(type(self), include_extras=True) if _has_text_ranges(self) else {}
+        for field in dataclasses.fields(self):
+            for limits in getattr(hints.get(field.name, field.type), "__metadata__", ()):
+                if isinstance(limits, Range):
+                    within(field.name, getattr(self, field.name), limits.low, limits.high, limits.unit)
 
 
 def check_host(host: str, port: int = 1) -> None:
@@ -102,6 +129,11 @@ def secret_file(name: str, path: str, host: str | None) -> str:
             f"a secret is sent only to the host that its directory is named after. Move the file there."
         )
     return found
+
+
+def _has_text_ranges(settings: Settings) -> bool:
+    """Return whether ranges are declared in annotations that are text (`from __future__ import annotations`)."""
+    return any(isinstance(field.type, str) and "Range(" in field.type for field in dataclasses.fields(settings))
 
 
 def _device_files() -> list[Path]:

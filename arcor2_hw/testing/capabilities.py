@@ -87,7 +87,7 @@ def contradictions(device: Generic, said: frozenset[str]) -> list[str]:
     wrong = []
     for name, hook in hooks(kind).items():
         here = inspect.getattr_static(device, name, None)
-        own = here is not None and here is not hook and not _is_of_ours(kind, name, here)
+        own = here is not None and here is not hook and (name in said or not _is_of_ours(kind, name, here))
         if name in said and not own:
             wrong.append(f"{name} is declared and is not there")
         elif name not in said and own and not _says_not_implemented(device, name):

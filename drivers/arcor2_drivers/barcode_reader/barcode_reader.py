@@ -1,75 +1,86 @@
-"""The barcode reader as an object type: reads one code when it is told to, each code once."""
+"""A barcode reader: reads one code when it is triggered; each code counts once."""
 
+import threading
 import time
+from collections.abc import Callable, Mapping
 from typing import ClassVar, Final
 
 from arcor2_hw.actions import action
-from arcor2_hw.data.device import Alarm, Connection, Health, Identity, LossReaction
-from arcor2_hw.exceptions import Cancelled, DeviceFault, OutOfRange, Refused
+from arcor2_hw.data.device import Health, Identity, LossReaction, Severity
+from arcor2_hw.exceptions import Cancelled, DeviceFault, DeviceTimeout, Refused
 from arcor2_hw.objects import Code, NoRead, Reader
-from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
+from arcor2_hw.objects.connected import AlarmText
+from arcor2_hw.objects.line_device import LineDevice
+from arcor2_hw.objects.observing import GoOn
+from arcor2_hw.objects.settings import within
 
 from . import lines
-from .conversation import Conversation
 from .settings import BarcodeReaderSettings
 
 LONGEST_SCAN: Final = 60.0
-"""s a program may wait for a code in one call."""
+"""Longest time a program may wait for a code in one call, s."""
 MARGIN: Final = 30.0
-"""s beyond it: coming into step before and after, each with the longest time-out a setting allows."""
-NO_READ: Final = "no_read"
+"""Time beyond it for resetting the reader before and after, each with the longest time-out a setting allows, s."""
 
 
-class BarcodeReader(Reader):
+class BarcodeReader(LineDevice, Reader):
     """A fixed-mount barcode reader on a serial line or TCP."""
 
     _ABSTRACT = False
     loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(1.0)  # by the reader's own time-out
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"scan": "stop", "code_present": "stop"}
+    ALARMS: ClassVar[Mapping[str, AlarmText]] = {
+        "dirty": AlarmText("the window is dirty", "clean the window", Severity.WARNING),
+        "hot": AlarmText("the reader is too hot", "make sure that air reaches the reader", Severity.WARNING),
+        "fail": AlarmText("the reader has failed", "replace the reader"),
+    }
 
     def __init__(self, obj_id: str, name: str, settings: BarcodeReaderSettings) -> None:
         super().__init__(obj_id, name, settings)
-        self._conversation = Conversation(name, settings)
-        self._who = self._conversation.who
-        self._stops = 0
-        self._kept = ""
+        self.use_line(settings.port, settings.baud_rate, settings.answer_timeout)
+        self._reading = threading.Lock()
+        self._health = Health.NORMAL
+        self._present_code = ""
 
     # -------------------------------------------------------------------------------- connection
-    def connect(self, timeout: float = DEFAULT_CONNECT_TIMEOUT) -> None:
-        """Open the port and ask how the reader is, within `timeout` s; nothing is read by that.
+    def greet(self, deadline: float) -> None:
+        """Ask for the status again and again: the first question may follow half a command in the reader."""
+        while True:
+            left = max(deadline - time.monotonic(), 0.01)
+            try:
+                return self._read_status(min(self.line.answer_timeout, left))
+            except DeviceTimeout:
+                if left <= self.line.answer_timeout:
+                    raise
+                self.line.loss = None
 
-        Raises NotConnected or DeviceTimeout naming the port.
-        """
-        self._conversation.observing.start(timeout)
+    def poll(self) -> None:
+        """Ask for the status."""
+        self._read_status()
+
+    def _read_status(self, timeout: float = 0.0) -> None:
+        status = self._ask(lines.STATUS, lambda line: lines.status(line) is not None, timeout)
+        found = lines.status(status)
+        assert found is not None
+        self._health = found.health
+        for code in self.ALARMS:
+            self.set_alarm(code, code == found.word.lower())
+
+    def condition(self) -> Health:
+        """Return the condition that the reader last reported."""
+        return self._health
 
     def disconnect(self) -> None:
-        """Close; harmless when closed. A reading under way is ended first."""
-        self._stops += 1
-        self._conversation.close()
-
-    @property
-    def connection(self) -> Connection:
-        """Tell how the line is."""
-        return self._conversation.observing.state
-
-    @property
-    def health(self) -> Health:
-        """Give the condition the reader told last; failure when it does not tell any more."""
-        return self._conversation.health
+        """Close; does nothing when closed. A reading that runs is ended first."""
+        self.stop_waiting()
+        super().disconnect()
 
     def identify(self) -> Identity:
-        """Ask the reader who it is."""
-        with self._conversation.held():
-            found = lines.identity(
-                self._conversation.ask(lines.IDENTIFY, lambda line: lines.identity(line) is not None)
-            )
+        """Ask the reader for its identity."""
+        with self.held():
+            found = lines.identity(self._ask(lines.IDENTIFY, lambda line: lines.identity(line) is not None))
         assert found is not None
         return found
-
-    def alarms(self) -> list[Alarm]:
-        """Give the reader's complaint, if it has one. It ends when its cause does; nobody has to acknowledge it."""
-        alarm = self._conversation.alarm
-        return [] if alarm is None else [alarm]
 
     # -------------------------------------------------------------------------------- reading
     def trigger(self, timeout: float) -> Code | NoRead:
@@ -77,52 +88,81 @@ class BarcodeReader(Reader):
 
         Raises ConnectionLost naming the port, DeviceTimeout when the reader does not answer, Cancelled by `stop`.
         """
-        if not 0.05 <= timeout <= LONGEST_SCAN:
-            raise OutOfRange(f"{self._who}: timeout must be 0.05 to {LONGEST_SCAN:g} s, not {timeout!r}")
-        stops = self._stops
-        talk = self._conversation
-        self._kept = ""
-        with talk.held(reading=True):
-            self._come_into_step()
-            deadline = time.monotonic() + timeout
-            code = self._read_until(deadline, stops)
-            if code is not None and self._stops == stops:
-                talk.observing.settled()
+        within(f"{self.who}: timeout", timeout, 0.05, LONGEST_SCAN, "s")
+        self.check()
+        go_on = self.begin("reading")
+        if not self._reading.acquire(blocking=False):
+            raise Refused(f"{self.who} is reading already")
+        try:
+            with self.held():
+                self._present_code = ""
+                self._reset()
+                code = self._read_until(time.monotonic() + timeout, go_on)
+                if code is None:
+                    self._reset()  # this ends the reading; its answer follows a code that was decoded just now
+                    go_on()
+                    return NoRead("timeout")
+                self.observing.settled()
                 return Code(code)
-            # RST ends the reading too, and its answer comes behind a code that was decoded just now.
-            self._come_into_step()
-        if self._stops != stops:
-            raise Cancelled(f"{self._who}: reading was stopped")
-        return NoRead("timeout")
+        finally:
+            self._reading.release()
 
-    def _come_into_step(self) -> None:
-        """Have the reader drop what it is doing; what comes before its answer belongs to no trigger to come."""
-        self._conversation.ask(lines.RESET, lambda line: line == lines.RESET_DONE)
-
-    def _read_until(self, deadline: float, stops: int) -> str | None:
-        """Trigger again and again, since the reader gives up earlier than we may; None when nothing was read."""
-        while self._stops == stops and time.monotonic() < deadline:
-            self._conversation.send(lines.TRIGGER)
-            line = self._conversation.next_line(
-                deadline, lambda text: lines.is_code(text) or text == lines.NO_CODE, lambda: self._stops != stops
-            )
-            if line is None or line != lines.NO_CODE:
-                return line
+    def _read_until(self, deadline: float, go_on: GoOn) -> str | None:
+        """Trigger repeatedly, since the reader gives up earlier than we may; None when nothing was read."""
+        buffer = lines.LineBuffer()
+        self.line.send(lines.TRIGGER.encode("ascii") + lines.CR)
+        while time.monotonic() < deadline:
+            for line in buffer.feed(self.line.receive()):
+                if lines.is_code(line):
+                    return self._unless_stopped(line, go_on)
+                if line == lines.NO_CODE:
+                    self.line.send(lines.TRIGGER.encode("ascii") + lines.CR)
+            if self._unless_stopped("", go_on) is None:
+                return None
         return None
 
+    @staticmethod
+    def _unless_stopped(code: str, go_on: GoOn) -> str | None:
+        """Return the code; None when the reading was stopped, so that the reader is reset first."""
+        try:
+            go_on()
+        except Cancelled:
+            return None
+        return code
+
     def stop(self) -> None:
-        """End a reading under way; called past everything else. What it would still have read is thrown away.
+        """End a reading that runs; what it would still have read is dropped.
 
         Returns when the reader has ended it. Raises DeviceTimeout.
         """
-        self._stops += 1
-        self._conversation.interrupt()
-        self._conversation.rest()
+        self.stop_waiting()
+        timeout = 3.0 * self.line.answer_timeout
+        if not self._reading.acquire(timeout=timeout):
+            raise DeviceTimeout(f"{self.who} did not end its reading within {timeout:g} s")
+        self._reading.release()
+
+    # -------------------------------------------------------------------------------- commands
+    def _reset(self) -> None:
+        """Make the reader drop what it does; what comes before its answer belongs to no later trigger."""
+        self._ask(lines.RESET, lambda line: line == lines.RESET_DONE)
+
+    def _ask(self, command: str, answers: Callable[[str], bool], timeout: float = 0.0) -> str:
+        """Send a command and return the line that answers it. Raises DeviceFault when the reader does not know it."""
+
+        def found(came: bytes) -> str | None:
+            for line in lines.LineBuffer().feed(came):
+                if lines.refused(line, command):
+                    raise DeviceFault(f"{self.who} does not know the command {command}", line)
+                if answers(line):
+                    return line
+            return None
+
+        return self.ask(command.encode("ascii") + lines.CR, found, command, timeout)
 
     # -------------------------------------------------------------------------------- actions
     @action(deadline=LONGEST_SCAN + MARGIN)
     def scan(self, timeout: float = 2.0, *, an: str | None = None) -> str:
-        """Read the code in front of the reader; fails when there is none.
+        """Read the code in front of the reader; fail when there is none.
 
         :param timeout: seconds after which it fails
         """
@@ -130,26 +170,26 @@ class BarcodeReader(Reader):
 
         code = self.trigger(timeout)
         if isinstance(code, NoRead):
-            raise DeviceFault(f"{self._who}: no code was read within {timeout:g} s", fault_code=NO_READ)
+            raise DeviceFault(f"{self.who}: no code was read within {timeout:g} s", fault_code="no_read")
         return code.text
 
     @action(deadline=LONGEST_SCAN + MARGIN)
     def code_present(self, timeout: float = 1.0, *, an: str | None = None) -> bool:
-        """Tell whether a code is in front of the reader; last_code then gives it, once.
+        """Return whether a code is in front of the reader; last_code then returns it, once.
 
-        :param timeout: seconds to look for one
+        :param timeout: seconds to try to read one
         """
         assert 0.05 <= timeout <= 60.0
 
         code = self.trigger(timeout)
         if isinstance(code, Code):
-            self._kept = code.text
+            self._present_code = code.text
         return isinstance(code, Code)
 
     @action
     def last_code(self, *, an: str | None = None) -> str:
-        """Give the code that code_present found. It is given once, and not after another reading has begun."""
-        code, self._kept = self._kept, ""
+        """Return the code that code_present found: once, and not after another reading has started."""
+        code, self._present_code = self._present_code, ""
         if not code:
-            raise Refused(f"{self._who}: last_code is refused: code_present has found none that was not given already")
+            raise Refused(f"{self.who}: there is no code that code_present found and last_code has not returned yet")
         return code

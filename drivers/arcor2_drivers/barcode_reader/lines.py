@@ -1,4 +1,4 @@
-"""The reader's lines: bytes in, what they mean out. Pure; docs/devices/barcode-reader.md is the source."""
+"""Parser of the reader's lines (docs/devices/barcode-reader.md). Pure functions."""
 
 import dataclasses
 from typing import Final
@@ -6,7 +6,7 @@ from typing import Final
 from arcor2_hw.data.device import Health, Identity
 
 MAX_LINE: Final = 512
-"""Bytes: a code has 128 at most, an identification hardly more; what is longer is noise."""
+"""Longest line, bytes: a code has at most 128; a longer line is noise."""
 MAX_CODE: Final = 128
 STX, ETX, CR, LF = b"\x02", b"\x03", b"\r", b"\n"
 
@@ -27,16 +27,16 @@ HEALTH: Final = {
 
 
 class LineBuffer:
-    """Cuts lines out of what comes: ended by CR, with LF behind or not, framed by STX and ETX or not."""
+    """Splits bytes into lines, which end in CR; LF after it and a frame of STX and ETX are optional."""
 
     def __init__(self) -> None:
         self._rest = b""
         self._skipping = False
         self.garbage = 0
-        """Lines dropped: too long, or with bytes that no answer has."""
+        """Number of lines dropped: too long, or with bytes that no answer contains."""
 
     def feed(self, data: bytes) -> list[str]:
-        """Give the lines completed by `data`."""
+        """Return the lines that `data` completes."""
         *complete, self._rest = (self._rest + data).split(CR)
         lines = []
         for raw in complete:
@@ -57,7 +57,7 @@ class LineBuffer:
 
 
 def _text(raw: bytes) -> str | None:
-    """Give the text of a line without its framing, None when it is none."""
+    """Return the text of a line without its frame, None when it is invalid."""
     raw = raw.lstrip(LF)
     if raw.startswith(STX) and raw.endswith(ETX):
         raw = raw[1:-1]
@@ -67,20 +67,20 @@ def _text(raw: bytes) -> str | None:
 
 
 def is_code(line: str) -> bool:
-    """Tell whether a line is a code, not one of the reader's words."""
+    """Return whether a line is a code and not a word of the protocol."""
     if not 1 <= len(line) <= MAX_CODE or line in (NO_CODE, TRIGGER, STOP, RESET, STATUS, IDENTIFY):
         return False
     return line.split(",", 1)[0] not in ("OK", "ERR", "STAT", "VER") or "," not in line
 
 
 def refused(line: str, command: str) -> bool:
-    """Tell whether a line says that the reader does not know a command."""
+    """Return whether a line says that the reader does not know a command."""
     return line == f"ERR,{command},00"
 
 
 @dataclasses.dataclass(frozen=True)
 class Status:
-    """What STAT answers."""
+    """The answer to STAT."""
 
     ready: bool
     health: Health
@@ -88,7 +88,7 @@ class Status:
 
 
 def status(line: str) -> Status | None:
-    """Read `STAT,<ready>,<health>`; None when the line is none."""
+    """Parse `STAT,<ready>,<health>`; None for another line."""
     parts = line.split(",")
     if len(parts) != 3 or parts[0] != STATUS or parts[1] not in ("0", "1") or parts[2] not in HEALTH:
         return None
@@ -96,7 +96,7 @@ def status(line: str) -> Status | None:
 
 
 def identity(line: str) -> Identity | None:
-    """Read `VER,<vendor>,<model>,<serial>,<firmware>`; None when the line is none."""
+    """Parse `VER,<vendor>,<model>,<serial>,<firmware>`; None for another line."""
     parts = line.split(",")
     if len(parts) != 5 or parts[0] != IDENTIFY:
         return None

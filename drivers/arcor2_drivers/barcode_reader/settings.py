@@ -1,11 +1,10 @@
-"""Settings of a barcode reader, checked when they are given."""
+"""Settings of a barcode reader."""
 
 import dataclasses
-import math
+from typing import Annotated
 
-from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
-from arcor2_hw.objects.settings import check_serial_port
+from arcor2_hw.objects.settings import Range, check_serial_port
 
 
 @dataclasses.dataclass
@@ -18,12 +17,9 @@ class BarcodeReaderSettings(Settings):
     """
 
     port: str
-    baud_rate: int = 9600
-    answer_timeout: float = 0.5
+    baud_rate: Annotated[int, Range(300, 921600)] = 9600
+    answer_timeout: Annotated[float, Range(0.1, 10.0, "s")] = 0.5
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         check_serial_port("port", self.port)
-        if not 300 <= self.baud_rate <= 921600:
-            raise OutOfRange(f"baud_rate must be 300 to 921600, not {self.baud_rate!r}")
-        if not (math.isfinite(self.answer_timeout) and 0.1 <= self.answer_timeout <= 10.0):
-            raise OutOfRange(f"answer_timeout must be 0.1 to 10 s, not {self.answer_timeout!r}")

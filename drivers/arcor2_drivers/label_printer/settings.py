@@ -1,17 +1,18 @@
-"""Settings of a label printer, checked when they are given."""
+"""Settings of a label printer."""
 
 import dataclasses
+from typing import Annotated
 
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
-from arcor2_hw.objects.asked_line import check_line
+from arcor2_hw.objects.settings import Range, check_serial_port
 
 from .zpl import DEFAULT_TEMPLATE, BadLabel, check_template
 
 
 @dataclasses.dataclass
 class ZplPrinterSettings(Settings):
-    """Where the printer is, and what its labels look like.
+    """Where the printer is, and the template of its labels.
 
     :param port: socket://host:9100, or a path such as /dev/ttyUSB0
     :param baud_rate: bits per second; without meaning for a socket
@@ -21,15 +22,14 @@ class ZplPrinterSettings(Settings):
     """
 
     port: str
-    baud_rate: int = 9600
-    answer_timeout: float = 1.0
-    print_timeout: float = 15.0
+    baud_rate: Annotated[int, Range(300, 921600)] = 9600
+    answer_timeout: Annotated[float, Range(0.1, 10.0, "s")] = 1.0
+    print_timeout: Annotated[float, Range(0.1, 90.0, "s")] = 15.0
     template: str = DEFAULT_TEMPLATE
 
     def __post_init__(self) -> None:
-        check_line(self.port, self.baud_rate, self.answer_timeout)
-        if not 0.1 <= self.print_timeout <= 90.0:
-            raise OutOfRange(f"print_timeout must be 0.1 to 90 s, not {self.print_timeout!r}")
+        super().__post_init__()
+        check_serial_port("port", self.port)
         try:
             check_template(self.template)
         except BadLabel as e:

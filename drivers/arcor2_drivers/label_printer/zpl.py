@@ -1,7 +1,7 @@
-"""ZPL as a host speaks it: labels put together and checked, answers taken apart. Pure.
+"""ZPL of a host: builds and checks labels, parses answers. Pure functions.
 
 Source: ZPL II programming guide, ~HS (host status return), ~HI (host identification), ^FH, ^BC, and SGD getvar;
-docs/devices/label-printer.md says what is used.
+docs/devices/label-printer.md lists what is used.
 """
 
 import dataclasses
@@ -27,12 +27,12 @@ _FORBIDDEN: Final = re.compile(r"\^(CC|CT|CD|DF|XF|JU|MP|XA|XZ|PQ(?!1(?![0-9])))
 
 
 class BadLabel(ValueError):
-    """What was given is no label that is printed exactly once; the text says why."""
+    """The text is not a label that is printed exactly once; the message says why."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Status:
-    """What ~HS tells."""
+    """The answer to ~HS."""
 
     paper_out: bool
     paused: bool
@@ -47,12 +47,12 @@ class Status:
 
     @property
     def idle(self) -> bool:
-        """Tell whether nothing waits to be printed."""
+        """Return whether nothing waits to be printed."""
         return not (self.formats_waiting or self.labels_left or self.partial_format)
 
 
 def status(data: bytes) -> Status | None:
-    """Read the three strings of ~HS; None while they are not all there, or are none."""
+    """Parse the three strings of ~HS; None while they are incomplete or invalid."""
     strings = [frame.decode("ascii").split(",") for frame in _FRAME.findall(data)]
     for one, two, three in zip(strings, strings[1:], strings[2:], strict=False):
         if (len(one), len(two), len(three)) != (12, 11, 2):
@@ -66,7 +66,7 @@ def status(data: bytes) -> Status | None:
 
 
 def identity(data: bytes) -> tuple[str, str] | None:
-    """Read model and firmware from the answer to ~HI; None when it is none."""
+    """Parse model and firmware in the answer to ~HI; None for another answer."""
     for frame in _FRAME.findall(data):
         parts = frame.decode("ascii").split(",")
         if len(parts) >= 4 and parts[2].isdigit():
@@ -75,32 +75,32 @@ def identity(data: bytes) -> tuple[str, str] | None:
 
 
 def getvar(name: str) -> bytes:
-    """Give the question for a variable of the printer."""
+    """Return the question for a variable of the printer."""
     return f'! U1 getvar "{name}"\r\n'.encode("ascii")
 
 
 def variable(data: bytes) -> str | None:
-    """Read the answer to getvar: a text in quotes; None when it is none."""
+    """Parse the answer to getvar, a text in quotes; None for another answer."""
     match = _QUOTED.search(data)
     return None if match is None else match[1].decode("ascii")
 
 
 def number(data: bytes) -> int | None:
-    """Read the answer to getvar when it is a count."""
+    """Parse the answer to getvar when it is a number; None for another answer."""
     text = variable(data)
     return int(text) if text is not None and text.isdigit() else None
 
 
 def field(text: str, barcode: bool = False) -> str:
-    """Give ^FH^FD…^FS that prints exactly `text`: nothing in it is a command. Raises BadLabel."""
+    """Return ^FH^FD…^FS that prints exactly `text`: nothing in it acts as a command. Raises BadLabel."""
     if len(text) > LONGEST_FIELD:
         raise BadLabel(f"is longer than {LONGEST_FIELD} characters")
     if not text.isprintable():
         raise BadLabel("has characters that cannot be printed")
     if barcode:
         if not text.isascii():
-            raise BadLabel("has characters that Code 128 does not have")
-        text = text.replace(">", ">0")  # > begins an invocation code of ^BC
+            raise BadLabel("has characters that Code 128 does not contain")
+        text = text.replace(">", ">0")  # > starts an invocation code of ^BC
     try:
         raw = text.encode("utf-8")
     except UnicodeEncodeError as e:
@@ -110,7 +110,7 @@ def field(text: str, barcode: bool = False) -> str:
 
 
 def fill(template: str, fields: dict[str, str]) -> str:
-    """Put fields into a template's places {title}, {text} and {code}. Raises BadLabel naming the field."""
+    """Fill the places of a template, {title}, {text} and {code}. Raises BadLabel naming the field."""
 
     def place(match: re.Match[str]) -> str:
         name = match[1]
@@ -123,7 +123,7 @@ def fill(template: str, fields: dict[str, str]) -> str:
 
 
 def check_template(template: str) -> None:
-    """Raise BadLabel when this cannot be filled to one label."""
+    """Raise BadLabel unless the filled template is one label."""
     for name in _PLACE.findall(template):
         if name not in FIELDS:
             raise BadLabel(f"has a place {{{name}}}; there are {', '.join(FIELDS)}")
@@ -131,14 +131,14 @@ def check_template(template: str) -> None:
 
 
 def check_label(label: str) -> bytes:
-    """Give the bytes of a label that is one format, printed once. Raises BadLabel."""
+    """Return the bytes of a label. Raises BadLabel unless it is one format that is printed once."""
     text = label.strip()
     if not (text.startswith("^XA") and text.endswith("^XZ") and len(text) > len("^XA^XZ")):
-        raise BadLabel("must begin with ^XA and end with ^XZ")
+        raise BadLabel("must start with ^XA and end with ^XZ")
     if len(text) > LONGEST_LABEL:
         raise BadLabel(f"is longer than {LONGEST_LABEL} characters")
     if "~" in text:
-        raise BadLabel("has a ~: control commands are no part of a label")
+        raise BadLabel("has a ~: a label may not contain control commands")
     if found := _FORBIDDEN.search(text, 3, len(text) - 3):
         raise BadLabel(f"has {found[0]}, which is not allowed in a single label")
     return text.encode("utf-8")

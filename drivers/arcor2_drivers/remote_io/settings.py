@@ -1,28 +1,31 @@
-"""Settings of a remote I/O block and of a tower light on one, checked when they are given."""
+"""Settings of a remote I/O block, and of a tower light on one."""
 
 import dataclasses
-import math
-from typing import Final
+from collections.abc import Collection, Mapping
+from typing import Annotated, Final
 
 from arcor2_hw.exceptions import OutOfRange
-from arcor2_hw.objects import Settings
-from arcor2_hw.objects.settings import check_host, check_serial_port
+from arcor2_hw.objects import MachineState, Settings
+from arcor2_hw.objects.settings import Range, check_host, check_serial_port, within
 
-from .patterns import parse_patterns
 from .points import Point, parse_address, parse_points
 from .registers import WATCHDOGS
 
 LONGEST_WATCHDOG: Final = 5000
-"""ms: what the types declare as their reaction to a loss (`loss_reaction`) holds up to here."""
+"""Longest watchdog time, ms; the types declare it as their reaction to a loss (`loss_reaction`)."""
 LONGEST_REQUEST: Final = 0.5
-"""s: disconnect may have to wait for one request."""
+"""Longest time for a request, s: disconnecting may have to wait for one."""
 BAUDRATES: Final = (9600, 19200, 38400, 57600, 115200)
-
-
-def within(name: str, value: float, low: float, high: float) -> None:
-    """Raise OutOfRange, naming the parameter, unless the value lies in the range."""
-    if not (math.isfinite(value) and low <= value <= high):
-        raise OutOfRange(f"{name} must be {low:g} to {high:g}, not {value!r}")
+COLORS: Final = ("red", "amber", "green", "blue", "white")
+DEFAULT_PATTERNS: Final = (
+    "execute=green; starting=green blinking; completing=green; complete=green blinking; "
+    "idle=white; resetting=white blinking; held=amber; holding=amber blinking; unholding=amber blinking; "
+    "suspended=amber; suspending=amber blinking; unsuspending=amber blinking; stopped=amber; "
+    "stopping=amber blinking; aborting=red blinking; aborted=red blinking; clearing=red"
+)
+"""Patterns of the states, as far as the tower has the colours (meaning of colours: IEC 60204-1, 10.3)."""
+Pattern = Mapping[str, bool]
+"""The colours that are lit, each with whether it blinks."""
 
 
 @dataclasses.dataclass
@@ -34,8 +37,8 @@ class BlockSettings(Settings):
     :param serial_port: serial port of a block on Modbus RTU; empty for TCP
     :param baudrate: bits per second on the serial line (8 data bits, no parity, 1 stop bit)
     :param unit_id: Modbus unit id
-    :param watchdog: which of the block's watchdogs is ours; each object on the same block takes another
-    :param watchdog_ms: ms of our silence after which the block puts our outputs into their safe state
+    :param watchdog: number of the block's watchdog to use; each object on the same block uses another
+    :param watchdog_ms: ms without a request after which the block puts our outputs into their safe state
     :param request_timeout: seconds the block has to answer one request
     """
 
@@ -44,11 +47,12 @@ class BlockSettings(Settings):
     serial_port: str = ""
     baudrate: int = 19200
     unit_id: int = 1
-    watchdog: int = 0
-    watchdog_ms: int = 1000
+    watchdog: Annotated[int, Range(0, WATCHDOGS - 1)] = 0
+    watchdog_ms: Annotated[int, Range(200, LONGEST_WATCHDOG, "ms")] = 1000
     request_timeout: float = 0.25
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self.serial_port = self.serial_port.strip()
         if bool(self.host.strip()) == bool(self.serial_port):
             raise OutOfRange("host must be the address of the block, or serial_port its serial port: one of the two")
@@ -59,20 +63,17 @@ class BlockSettings(Settings):
         if self.baudrate not in BAUDRATES:
             raise OutOfRange(f"baudrate must be one of {', '.join(map(str, BAUDRATES))}, not {self.baudrate!r}")
         within("unit_id", self.unit_id, 1 if self.serial_port else 0, 247 if self.serial_port else 255)
-        within("watchdog", self.watchdog, 0, WATCHDOGS - 1)
-        within("watchdog_ms", self.watchdog_ms, 200, LONGEST_WATCHDOG)
-        # A reading that is asked for a second time must not trip the watchdog: two time-outs, one in which a serial
-        # line is drained, and one to spare.
-        within("request_timeout", self.request_timeout, 0.05, min(LONGEST_REQUEST, self.watchdog_ms / 4000.0))
+        # A repeated reading must not trip the watchdog: two time-outs, one to drain a serial line, and one to spare.
+        within("request_timeout", self.request_timeout, 0.05, min(LONGEST_REQUEST, self.watchdog_ms / 4000.0), "s")
 
 
 @dataclasses.dataclass
 class RemoteIOSettings(BlockSettings):
     """A block and its named points.
 
-    :param points: name=terminal and options, parted by semicolons: "part=DI0 debounce=0.02; valve=DO4 on_loss=off;
+    :param points: name=terminal and options, separated by semicolons: "part=DI0 debounce=0.02; valve=DO4 on_loss=off;
         level=AI0 scale=0.001 unit=m"; debounce in s for DI, on_loss hold, off or on for DO (hold or off for AO; off
-        when not given), scale and unit for AI and AO
+        when omitted), scale and unit for AI and AO
     """
 
     points: str = ""
@@ -82,12 +83,9 @@ class RemoteIOSettings(BlockSettings):
         parse_points(self.points)
 
 
-COLORS: Final = ("red", "amber", "green", "blue", "white")
-
-
 @dataclasses.dataclass
 class TowerLightSettings(BlockSettings):
-    """A block, the outputs that a tower light's lamps are at, and what they show.
+    """A block, the outputs of a tower light's lamps, and the patterns they show.
 
     :param red: output of the red lamp, as DO0; empty when there is none
     :param amber: output of the amber lamp
@@ -95,9 +93,9 @@ class TowerLightSettings(BlockSettings):
     :param blue: output of the blue lamp
     :param white: output of the white lamp
     :param buzzer: output of the buzzer
-    :param on_loss: colour that is lit when the block loses us; empty for none
+    :param on_loss: colour that is lit when the connection to the block is lost; empty for none
     :param blink_period: seconds from one flash to the next
-    :param patterns: what show_state shows: "execute=green; aborted=red+amber blinking; idle=off"; empty for the usual
+    :param patterns: what show_state shows: "execute=green; aborted=red+amber blinking; idle=off"; empty for the default
     """
 
     red: str = ""
@@ -107,12 +105,11 @@ class TowerLightSettings(BlockSettings):
     white: str = ""
     buzzer: str = ""
     on_loss: str = ""
-    blink_period: float = 1.0
+    blink_period: Annotated[float, Range(0.2, 10.0, "s")] = 1.0
     patterns: str = ""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        within("blink_period", self.blink_period, 0.2, 10.0)
         fitted = self.lamps()
         if not fitted:
             raise OutOfRange(f"one of {', '.join(COLORS)} must be the output of a lamp")
@@ -122,11 +119,11 @@ class TowerLightSettings(BlockSettings):
         self.points()
 
     def lamps(self) -> list[str]:
-        """Give the colours that are there."""
+        """Return the colours that the tower has."""
         return [color for color in COLORS if getattr(self, color)]
 
     def points(self) -> dict[str, Point]:
-        """Give lamps and buzzer as points. Raises OutOfRange naming the parameter."""
+        """Return lamps and buzzer as points. Raises OutOfRange naming the parameter."""
         used: dict[str, str] = {}
         for name in (*COLORS, "buzzer"):
             terminal = getattr(self, name)
@@ -135,9 +132,30 @@ class TowerLightSettings(BlockSettings):
             if parse_address(terminal, name)[0] != "DO":
                 raise OutOfRange(f"{name} must be a digital output such as DO0, not {terminal}")
             if terminal in used.values():
-                raise OutOfRange(f"{name} must be an output of its own: {terminal} is another lamp's")
+                raise OutOfRange(f"{name} must be an output of its own: {terminal} is used by another lamp")
             used[name] = terminal
-        on = self.on_loss
-        return parse_points(
-            "; ".join(f"{name}={terminal} on_loss={'on' if name == on else 'off'}" for name, terminal in used.items())
-        )
+        safe = {name: "on" if name == self.on_loss else "off" for name in used}
+        return parse_points("; ".join(f"{name}={terminal} on_loss={safe[name]}" for name, terminal in used.items()))
+
+
+def parse_patterns(text: str, fitted: Collection[str]) -> dict[str, Pattern]:
+    """Return the lamps by state: "execute=green; aborted=red+amber blinking; idle=off". Raises OutOfRange."""
+    given = bool(text.strip())
+    states = [state.name.lower() for state in MachineState]
+    patterns: dict[str, Pattern] = {}
+    for entry in filter(None, (part.strip() for part in (text if given else DEFAULT_PATTERNS).split(";"))):
+        head, *words = entry.split()
+        state, sign, lamps = head.partition("=")
+        if not sign or not lamps or words not in ([], ["blinking"]):
+            raise OutOfRange(f"patterns must be a list of state=colour or state=colour blinking, not {entry!r}")
+        if state not in states:
+            raise OutOfRange(f"patterns must name a state of {', '.join(states)}, not {state!r}")
+        if state in patterns:
+            raise OutOfRange(f"patterns must name each state once: {state!r} is in it twice")
+        colors = [] if lamps == "off" else lamps.split("+")
+        unknown = [color for color in colors if color not in fitted]
+        if unknown and given:
+            raise OutOfRange(f"patterns must show {state} by {', '.join(fitted)} or off, not {unknown[0]!r}")
+        if not unknown:
+            patterns[state] = dict.fromkeys(colors, bool(words))
+    return patterns

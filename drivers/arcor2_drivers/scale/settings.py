@@ -1,10 +1,10 @@
-"""Settings of a scale, checked when they are given."""
+"""Settings of a scale."""
 
 import dataclasses
+from typing import Annotated
 
-from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
-from arcor2_hw.objects.asked_line import check_line
+from arcor2_hw.objects.settings import Range, check_serial_port
 
 
 @dataclasses.dataclass
@@ -18,11 +18,10 @@ class MtSicsScaleSettings(Settings):
     """
 
     port: str
-    baud_rate: int = 9600
-    answer_timeout: float = 0.5
-    stable_timeout: float = 10.0
+    baud_rate: Annotated[int, Range(300, 921600)] = 9600
+    answer_timeout: Annotated[float, Range(0.1, 10.0, "s")] = 0.5
+    stable_timeout: Annotated[float, Range(0.1, 60.0, "s")] = 10.0
 
     def __post_init__(self) -> None:
-        check_line(self.port, self.baud_rate, self.answer_timeout)
-        if not 0.1 <= self.stable_timeout <= 60.0:
-            raise OutOfRange(f"stable_timeout must be 0.1 to 60 s, not {self.stable_timeout!r}")
+        super().__post_init__()
+        check_serial_port("port", self.port)

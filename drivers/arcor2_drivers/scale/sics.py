@@ -1,4 +1,4 @@
-"""MT-SICS answers: bytes in, what they mean out. Pure; docs/devices/scale.md says what is used."""
+"""Parser of MT-SICS answers (docs/devices/scale.md). Pure functions."""
 
 import dataclasses
 import re
@@ -6,7 +6,7 @@ from decimal import Decimal
 from typing import Final
 
 KILOGRAMS: Final = {"kg": Decimal(1), "g": Decimal("1e-3"), "mg": Decimal("1e-6")}
-ERRORS: Final = {"ES": "does not know the command", "ET": "heard a damaged command", "EL": "refuses its parameter"}
+ERRORS: Final = {"ES": "does not know the command", "ET": "received a damaged command", "EL": "refuses its parameter"}
 LONGEST_LINE: Final = 80
 _VALUE: Final = re.compile(r"-?\d{1,9}(\.\d{1,6})?")
 _TEXT: Final = re.compile(r'(I[0-4]) A "([^"]*)"')
@@ -14,7 +14,7 @@ _TEXT: Final = re.compile(r'(I[0-4]) A "([^"]*)"')
 
 @dataclasses.dataclass(frozen=True)
 class Answer:
-    """What a line says: the command it answers (or ES, ET, EL), its mark, and a value in kg or a text if it has one.
+    """A line: the command it answers (or ES, ET, EL), its mark, and a value in kg or a text if it has one.
 
     mark: S stable, D dynamic, A done, I not executable now, + above and - below the range. unit: as sent.
     """
@@ -27,13 +27,13 @@ class Answer:
 
 
 def answers(data: bytes) -> list[Answer]:
-    """Give the sensible lines among those that are complete, in order."""
+    """Return the valid lines among those that are complete, in order."""
     lines = (raw.decode("ascii", "replace") for raw in data.split(b"\r\n")[:-1] if len(raw) <= LONGEST_LINE)
     return [found for line in lines if (found := answer(line)) is not None]
 
 
 def answer(line: str) -> Answer | None:
-    """Read one line without its CR LF; None when it is none. The value field may be padded as it likes."""
+    """Parse one line without its CR LF; None when it is invalid. The value field may be padded."""
     if line in ERRORS:
         return Answer(line)
     if match := _TEXT.fullmatch(line):

@@ -78,7 +78,7 @@ def test_a_code_is_consumed_once(fake: FakeProcess, reader: BarcodeReader) -> No
     fake.control.do("present", code=None)
     assert reader.trigger(0.3) == NoRead("timeout")
     assert not reader.code_present(0.1)
-    with pytest.raises(Refused, match=f"^reader at {fake.ready['port']}: last_code is refused"):
+    with pytest.raises(Refused, match=f"^reader at {fake.ready['port']}: there is no code that code_present found"):
         reader.last_code()
     fake.control.do("present", code="TWICE")
     assert reader.code_present(1.0)
@@ -284,7 +284,7 @@ def test_reader_that_does_not_answer_sensibly(
     fake.control.do("present", code="HERE")
     fake.control.do(fault)
     began = time.monotonic()
-    with pytest.raises(DeviceTimeout, match=f"^reader at {fake.ready['port']} did not answer RST within 0.25 s$"):
+    with pytest.raises(DeviceTimeout, match=f"^reader at {fake.ready['port']} (did not answer|gave no valid answer to) RST within 0.25 s$"):
         reader.scan()
     assert time.monotonic() - began < 0.6
     wait_for(lambda: reader.connection, lambda state: state is Connection.LOST)
@@ -310,7 +310,7 @@ def test_a_silent_reader_is_noticed_while_idle(
 ) -> None:
     fake.control.do("silence")
     wait_for(lambda: reader.connection, lambda state: state is Connection.LOST)
-    with pytest.raises(DeviceTimeout, match=f"^reader at {fake.ready['port']} has fallen silent"):
+    with pytest.raises(DeviceTimeout, match=f"^reader at {fake.ready['port']} did not answer STAT within 0.25 s"):
         reader.scan()
 
 
@@ -331,7 +331,7 @@ def test_port_without_a_reader(make: Callable[..., BarcodeReader]) -> None:
     try:
         port = os.ttyname(theirs)
         began = time.monotonic()
-        with pytest.raises(DeviceTimeout, match=f"^reader at {port} does not answer"):
+        with pytest.raises(DeviceTimeout, match=f"^reader at {port} did not answer STAT"):
             make(port).connect(0.6)
         assert time.monotonic() - began < 0.9
     finally:

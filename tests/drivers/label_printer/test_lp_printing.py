@@ -122,26 +122,26 @@ def test_a_fault_in_between_leaves_the_label_unconfirmed(
     fake.control.do("media", labels=5)
 
     # between the look at the status and the printing
-    send = printer._line.send
+    send = printer.line.send
 
     def send_and_pause(data: bytes) -> None:
         if data.startswith(b"^XA"):
             fake.control.do("pause", on=True)
         send(data)
 
-    printer._line.send = send_and_pause  # type: ignore[method-assign]
+    printer.line.send = send_and_pause  # type: ignore[method-assign]
     with pytest.raises(DeviceFault, match=r"it is paused.*the label was sent and may come out later") as raised:
         printer.print(LABEL)
     assert raised.value.fault_code == "paused"
     for call in (lambda: printer.print(LABEL), lambda: printer.print_label("a", "b", "c")):
-        with pytest.raises(Refused, match="whether the last label came out is not known"):
+        with pytest.raises(Refused, match="it is unknown whether the last label was printed"):
             call()
     with pytest.raises(Refused, match="the label still waits in the printer: it is paused"):
         printer.last_came_out()
     fake.control.do("pause", on=False)
     fake.control.wait_until(lambda truth: truth["counter"] == 2)
     assert printer.last_came_out() is True
-    printer._line.send = send  # type: ignore[method-assign]
+    printer.line.send = send  # type: ignore[method-assign]
     assert printer.print(LABEL) == "printer-3"
     assert fake.truth()["received"].count("format") == 3
     with pytest.raises(Refused, match="every label was confirmed"):
@@ -168,7 +168,7 @@ def test_a_label_that_never_comes_is_not_sent_again(fake: FakeProcess, printer: 
 def test_lost_after_sending_nothing_is_sent_again(
     fake: FakeProcess, printer: ZplPrinter, wait_for: Callable[..., Any]
 ) -> None:
-    send = printer._line.send
+    send = printer.line.send
 
     def send_and_lose(data: bytes) -> None:
         send(data)
@@ -176,16 +176,16 @@ def test_lost_after_sending_nothing_is_sent_again(
             fake.control.wait_until(lambda truth: "format" in truth["received"])
             fake.control.do("unplug")
 
-    printer._line.send = send_and_lose  # type: ignore[method-assign]
+    printer.line.send = send_and_lose  # type: ignore[method-assign]
     with pytest.raises(ConnectionLost, match=f"^printer at {fake.ready['port']}: the connection was lost"):
         printer.print(LABEL)
-    printer._line.send = send  # type: ignore[method-assign]
+    printer.line.send = send  # type: ignore[method-assign]
     fake.control.wait_until(lambda truth: truth["counter"] == 1)  # it finished what it had
     wait_for(lambda: printer.connection, lambda state: state is Connection.LOST)
     assert printer.health is Health.FAILURE
     fake.control.do("plug")
     wait_for(lambda: printer.connection, lambda state: state is Connection.BACK, within=8.0)
-    with pytest.raises(Refused, match="whether the last label came out is not known"):
+    with pytest.raises(Refused, match="it is unknown whether the last label was printed"):
         printer.print(LABEL)
     assert printer.last_came_out() is True
     assert printer.print(LABEL) == "printer-2"
@@ -194,12 +194,12 @@ def test_lost_after_sending_nothing_is_sent_again(
 
 @pytest.mark.parametrize("fake", ["pty"], indirect=True)
 def test_labels_of_somebody_else(fake: FakeProcess, printer: ZplPrinter) -> None:
-    with printer._line.held():
+    with printer.line.held():
         fake.control.do("pause")
-        printer._line.send(b"^XA^FDtheirs^FS^PQ2^XZ")
+        printer.line.send(b"^XA^FDtheirs^FS^PQ2^XZ")
         fake.control.wait_until(lambda truth: truth["waiting"] == 1)
         fake.control.do("pause", on=False)
-        with pytest.raises(Refused, match="is printing labels of somebody else; nothing was sent"):
+        with pytest.raises(Refused, match="is printing labels of another client; nothing was sent"):
             printer.print(LABEL)
     fake.control.wait_until(lambda truth: truth["counter"] == 2)
     assert printer.print(LABEL) == "printer-3"
@@ -209,7 +209,7 @@ def test_labels_of_somebody_else(fake: FakeProcess, printer: ZplPrinter) -> None
 @pytest.mark.parametrize("fault", ["silence", "half_frame", "garbage"])
 def test_no_sensible_answer(fake: FakeProcess, printer: ZplPrinter, wait_for: Callable[..., Any], fault: str) -> None:
     began = time.monotonic()
-    with printer._line.held():
+    with printer.line.held():
         fake.control.do(fault)
         with pytest.raises(DeviceFault, match=f"^printer at {fake.ready['port']} does not answer") as raised:
             printer.print(LABEL)
@@ -223,8 +223,8 @@ def test_no_sensible_answer(fake: FakeProcess, printer: ZplPrinter, wait_for: Ca
 @pytest.mark.parametrize(
     ("label", "why"),
     [
-        ("hello", "must begin with"),
-        ("^XA^XZ", "must begin with"),
+        ("hello", "must start with"),
+        ("^XA^XZ", "must start with"),
         ("^XA^FDa^FS^XZ^XA^FDb^FS^XZ", "not allowed"),
         ("^XA^FDa^FS^PQ2^XZ", "PQ"),
         ("^XA^FDa^FS^pq10^XZ", "pq"),

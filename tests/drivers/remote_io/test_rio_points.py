@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from arcor2_drivers.remote_io.edges import Debounced, Edge
+from arcor2_hw.objects.edges import Debounced, Edge
 from arcor2_drivers.remote_io.points import parse_points
 from arcor2_drivers.remote_io.remote_io import RemoteIO
 from arcor2_drivers.remote_io.settings import RemoteIOSettings
@@ -59,13 +59,13 @@ def test_point_list() -> None:
     ("points", "told"),
     [
         ("", "at least one point"),
-        ("lamp", "name=terminal.*'lamp'"),
-        ("1lamp=DO0", "name=terminal"),
+        ("lamp", r"name=\.\.\..*'lamp'"),
+        ("1lamp=DO0", r"name=\.\.\."),
         ("lamp=XY0", "terminal such as DI0.*'XY0'"),
         ("lamp=DO16", "DO0 to DO15, not DO16"),
-        ("a=DO1; a=DO2", "'a' is there twice"),
+        ("a=DO1; a=DO2", "'a' is in it twice"),
         ("a=DO1; b=DO1", "DO1 is 'a' and 'b'"),
-        ("a=DI1 on_loss=off", "a .DI1. only debounce"),
+        ("a=DI1 on_loss=off", "a .DI. only debounce"),
         ("a=DO1 on_loss=maybe", "on_loss of hold, off, on"),
         ("a=AO1 on_loss=on", "on_loss of hold, off"),
         ("a=AI1 scale=x", "number as scale"),
@@ -214,7 +214,7 @@ def test_pulse_is_timed_by_the_block(fake: FakeProcess, block: RemoteIO) -> None
     assert (on["output"], on["on"], off["output"], off["on"]) == (4, True, 4, False)
     assert off["time"] - on["time"] == pytest.approx(0.15, abs=0.001)
     with pytest.raises(OutOfRange, match=r"duration must be 0.01 to 60"):
-        block._block.pulse("lamp", 100.0)
+        block.pulse_output("lamp", 100.0)
 
 
 def test_a_pulse_that_is_stopped_is_off(fake: FakeProcess, block: RemoteIO, wait_for: Callable[..., Any]) -> None:

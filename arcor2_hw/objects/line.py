@@ -1,0 +1,248 @@
+"""A line of bytes to a device: a serial port or a TCP socket, with one question at a time."""
+
+import contextlib
+import select
+import socket
+import threading
+import time
+import urllib.parse
+from collections.abc import Callable, Iterator
+from typing import Final, Protocol, TypeVar
+
+from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotConnected, Refused
+from arcor2_hw.objects.settings import check_serial_port
+
+T = TypeVar("T")
+
+READ_PERIOD: Final = 0.02
+"""Longest time a read waits for the first byte, s."""
+WRITE_TIMEOUT: Final = 0.5
+"""Longest time a write may take, s: a line that takes no bytes for that long is blocked."""
+CHUNK: Final = 4096
+LONGEST_ANSWER: Final = 65536
+"""Longest answer, bytes; of a longer one the end is kept."""
+
+
+class Line:
+    """A serial port, or a TCP socket given as `socket://host:port`.
+
+    A question whose answer does not come in time breaks the line. A broken line has to be opened again, so that a late
+    answer is never taken for the answer to the next question.
+
+    Args:
+        who: Name and address of the device, for errors.
+        port: Path of the serial port, or `socket://host:port`.
+        baud_rate: Bits per second of the serial port.
+        answer_timeout: Time the device has to answer, s.
+    """
+
+    def __init__(self, who: str, port: str, baud_rate: int = 9600, answer_timeout: float = 0.5) -> None:
+        check_serial_port("port", port)
+        self.who = who
+        self.answer_timeout = answer_timeout
+        self.loss: DeviceError | None = None
+        """What broke the line, until it is opened again."""
+        self._port, self._baud_rate = port, baud_rate
+        self._open: _Port | None = None
+        self._one_user = threading.RLock()
+
+    # -------------------------------------------------------------------------------- life
+    def open(self, timeout: float) -> None:
+        """Open the line within `timeout` s.
+
+        Raises:
+            NotConnected: The port cannot be opened.
+            DeviceTimeout: The host does not answer.
+        """
+        self.close()
+        try:
+            if self._port.startswith("socket://"):
+                self._open = _Socket(self._port, timeout)
+            else:
+                self._open = _Serial(self._port, self._baud_rate)
+        except TimeoutError:
+            raise DeviceTimeout(f"{self.who} cannot be reached within {timeout:.1f} s") from None
+        except (OSError, ValueError) as error:
+            why = "is used by another program" if "exclusively" in str(error) else "cannot be opened"
+            raise NotConnected(f"{self.who}: the port {why}", str(error)) from error
+        self.loss = None
+
+    def close(self) -> None:
+        """Close the line; does nothing when it is closed. A question that waits for its answer fails."""
+        port, self._open = self._open, None
+        if port is not None:
+            with contextlib.suppress(OSError):
+                port.close()
+
+    @contextlib.contextmanager
+    def held(self, patience: float = 0.0) -> Iterator[None]:
+        """Use the line exclusively. Raises Refused when it is in use for `patience` s, by default 4 answer times."""
+        if not self._one_user.acquire(timeout=patience or 4.0 * self.answer_timeout):
+            raise Refused(f"{self.who} is busy with another call")
+        try:
+            yield
+        finally:
+            self._one_user.release()
+
+    @contextlib.contextmanager
+    def held_if_free(self) -> Iterator[bool]:
+        """Use the line exclusively unless somebody else does; the value is false then."""
+        free = self._one_user.acquire(blocking=False)
+        try:
+            yield free
+        finally:
+            if free:
+                self._one_user.release()
+
+    # -------------------------------------------------------------------------------- bytes
+    def send(self, data: bytes) -> None:
+        """Send bytes. Raises ConnectionLost, DeviceTimeout, NotConnected."""
+        port = self._required()
+        try:
+            port.write(data)
+        except TimeoutError as error:
+            raise self.broken(DeviceTimeout(f"{self.who} takes no bytes", str(error))) from error
+        except (OSError, TypeError) as error:
+            raise self._lost(error) from error
+
+    def receive(self) -> bytes:
+        """Return the bytes that came, after at most READ_PERIOD s. Raises ConnectionLost, NotConnected."""
+        port = self._required()
+        try:
+            return port.read()
+        except (OSError, TypeError) as error:  # TypeError: pyserial, closed by another thread meanwhile
+            raise self._lost(error) from error
+
+    def waiting(self) -> bytes:
+        """Return the bytes that came unasked, without waiting. Raises ConnectionLost, NotConnected."""
+        port = self._required()
+        try:
+            has_bytes = port.has_bytes()
+        except (OSError, TypeError) as error:
+            raise self._lost(error) from error
+        return self.receive() if has_bytes else b""
+
+    # -------------------------------------------------------------------------------- questions
+    def ask(self, question: bytes, answer: Callable[[bytes], T | None], name: str, timeout: float = 0.0) -> T:
+        """Send a question and return what `answer` makes of the bytes that came since.
+
+        Args:
+            question: The bytes to send. What came before is thrown away.
+            answer: Called with all bytes that came; returns None while the answer is not complete.
+            name: Name of the question, for errors.
+            timeout: Time the device has, s; 0 for the line's own.
+
+        Raises:
+            DeviceTimeout: No answer came in time. The line is broken then.
+            ConnectionLost: The line broke.
+        """
+        limit = timeout or self.answer_timeout
+        with self.held():
+            self.waiting()
+            self.send(question)
+            deadline, came = time.monotonic() + limit, b""
+            while time.monotonic() < deadline:
+                if data := self.receive():
+                    came = (came + data)[-LONGEST_ANSWER:]
+                    if (found := answer(came)) is not None:
+                        return found
+        how = "gave no valid answer to" if came else "did not answer"
+        late = f"{self.who} {how} {name} within {limit:.3g} s"
+        raise self.broken(DeviceTimeout(late, repr(came[-200:])))
+
+    def ask_text(self, question: str, end: bytes = b"\r") -> str:
+        """Send a line of ASCII text and return the line that answers it, both without their `end`."""
+
+        def first_line(came: bytes) -> str | None:
+            return came.split(end, 1)[0].decode("ascii", "replace").strip() if end in came else None
+
+        return self.ask(question.encode("ascii") + end, first_line, question)
+
+    def broken(self, error: DeviceError) -> DeviceError:
+        """Note what broke the line, and return it."""
+        self.loss = self.loss or error
+        return error
+
+    def loss_again(self) -> DeviceError | None:
+        """Return a new error like the one that broke the line."""
+        loss = self.loss
+        if isinstance(loss, DeviceFault):
+            return type(loss)(str(loss), loss.detail, loss.fault_code)
+        return None if loss is None else type(loss)(str(loss), loss.detail)
+
+    def _required(self) -> "_Port":
+        port = self._open
+        if port is None:
+            raise self.loss_again() or NotConnected(f"{self.who} is not connected")
+        return port
+
+    def _lost(self, error: Exception) -> DeviceError:
+        text = f"{self.who}: the connection was lost: unplugged, or the port was closed"
+        return self.broken(ConnectionLost(text, str(error)))
+
+
+class _Port(Protocol):
+    """What a line needs of a port; every method raises OSError when the other end is gone."""
+
+    def read(self) -> bytes: ...
+
+    def has_bytes(self) -> bool: ...
+
+    def write(self, data: bytes) -> None: ...
+
+    def close(self) -> None: ...
+
+
+class _Socket:
+    def __init__(self, url: str, timeout: float) -> None:
+        parts = urllib.parse.urlsplit(url)
+        self._socket = socket.create_connection((parts.hostname, parts.port), timeout)
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def read(self) -> bytes:
+        if not self._readable(READ_PERIOD):
+            return b""
+        if data := self._socket.recv(CHUNK):
+            return data
+        raise ConnectionResetError("closed by the other end")
+
+    def has_bytes(self) -> bool:
+        return self._readable(0.0)
+
+    def write(self, data: bytes) -> None:
+        self._socket.settimeout(WRITE_TIMEOUT)
+        self._socket.sendall(data)
+
+    def close(self) -> None:
+        self._socket.close()
+
+    def _readable(self, timeout: float) -> bool:
+        try:
+            return bool(select.select([self._socket], [], [], timeout)[0])
+        except ValueError as error:  # closed by another thread meanwhile
+            raise ConnectionResetError("closed") from error
+
+
+class _Serial:
+    def __init__(self, path: str, baud_rate: int) -> None:
+        import serial
+
+        self._too_late = serial.SerialTimeoutException
+        self._serial = serial.Serial(path, baud_rate, timeout=READ_PERIOD, write_timeout=WRITE_TIMEOUT, exclusive=True)
+        self._serial.reset_input_buffer()
+
+    def read(self) -> bytes:
+        data: bytes = self._serial.read(1)
+        return data + self._serial.read(self._serial.in_waiting) if data else b""
+
+    def has_bytes(self) -> bool:
+        return bool(self._serial.in_waiting)
+
+    def write(self, data: bytes) -> None:
+        try:
+            self._serial.write(data)
+        except self._too_late as error:
+            raise TimeoutError(str(error)) from error
+
+    def close(self) -> None:
+        self._serial.close()

@@ -1,0 +1,127 @@
+"""LineDevice: a device that answers questions on a serial port or a TCP socket. A mixin of object types."""
+
+import contextlib
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Final, TypeVar
+
+from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected
+from arcor2_hw.objects.connected import Connected
+from arcor2_hw.objects.line import READ_PERIOD, Line
+
+T = TypeVar("T")
+
+LAST_ANSWER: Final = 0.3
+"""Time a question has to end before the line is closed, s."""
+
+
+class LineDevice(Connected):
+    """A device on a text line; call `use_line` in `__init__`.
+
+    A driver overrides `greet` (called when the line was opened), `poll` (called each `poll_period` s while the line is
+    free) and, where the device talks or falls silent by itself, `on_unasked` and `overdue`. They use `ask` and raise
+    DeviceError. An answer that does not come in time ends the connection, which is then opened again.
+    """
+
+    poll_period: float = 1.0
+    """Time between two calls of `poll`, s."""
+    line: Line
+
+    def use_line(self, port: str, baud_rate: int, answer_timeout: float) -> None:
+        """Prepare the line; nothing is opened yet."""
+        self.line = Line(f"{self.name} at {port}", port, baud_rate, answer_timeout)
+        self.keep_connection(self.line.who)
+
+    # -------------------------------------------------------------------------------- hooks
+    def greet(self, deadline: float) -> None:
+        """See that the device answers, until `deadline` (monotonic, s). Raises DeviceError."""
+
+    def poll(self) -> None:
+        """Ask for the state of the device. Raises DeviceError."""
+
+    def on_unasked(self, data: bytes) -> None:
+        """Take bytes that came without a question."""
+
+    def overdue(self, error: DeviceTimeout) -> DeviceError:
+        """Return the error that a missing answer means."""
+        return error
+
+    # -------------------------------------------------------------------------------- questions
+    @contextlib.contextmanager
+    def held(self, patience: float = 0.0) -> Iterator[None]:
+        """Use the line exclusively.
+
+        Raises:
+            NotConnected: The device is not connected.
+            DeviceError: What the connection was lost by.
+            Refused: The line is in use for `patience` s, by default 4 answer times.
+        """
+        self.check()
+        with self.line.held(patience):
+            self.check()
+            yield
+
+    def check(self) -> None:
+        """Return while the device is observed. Raises NotConnected, or what the connection was lost by."""
+        try:
+            self.observing.check()
+        except ConnectionLost as error:
+            raise self.line.loss_again() or error from None
+        except NotConnected as error:
+            raise NotConnected(f"{self.who} is not connected", error.detail) from None
+        if (loss := self.line.loss_again()) is not None:
+            raise loss
+
+    def ask(self, question: bytes, answer: Callable[[bytes], T | None], name: str, timeout: float = 0.0) -> T:
+        """Send a question and return what `answer` makes of all bytes that came since; see `Line.ask`."""
+        with self.line.held():
+            if data := self.line.waiting():
+                self.on_unasked(data)
+            broken = self.line.loss
+            try:
+                return self.line.ask(question, answer, name, timeout)
+            except DeviceTimeout as late:
+                error = self.overdue(late)
+                self.line.loss = broken or error
+                raise error from None
+
+    def disconnect(self) -> None:
+        """Stop observing and close; does nothing when closed. A question has a moment to end."""
+        with contextlib.suppress(DeviceError), self.line.held(LAST_ANSWER):
+            pass
+        super().disconnect()
+
+    # -------------------------------------------------------------------------------- on the observing thread
+    def open_link(self, timeout: float) -> None:
+        """Open the line and greet the device."""
+        deadline = time.monotonic() + timeout
+        before = self.line.loss
+        try:
+            self.line.open(timeout)
+            with self.line.held():
+                self.greet(deadline)
+        except DeviceError:
+            self.line.loss = before or self.line.loss
+            raise
+
+    def close_link(self) -> None:
+        """Close the line."""
+        self.line.close()
+
+    def watch(self, stopping: threading.Event) -> None:
+        """Poll the device, and take what comes unasked."""
+        polled = time.monotonic()
+        while not stopping.wait(READ_PERIOD):
+            if self.line.loss is not None:
+                raise self.line.loss
+            with self.line.held_if_free() as free:
+                if free and (data := self.line.waiting()):
+                    self.on_unasked(data)
+                if free and time.monotonic() - polled >= self.poll_period:
+                    self.poll()
+                    polled = time.monotonic()
+
+    def on_lost(self, error: DeviceError) -> None:
+        """Remember what the connection was lost by."""
+        self.line.broken(error)

@@ -1,0 +1,126 @@
+"""PointActions: the actions of a device with named points. A mixin of object types, before IOBlock."""
+
+import abc
+from collections.abc import Callable, Mapping
+from typing import ClassVar, Final
+
+from arcor2_hw.actions import action
+from arcor2_hw.data.device import Quality, Reading
+from arcor2_hw.exceptions import DeviceFault, OutOfRange, Refused
+from arcor2_hw.objects.edges import Edge, EdgeListeners
+from arcor2_hw.objects.small import IOPoint, PointKind
+
+LONGEST_WAIT: Final = 600.0
+"""Longest time a program may wait for a point in one call, s."""
+MARGIN: Final = 20.0
+"""Time beyond it for requests that are repeated, behind another request, s."""
+
+
+class PointActions(abc.ABC):
+    """Reads, writes and observes points by name; a driver sets `io_points` in `__init__`."""
+
+    DYNAMIC_PARAMS: ClassVar[dict[str, tuple[str, set[str]]]] = {"name": ("point_names", set())}
+    who: str
+    io_points: Mapping[str, IOPoint]
+    edge_listeners: EdgeListeners
+
+    def points(self) -> list[IOPoint]:
+        """Return the points."""
+        return list(self.io_points.values())
+
+    def point_names(self) -> list[str]:
+        """Return the names of the points."""
+        return list(self.io_points)
+
+    def require_point(self, name: str, kind: PointKind | None = None) -> IOPoint:
+        """Return the point of a name. Raises OutOfRange when there is none, Refused when it is of another kind."""
+        point = self.io_points.get(name)
+        if point is None:
+            raise OutOfRange(f"{self.who} has no point {name!r}; there are {', '.join(self.io_points)}")
+        if kind not in (None, point.kind):
+            raise Refused(f"{self.who}: {name} is {self.address_of(name)}; this needs a point that is {kind}")
+        return point
+
+    def address_of(self, name: str) -> str:
+        """Return where a point is in the device, for errors."""
+        return name
+
+    @abc.abstractmethod
+    def read(self, name: str) -> Reading[bool | float]:
+        """Read a point."""
+
+    @abc.abstractmethod
+    def write(self, name: str, value: bool | float) -> None:
+        """Write an output."""
+
+    @abc.abstractmethod
+    def await_point(self, name: str, value: bool, timeout: float) -> None:
+        """Return when a digital point has the value. Raises DeviceTimeout after `timeout` s, Cancelled."""
+
+    def subscribe(self, name: str, listener: Callable[[Edge], None]) -> Callable[[], None]:
+        """Call `listener` with each edge of a digital point, on the observing thread; it has to be quick.
+
+        Returns the function that ends the subscription. The subscription outlasts a loss of the connection; changes
+        during the loss cause no edge.
+        """
+        self.require_point(name, PointKind.DIGITAL)
+        return self.edge_listeners.add(name, listener)
+
+    # -------------------------------------------------------------------------------- actions
+    @action
+    def read_digital(self, name: str, *, an: str | None = None) -> bool:
+        """Read a digital input or output.
+
+        :param name: name of the point
+        """
+        self.require_point(name, PointKind.DIGITAL)
+        return bool(self.read(name).value)
+
+    @action
+    def read_analog(self, name: str, *, an: str | None = None) -> float:
+        """Read an analogue input or output, in its unit.
+
+        :param name: name of the point
+        """
+        self.require_point(name, PointKind.ANALOG)
+        reading = self.read(name)
+        if reading.quality is Quality.BAD:
+            raise self.bad_reading(name)
+        return float(reading.value)
+
+    def bad_reading(self, name: str) -> DeviceFault:
+        """Return the error for a point whose value is bad."""
+        return DeviceFault(f"{self.who}: {name} ({self.address_of(name)}) is bad", fault_code="bad")
+
+    @action
+    def write_digital(self, name: str, value: bool, *, an: str | None = None) -> None:
+        """Switch a digital output.
+
+        :param name: name of the output
+        :param value: on or off
+        """
+        self.require_point(name, PointKind.DIGITAL)
+        self.write(name, value)
+
+    @action
+    def write_analog(self, name: str, value: float, *, an: str | None = None) -> None:
+        """Set an analogue output, in its unit.
+
+        :param name: name of the output
+        :param value: the value, in the unit of the point
+        """
+        self.require_point(name, PointKind.ANALOG)
+        self.write(name, value)
+
+    @action(deadline=LONGEST_WAIT + MARGIN)
+    def wait_for(self, name: str, value: bool, timeout: float, *, an: str | None = None) -> None:
+        """Wait until a digital point has the value.
+
+        :param name: name of the point
+        :param value: on or off
+        :param timeout: how long at most, s
+        """
+        assert 0.0 <= timeout <= 600.0
+
+        self.require_point(name, PointKind.DIGITAL)
+        self.await_point(name, value, timeout)

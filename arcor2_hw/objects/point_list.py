@@ -1,0 +1,88 @@
+"""Named points in a setting: `name=DI... debounce=0.02`, `name=AO... scale=0.01 unit=m/s on_loss=hold`."""
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+from arcor2_hw.data.base import UNSET
+from arcor2_hw.exceptions import OutOfRange
+from arcor2_hw.objects.small import IOPoint, OnLoss, PointDirection, PointKind
+
+OPTIONS: Final = {"DI": ("debounce",), "DO": ("on_loss",), "AI": ("scale", "unit"), "AO": ("scale", "unit", "on_loss")}
+"""Options by kind of point: digital or analogue, input or output."""
+LONGEST_DEBOUNCE: Final = 10.0
+"""Longest debounce time, s."""
+
+
+def entries(text: str, separator: str, parameter: str) -> dict[str, list[str]]:
+    """Return the words of each `name=word word ...`, by name. Raises OutOfRange naming the parameter."""
+    found: dict[str, list[str]] = {}
+    for entry in filter(None, (part.strip() for part in text.split(separator))):
+        name, sign, rest = entry.partition("=")
+        if not sign or not name.isidentifier() or not rest.strip():
+            raise OutOfRange(f"{parameter} must be a list of name=..., separated by {separator!r}, not {entry!r}")
+        if name in found:
+            raise OutOfRange(f"{parameter} must name each point once: {name!r} is in it twice")
+        found[name] = rest.split()
+    return found
+
+
+def io_point(
+    name: str,
+    kind: str,
+    words: Sequence[str],
+    parameter: str,
+    *,
+    debounce: bool = True,
+    safe_states: Sequence[OnLoss] = tuple(OnLoss),
+    default_on_loss: OnLoss = OnLoss.OFF,
+) -> IOPoint:
+    """Return a point.
+
+    Args:
+        name: Name of the point.
+        kind: DI, DO, AI or AO.
+        words: The options, as `scale=0.001`.
+        parameter: Name of the setting, for errors.
+        debounce: Whether inputs may be debounced.
+        safe_states: What an output may do when the device loses us.
+        default_on_loss: What an output does unless the option says otherwise.
+
+    Raises:
+        OutOfRange: An option is wrong; the error names the parameter and the point.
+    """
+    known = [option for option in OPTIONS[kind] if debounce or option != "debounce"]
+    options: dict[str, str] = {}
+    for word in words:
+        key, sign, value = word.partition("=")
+        if not sign or not value or key not in known or key in options:
+            allowed = ", ".join(sorted(known)) or "no options"
+            raise OutOfRange(f"{parameter} must give {name} ({kind}) only {allowed}, each once, not {word!r}")
+        options[key] = value
+    on_loss = options.get("on_loss", default_on_loss)
+    if on_loss not in safe_states:
+        raise OutOfRange(f"{parameter} must give {name} an on_loss of {', '.join(safe_states)}, not {on_loss!r}")
+    point = IOPoint(
+        name=name,
+        direction=PointDirection.INPUT if kind in ("DI", "AI") else PointDirection.OUTPUT,
+        kind=PointKind.DIGITAL if kind in ("DI", "DO") else PointKind.ANALOG,
+        unit=options.get("unit", ""),
+        scale=_number(options.get("scale", "1"), "scale", name, parameter),
+        debounce=_number(options.get("debounce", "0"), "debounce", name, parameter),
+        on_loss=OnLoss(on_loss) if kind in ("DO", "AO") else UNSET,
+    )
+    if point.scale == 0.0:
+        raise OutOfRange(f"{parameter} must give {name} a scale other than 0")
+    if not 0.0 <= point.debounce <= LONGEST_DEBOUNCE:
+        raise OutOfRange(f"{parameter} must give {name} a debounce of 0 to {LONGEST_DEBOUNCE:g} s")
+    return point
+
+
+def _number(text: str, key: str, name: str, parameter: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise OutOfRange(f"{parameter} must give {name} a number as {key}, not {text!r}")
+    return value

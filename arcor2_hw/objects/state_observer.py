@@ -1,0 +1,233 @@
+"""StateObserver: one thread reads the state of a device periodically; others read it, or wait for a change."""
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Generic, NamedTuple, TypeVar
+
+from arcor2_hw.data.base import Timestamp, now
+from arcor2_hw.exceptions import DeviceError, DeviceTimeout, Stale
+from arcor2_hw.keep_alive import BUSY_FOR, LONGEST_STEP, RunningTime, once_within
+from arcor2_hw.objects.observing import GoOn, Observing
+
+T = TypeVar("T")
+
+CLOSED_BY_US = 0.5
+"""Time the thread waits for its end when reading fails because we close the connection, s."""
+
+
+class Snapshot(NamedTuple, Generic[T]):
+    """A state, and when it was asked for: on the monotonic clock (s) and in UTC."""
+
+    value: T
+    asked: float
+    stamp: Timestamp
+
+    @classmethod
+    def by(cls, read: Callable[[], T]) -> "Snapshot[T]":
+        """Return a snapshot of what `read` returns, asked for now."""
+        asked, stamp = time.monotonic(), now()
+        return cls(read(), asked, stamp)
+
+
+class StateObserver(Generic[T]):
+    """Keeps the newest state of a device.
+
+    A driver overrides `open`, `read` and `close`, and where needed `on_state`, `after_reading`, `on_lost` and
+    `interrupt`. All of them run on the observing thread, except the first `open`, `interrupt` and states that come
+    unasked (`put`). They raise DeviceError.
+    """
+
+    period: float = 0.1
+    """Time between readings while nobody waits, s."""
+    busy_period: float = 0.02
+    """Time between readings while somebody waits, s."""
+    fresh_for: float = 0.5
+    """Age up to which a state counts as current, s."""
+    answers_within: float = 3.0
+    """Time within which a reading that was asked for is there, s: repeated, and behind another request."""
+
+    def __init__(self, who: str) -> None:
+        self.who = who
+        self.observing = Observing(who, self._first, self._watch, self.close, self._lost)
+        self._changed = threading.Condition()
+        self._newest: Snapshot[T] | None = None
+        self._waiting = 0
+        self._hurry = threading.Event()
+        self._ending = False
+
+    # -------------------------------------------------------------------------------- hooks
+    def open(self, timeout: float) -> Snapshot[T]:
+        """Open the connection within `timeout` s and return the first state, made by `Snapshot.by`."""
+        raise NotImplementedError
+
+    def read(self) -> T | None:
+        """Read the state; None when there is none to take because states come unasked."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Close the connection; does nothing when it is closed."""
+
+    def interrupt(self) -> None:
+        """End a reading that waits for its answer, because we disconnect."""
+
+    def on_state(self, snapshot: Snapshot[T]) -> None:
+        """Take a new state before others see it; nobody else gets a state meanwhile."""
+
+    def after_reading(self) -> None:
+        """Do what follows each reading, such as keeping a watchdog quiet."""
+
+    def on_lost(self, error: DeviceError) -> None:
+        """Do what a loss of the connection requires; called once per loss."""
+
+    # -------------------------------------------------------------------------------- life
+    def connect(self, timeout: float) -> None:
+        """Start to observe; does nothing when started. Raises NotConnected, DeviceTimeout, DeviceFault."""
+        self._ending = False
+        self.observing.start(timeout)
+
+    def disconnect(self) -> None:
+        """Stop observing; does nothing when stopped. Whoever waits gets NotConnected."""
+        self._ending = True
+        self.interrupt()
+        self._hurry.set()
+        self.observing.stop()
+        self._newest = None
+        self.wake()
+
+    @property
+    def ending(self) -> bool:
+        """Return whether we are disconnecting, so that a failure of the connection is expected."""
+        return self._ending
+
+    @property
+    def losses(self) -> int:
+        """Return how often the connection was lost; see `check_unbroken`."""
+        return self.observing.losses
+
+    @property
+    def taking(self) -> threading.Condition:
+        """Return what is locked while a state is taken: no `on_state` runs while another thread holds it."""
+        return self._changed
+
+    # -------------------------------------------------------------------------------- states
+    def newest(self) -> T | None:
+        """Return the newest state however old; None before the first."""
+        newest = self._newest
+        return None if newest is None else newest.value
+
+    def current(self) -> Snapshot[T]:
+        """Return the newest state; wait a moment for one that is not older than `fresh_for`.
+
+        Raises:
+            NotConnected, ConnectionLost: The device is not observed.
+            Stale: The newest state is too old.
+        """
+        self.observing.check()
+        once_within(lambda: self._age() <= self.fresh_for or not self.observing.online, BUSY_FOR, self.busy_period)
+        self.observing.check()
+        newest, age = self._newest, self._age()
+        if newest is None or age > self.fresh_for:
+            raise Stale(f"{self.who}: the newest state is {age:.2f} s old; at most {self.fresh_for:g} s are allowed")
+        return newest
+
+    def _age(self) -> float:
+        newest = self._newest
+        return float("inf") if newest is None else time.monotonic() - newest.asked
+
+    def fresh(self) -> Snapshot[T]:
+        """Return a state that was asked for after this call. Raises DeviceTimeout, NotConnected, ConnectionLost."""
+        return self.wait(lambda _: True, self.answers_within, "reporting its state")
+
+    def wait(self, holds: Callable[[T], bool], timeout: float, what: str, go_on: GoOn | None = None) -> Snapshot[T]:
+        """Return the first state asked for from now on for which `holds` is true.
+
+        Args:
+            holds: Tells whether the state is the awaited one. It may raise DeviceError.
+            timeout: Longest time to wait, s.
+            what: Name of what is awaited, for errors.
+            go_on: What `begin` returned to the work that waits.
+
+        Raises:
+            DeviceTimeout: No such state came in time.
+            ConnectionLost: The connection was lost.
+            Cancelled: The work was stopped.
+        """
+        began, losses, clock = time.monotonic(), self.losses, RunningTime()
+        with self._changed:
+            self._waiting += 1
+            try:
+                self._hurry.set()
+                while True:
+                    if go_on is not None:
+                        go_on()
+                    self.check_unbroken(losses)
+                    newest = self._newest
+                    if newest is not None and newest.asked >= began and holds(newest.value):
+                        return newest
+                    if clock() >= timeout:
+                        raise DeviceTimeout(f"{self.who}: {what} took longer than {timeout:.3g} s")
+                    self._changed.wait(min(timeout, LONGEST_STEP))
+            finally:
+                self._waiting -= 1
+
+    def put(self, value: T, asked: float) -> None:
+        """Take a state that came unasked; it holds since `asked` (monotonic, s)."""
+        self._set(Snapshot(value, asked, now()))
+
+    def wake(self) -> None:
+        """Let everybody who waits check again."""
+        with self._changed:
+            self._changed.notify_all()
+
+    def hurry(self) -> None:
+        """Read the state at once."""
+        self._hurry.set()
+
+    # -------------------------------------------------------------------------------- stopping
+    def begin(self, what: str) -> GoOn:
+        """Return the check for work that starts now: it raises after a stop, and after a loss even if reconnected."""
+        return self.observing.begin(what)
+
+    def stop_waiting(self) -> None:
+        """End with Cancelled the work that has started."""
+        self.observing.cancel()
+        self.wake()
+
+    def check_unbroken(self, losses: int) -> None:
+        """Return while the device is observed and was since `losses` was read from here."""
+        self.observing.check_unbroken(losses)
+
+    # -------------------------------------------------------------------------------- on the observing thread
+    def _first(self, timeout: float) -> None:
+        self._set(self.open(timeout))
+
+    def _watch(self, stopping: threading.Event) -> None:
+        while not stopping.is_set():
+            self._hurry.wait(self.busy_period if self._waiting else self.period)
+            self._hurry.clear()
+            if stopping.is_set():
+                return
+            try:
+                self._take()
+                self.after_reading()
+            except DeviceError:
+                if not self._ending:
+                    raise
+                stopping.wait(CLOSED_BY_US)  # we closed it: that is no loss
+
+    def _take(self) -> None:
+        asked, stamp = time.monotonic(), now()
+        value = self.read()
+        if value is not None:
+            self._set(Snapshot(value, asked, stamp))
+
+    def _set(self, snapshot: Snapshot[T]) -> None:
+        with self._changed:
+            self.on_state(snapshot)
+            self._newest = snapshot
+            self._changed.notify_all()
+
+    def _lost(self, error: DeviceError) -> None:
+        self.on_lost(error)
+        self.wake()
