@@ -229,7 +229,6 @@ class _Serial:
 
         self._too_late = serial.SerialTimeoutException
         self._serial = serial.Serial(path, baud_rate, timeout=READ_PERIOD, write_timeout=WRITE_TIMEOUT, exclusive=True)
-        self._serial.reset_input_buffer()
 
     def read(self) -> bytes:
         data: bytes = self._serial.read(1)

@@ -8,7 +8,9 @@ from typing import Final, TypeVar
 
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected
 from arcor2_hw.objects.connected import Connected
+from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.line import READ_PERIOD, Line
+from arcor2_hw.objects.state_observer import CLOSED_BY_US
 
 T = TypeVar("T")
 
@@ -32,6 +34,7 @@ class LineDevice(Connected):
         """Prepare the line; nothing is opened yet."""
         self.line = Line(f"{self.name} at {port}", port, baud_rate, answer_timeout)
         self.keep_connection(self.line.who)
+        self._ending = False
 
     # -------------------------------------------------------------------------------- hooks
     def greet(self, deadline: float) -> None:
@@ -86,10 +89,17 @@ class LineDevice(Connected):
                 self.line.loss = broken or error
                 raise error from None
 
+    def connect(self, timeout: float = DEFAULT_CONNECT_TIMEOUT) -> None:
+        """Open the line and greet the device within `timeout` s. Raises NotConnected, DeviceTimeout, DeviceFault."""
+        self._ending = False
+        super().connect(timeout)
+
     def disconnect(self) -> None:
         """Stop observing and close; does nothing when closed. A question has a moment to end."""
         with contextlib.suppress(DeviceError), self.line.held(LAST_ANSWER):
             pass
+        self._ending = True
+        self.line.close()
         super().disconnect()
 
     # -------------------------------------------------------------------------------- on the observing thread
@@ -99,6 +109,8 @@ class LineDevice(Connected):
         before = self.line.loss
         try:
             self.line.open(timeout)
+            if self._ending:
+                raise NotConnected(f"{self.who} is being disconnected")
             with self.line.held():
                 self.greet(deadline)
         except DeviceError:
@@ -111,6 +123,14 @@ class LineDevice(Connected):
 
     def watch(self, stopping: threading.Event) -> None:
         """Poll the device, and take what comes unasked."""
+        try:
+            self._poll_until(stopping)
+        except DeviceError:
+            if not self._ending:
+                raise
+            stopping.wait(CLOSED_BY_US)  # we closed the line: that is no loss
+
+    def _poll_until(self, stopping: threading.Event) -> None:
         polled = time.monotonic()
         while not stopping.wait(READ_PERIOD):
             if self.line.loss is not None:

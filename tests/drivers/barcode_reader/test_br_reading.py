@@ -284,7 +284,8 @@ def test_reader_that_does_not_answer_sensibly(
     fake.control.do("present", code="HERE")
     fake.control.do(fault)
     began = time.monotonic()
-    with pytest.raises(DeviceTimeout, match=f"^reader at {fake.ready['port']} (did not answer|gave no valid answer to) RST within 0.25 s$"):
+    late = f"^reader at {fake.ready['port']} (did not answer|gave no valid answer to) RST within 0.25 s$"
+    with pytest.raises(DeviceTimeout, match=late):
         reader.scan()
     assert time.monotonic() - began < 0.6
     wait_for(lambda: reader.connection, lambda state: state is Connection.LOST)

@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 
-from arcor2_hw.objects.edges import Debounced, Edge
 from arcor2_drivers.remote_io.points import parse_points
 from arcor2_drivers.remote_io.remote_io import RemoteIO
 from arcor2_drivers.remote_io.settings import RemoteIOSettings
@@ -22,6 +21,7 @@ from arcor2_hw.exceptions import (
     OutOfRange,
     Refused,
 )
+from arcor2_hw.objects.edges import Debounced, Edge
 from arcor2_hw.objects.small import OnLoss, PointDirection, PointKind
 from tests.drivers.remote_io.conftest import POINTS
 from tests.fakes.conftest import FakeProcess
