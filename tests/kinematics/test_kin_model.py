@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from arcor2_drivers.dobot_magician import kinematics as dobot_kinematics
 from arcor2_drivers.two_axis_robot import kinematics as two_axis_kinematics
-from arcor2_drivers.universal_robots.frames import world_from_base
+from arcor2_drivers.universal_robots.geometry import world_from_base
 from arcor2_fakes.ur.kinematics import MODELS, Chain
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import Joint

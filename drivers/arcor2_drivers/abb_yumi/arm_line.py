@@ -1,4 +1,4 @@
-"""The two sockets to the motion server of one arm: commands, and the watch line with keep-alive and stop."""
+"""Connection to the motion server of one arm: a socket for commands, and one for keep-alive and stop."""
 
 import contextlib
 import queue
@@ -23,20 +23,20 @@ from arcor2_hw.keep_alive import PULSE_PERIOD, KeepAlive
 from .motion_lines import LAST_SEQUENCE, LONGEST_LINE, MEANING, VERSION, Answer, Code, Status, answer, line
 
 ANSWER_WITHIN: Final = 2.0
-"""Seconds an answer that needs no motion may take; the server looks every 20 ms."""
+"""Time for an answer that needs no motion, s; the server reads every 20 ms."""
 KEEP_ALIVES: Final = 4
-"""Keep-alives in the time of the watchdog."""
+"""Keep-alives per period of the watchdog."""
 LISTENS_AGAIN: Final = 0.1
-"""Seconds between two attempts to connect."""
+"""Time between two attempts to connect, s."""
 SILENT: Final = 1.0
-"""Seconds without an answer to a keep-alive after which the line is given up."""
+"""Time without an answer to a keep-alive after which the connection is lost, s."""
 STOP_ANSWER: Final = 0.8
-"""Seconds until the server has told that the arm stands: 50 ms until it looks, 0.2 s of braking, and slack."""
+"""Time for the server to confirm standstill, s: 50 ms until it reads, 0.2 s of braking, and slack."""
 NUMBERS: Final = {"left": 1, "right": 2}
 
 
 class _Socket:
-    """A connection of lines."""
+    """A socket that carries lines."""
 
     def __init__(self, raw: socket.socket) -> None:
         self.raw = raw
@@ -48,18 +48,18 @@ class _Socket:
             self.raw.sendall(data)
 
     def lines(self) -> list[bytes]:
-        """Give the whole lines that have come. Raises OSError, also when the other end closed."""
+        """Return the complete lines received. Raise OSError, also when the other end has closed."""
         data = self.raw.recv(4096)
         if not data:
             raise ConnectionResetError("closed by the controller")
         *lines, self._rest = (self._rest + data).split(b"\n")
         if len(self._rest) > 2 * LONGEST_LINE:
-            raise ConnectionResetError("it sends what is no line")
+            raise ConnectionResetError("it sends an endless line")
         return lines
 
 
 class Command:
-    """A command that was sent: its number and what has come back."""
+    """A command that was sent, and its answers."""
 
     def __init__(self, sequence: int, code: Code) -> None:
         self.sequence = sequence
@@ -68,19 +68,19 @@ class Command:
 
     @property
     def what(self) -> str:
-        """Give the name of the command."""
+        """Return the name of the command."""
         return self.code.name.lower().replace("_", " ")
 
 
 class ArmLine:
-    """The line to one arm's motion server. `ended` is why it is over; None while it lives."""
+    """Connection to one arm's motion server. `ended` is None while it lives, then the reason."""
 
-    def __init__(self, name: str, arm: str, host: str, port: int, told_ended: Callable[[DeviceError], None]) -> None:
+    def __init__(self, name: str, arm: str, host: str, port: int, on_ended: Callable[[DeviceError], None]) -> None:
         self.arm = arm
-        self.who = f"the {arm} arm of {name} ({host}:{port})"
+        self.who = f"The {arm} arm of {name} ({host}:{port})"
         self.ended: DeviceError | None = None
         self._host, self._port = host, port
-        self._told_ended = told_ended
+        self._on_ended = on_ended
         self._commands: _Socket | None = None
         self._watch: _Socket | None = None
         self._waiting: dict[int, Command] = {}
@@ -91,12 +91,12 @@ class ArmLine:
         self._asking = threading.Lock()
         self._over = threading.Event()
         self._keep_alive: KeepAlive | None = None
-        self._heard = 0.0
+        self._answered_at = 0.0
         self._thread: threading.Thread | None = None
 
-    # -------------------------------------------------------------------------------- its life
+    # -------------------------------------------------------------------------------- connection
     def open(self, timeout: float, watchdog: float) -> None:
-        """Connect, check who answers, and begin a session with its watchdog. Raises DeviceError, naming the address."""
+        """Connect, check the server, and start a session with its watchdog. Raise DeviceError."""
         until = time.monotonic() + timeout
         opened: list[socket.socket] = []
         try:
@@ -105,25 +105,25 @@ class ArmLine:
         except OSError as e:
             for each in opened:
                 each.close()
-            self.ended = NotConnected(f"{self.who} is not there: is its RAPID program running?", str(e))
+            self.ended = NotConnected(f"{self.who} refuses the connection. Is its RAPID program running?", str(e))
             raise self.ended from e
         self.attach(opened[0], opened[1], watchdog)
         try:
             version, number = self.ask(Code.HELLO, within=max(until - time.monotonic(), 0.1))[:2]
             if version != VERSION:
-                raise Refused(f"{self.who} runs version {version:g} of the RAPID modules, not {VERSION}")
+                raise Refused(f"{self.who} runs RAPID modules of version {version:g}. Load version {VERSION}.")
             if number != NUMBERS[self.arm]:
-                raise Refused(f"{self.who} is the server of the other arm: check the ports")
+                raise Refused(f"{self.who} is the server of the other arm. Check the ports.")
             self.ask(Code.BEGIN, watchdog)
         except DeviceTimeout as e:
             self.end(e)
-            raise DeviceTimeout(f"{self.who} does not answer: its program stands, or serves somebody else") from e
+            raise DeviceTimeout(f"{self.who} does not answer. Its program is stopped, or serves another client.") from e
         except (DeviceError, ValueError) as e:
-            self.end(e if isinstance(e, DeviceError) else DeviceFault(f"{self.who} answers hello wrongly"))
+            self.end(e if isinstance(e, DeviceError) else DeviceFault(f"{self.who} sent an invalid answer to hello."))
             raise
 
     def end(self, why: DeviceError, wait: bool = True) -> None:
-        """Close; the server stops its arm when it sees that. Harmless when it is over."""
+        """Close the connection, unless it has ended; the server then stops its arm."""
         if self.ended is None:
             self.ended = why
         self._over.set()
@@ -141,7 +141,7 @@ class ArmLine:
             try:
                 raw = socket.create_connection((self._host, port), max(until - time.monotonic(), 0.05))
                 break
-            except ConnectionRefusedError:  # a program that was just started does not listen yet
+            except ConnectionRefusedError:  # a program that has just started does not listen yet
                 if time.monotonic() + LISTENS_AGAIN > until:
                     raise
                 time.sleep(LISTENS_AGAIN)
@@ -149,7 +149,7 @@ class ArmLine:
         return raw
 
     def attach(self, commands: socket.socket, watch: socket.socket, watchdog: float) -> None:
-        """Keep the server's watchdog quiet on sockets that are open; they are closed at the end of the line."""
+        """Serve open sockets and keep the watchdog from tripping; the sockets are closed at the end."""
         for each in (commands, watch):
             each.settimeout(0.2)
         self._commands, self._watch = _Socket(commands), _Socket(watch)
@@ -159,7 +159,7 @@ class ArmLine:
         except DeviceTimeout:
             self._close()
             raise
-        self._heard = time.monotonic()
+        self._answered_at = time.monotonic()
         self._thread = threading.Thread(target=self._run, name=f"watching {self.who}", daemon=True)
         self._thread.start()
 
@@ -170,61 +170,62 @@ class ArmLine:
             if each is not None:
                 each.raw.close()
 
-    # -------------------------------------------------------------------------------- asking
+    # -------------------------------------------------------------------------------- commands
     def ask(self, code: Code, *values: float, within: float = ANSWER_WITHIN) -> tuple[float, ...]:
-        """Give what the server answers. Raises DeviceTimeout, Refused with its status, or what ended the line."""
+        """Return the values of the server's answer. Raise DeviceTimeout, CommandRefused or why it ended."""
         with self._asking:
             if self._motion is not None:
-                raise Refused(f"{self.who} is moving: its server answers when it stands")
+                raise Refused(f"{self.who} is moving. Its server answers at standstill.")
             command = self._send(code, values)
         until = time.monotonic() + within
         try:
             while time.monotonic() < until:
                 found = self.poll(command, 0.05)
                 if found is not None:
-                    return self.judged(found, command).values
+                    return self.checked(found, command).values
         finally:
             self.forget(command)
-        raise DeviceTimeout(f"{self.who} did not answer {command.what} within {within:g} s")
+        raise DeviceTimeout(f"{self.who} did not answer {command.what} within {within:g} s.")
 
-    def begin(self, code: Code, *values: float, valid: Callable[[], bool]) -> Command | None:
-        """Start a motion, or give None when `valid` said no just before. To be polled to its end, and forgotten."""
+    def start(self, code: Code, *values: float, stopped: Callable[[], bool]) -> Command | None:
+        """Start a motion, unless `stopped` returns True; then return None. Poll it to its end, then `forget` it."""
         with self._asking:
-            if not valid():
+            if stopped():
                 return None
             self._motion = self._send(code, values)
             return self._motion
 
     def forget(self, command: Command) -> None:
-        """Drop a command; what still comes of it answers nothing."""
+        """Drop a command; its later answers are discarded."""
         self._waiting.pop(command.sequence, None)
         if self._motion is command:
             self._motion = None
 
     def poll(self, command: Command, wait: float) -> Answer | None:
-        """Give the next answer to a command, None when none comes within `wait` s. Raises what ended the line."""
+        """Return the next answer to a command, None if none comes in `wait` s. Raise why the connection ended."""
         with contextlib.suppress(queue.Empty):
             return command.answers.get(timeout=wait)
         if self.ended is not None:
             raise self.ended
         return None
 
-    def judged(self, found: Answer, command: Command) -> Answer:
-        """Give an answer that says done. Raises Refused or DeviceFault."""
+    def checked(self, found: Answer, command: Command) -> Answer:
+        """Return an answer with status DONE. Raise CommandRefused or DeviceFault for another one."""
         if found.status == Status.DONE:
             return found
         try:
             status = Status(found.status)
         except ValueError:
-            raise DeviceFault(f"{self.who} answers with status {found.status}", fault_code=found.status) from None
+            problem = f"{self.who} answered with the unknown status {found.status}."
+            raise DeviceFault(problem, fault_code=found.status) from None
         what = f"{self.who}, {command.what}: {MEANING.get(status, status.name)}"
         if status in (Status.BAD_CHECK, Status.RAPID_ERROR):
             number = int(found.values[0]) if found.values else int(status)
             raise DeviceFault(what, f"status {int(status)} {found.values}", number)
-        raise Unwilling(what, status)
+        raise CommandRefused(what, status)
 
     def stop(self) -> bool:
-        """Have the arm stop, past all else; true when the server has told within its time that the arm stands."""
+        """Stop the arm, whatever else is in progress; return whether the server confirmed standstill in time."""
         watch = self._watch
         if watch is None or self.ended is not None:
             return False
@@ -257,25 +258,25 @@ class ArmLine:
             self._commands.send(data)
         except OSError as e:
             self._waiting.pop(command.sequence, None)
-            raise ConnectionLost(f"the connection to {self.who} broke", str(e)) from e
+            raise ConnectionLost(f"{self.who}: the connection broke.", str(e)) from e
         return command
 
-    # -------------------------------------------------------------------------------- on its thread
+    # -------------------------------------------------------------------------------- on the connection's thread
     def _run(self) -> None:
         try:
             self._serve()
         except (OSError, ValueError) as e:
-            why: DeviceError = ConnectionLost(f"the connection to {self.who} broke", str(e))
+            why: DeviceError = ConnectionLost(f"{self.who}: the connection broke.", str(e))
         except DeviceError as e:
             why = e
         else:
-            why = NotInControl(f"the line to {self.who} was closed")
+            why = NotInControl(f"{self.who}: the connection was closed.")
         first = self.ended is None
         if first:
             self.ended = why
         self._close()
         if first:
-            self._told_ended(why)
+            self._on_ended(why)
 
     def _serve(self) -> None:
         commands, watch, keep_alive = self._commands, self._watch, self._keep_alive
@@ -289,24 +290,24 @@ class ArmLine:
                 if each.raw in ready:
                     for raw in each.lines():
                         self._take(answer(raw), each is watch)
-            if time.monotonic() - self._heard > SILENT:
-                raise ConnectionLost(f"{self.who} has not answered for {SILENT:g} s")
+            if time.monotonic() - self._answered_at > SILENT:
+                raise ConnectionLost(f"{self.who} has not answered for {SILENT:g} s.")
 
     def _take(self, found: Answer, from_watch: bool) -> None:
         if not from_watch:
             command = self._waiting.get(found.sequence)
             if command is not None and command.code == found.code:
-                command.answers.put(found)  # any other is late: whoever asked has gone
+                command.answers.put(found)  # any other is late: its command was dropped
             return
-        self._heard = time.monotonic()
+        self._answered_at = time.monotonic()
         if found.code == Code.STOP and found.status == Status.DONE:
             stood = self._stopped.pop(found.sequence, None)
             if stood is not None:
                 stood.set()
 
 
-class Unwilling(Refused):
-    """The motion server refuses a command, or ended it early; `status` says how."""
+class CommandRefused(Refused):
+    """The motion server refused a command, or ended it early; `status` is the reason."""
 
     def __init__(self, message: str, status: Status) -> None:
         super().__init__(message, f"status {int(status)}")

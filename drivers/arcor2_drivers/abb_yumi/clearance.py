@@ -1,7 +1,7 @@
-"""The rule by which the arms keep clear of each other: capsules about nominal links, along the path before it is run.
+"""Clearance between the arms: a path is checked before it is run, with capsules around nominal links.
 
-Upper arm, forearm, wrist and hand of each arm are capsules. The joints of a path are taken in steps; where the other
-arm stands or moves is known from the controller, or from what we had it do. Body, table and parts are not known here.
+Upper arm, forearm, wrist and hand of each arm are capsules. A path is sampled in steps. The other arm is
+at the position read from the controller, or on the path that it executes. Body, table and parts are not considered.
 """
 
 import threading
@@ -13,23 +13,24 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.exceptions import Refused
 
 from . import nominal
+from .arms import other_arm
 from .nominal import Array
 from .settings import ARMS
 
 RADII: Final = np.array([0.075, 0.065, 0.05, 0.04])
-"""m: upper arm, forearm, wrist, hand; nominal links with their covers lie within."""
+"""Radii of upper arm, forearm, wrist and hand, m; they contain the nominal links with their covers."""
 AXES: Final = (1, 3, 4, 6)
-"""Frames whose origins are shoulder, elbow, wrist, flange."""
+"""Frames with their origins at shoulder, elbow, wrist and flange."""
 ANGLE_STEP: Final = 0.05
-"""rad between two joint positions that are looked at."""
-ALREADY: Final = 0.002
-"""m by which arms that stand too close already may come closer on their way apart."""
+"""Joint angle between two checked positions, rad."""
+APPROACH: Final = 0.002
+"""Distance by which arms that are too close already may approach further while they separate, m."""
 TIMING: Final = 0.05
-"""Part of a synchronised path by which the arms may be ahead of each other."""
+"""Fraction of a synchronized path by which one arm may be ahead of the other."""
 
 
 def bones(arm: str, joints: Array, tcp: Pose) -> Array:
-    """Give the points of shoulder, elbow, wrist, flange and TCP, shape (n, 5, 3), of joints (n, 7)."""
+    """Return shoulder, elbow, wrist, flange and TCP, shape (n, 5, 3), for joints of shape (n, 7)."""
     found = nominal.frames(arm, joints)
     points = np.empty((len(joints), 5, 3))
     points[:, :4] = found[:, list(AXES)][:, :, :3, 3]
@@ -38,7 +39,7 @@ def bones(arm: str, joints: Array, tcp: Pose) -> Array:
 
 
 def between(one: Array, other: Array) -> Array:
-    """Give the clearance of the capsules, m, of points (..., 5, 3) that broadcast; negative inside."""
+    """Return the clearance of capsules, m, for points of shape (..., 5, 3), broadcast; negative if they overlap."""
     p, q = one[..., :-1, None, :], other[..., None, :-1, :]
     u, v = one[..., 1:, None, :] - p, other[..., None, 1:, :] - q
     w = p - q
@@ -55,36 +56,32 @@ def between(one: Array, other: Array) -> Array:
 
 
 def joint_path(start: Array, goal: Array) -> Array:
-    """Give the joints (n, 7) of a motion in which all axes go evenly."""
+    """Return the joints, shape (n, 7), of a motion with all axes together."""
     count = int(np.clip(np.abs(goal - start).max() / ANGLE_STEP, 2, 120))
     return start + np.linspace(0.0, 1.0, count + 1)[:, None] * (goal - start)
 
 
 class Clearance:
-    """Knows what each arm is doing, and judges what one is to do next."""
+    """Stores the path that each arm executes, and checks new ones against it."""
 
     def __init__(self, name: str, tools: dict[str, Pose], least: float) -> None:
         self._name, self._tools, self._least = name, tools, least
         self._lock = threading.Lock()
         self._paths: dict[str, Array] = {}
 
-    def set_tool(self, arm: str, tcp: Pose) -> None:
-        """Take note of another TCP; the hand reaches from the flange to there."""
-        self._tools[arm] = tcp
-
     def claim(self, arm: str, path: Array, other_joints: Array) -> None:
-        """Judge a path of one arm against where the other is, or may come to; keep it until `free`. Raises Refused."""
+        """Check a path of one arm against the other one, and reserve it until `free`. Raise Refused."""
         other = other_arm(arm)
         with self._lock:
             there = self._paths.get(other, other_joints[None, :])
             mine = bones(arm, path, self._tools[arm])
             theirs = bones(other, there, self._tools[other])
             gaps = between(mine[:, None], theirs[None, :]).min(axis=1)
-            self._judge(arm, gaps)
+            self._check(arm, gaps)
             self._paths[arm] = path
 
     def claim_both(self, paths: dict[str, Array]) -> None:
-        """Judge paths that both arms run in step; keep them until `free`. Raises Refused."""
+        """Check paths that both arms execute in step, and reserve them until `free`. Raise Refused."""
         count = max(len(path) for path in paths.values())
         one, two = (_resampled(bones(arm, paths[arm], self._tools[arm]), count) for arm in ARMS)
         with self._lock:
@@ -93,41 +90,36 @@ class Clearance:
             for shift in range(-reach, reach + 1):
                 at = np.clip(np.arange(count) + shift, 0, count - 1)
                 gaps = np.minimum(gaps, between(one, two[at]))
-            self._judge("left", gaps)
+            self._check("left", gaps)
             self._paths.update(paths)
 
-    def judge_stand(self, arm: str, joints: Array, other_joints: Array) -> None:
-        """Judge joints at which one arm would stand beside the other. Raises Refused."""
+    def check_joints(self, arm: str, joints: Array, other_joints: Array) -> None:
+        """Check joints of one arm against the present ones of the other. Raise Refused."""
         other = other_arm(arm)
         mine, theirs = (
             bones(arm, joints[None, :], self._tools[arm]),
             bones(other, other_joints[None, :], self._tools[other]),
         )
         with self._lock:
-            self._judge(arm, np.append(np.inf, between(mine, theirs)))
+            self._check(arm, np.append(np.inf, between(mine, theirs)))
 
     def free(self, arm: str) -> None:
-        """Forget an arm's path: it stands."""
+        """Drop the path of an arm that is at standstill."""
         with self._lock:
             self._paths.pop(arm, None)
 
-    def _judge(self, arm: str, gaps: Array) -> None:
+    def _check(self, arm: str, gaps: Array) -> None:
         least = float(gaps.min())
-        if least < min(self._least, float(gaps[0]) - ALREADY):
+        if least < min(self._least, float(gaps[0]) - APPROACH):
             gap = f"{least * 1e3:.0f} mm" if least > 0.0 else "touching it"
             raise Refused(
-                f"{self._name}: the {arm} arm would come too close to the {other_arm(arm)} arm",
-                f"nominal clearance {gap}, {self._least * 1e3:.0f} mm asked for",
+                f"{self._name}: the {arm} arm would come too close to the {other_arm(arm)} arm.",
+                f"nominal clearance {gap}, required {self._least * 1e3:.0f} mm",
             )
 
 
-def other_arm(arm: str) -> str:
-    """Give the other arm."""
-    return ARMS[1 - ARMS.index(arm)]
-
-
 def _resampled(points: Array, count: int) -> Array:
-    """Give points at `count` equal parts of a path."""
+    """Return `count` evenly spaced points of a path."""
     places = np.linspace(0.0, len(points) - 1.0, count)
     low = np.minimum(places.astype(int), len(points) - 2)
     part = (places - low)[:, None, None]

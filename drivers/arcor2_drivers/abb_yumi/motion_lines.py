@@ -1,4 +1,4 @@
-"""The lines of the RAPID motion server (rapid/README.md): pure functions and the numbers' meaning."""
+"""Protocol of the RAPID motion server (rapid/README.md): codes, statuses, encoding and decoding of lines."""
 
 import enum
 import math
@@ -10,13 +10,13 @@ from arcor2_hw.keep_alive import TOO_SLOW
 
 VERSION: Final = 1
 LONGEST_LINE: Final = 79
-"""Characters before the line feed: a string of RAPID holds 80."""
+"""Greatest number of characters before the line feed: a RAPID string holds 80."""
 LAST_SEQUENCE: Final = 9999
 MOST_WAYPOINTS: Final = 50
 
 
 class Code(enum.IntEnum):
-    """What is asked for."""
+    """Code of a command."""
 
     HELLO = 1
     BEGIN = 2
@@ -52,7 +52,7 @@ class Code(enum.IntEnum):
 
 
 class Status(enum.IntEnum):
-    """How it went."""
+    """Status of an answer."""
 
     DONE = 0
     ACCEPTED = 1
@@ -72,20 +72,20 @@ class Status(enum.IntEnum):
 MEANING: Final = {
     Status.STOPPED: "stopped",
     Status.WATCHDOG: f"stopped by its watchdog: {TOO_SLOW.format('robot')}",
-    Status.BAD_CHECK: "the check of the line was wrong",
-    Status.BAD_CODE: "the code is not known to the RAPID modules",
+    Status.BAD_CHECK: "the checksum of the line was wrong",
+    Status.BAD_CODE: "the RAPID modules do not know the code",
     Status.BAD_COUNT: "the number of arguments was wrong",
     Status.BAD_VALUE: "a value was refused",
     Status.UNREACHABLE: "the target cannot be reached",
-    Status.NO_SESSION: "no session has begun, or its watchdog ended it",
+    Status.NO_SESSION: "no session was started, or its watchdog ended it",
     Status.BY_HAND: "the arm is being moved by hand",
-    Status.NO_PARTNER: "the other arm did not come to the synchronised motion",
+    Status.NO_PARTNER: "the other arm did not join the synchronized motion",
     Status.RAPID_ERROR: "a RAPID error",
 }
 
 
 class Answer(NamedTuple):
-    """A line of the server."""
+    """An answer of the server."""
 
     sequence: int
     code: int
@@ -94,35 +94,35 @@ class Answer(NamedTuple):
 
 
 def check(text: str) -> int:
-    """Give the check number: the sum of position (from 1) times character code, modulo 997."""
+    """Return the checksum: the sum of position (from 1) times character code, modulo 997."""
     return sum(place * ord(sign) for place, sign in enumerate(text, 1)) % 997
 
 
-PARTS: Final = {Code.TOOL: 3, Code.STAGE_ORIENTATION: 0}
-"""From which argument on a code takes parts of a quaternion, which need six decimals; all else has three."""
+QUATERNIONS: Final = {Code.TOOL: 3, Code.STAGE_ORIENTATION: 0}
+"""First argument that is part of a quaternion, with six decimals; other arguments have three."""
 
 
 def number(value: float, decimals: int = 3) -> str:
-    """Write a number, without zeros at its end. Raises ValueError when it is not finite."""
+    """Format a number without trailing zeros. Raise ValueError unless it is finite."""
     if not math.isfinite(value):
-        raise ValueError("the numbers of a command must be finite")
+        raise ValueError("The numbers of a command must be finite.")
     text = f"{value:.{decimals}f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
 
 
 def line(sequence: int, code: Code, values: Iterable[float] = ()) -> bytes:
-    """Give the line of a command. Raises ValueError when it would be too long, or a number is not finite."""
-    first = PARTS.get(code, LONGEST_LINE)
+    """Return the line of a command. Raise ValueError if it is too long, or a number is not finite."""
+    first = QUATERNIONS.get(code, LONGEST_LINE)
     numbers = (number(value, 6 if place >= first else 3) for place, value in enumerate(values))
     text = " ".join([str(sequence), str(int(code)), *numbers])
     out = f"{text}*{check(text)}"
     if len(out) > LONGEST_LINE:
-        raise ValueError(f"the line has {len(out)} characters, {LONGEST_LINE} fit: {out}")
+        raise ValueError(f"The line has {len(out)} characters; at most {LONGEST_LINE} are allowed: {out}")
     return f"{out}\n".encode()
 
 
 def answer(raw: bytes) -> Answer:
-    """Give what a line says. Raises DeviceFault for a line that is none."""
+    """Decode a line. Raise DeviceFault for a garbled one."""
     try:
         text, star, given = raw.decode("ascii").rstrip("\r").rpartition("*")
         if not star or int(given) != check(text):
@@ -130,4 +130,4 @@ def answer(raw: bytes) -> Answer:
         sequence, code, status, *values = text.split(" ")
         return Answer(int(sequence), int(code), int(status), tuple(map(float, values)))
     except ValueError:  # UnicodeDecodeError is one
-        raise DeviceFault("a line of the motion server is garbled", repr(raw[:100]), "garbled") from None
+        raise DeviceFault("A line of the motion server is garbled.", repr(raw[:100]), "garbled") from None

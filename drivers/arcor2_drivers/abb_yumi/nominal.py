@@ -1,7 +1,7 @@
-"""Nominal kinematics of the two arms, for what the controller cannot be asked: reachability and clearance.
+"""Nominal kinematics of both arms, for what the controller does not compute: reachability and clearance.
 
-Built from the published dimensions and the feet's usual places on the body; a real arm is off by some millimetres, so
-no motion is ever commanded from these numbers. Joints are axes 1 to 7 in rad; axis 7 sits between 2 and 3.
+They use the published dimensions and the usual mounting of the arms. A real arm differs by some millimetres, so no
+motion is commanded from these numbers. Joints are axes 1 to 7 in rad; axis 7 is between 2 and 3.
 """
 
 import math
@@ -39,13 +39,13 @@ LINKS: Final = (
     ((-0.027, 0.0, 0.0), (HALF, 0.0, 0.0)),
     ((0.027, 0.036, 0.0), (-HALF, math.pi, 0.0)),
 )
-"""Where each axis stands in the frame of the one before: position (m), roll, pitch, yaw."""
+"""Frame of each axis in the previous one: position (m), roll, pitch, yaw (rad)."""
 FEET: Final = {
     LEFT: ((0.05355, 0.0725, 0.41492), (0.9781, -0.5716, 2.3180)),
     RIGHT: ((0.05355, -0.0725, 0.41492), (-0.9795, -0.5682, -2.3155)),
 }
-LOST: Final = 0.03
-"""m that nominal kinematics may be short of a pose that the controller is still asked about."""
+MAX_ERROR: Final = 0.03
+"""Greatest error of nominal kinematics, m, with which the controller is still asked for a solution."""
 
 
 def _transform(position: tuple[float, float, float], rpy: tuple[float, float, float]) -> Array:
@@ -68,7 +68,7 @@ _FEET: Final = {arm: _transform(*foot) for arm, foot in FEET.items()}
 
 
 def frames(arm: str, joints: Array) -> Array:
-    """Give the axes' frames in the robot's, shape (n, 7, 4, 4), of joints (n, 7); the last is the flange."""
+    """Return the frames of the axes in the robot's, shape (n, 7, 4, 4), for joints (n, 7); the last is the flange."""
     out = np.empty((len(joints), 7, 4, 4))
     at = np.broadcast_to(_FEET[arm], (len(joints), 4, 4))
     for link, (axis, step) in enumerate(zip(ORDER, _STEPS, strict=True)):
@@ -82,7 +82,7 @@ def frames(arm: str, joints: Array) -> Array:
 
 
 def nearest(arm: str, flange: Array, seed: Array, rounds: int = 40) -> tuple[Array, float]:
-    """Give joints near a seed that bring the flange nearest to a pose (4, 4), and by how much they miss it, m."""
+    """Return joints near a seed that bring the flange nearest to a pose, shape (4, 4), and the error, m."""
     low, high = np.array(LIMITS).T
     q = np.clip(seed, low, high)
     missing, jacobian = _linearised(arm, q, flange)
@@ -92,7 +92,7 @@ def nearest(arm: str, flange: Array, seed: Array, rounds: int = 40) -> tuple[Arr
         if size < 1e-5:
             break
         free = np.ones(7)
-        for _ in range(3):  # an axis at its limit takes no part in a step that would lead beyond
+        for _ in range(3):  # keep an axis at its limit from moving beyond it
             reduced = jacobian * free
             step = reduced.T @ np.linalg.solve(reduced @ reduced.T + damping**2 * np.eye(6), missing)
             blocked = ((q <= low) & (step < 0.0)) | ((q >= high) & (step > 0.0))
@@ -112,7 +112,7 @@ def nearest(arm: str, flange: Array, seed: Array, rounds: int = 40) -> tuple[Arr
 
 
 def _linearised(arm: str, q: Array, flange: Array) -> tuple[Array, Array]:
-    """Give what is missing to a pose, 0.3 m counting as a radian, and how each joint closes it."""
+    """Return the error to a pose (0.3 m per radian), and its Jacobian by the joints."""
     found = frames(arm, q[None, :])[0]
     at = found[6]
     missing = np.empty(6)
@@ -126,7 +126,7 @@ def _linearised(arm: str, q: Array, flange: Array) -> tuple[Array, Array]:
 
 
 def _turn(rotation: Array) -> Array:
-    """Give axis times angle."""
+    """Return axis times angle of a rotation matrix."""
     skew = np.array([rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]])
     sine, cosine = float(np.linalg.norm(skew)) / 2.0, (float(np.trace(rotation)) - 1.0) / 2.0
     angle = math.atan2(sine, cosine)
@@ -135,12 +135,12 @@ def _turn(rotation: Array) -> Array:
         return out
     if cosine > 0.0:
         return skew / 2.0
-    axis = np.sqrt(np.clip((np.diag(rotation) + 1.0) / 2.0, 0.0, None))  # a half turn: any sign leads there
+    axis = np.sqrt(np.clip((np.diag(rotation) + 1.0) / 2.0, 0.0, None))  # a half turn: both signs are equivalent
     return np.asarray(axis * math.pi)
 
 
 def straight(arm: str, start: Array, flange: Array, step: float = 0.02) -> Array | None:
-    """Give joints (n, 7) along the straight line of the flange from joints to a pose; None where it loses the line."""
+    """Return joints, shape (n, 7), along a line of the flange to a pose; None if there is no solution on the line."""
     first = frames(arm, start[None, :])[0, 6]
     distance = float(np.linalg.norm(flange[:3, 3] - first[:3, 3]))
     turn = _turn(flange[:3, :3] @ first[:3, :3].T)
@@ -152,14 +152,14 @@ def straight(arm: str, start: Array, flange: Array, step: float = 0.02) -> Array
         pose[:3, :3] = _rotation(turn * part) @ first[:3, :3]
         pose[:3, 3] = first[:3, 3] + part * (flange[:3, 3] - first[:3, 3])
         q, missed = nearest(arm, pose, path[-1], rounds=12)
-        if missed > LOST:
+        if missed > MAX_ERROR:
             return None
         path.append(q)
     return np.array(path)
 
 
 def _rotation(turn: Array) -> Array:
-    """Give the rotation matrix of axis times angle (Rodrigues)."""
+    """Return the rotation matrix of axis times angle (Rodrigues)."""
     angle = float(np.linalg.norm(turn))
     if angle < 1e-12:
         return np.eye(3)

@@ -1,11 +1,10 @@
-"""Asks the controller again and again, in a thread of its own; everybody else reads what was told. Never writes."""
+"""Observation of the controller: one thread polls Robot Web Services. It never writes."""
 
 import threading
 import time
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
-from arcor2_hw.data.geometry import Pose
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected, Refused, Stale
 from arcor2_hw.objects.observing import Observing
 
@@ -16,31 +15,31 @@ from .settings import ARMS, YumiSettings
 TASKS: Final = {"left": "T_ROB_L", "right": "T_ROB_R"}
 UNITS: Final = {"left": "ROB_L", "right": "ROB_R"}
 PROGRAMS: Final = {"left": "Arcor2Left", "right": "Arcor2Right"}
-"""Names of the programs as they are loaded from the .pgf files."""
+"""Names of the programs that the .pgf files load."""
 FRESH: Final = 0.8
-"""Seconds: how old a position may be. A look takes six requests, each of which may take ten ms and more."""
+"""Greatest age of a sample, s: it takes six requests of ten ms or more each."""
 AT_REST: Final = 2e-3
-"""rad/s below which a joint counts as standing."""
+"""Joint speed below which a joint is at standstill, rad/s."""
 
 
 class _Leaving(Exception):
-    """Observing ends in the middle of a look."""
+    """Observation ends between two requests."""
 
 
 class Holder(NamedTuple):
-    """Who has mastership of RAPID."""
+    """Client that has mastership of RAPID."""
 
     alias: str
     application: str
     location: str
 
     def __str__(self) -> str:
-        beside = ", ".join(part for part in (self.application, self.location) if part)
-        return (self.alias or "somebody") + (f" ({beside})" if beside else "")
+        details = ", ".join(part for part in (self.application, self.location) if part)
+        return (self.alias or "another client") + (f" ({details})" if details else "")
 
 
 class Panel(NamedTuple):
-    """What a person changes, and since when (monotonic) it is known."""
+    """State that a person changes, and the time when it was read (monotonic)."""
 
     monotonic: float
     operation_mode: str
@@ -49,16 +48,21 @@ class Panel(NamedTuple):
     programs: dict[str, str]
     holder: Holder | None
     lead_through: dict[str, bool | None]
-    """None where the controller has no such resource."""
+    """None if the controller has no such resource."""
 
     @property
     def ours(self) -> bool:
-        """Tell whether the programs of both tasks are our motion servers."""
+        """Return whether the programs of both tasks are our motion servers."""
         return self.programs == PROGRAMS
+
+    @property
+    def program_names(self) -> str:
+        """Return the names of the programs loaded."""
+        return " and ".join(sorted({name or "no program" for name in self.programs.values()}))
 
 
 class Sample(NamedTuple):
-    """One look: when it was begun (monotonic), joints (rad, axes 1 to 7), flange in the robot's frame, and so on."""
+    """State of the robot: start of reading (monotonic), joints (rad, axes 1 to 7), flange in the robot's frame."""
 
     monotonic: float
     control_state: str
@@ -69,17 +73,17 @@ class Sample(NamedTuple):
 
     @property
     def age(self) -> float:
-        """Give the seconds since it was begun."""
+        """Return the time since reading started, s."""
         return time.monotonic() - self.monotonic
 
     @property
     def moving(self) -> bool:
-        """Tell whether an arm moves."""
+        """Return whether an arm moves."""
         return max(self.speeds.values()) > AT_REST
 
 
 def read_panel(rws: Rws) -> Panel:
-    """Ask for what a person changes."""
+    """Read the state that a person changes."""
     panel = Panel(0.0, "", 0.0, "", {}, None, {})
     for part in PARTS:
         panel = part(rws, panel)
@@ -95,7 +99,7 @@ def _speed(rws: Rws, panel: Panel) -> Panel:
     try:
         return panel._replace(speed_ratio=float(ratio) / 100.0)
     except ValueError:
-        raise ConnectionLost(f"{rws.who} gave a speed ratio that is none", ratio) from None
+        raise ConnectionLost(f"{rws.who} returned an invalid speed ratio.", ratio) from None
 
 
 def _collision(rws: Rws, panel: Panel) -> Panel:
@@ -115,26 +119,26 @@ def _lead_throughs(rws: Rws, panel: Panel) -> Panel:
 
 
 PARTS: Final = (_mode, _speed, _collision, _programs, _holder, _lead_throughs)
-"""What the panel is asked for in, one part beside each look: a burst of all would let the positions grow old."""
+"""Parts of the panel; one is read after each sample, because reading all of them would delay the next one."""
 
 
 def holder(rws: Rws) -> Holder | None:
-    """Ask who has mastership of RAPID; None when nobody has."""
-    told = rws.get("/rw/mastership/rapid")
-    if not told or told[0].get("mastership", "nomaster") == "nomaster":
+    """Return the client that has mastership of RAPID, or None."""
+    states = rws.get("/rw/mastership/rapid")
+    if not states or states[0].get("mastership", "nomaster") == "nomaster":
         return None
-    return Holder(told[0].get("alias", ""), told[0].get("application", ""), told[0].get("location", ""))
+    return Holder(*(states[0].get(field, "") for field in Holder._fields))
 
 
 def _program(rws: Rws, task: str) -> str:
     try:
         return rws.value(f"/rw/rapid/tasks/{task}/program", "name")
-    except Refused:  # no program is loaded
+    except Refused:  # no program loaded
         return ""
 
 
 def lead_through_path(unit: str) -> str:
-    """Give the resource of lead-through of a mechanical unit."""
+    """Return the path of the lead-through resource of a mechanical unit."""
     return f"/rw/motionsystem/mechunits/{unit}/lead-through"
 
 
@@ -146,18 +150,18 @@ def _lead_through(rws: Rws, unit: str) -> bool | None:
 
 
 def read_running(rws: Rws) -> bool:
-    """Ask whether RAPID runs."""
+    """Return whether RAPID runs."""
     return rws.value("/rw/rapid/execution", "ctrlexecstate") == "running"
 
 
 def read_joints(fields: Fields) -> list[float]:
-    """Give the joints of a jointtarget, rad; axis 7 is eax_a."""
+    """Return the joints of a jointtarget, rad; axis 7 is eax_a."""
     names = [*(f"rax_{number}" for number in range(1, 7)), "eax_a"]
     return to_radians(float(fields[name]) for name in names)
 
 
 def read_target(fields: Fields) -> RobTarget:
-    """Give a robtarget; its eax_a is the arm angle."""
+    """Return a robtarget; its eax_a is the arm angle."""
     pose = pose_from(
         [float(fields[name]) for name in ("x", "y", "z")], [float(fields[f"q{number}"]) for number in range(1, 5)]
     )
@@ -166,41 +170,37 @@ def read_target(fields: Fields) -> RobTarget:
 
 
 class Observer:
-    """The observed controller. `seen` is called on the observing thread with each sample."""
+    """Observes the controller. `on_sample` and `on_lost` are called on the observing thread."""
 
-    def __init__(
-        self,
-        name: str,
-        settings: YumiSettings,
-        seen: Callable[[Sample], None] = lambda _: None,
-        lost: Callable[[DeviceError], None] = lambda _: None,
-    ) -> None:
+    on_sample: Callable[[Sample], None] | None = None
+    on_lost: Callable[[DeviceError], None] | None = None
+
+    def __init__(self, name: str, settings: YumiSettings) -> None:
         self.rws = Rws(name, settings.host, settings.rws_port, settings.user, settings.password)
         self.who = self.rws.who
         self.fresh = max(FRESH, 3.0 * settings.poll_period)
         self.version = ""
         self._period = settings.poll_period
-        self._seen = seen
         self._sample: Sample | None = None
         self._panel: Panel | None = None
-        self._news = threading.Condition()
+        self._received = threading.Condition()
         self._hurry = threading.Event()
         self._ending = False
         self._part = 0
-        self.observing = Observing(self.who, self._open, self._watch, self._close, lost)
+        self.observing = Observing(self.who, self._open, self._watch, self._close, self._lost)
 
     def connect(self, timeout: float) -> None:
-        """Begin to observe. Raises NotConnected, DeviceTimeout, ConnectionLost, each naming host and port."""
+        """Start to observe. Raise NotConnected, DeviceTimeout or ConnectionLost."""
         self._ending = False
         self.observing.start(timeout)
 
     def leave(self) -> None:
-        """Ask no more; the request under way is the last. To be followed by `disconnect`."""
+        """Send no further requests; call `disconnect` afterwards."""
         self._ending = True
         self._hurry.set()
 
     def disconnect(self) -> None:
-        """Stop observing and end the session; harmless when it was not observed."""
+        """Stop observing and end the session."""
         online = self.observing.online
         self.leave()
         self.observing.stop()
@@ -208,45 +208,45 @@ class Observer:
             self.rws.logout()
 
     def newest(self) -> Sample | None:
-        """Give the newest sample, however old."""
+        """Return the latest sample, whatever its age; None before the first."""
         return self._sample
 
     def sample(self) -> Sample:
-        """Give the newest sample. Raises NotConnected, ConnectionLost, or Stale when it is too old."""
+        """Return the latest sample. Raise NotConnected, ConnectionLost, or Stale if it is too old."""
         newest = self._sample
         if newest is not None and newest.age <= self.fresh and self.observing.online:
             return newest
         self.observing.check()
         if newest is None:
-            raise NotConnected(f"{self.who} has told nothing yet")
-        raise Stale(f"what {self.who} told last is {newest.age:.2f} s old, {self.fresh:g} s are allowed")
+            raise NotConnected(f"{self.who} has not been read yet.")
+        raise Stale(f"The state of {self.who} is {newest.age:.2f} s old; at most {self.fresh:g} s is allowed.")
 
     def panel(self) -> Panel:
-        """Give what a person changes, as known last. Raises as `sample`."""
+        """Return the latest panel. Raise as `sample`."""
         self.sample()
         assert self._panel is not None
         return self._panel
 
     @property
     def known_panel(self) -> Panel | None:
-        """Give what a person changes, as known last, however old."""
+        """Return the latest panel, whatever its age."""
         return self._panel
 
     def note(self, panel: Panel) -> None:
-        """Take what was asked elsewhere."""
+        """Store a panel that was read elsewhere."""
         self._panel = panel
 
     def sample_after(self, moment: float, within: float = 1.0) -> Sample:
-        """Wait for a sample that was begun after a moment (monotonic). Raises DeviceTimeout, or how it was lost."""
+        """Wait for a sample started after a moment (monotonic). Raise DeviceTimeout, or why the connection is lost."""
         self._hurry.set()
-        with self._news:
+        with self._received:
             while (newest := self._sample) is None or newest.monotonic < moment:
                 self.observing.check()
                 left = moment + within - time.monotonic()
-                if left <= 0.0 or not self._news.wait(min(left, 0.2)):
+                if left <= 0.0 or not self._received.wait(min(left, 0.2)):
                     self.observing.check()
                     if time.monotonic() > moment + within:
-                        raise DeviceTimeout(f"{self.who} has told nothing new for {within:g} s")
+                        raise DeviceTimeout(f"{self.who} has sent no new state for {within:g} s.")
         return newest
 
     # -------------------------------------------------------------------------------- on the observing thread
@@ -255,10 +255,10 @@ class Observer:
             self.version = self.rws.get("/rw/system", FIRST_WITHIN)[0].get("rwversion", "")
             if not self.version.startswith("6."):
                 version = self.version or "?"
-                raise Refused(f"{self.who} has RobotWare {version}; this driver speaks RWS 1.0 of RobotWare 6")
+                raise Refused(f"{self.who} has RobotWare {version}. This driver supports RobotWare 6 (RWS 1.0) only.")
             self._sample = None
             self._panel = read_panel(self.rws)
-            self._look()
+            self._read()
 
     def _close(self) -> None:
         self.rws.close()
@@ -268,43 +268,50 @@ class Observer:
             self._hurry.wait(self._period)
             self._hurry.clear()
             try:
-                self._look()
+                self._read()
             except _Leaving:
                 stopping.wait(1.0)
                 return
             self._part = (self._part + 1) % len(PARTS)
             assert self._panel is not None
-            noted = self._panel
-            found = PARTS[self._part](self.rws, noted)
-            if self._panel is noted:  # else it was asked elsewhere in between
+            before = self._panel
+            found = PARTS[self._part](self.rws, before)
+            if self._panel is before:  # else it was read elsewhere meanwhile
                 self._panel = found._replace(monotonic=time.monotonic())
 
-    def _go_on(self) -> None:
+    def _check_not_leaving(self) -> None:
         if self._ending:
             raise _Leaving
 
-    def _look(self) -> None:
-        began, rws = time.monotonic(), self.rws
-        self._go_on()
+    def _lost(self, error: DeviceError) -> None:
+        if self.on_lost is not None:
+            self.on_lost(error)
+
+    def _read(self) -> None:
+        started, rws = time.monotonic(), self.rws
+        self._check_not_leaving()
         state = rws.value("/rw/panel/ctrlstate", "ctrlstate")
-        self._go_on()
+        self._check_not_leaving()
         running = read_running(rws)
         joints, targets = {}, {}
         for arm, unit in UNITS.items():
             place = f"/rw/motionsystem/mechunits/{unit}"
-            self._go_on()
-            told = rws.get(f"{place}/jointtarget")
-            self._go_on()
-            posed = rws.get(f"{place}/robtarget", tool="tool0", wobj="wobj0", coordinate="World")
+            self._check_not_leaving()
+            jointtarget = rws.get(f"{place}/jointtarget")
+            self._check_not_leaving()
+            robtarget = rws.get(f"{place}/robtarget", tool="tool0", wobj="wobj0", coordinate="World")
             try:
-                joints[arm], targets[arm] = read_joints(told[0]), read_target(posed[0])
+                joints[arm], targets[arm] = read_joints(jointtarget[0]), read_target(robtarget[0])
             except (IndexError, KeyError, ValueError):
-                raise ConnectionLost(f"{self.who} gave a position of {unit} that is none", f"{told} {posed}") from None
-        sample = Sample(began, state, running, joints, targets, self._speeds(began, joints))
-        with self._news:
+                raise ConnectionLost(
+                    f"{self.who} returned an invalid position of {unit}.", f"{jointtarget} {robtarget}"
+                ) from None
+        sample = Sample(started, state, running, joints, targets, self._speeds(started, joints))
+        with self._received:
             self._sample = sample
-            self._news.notify_all()
-        self._seen(sample)
+            self._received.notify_all()
+        if self.on_sample is not None:
+            self.on_sample(sample)
 
     def _speeds(self, now: float, joints: dict[str, list[float]]) -> dict[str, float]:
         last = self._sample
@@ -314,8 +321,3 @@ class Observer:
         return {
             arm: max(abs(b - a) for a, b in zip(last.joints[arm], joints[arm], strict=True)) / spent for arm in ARMS
         }
-
-
-def world(object_pose: Pose, target: RobTarget, tcp: Pose) -> Pose:
-    """Give the TCP in the scene's world, for a flange in the robot's frame."""
-    return object_pose * target.pose * tcp

@@ -1,4 +1,4 @@
-"""Robot Web Services 1.0 (RobotWare 6): a session with digest authentication, questions, acts, ABB's own errors."""
+"""Client of Robot Web Services 1.0 (RobotWare 6), with digest authentication and the controller's error texts."""
 
 import contextlib
 import math
@@ -13,18 +13,18 @@ import httpx
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotConnected, Refused
 
 REQUEST_TIMEOUT: Final = 1.0
-"""Seconds a request may take: the web server of an IRC5 answers within some ten ms, seldom in hundreds."""
+"""Time for a request, s: the web server of an IRC5 usually answers within some ten ms, rarely in hundreds."""
 FIRST_WITHIN: Final = 1.5
-"""Seconds the first answer of a session may take: it costs two requests, by digest authentication."""
+"""Time for the first answer of a session, s: digest authentication needs two requests."""
 
 Fields = dict[str, str]
 
 _NO_TLS: Final = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-"""Trusts nobody and is never used; without it every new client reads the certificates of the system, 20 ms long."""
+"""Unused, and trusts no one; without it every new client loads the system's certificates, which takes 20 ms."""
 
 
 class Rws:
-    """One session. It may be opened and closed again; the session at the controller lives on, until `logout`."""
+    """One session. Closing keeps the session at the controller, until `logout`."""
 
     def __init__(self, name: str, host: str, port: int, user: str, password: str) -> None:
         self.name = name
@@ -39,7 +39,7 @@ class Rws:
 
     @contextlib.contextmanager
     def all_until(self, moment: float) -> Iterator[None]:
-        """Have all requests of a block be over by a moment (monotonic): many that are slow are as bad as one."""
+        """Set a common deadline (monotonic) for all requests of a block."""
         self._until = moment
         try:
             yield
@@ -47,14 +47,14 @@ class Rws:
             self._until = math.inf
 
     def close(self) -> None:
-        """Close the connection; harmless when closed. The session stays."""
+        """Close the connection, but not the session."""
         client, self._client = self._client, None
         if client is not None:
             self._cookies = client.cookies
             client.close()
 
     def logout(self, timeout: float = 0.2) -> None:
-        """End the session at the controller, and what it holds with it; not reaching the controller is no error."""
+        """End the session at the controller, if it can be reached; its mastership is released."""
         if self._client is not None:
             with contextlib.suppress(DeviceError):
                 self._ask("GET", "/logout", {}, None, timeout)
@@ -62,39 +62,41 @@ class Rws:
         self._cookies, self._fresh = httpx.Cookies(), True
 
     def get(self, path: str, timeout: float = REQUEST_TIMEOUT, **query: str) -> list[Fields]:
-        """Give the states of a resource, each with `_type` and `_title`.
+        """Return the states of a resource, each with `_type` and `_title`.
 
-        Raises NotConnected, ConnectionLost, DeviceTimeout, Refused or DeviceFault with the controller's words.
+        Raises:
+            DeviceError: NotConnected, ConnectionLost, DeviceTimeout, or Refused or DeviceFault with the controller's
+                text.
         """
         answer = self._ask("GET", path, query, None, timeout)
         try:
             found = answer.json()["_embedded"]["_state"]
             return [{str(key): str(value) for key, value in state.items()} for state in found]
         except (ValueError, KeyError, TypeError, AttributeError):
-            raise ConnectionLost(f"{self.who} answered {path} in a form that is none", answer.text[:200]) from None
+            raise ConnectionLost(f"{self.who} sent an invalid answer to {path}.", answer.text[:200]) from None
 
     def value(self, path: str, field: str, timeout: float = REQUEST_TIMEOUT) -> str:
-        """Give one field of a resource with one state."""
+        """Return a field of the first state of a resource."""
         states = self.get(path, timeout)
         if not states or field not in states[0]:
-            raise ConnectionLost(f"{self.who} answered {path} without {field}", str(states)[:200])
+            raise ConnectionLost(f"The answer of {self.who} to {path} has no field {field}.", str(states)[:200])
         return states[0][field]
 
     def act(self, path: str, action: str | None, body: Fields | None = None, timeout: float = REQUEST_TIMEOUT) -> None:
-        """Have something done; raises as `get`."""
+        """Send a command. Raise as `get`."""
         self._ask("POST", path, {"action": action} if action else {}, body or {}, timeout)
 
     @contextlib.contextmanager
     def _turn(self, timeout: float) -> Iterator[None]:
         if not self._lock.acquire(timeout=timeout):
-            raise DeviceTimeout(f"{self.who} is busy with another request")
+            raise DeviceTimeout(f"{self.who} is busy with another request.")
         try:
             yield
         finally:
             self._lock.release()
 
     def _ask(self, method: str, path: str, query: Fields, body: Fields | None, timeout: float) -> httpx.Response:
-        if self._fresh:  # digest authentication asks twice
+        if self._fresh:  # digest authentication needs two requests
             timeout = max(timeout, FIRST_WITHIN)
         until = min(time.monotonic() + timeout, self._until)
         timeout = max(until - time.monotonic(), 0.01)
@@ -117,27 +119,27 @@ class Rws:
                     timeout=max(until - time.monotonic(), 0.01),
                 )
             except httpx.ConnectError as e:
-                raise NotConnected(f"{self.who} is not there", str(e)) from e
+                raise NotConnected(f"{self.who} refuses the connection. Is the controller switched on?", str(e)) from e
             except httpx.TimeoutException as e:
-                raise DeviceTimeout(f"{self.who} did not answer {path} within {timeout:.2g} s") from e
+                raise DeviceTimeout(f"{self.who} did not answer {path} within {timeout:.2g} s.") from e
             except httpx.HTTPError as e:
-                raise ConnectionLost(f"the connection to {self.who} broke", f"{path}: {e}") from e
+                raise ConnectionLost(f"The connection to {self.who} broke.", f"{path}: {e}") from e
         self._fresh = False
         if answer.status_code >= 400:
             raise self._refusal(answer, path)
         return answer
 
     def _refusal(self, answer: httpx.Response, path: str) -> DeviceError:
-        """Give the error that an answer stands for, with the controller's number and words."""
+        """Return the error of an answer, with the controller's number and text."""
         status = answer.status_code
         if status == httpx.codes.UNAUTHORIZED:
-            return NotConnected(f"{self.who} refuses user {self._user!r} or the password", path)
-        told: Any = {}
+            return NotConnected(f"{self.who} rejects user {self._user!r} or the password.", path)
+        given: Any = {}
         with contextlib.suppress(ValueError, KeyError, TypeError):
-            told = answer.json()["_embedded"]["status"]
-        code, text = (told.get("code", ""), told.get("msg", "")) if isinstance(told, dict) else ("", "")
+            given = answer.json()["_embedded"]["status"]
+        code, text = (given.get("code", ""), given.get("msg", "")) if isinstance(given, dict) else ("", "")
         detail = f"{path}: HTTP {status}" + (f", code {code}" if code != "" else "")
-        words = f": {text}" if text else ""
+        reason = f": {text}" if text else f" with HTTP {status}"
         if status >= 500:
-            return DeviceFault(f"{self.who} failed{words or f' with HTTP {status}'}", detail, code or status)
-        return Refused(f"{self.who} refuses{words or f' with HTTP {status}'}", detail)
+            return DeviceFault(f"{self.who} failed{reason}", detail, code or status)
+        return Refused(f"{self.who} refuses{reason}", detail)

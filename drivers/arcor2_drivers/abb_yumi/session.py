@@ -1,13 +1,13 @@
-"""ControlSession: what is ours while we control: mastership of RAPID, and a line to each arm's motion server."""
+"""Control session: the connections to the motion servers of both arms, and the RAPID commands around them."""
 
+import logging
 import math
 import threading
 import time
-from collections.abc import Callable
 from typing import Final
 
 from arcor2_hw.data.geometry import Pose
-from arcor2_hw.exceptions import DeviceError, DeviceTimeout, NotInControl, Refused
+from arcor2_hw.exceptions import DeviceError, DeviceTimeout, Refused
 
 from .arm_line import ArmLine
 from .frames import orientation_values, position_values
@@ -16,38 +16,38 @@ from .rws import Rws
 from .settings import ARMS, YumiSettings
 
 LINE_WITHIN: Final = 2.0
-"""Seconds the servers may take to listen after the program was started."""
+"""Time for the servers to listen after the program was started, s."""
 POLL: Final = 0.05
+
+log = logging.getLogger(__name__)
 
 Load = tuple[float, tuple[float, float, float]]
 
 
 class ControlSession:
-    """Control of both arms. `ended` is why it is over, None while it lives, `ended_at` when (monotonic); `over` is told
-    when it ends itself.
-    """
+    """Control of both arms. `ended` is None while it lives, then the reason; `ended_at` is the time (monotonic)."""
 
-    def __init__(self, name: str, settings: YumiSettings, over: Callable[[DeviceError], None]) -> None:
+    def __init__(self, name: str, settings: YumiSettings) -> None:
+        self.name = name
         self.ended: DeviceError | None = None
         self.ended_at = math.inf
         self.lines = {arm: ArmLine(name, arm, settings.host, settings.port(arm), self._line_ended) for arm in ARMS}
         self._settings = settings
-        self._over = over
         self._ending = threading.Lock()
 
     def open(self) -> None:
-        """Connect to both servers and begin their sessions. Raises DeviceError naming the address."""
+        """Connect to both servers and start their sessions. Raise DeviceError."""
         for line in self.lines.values():
             line.open(LINE_WITHIN, self._settings.watchdog)
 
-    def tell_tool(self, arm: str, tcp: Pose, load: Load) -> None:
-        """Tell an arm's server of its tool."""
+    def set_tool(self, arm: str, tcp: Pose, load: Load) -> None:
+        """Set the tool of an arm."""
         line = self.lines[arm]
         line.ask(Code.TOOL, *position_values(tcp), *orientation_values(tcp))
         line.ask(Code.LOAD, load[0], *(value * 1e3 for value in load[1]))
 
     def end(self, why: DeviceError, wait: bool = True) -> None:
-        """End it: the servers stop their arms. Harmless when it is over."""
+        """End the session, unless it has ended; the servers stop their arms."""
         with self._ending:
             if self.ended is None:
                 self.ended, self.ended_at = why, time.monotonic()
@@ -58,16 +58,16 @@ class ControlSession:
         first = self.ended is None
         self.end(why, wait=False)
         if first:
-            self._over(why)
+            log.warning("%s: control ended: %s", self.name, why)
 
 
 def request_mastership(rws: Rws, domain: str) -> None:
-    """Have mastership of a domain. Raises Refused with the controller's words."""
+    """Take mastership of a domain. Raise Refused, with the controller's text."""
     rws.act(f"/rw/mastership/{domain}", "request")
 
 
 def release_mastership(rws: Rws, domain: str) -> bool:
-    """Give mastership of a domain back; not having it is no error. Tells whether the controller has confirmed it."""
+    """Release mastership of a domain, if we have it. Return whether the controller confirmed it."""
     try:
         rws.act(f"/rw/mastership/{domain}", "release")
     except Refused:
@@ -78,16 +78,16 @@ def release_mastership(rws: Rws, domain: str) -> bool:
 
 
 def await_value(rws: Rws, path: str, field: str, value: str, within: float, what: str) -> None:
-    """Wait until a resource says something. Raises DeviceTimeout naming what was waited for."""
+    """Wait until a field of a resource has a value. Raise DeviceTimeout; `what` names the expected action."""
     until = time.monotonic() + within
     while rws.value(path, field) != value:
         if time.monotonic() > until:
-            raise DeviceTimeout(f"{rws.who} did not {what} within {within:g} s")
+            raise DeviceTimeout(f"{rws.who} did not {what} within {within:g} s.")
         time.sleep(POLL)
 
 
 def start_rapid(rws: Rws) -> None:
-    """Start RAPID from main in all tasks: whatever motion was left half done is forgotten. Needs mastership."""
+    """Start RAPID from main in all tasks, which drops an interrupted motion. Needs mastership."""
     rws.act("/rw/rapid/execution", "resetpp", timeout=2.0)
     rws.act(
         "/rw/rapid/execution",
@@ -106,10 +106,5 @@ def start_rapid(rws: Rws) -> None:
 
 
 def stop_rapid(rws: Rws, timeout: float = 1.0) -> None:
-    """Stop RAPID in all tasks quickly."""
+    """Stop RAPID in all tasks with a quick stop."""
     rws.act("/rw/rapid/execution", "stop", {"stopmode": "qstop", "usetsp": "alltsk"}, timeout)
-
-
-def not_controlled(name: str, why: DeviceError | None) -> NotInControl:
-    """Give the error of a command without control."""
-    return NotInControl(f"control of {name} is not taken" + (f": {why}" if why is not None else ""))

@@ -1,4 +1,4 @@
-"""What the controller's words mean: control state, operating mode, collision detection."""
+"""Terms of the controller as states of a robot: control state, operating mode, collision detection."""
 
 from typing import Final
 
@@ -18,7 +18,7 @@ SAFETY: Final = {
     "emergencystopreset": Safety.EMERGENCY_STOP,
     "sysfail": Safety.FAULT,
 }
-"""emergencystopreset: the button is released, motors on has not been confirmed yet."""
+"""emergencystopreset: the button is released, but the motors have not been switched on yet."""
 MODES: Final = {
     "AUTO": Mode.AUTOMATIC,
     "AUTO_CH": Mode.AUTOMATIC,
@@ -29,22 +29,22 @@ MODES: Final = {
 REMEDIES: Final = {
     Safety.EMERGENCY_STOP: "Release the emergency stop, press motors on at the controller, then take control.",
     Safety.SAFEGUARD_STOP: "Close the safeguard, or hold the enabling device, then take control.",
-    Safety.PROTECTIVE_STOP: "Look what was hit, acknowledge by name, then take control.",
-    Safety.FAULT: "Restart the controller; its event log says why.",
+    Safety.PROTECTIVE_STOP: "Check what the robot hit, acknowledge the collision, then take control.",
+    Safety.FAULT: "Restart the controller. Its event log has the cause.",
 }
 
 
 def safety_of(control_state: str, collided: bool) -> Safety:
-    """Give what the safety system says; an unknown word counts as a fault."""
+    """Return the safety state; an unknown control state counts as a fault."""
     found = SAFETY.get(control_state, Safety.FAULT)
     return Safety.PROTECTIVE_STOP if found is Safety.NORMAL and collided else found
 
 
 def power_of(control_state: str) -> Power:
-    """Give the drive power: with motors off the brakes are closed and the drives without power."""
+    """Return the drive power; with motors off the brakes are closed."""
     return Power.OPERATIONAL if control_state == MOTORS_ON else Power.OFF
 
 
-def mode_of(word: str) -> Mode:
-    """Give the operating mode."""
-    return MODES.get(word, Mode.OTHER)
+def mode_of(operation_mode: str) -> Mode:
+    """Return the operating mode."""
+    return MODES.get(operation_mode, Mode.OTHER)

@@ -1,41 +1,48 @@
-"""YuMi: the actions that ABB's two-arm robot offers to programs."""
+"""YuMi: the object type of ABB's two-arm robot, composed of observer, control, kinematics and motion."""
 
 from typing import ClassVar, Final
 
+import numpy as np
+
 from arcor2_hw.actions import StrEnum, action
+from arcor2_hw.data.device import Alarm, Connection, Health, Identity, LossReaction
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.project import ProjectRobotJoints
-from arcor2_hw.exceptions import DeviceFault, Refused
+from arcor2_hw.data.robot import Control as ControlMode
+from arcor2_hw.data.robot import Joint, MoveResult, RobotState, RobotType, Safety
+from arcor2_hw.exceptions import NotFound, Refused
+from arcor2_hw.keep_alive import FROZEN_AFTER
+from arcor2_hw.objects import MultiArmRobot
+from arcor2_hw.objects.arm import TCP, SafetyAlarm, check_confirmed, check_end_effector, named_joints
+from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 
-from .motion_lines import Code
-from .settings import YumiSettings
-from .yumi_motion import YumiMotion
+from .arms import JOINT_LIMITS, JOINTS, Arms, other_arm
+from .control import Control, log
+from .hands import ArmId as ArmId
+from .hands import Hands
+from .kinematics import Kinematics
+from .motion import Motion
+from .observer import Observer
+from .settings import ARMS, LONGEST_WATCHDOG, YumiSettings
+from .states import AUTOMATIC, REMEDIES, mode_of, power_of
 
-HAND_WITHIN: Final = 6.0
-"""Seconds the fingers may take; their whole stroke takes one or two."""
-HELD: Final = 0.001
-"""m of width from which on the closed fingers hold something."""
-NOTHING_HELD: Final = "nothing_held"
-
-
-class ArmId(StrEnum):
-    """Which arm, as seen by the robot."""
-
-    LEFT = "left"
-    RIGHT = "right"
+BRAKES_WITHIN: Final = 0.2
+"""Time to brake from full speed, s."""
 
 
 class MoveType(StrEnum):
-    """How the TCP gets to its target."""
+    """Path of the TCP to its target."""
 
     LINEAR = "linear"
     JOINT = "joint"
 
 
-class YuMi(YumiMotion):
+class YuMi(Hands, MultiArmRobot):
     """ABB YuMi (IRB 14000): two arms of seven axes, 0.5 kg each, 559 mm."""
 
     _ABSTRACT = False
+    robot_type = RobotType.ARTICULATED
+    loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(FROZEN_AFTER + LONGEST_WATCHDOG + BRAKES_WITHIN)
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {
         "move": "stop",
         "move_to": "stop",
@@ -44,7 +51,271 @@ class YuMi(YumiMotion):
 
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: YumiSettings) -> None:
         super().__init__(obj_id, name, pose, settings)
+        self._yumi = settings
+        self._arms = Arms(self, settings)
+        self._observer = Observer(name, settings)
+        self._control = Control(self._arms, self._observer)
+        self._kinematics = Kinematics(self._arms, self._observer)
+        self._motion = Motion(self._arms, self._observer, self._control, self._kinematics)
+        self._safety_alarm = SafetyAlarm(REMEDIES)
 
+    # -------------------------------------------------------------------------------- connection and control
+    def connect(self, timeout: float = DEFAULT_CONNECT_TIMEOUT) -> None:
+        """Observe the controller; a program continues to run.
+
+        Raises:
+            DeviceError: NotConnected, DeviceTimeout, ConnectionLost, or Refused for another RobotWare.
+        """
+        if not self._observer.observing.online:
+            self._observer.connect(timeout)
+
+    def disconnect(self) -> None:
+        """Release control and close the connections."""
+        self._control.disconnect()
+        self._observer.disconnect()
+
+    @property
+    def connection(self) -> Connection:
+        """Return the state of the observing connection."""
+        return self._observer.observing.state
+
+    @property
+    def health(self) -> Health:
+        """Return the condition of the robot."""
+        if not self._observer.observing.online:
+            return Health.FAILURE if self.connection in (Connection.LOST, Connection.FAILED) else Health.NORMAL
+        safety = self._safety()
+        if safety is Safety.FAULT:
+            return Health.FAILURE
+        return Health.NORMAL if safety is Safety.NORMAL else Health.CHECK_FUNCTION
+
+    def identify(self) -> Identity:
+        """Return the serial number and version of the controller."""
+        self._observer.observing.check()
+        states = self._observer.rws.get("/ctrl/identity")
+        serial = states[0].get("ctrl-id", "") if states else ""
+        return Identity("ABB", "IRB 14000 YuMi", serial, f"RobotWare {self._observer.version}")
+
+    def take_control(self) -> None:
+        """Take control of both arms, unless we have it. Raise NotInControl, SafetyStop or Refused."""
+        self._control.take()
+
+    def release_control(self) -> None:
+        """Stop both arms and release control, if we have it. Motors and motion servers stay on."""
+        self._control.release()
+
+    def control_owner(self) -> str | None:
+        """Return "us", "pendant", the holder of mastership, the RAPID program that runs, or None."""
+        return self._control.owner()
+
+    # -------------------------------------------------------------------------------- state
+    def state(self) -> RobotState:
+        """Return the state of the robot. Raise NotConnected, ConnectionLost or Stale."""
+        sample, panel = self._observer.sample(), self._observer.panel()
+        return RobotState(
+            mode_of(panel.operation_mode),
+            power_of(sample.control_state),
+            self._control.safety(sample),
+            self._control.program_state(sample, panel),
+            ControlMode.REMOTE if panel.operation_mode == AUTOMATIC else ControlMode.LOCAL,
+            sample.moving or self.move_in_progress,
+            panel.speed_ratio,
+            self._control.obstacles(sample, panel),
+        )
+
+    def get_arm_ids(self) -> set[str]:
+        """Return left and right, as seen by the robot."""
+        return set(ARMS)
+
+    def get_end_effectors_ids(self, arm_id: str | None = None) -> set[str]:
+        """Return the only end effector of each arm, its TCP."""
+        self._arms.some(arm_id)
+        return {TCP}
+
+    def get_end_effector_pose(self, end_effector: str, arm_id: str | None = None) -> Pose:
+        """Return the TCP of an arm in the world. Raise NotFound, NotConnected, ConnectionLost or Stale."""
+        check_end_effector(self.name, end_effector)
+        arm = self._arms.one(arm_id)
+        return self._arms.tcp(self._observer.sample(), arm)
+
+    def robot_joints(self, include_gripper: bool = False, arm_id: str | None = None) -> list[Joint]:
+        """Return the joint values, of both arms if none is named."""
+        arms, sample = self._arms.some(arm_id), self._observer.sample()
+        return [joint for arm in arms for joint in named_joints(JOINTS[arm], sample.joints[arm])]
+
+    def grippers(self, arm_id: str | None = None) -> set[str]:
+        """Return `gripper` if an arm has fingers."""
+        return {"gripper"} if any(getattr(self._yumi, f"{arm}_gripper") for arm in self._arms.some(arm_id)) else set()
+
+    def suctions(self, arm_id: str | None = None) -> set[str]:
+        """Return `suction` if an arm has a suction cup."""
+        return {"suction"} if any(getattr(self._yumi, f"{arm}_suction") for arm in self._arms.some(arm_id)) else set()
+
+    def joint_limits(self, arm_id: str | None = None) -> dict[str, tuple[float, float]]:
+        """Return the ranges of the axes as delivered, rad; the controller's configuration may be narrower."""
+        return {name: limits for arm in self._arms.some(arm_id) for name, limits in JOINT_LIMITS[arm].items()}
+
+    def max_tcp_speed(self) -> float:
+        """Return the configured maximum of the TCP speed, m/s."""
+        return self._yumi.max_tcp_speed
+
+    # -------------------------------------------------------------------------------- motion
+    @property
+    def move_in_progress(self) -> bool:
+        """Return whether an arm executes a motion of ours."""
+        return self._motion.in_progress()
+
+    @property
+    def last_moves(self) -> dict[str, MoveResult]:
+        """Return the result of the last motion of each arm."""
+        return self._motion.last
+
+    def check_if_ready_to_move(self, arm_id: str | None = None) -> None:
+        """Raise what prevents an arm, or one of them if none is named, from moving."""
+        self._motion.check_ready(self._arms.some(arm_id))
+
+    def move_to_pose(
+        self,
+        end_effector_id: str,
+        target_pose: Pose,
+        speed: float,
+        safe: bool = True,
+        linear: bool = True,
+        arm_id: str | None = None,
+    ) -> None:
+        """Move the TCP of an arm to a pose in the world, in a line or with all axes together.
+
+        The arm keeps clear of the other one, whatever `safe` is. This driver avoids no other obstacles.
+
+        Raises:
+            KinematicsException: The pose cannot be reached.
+            DeviceError: OutOfRange, Refused, NotInControl, SafetyStop, Cancelled or DeviceTimeout.
+        """
+        check_end_effector(self.name, end_effector_id)
+        arm = self._arms.one(arm_id)
+        self._motion.to_pose(arm, target_pose, linear, speed, self._control.stops[arm].guard())
+
+    def move_to_joints(
+        self, target_joints: list[Joint], speed: float, safe: bool = True, arm_id: str | None = None
+    ) -> None:
+        """Move an arm to joint values, all axes together; it keeps clear of the other one."""
+        self._to_joints(self._arms.one(arm_id), target_joints, speed)
+
+    def _to_joints(self, arm: str, joints: list[Joint], speed: float) -> None:
+        guard = self._control.stops[arm].guard()
+        self._motion.to_joints(arm, self._arms.joint_values(joints, arm), speed, guard)
+
+    def move_path(
+        self,
+        waypoints: list[Pose],
+        blend: float = 0.0,
+        linear: bool = True,
+        speed: float = 0.25,
+        arm_id: str | None = None,
+    ) -> MoveResult:
+        """Move the TCP of an arm in lines through poses in the world; `blend` is the corner radius, m, up to 0.2."""
+        arm = self._arms.one(arm_id)
+        if not linear:
+            raise Refused(f"{self.name} moves along paths in lines only. Set linear to true.")
+        return self._motion.along(arm, waypoints, blend, speed, self._control.stops[arm].guard())
+
+    def move_synchronously(self, targets: dict[str, Pose | list[Joint]], speed: float = 0.25) -> dict[str, MoveResult]:
+        """Move both arms, all axes together, so that they start and arrive together; when one stops, both do.
+
+        Args:
+            targets: Pose in the world, or joints, by arm id.
+            speed: Fraction of the maximum.
+        """
+        return self._motion.synchronously(targets, speed)
+
+    def stop(self, arm_id: str | None = None) -> None:
+        """Stop an arm, or both, and wait for standstill. This is not a safety function.
+
+        An arm that moves together with the other one stops it, too. Raise NotInControl or DeviceTimeout.
+        """
+        self._motion.stop(self._arms.some(arm_id))
+
+    def inverse_kinematics(
+        self,
+        end_effector_id: str,
+        pose: Pose,
+        start_joints: list[Joint] | None = None,
+        avoid_collisions: bool = True,
+        arm_id: str | None = None,
+    ) -> list[Joint]:
+        """Return joints of an arm for a pose in the world, near `start_joints` or the present ones. Needs control.
+
+        With `avoid_collisions`, joints too close to the other arm are refused. Raise KinematicsException or Refused.
+        """
+        check_end_effector(self.name, end_effector_id)
+        arm = self._arms.one(arm_id)
+        seed = self._arms.joint_values(start_joints, arm) if start_joints else None
+        with self._kinematics.staging[arm]:
+            joints, _ = self._kinematics.solve(self._control.current(), arm, pose, seed)
+        if avoid_collisions:
+            other = self._kinematics.present(other_arm(arm))
+            self._motion.clearance.check_joints(arm, np.array(joints), other)
+        return named_joints(JOINTS[arm], joints)
+
+    def forward_kinematics(self, end_effector_id: str, joints: list[Joint], arm_id: str | None = None) -> Pose:
+        """Return the TCP of an arm in the world for joints, by the controller's calibration. Needs control."""
+        check_end_effector(self.name, end_effector_id)
+        arm = self._arms.one(arm_id)
+        values = self._arms.joint_values(joints, arm)
+        return self._kinematics.forward(self._control.current(), arm, values)
+
+    # -------------------------------------------------------------------------------- tool, teaching, power, safety
+    def set_tool(
+        self,
+        tcp: Pose,
+        mass: float,
+        cog: tuple[float, float, float],
+        inertia: tuple[float, ...] | None = None,
+        arm_id: str | None = None,
+    ) -> None:
+        """Set the tool of an arm: TCP in the flange, mass in kg, center of gravity in m; without inertia."""
+        self._control.set_tool(self._arms.one(arm_id), tcp, mass, cog, inertia)
+
+    def get_hand_teaching_mode(self, arm_id: str | None = None) -> bool:
+        """Return whether an arm can be moved by hand."""
+        return self._control.teaching(self._arms.one(arm_id))
+
+    def set_hand_teaching_mode(self, enabled: bool, arm_id: str | None = None) -> None:
+        """Make an arm movable by hand, or stiff again. Raise Refused while an arm moves, or without lead-through."""
+        self._control.set_teaching(self._arms.one(arm_id), enabled, self.move_in_progress)
+
+    def power_on(self) -> None:
+        """Switch the motors on; the arms do not move. Raise NotInControl in manual mode, SafetyStop or Refused."""
+        self._control.power_on()
+
+    def _safety(self) -> Safety:
+        newest = self._observer.newest()
+        return self._control.safety(newest) if newest is not None else Safety.NORMAL
+
+    def alarms(self) -> list[Alarm]:
+        """Return the active safety stop, if any."""
+        return self._safety_alarm.alarms(self._safety())
+
+    def acknowledge(self, code: str) -> None:
+        """Raise Refused: only a named person can acknowledge a safety stop. Raise NotFound for an inactive alarm."""
+        if code not in {alarm.code for alarm in self.alarms()}:
+            raise NotFound(f"{self.name} has no alarm {code}.")
+        if code == Safety.PROTECTIVE_STOP.value:
+            raise Refused(
+                f"{code} of {self.name} must be acknowledged by the person who inspected the robot: "
+                "acknowledge_protective_stop(confirmed_by)."
+            )
+        raise Refused(f"{code} of {self.name} must be acknowledged at the controller.")
+
+    def acknowledge_protective_stop(self, confirmed_by: str) -> None:
+        """Acknowledge a collision, so that control can be taken again; the old motion does not continue."""
+        check_confirmed(confirmed_by)
+        if self._control.safety(self._observer.sample()) is not Safety.PROTECTIVE_STOP:
+            raise Refused(f"{self.name} has no protective stop.")
+        self._control.collision_acknowledged = True
+        log.warning("%s: collision acknowledged by %s", self.name, confirmed_by)
+
+    # -------------------------------------------------------------------------------- actions
     @action
     def move(
         self,
@@ -55,109 +326,39 @@ class YuMi(YumiMotion):
         *,
         an: str | None = None,
     ) -> None:
-        """Move the TCP of an arm to a pose; it keeps clear of the other arm.
+        """Move the TCP of an arm to a pose. The arm keeps clear of the other one.
 
-        :param pose: where to
+        :param pose: target
         :param arm: which arm
         :param move_type: in a line, or all axes together
         :param speed: fraction of the configured maximum
         """
         assert 0.01 <= speed <= 1.0
-        self._move_pose(arm.value, pose, move_type is MoveType.LINEAR, speed, self._stops[arm.value])
+        linear = move_type is MoveType.LINEAR
+        self._motion.to_pose(arm.value, pose, linear, speed, self._control.stops[arm.value].guard())
 
     @action
     def move_to(
         self, joints: ProjectRobotJoints, arm: ArmId = ArmId.LEFT, speed: float = 0.25, *, an: str | None = None
     ) -> None:
-        """Move an arm to stored joint values, all axes arriving together; it keeps clear of the other arm.
+        """Move an arm to stored joint values, all axes together. The arm keeps clear of the other one.
 
-        :param joints: where to
-        :param arm: which arm the joints are of
+        :param joints: target
+        :param arm: which arm the joints belong to
         :param speed: fraction of the configured maximum
         """
         assert 0.01 <= speed <= 1.0
-        stops = self._stops[arm.value]
-        self._move_joints(arm.value, self._checked_joints(joints.joints, arm.value), speed, stops)
+        self._to_joints(arm.value, joints.joints, speed)
 
     @action
     def move_both(
         self, left: ProjectRobotJoints, right: ProjectRobotJoints, speed: float = 0.25, *, an: str | None = None
     ) -> None:
-        """Move both arms to stored joint values; they start and arrive together.
+        """Move both arms to stored joint values. They start and arrive together.
 
-        :param left: where the left arm goes to
-        :param right: where the right arm goes to
+        :param left: target of the left arm
+        :param right: target of the right arm
         :param speed: fraction of the configured maximum
         """
         assert 0.01 <= speed <= 1.0
         self.move_synchronously({"left": left.joints, "right": right.joints}, speed)
-
-    @action
-    def grip(self, arm: ArmId = ArmId.LEFT, force: float = 10.0, *, an: str | None = None) -> float:
-        """Close the fingers; give the width at which they stand, m. Fails with nothing_held when they meet.
-
-        :param arm: which arm
-        :param force: N
-        """
-        assert 1.0 <= force <= 20.0
-        width = self._hand(arm, Code.HAND_GRIP, force)
-        if width < HELD:
-            raise DeviceFault(f"the {arm.value} hand of {self.name} gripped nothing", fault_code=NOTHING_HELD)
-        return width
-
-    @action
-    def open_gripper(self, arm: ArmId = ArmId.LEFT, width: float = 0.02, *, an: str | None = None) -> float:
-        """Open the fingers to a width; give the width at which they stand, m.
-
-        :param arm: which arm
-        :param width: m between the fingers
-        """
-        assert 0.0 <= width <= 0.025
-        return self._hand(arm, Code.HAND_MOVE, width * 1e3)
-
-    @action
-    def calibrate_gripper(self, arm: ArmId = ArmId.LEFT, *, an: str | None = None) -> None:
-        """Close the empty fingers to find their zero; needed once after the controller was started.
-
-        :param arm: which arm
-        """
-        self._hand(arm, Code.HAND_CALIBRATE)
-
-    @action
-    def gripper_width(self, arm: ArmId = ArmId.LEFT, *, an: str | None = None) -> float:
-        """Read the width between the fingers, m.
-
-        :param arm: which arm
-        """
-        return self._hand(arm, Code.HAND_STATE)
-
-    @action
-    def set_suction(self, arm: ArmId = ArmId.LEFT, on: bool = True, *, an: str | None = None) -> None:
-        """Switch the vacuum; it keeps its state when the robot loses the hub.
-
-        :param arm: which arm
-        :param on: on or off
-        """
-        self._sucks(arm)
-        self._controlled().lines[arm.value].ask(Code.HAND_VACUUM, float(on), within=HAND_WITHIN)
-
-    @action
-    def set_blow_off(self, arm: ArmId = ArmId.LEFT, on: bool = True, *, an: str | None = None) -> None:
-        """Switch the air that blows a part off the cup.
-
-        :param arm: which arm
-        :param on: on or off
-        """
-        self._sucks(arm)
-        self._controlled().lines[arm.value].ask(Code.HAND_BLOW, float(on), within=HAND_WITHIN)
-
-    def _hand(self, arm: ArmId, code: Code, *values: float) -> float:
-        """Have the fingers do something; give their width, m."""
-        if not getattr(self._yumi, f"{arm.value}_gripper"):
-            raise Refused(f"the {arm.value} hand of {self.name} has no fingers: {arm.value}_gripper is not set")
-        told = self._controlled().lines[arm.value].ask(code, *values, within=HAND_WITHIN)
-        return told[0] / 1e3
-
-    def _sucks(self, arm: ArmId) -> None:
-        if not getattr(self._yumi, f"{arm.value}_suction"):
-            raise Refused(f"the {arm.value} hand of {self.name} has no cup: {arm.value}_suction is not set")

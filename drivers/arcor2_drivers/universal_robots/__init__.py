@@ -1,1 +1,1 @@
-"""Universal Robots arms: e-series and CB3, through ur_rtde and the dashboard server."""
+"""Universal Robots arms, e-series and CB3, via ur_rtde and the dashboard server."""

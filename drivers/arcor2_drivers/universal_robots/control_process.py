@@ -1,13 +1,14 @@
-"""The process that holds ur_rtde's control and I/O interfaces and kicks the controller's watchdog. Run by `control.py`.
+"""Control process: holds ur_rtde's control and I/O interfaces and signals the controller's watchdog.
 
-A process of its own for two reasons. A busy cell host must not stop the arm: kicks and the deadline of a jog do not
-depend on the host's interpreter. And ur_rtde 1.6.5, when its connection breaks, reconnects on its own account and sends
-its program again, which ends whatever plays on the controller by then, without the watchdog; it sometimes crashes the
-process; and its constructors and destructors hold the interpreter. A process can be killed at any moment.
+`session.py` runs this script in a separate process for two reasons. First, a busy cell host must not stop the arm:
+watchdog signals and the deadline of a jog must not depend on the host's interpreter. Second, a process can be killed.
+When the connection of ur_rtde 1.6.5 breaks, it reconnects and sends its program again without the watchdog, which stops
+whatever plays on the controller by then. It sometimes crashes, and its constructors and destructors hold the
+interpreter.
 
-Standard input has one request a line, `{"n": 1, "do": "moveL", "args": [...]}`, and the host's pulses. Standard output
-has one answer a line, `{"n": 1, "data": ...}` or `{"n": 1, "error": "..."}`; a request without a number is not
-answered. When the host ends, or sends no pulse for FROZEN_AFTER s, this process stops the program and ends.
+Standard input has one request per line, `{"n": 1, "do": "moveL", "args": [...]}`, and the host's pulses. Standard
+output has one answer per line, `{"n": 1, "data": ...}` or `{"n": 1, "error": "..."}`; a request without a number is not
+answered. When the host ends, or sends no pulse for FROZEN_AFTER s, this process stops the program and exits.
 """
 
 import contextlib
@@ -42,27 +43,32 @@ COMMANDS = (
 )
 SPEEDS = ("speedJ", "speedL")
 MOTIONS = frozenset({"moveJ", "moveL", "teachMode", "own"})
-"""Commands before which a jog is ended: two threads of the program must not both move the arm."""
+"""Commands that end a jog first: two threads of the control program must not both move the arm."""
 OUTPUTS = ("setConfigurableDigitalOut", "setStandardDigitalOut", "setToolDigitalOut")
-SHOWN = 0.02  # s until the next command, a kick, may take the velocity's place in the register: two cycles of a CB3
-RESUMED_WITHIN = 3.0  # s for the control program to play again; it takes 0.1
-KICKS_PER_PERIOD = 8.0  # kicks within one period of the watchdog
-AHEAD = -10  # niceness that is asked for; most computers refuse it
-LAST_STOP = 0.15  # s for the stop with which this process ends; the watchdog stops the arm if it fails
-LOOK = 0.1  # s between two looks whether the host has ended
-
+VELOCITY_READ: Final = 0.02
+"""Time before the next command may overwrite a velocity in its register, s: two cycles of a CB3."""
+RESUMED_WITHIN: Final = 3.0
+"""Time for the control program to play again, s; it takes 0.1 s."""
+KICKS_PER_PERIOD: Final = 8.0
+"""Watchdog signals within one period of the watchdog."""
+NICENESS: Final = -10
+"""Requested niceness; most computers refuse it."""
+LAST_STOP: Final = 0.15
+"""Time for the last stop of this process, s; if it fails, the watchdog stops the arm."""
+HOST_CHECK: Final = 0.1
+"""Time between two checks whether the host has ended, s."""
 TOO_SLOW: Final = 3
-"""Exit status when the watchdog must have tripped because this process was not run in time."""
+"""Exit status when this process was not scheduled in time, so that the watchdog must have tripped."""
 HOST_FROZEN: Final = 4
 """Exit status when the host has sent no pulse for FROZEN_AFTER s."""
 
 
 def main() -> None:
-    """Open with the arguments of the command line, a JSON object, and serve."""
+    """Connect with the arguments of the command line, a JSON object, and execute requests."""
     answers = os.fdopen(os.dup(1), "w", buffering=1, encoding="utf-8")
-    with contextlib.suppress(OSError):  # as a service it needs LimitNICE for it
-        os.setpriority(os.PRIO_PROCESS, 0, AHEAD)
-    os.dup2(2, 1)  # the library writes to standard output as it pleases
+    with contextlib.suppress(OSError):  # a service needs LimitNICE for it
+        os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
+    os.dup2(2, 1)  # the library prints to standard output
     arguments = json.loads(sys.argv[1])
     try:
         program = ControlProgram(**arguments)
@@ -93,10 +99,10 @@ def main() -> None:
 
 
 def _listen(requests: "queue.SimpleQueue[bytes | int]") -> None:
-    """Put requests into the queue, at last the exit status, and leave the main thread a moment for its last stop."""
+    """Queue requests, finally the exit status, and give the main thread time for its last stop."""
     parent = Parent()
     while parent.ended is None:
-        for line in parent.lines(LOOK):
+        for line in parent.lines(HOST_CHECK):
             requests.put(line)
     status = HOST_FROZEN if parent.ended is ParentEnd.FROZEN else 0
     requests.put(status)
@@ -105,7 +111,7 @@ def _listen(requests: "queue.SimpleQueue[bytes | int]") -> None:
 
 
 class ControlProgram:
-    """The control program on the controller, or a program of our own in its place: commands, kicks, ends of jogs."""
+    """The control program on the controller, or a motion program in its place: commands, watchdog signals, jogs."""
 
     def __init__(self, host: str, frequency: float, upper: bool, watchdog: float) -> None:
         self._io = RTDEIOInterface(host, False, upper)
@@ -115,7 +121,7 @@ class ControlProgram:
         self._control = RTDEControlInterface(host, frequency, flags)
         self._frequency = watchdog
         if not self._control.setWatchdog(watchdog):
-            raise RuntimeError("the watchdog of the control program cannot be armed")
+            raise RuntimeError("The watchdog of the control program cannot be armed.")
         self._registers = Registers(self._io, 42 if upper else 18)
         self._own = False
         self._jog_ends = math.inf
@@ -137,7 +143,7 @@ class ControlProgram:
         return self._jog_ends < math.inf
 
     def do(self, command: str, arguments: list[Any]) -> Any:
-        """Carry out a command and return what the library returns."""
+        """Execute a command and return the result of the library."""
         if command in MOTIONS and self._jogs:
             self.do("speedStop", [])
         if command == "speedStop":
@@ -148,7 +154,7 @@ class ControlProgram:
             self._written = time.monotonic()
 
     def keep_alive(self) -> float:
-        """End a jog that was not renewed, kick the watchdog when that is due; return the seconds to the next time."""
+        """End an expired jog and signal the watchdog, if due. Return the time until the next call, s."""
         now = time.monotonic()
         if now - self._written > 1.0 / self._frequency:
             os._exit(TOO_SLOW)  # the controller has stopped the program
@@ -160,51 +166,51 @@ class ControlProgram:
         return max(min(self._written + self._period, self._jog_ends) - time.monotonic(), 0.0)
 
     def last_stop(self) -> None:
-        """Stop what plays: the host is gone."""
+        """Stop the program: the host has ended."""
         if self._own:
             self._registers.halt()
         else:
             self._control.stopScript()
 
     def _stop(self, deceleration: float) -> Any:
-        """Stop what moves; a jog stands when this returns.
+        """Stop the motion. A jog is at standstill when this returns.
 
-        Always the asynchronous stopL, the only one of the four that is run as what it is called: ur_rtde 1.6.5 runs a
+        The asynchronous stopL is the only one of the four stops that does what its name says: ur_rtde 1.6.5 runs a
         synchronous stopL as stopj until the first asynchronous stop, and stopJ as stopl from then on.
         """
         if self._own:
             return self._registers.halt()
-        if self._jogs:  # a stopL beside the thread that holds the velocity is no stop
+        if self._jogs:  # stopL has no effect next to the thread that holds the velocity
             return self.do("speedStop", [])
         return self._control.stopL(deceleration, True)
 
     def _speed(self, command: Callable[..., bool]) -> Callable[..., bool]:
         def speed(velocities: list[float], acceleration: float, until: float) -> bool:
-            """Move by a velocity until a moment of the monotonic clock; false when that is over."""
+            """Move with a velocity until a time of the monotonic clock; return False if it has passed."""
             if time.monotonic() >= until:
                 return False
-            # Without the library's own time: its call would last that long, and kicks and a stop would wait behind it.
+            # Without the duration that the library supports: its call would block watchdog signals and a stop so long.
             taken = command(velocities, acceleration)
             self._jog_ends = until
-            time.sleep(SHOWN)
+            time.sleep(VELOCITY_READ)
             return taken
 
         return speed
 
     def _begin_own(self) -> bool:
-        """Kick the watchdog of a program of our own from now on, and take back an earlier request to stop."""
-        self._own = True  # the library's own kick would wait for its program without end
+        """Signal the watchdog of a motion program from now on, and clear an earlier stop request."""
+        self._own = True  # the library's own signal would wait forever for its program
         return self._registers.ready()
 
     def _end_own(self) -> bool:
-        """Kick the watchdog of the control program again, which plays still."""
+        """Signal the watchdog of the control program again, which is still playing."""
         self._own = False
         return True
 
     def _resume(self) -> bool:
-        """Send the control program again, after one of our own, and arm its watchdog."""
+        """Send the control program again, after a motion program, and arm its watchdog."""
         control, until = self._control, time.monotonic() + RESUMED_WITHIN
-        # While the library still believes that a program runs it would send "stop" first, which the new one obeys.
+        # While the library assumes that a program runs, it would first send "stop", which the new program obeys.
         while control.isProgramRunning() and time.monotonic() < until:
             time.sleep(0.002)
         control.reuploadScript()
@@ -217,22 +223,22 @@ class ControlProgram:
 
 
 class Registers:
-    """The two integer registers that a program of our own reads: kicks, and the request to stop."""
+    """The two integer registers that a motion program reads: watchdog signal and stop request."""
 
     def __init__(self, io: RTDEIOInterface, first: int) -> None:
         self._io, self._first, self._kicks = io, first, 0
 
     def ready(self) -> bool:
-        """Take back an earlier request to stop."""
+        """Clear an earlier stop request."""
         return bool(self._io.setInputIntRegister(self._first + 1, 0)) and self.kick()
 
     def kick(self) -> bool:
-        """Kick the watchdog."""
+        """Signal the watchdog."""
         self._kicks = (self._kicks + 1) % 1000
         return bool(self._io.setInputIntRegister(self._first, self._kicks))
 
     def halt(self) -> bool:
-        """Request that the program stops."""
+        """Request the program to stop."""
         return bool(self._io.setInputIntRegister(self._first + 1, 1))
 
 

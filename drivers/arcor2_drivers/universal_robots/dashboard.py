@@ -1,7 +1,7 @@
-"""The dashboard server, port 29999: one line of text out, one line back, each with its deadline.
+"""The dashboard server, port 29999: one line of text per command, one line per answer, each with a deadline.
 
-Source: Universal Robots, "Dashboard Server, e-Series". Beside the library's own client because that one bounds no wait
-by the caller's deadline, and a stop must not queue behind a question: every `Dashboard` is a connection of its own.
+Source: Universal Robots, "Dashboard Server, e-Series". The library's own client is not used: its waits have no deadline
+that the caller sets, and a stop must not queue behind another command. Every `Dashboard` is a separate connection.
 """
 
 import contextlib
@@ -9,24 +9,26 @@ import re
 import socket
 import threading
 import time
+from collections.abc import Iterator
 
-from arcor2_hw.data.robot import Mode, ProgramState
-from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotConnected, Refused
+from arcor2_hw.data.robot import Mode
+from arcor2_hw.exceptions import ConnectionLost, DeviceFault, DeviceTimeout, NotConnected, Refused
 
 PORT = 29999
-MAX_LINE = 4096  # the longest honest answer names a file
+MAX_LINE = 4096
+"""Greatest length of an answer, bytes: the longest ones contain a file name."""
 
 
 def is_remote(answer: str) -> bool:
-    """Read the answer to `is in remote control`; DeviceFault when it is none."""
+    """Decode the answer to `is in remote control`. Raise DeviceFault for garbage."""
     word = answer.strip().lower()
     if word not in ("true", "false"):
-        raise DeviceFault("the controller's answer on remote control makes no sense", answer)
+        raise DeviceFault("The controller's answer to 'is in remote control' is not valid.", answer)
     return word == "true"
 
 
 def operational_mode(answer: str, remote: bool) -> Mode:
-    """Read the answer to `get operational mode`; a controller without modes (CB3, no password set) gives OTHER."""
+    """Decode the answer to `get operational mode`; a controller without modes (CB3, no password set) returns OTHER."""
     word = answer.strip().upper()
     if word == "MANUAL":
         return Mode.MANUAL_REDUCED_SPEED
@@ -35,63 +37,60 @@ def operational_mode(answer: str, remote: bool) -> Mode:
     return Mode.OTHER
 
 
-_STATES = {"STOPPED": ProgramState.STOPPED, "PLAYING": ProgramState.PLAYING, "PAUSED": ProgramState.PAUSED}
-
-
-def program(answer: str) -> tuple[ProgramState, str]:
-    """Read the answer to `programState`, "PLAYING name.urp": state and name; DeviceFault when it is none."""
+def program_name(answer: str) -> str:
+    """Return the name in the answer to `programState`, "PLAYING name.urp". Raise DeviceFault for garbage."""
     word, _, name = answer.strip().partition(" ")
-    if word.upper() not in _STATES:
-        raise DeviceFault("the controller's answer on its program makes no sense", answer)
-    return _STATES[word.upper()], name.strip()
+    if word.upper() not in ("STOPPED", "PLAYING", "PAUSED"):
+        raise DeviceFault("The controller's answer to 'programState' is not valid.", answer)
+    return name.strip()
 
 
 def version(answer: str) -> str:
-    """Read the version x.y.z or x.y.z.w out of the answer to `PolyscopeVersion`, "" when there is none."""
+    """Return the version x.y.z or x.y.z.w in the answer to `PolyscopeVersion`, or an empty string."""
     found = re.search(r"\d+\.\d+\.\d+(?:\.\d+)?", answer, re.ASCII)
     return found[0] if found else ""
 
 
 class Dashboard:
-    """One connection to the dashboard server, opened when first used; safe to call from several threads."""
+    """One connection to the dashboard server, opened on first use. Thread-safe."""
 
     def __init__(self, host: str, port: int = PORT) -> None:
         self.address = f"{host}:{port}"
-        self._where = (host, port)
+        self._host, self._port = host, port
         self._lock = threading.Lock()
         self._socket: socket.socket | None = None
         self._buffer = b""
 
     def open(self, timeout: float) -> None:
-        """Connect and take the greeting; harmless when open. Raises NotConnected, DeviceTimeout, ConnectionLost."""
+        """Connect and read the greeting, if not connected. Raise NotConnected, DeviceTimeout or ConnectionLost."""
         deadline = time.monotonic() + timeout
-        with self._held(deadline):
-            self._opened(deadline)
+        with self._locked(deadline):
+            self._connected(deadline)
 
     def ask(self, command: str, timeout: float = 1.0) -> str:
-        """Send a command, give the answer. After an error the connection is closed, so no late answer is taken."""
+        """Send a command and return the answer. After an error the connection is closed, with any late answer."""
         deadline = time.monotonic() + timeout
-        with self._held(deadline):
-            opened = self._opened(deadline)
+        with self._locked(deadline):
+            opened = self._connected(deadline)
             try:
                 opened.settimeout(max(deadline - time.monotonic(), 0.001))
                 opened.sendall(command.encode("ascii") + b"\n")
                 return self._line(deadline)
             except TimeoutError:
                 self._shut()
-                raise DeviceTimeout(f"dashboard {self.address} did not answer {command!r} in {timeout:g} s") from None
+                raise DeviceTimeout(f"Dashboard {self.address} did not answer {command!r} in {timeout:g} s.") from None
             except OSError as e:
                 self._shut()
-                raise ConnectionLost(f"dashboard {self.address} closed the connection", f"{command!r}: {e}") from e
+                raise ConnectionLost(f"Dashboard {self.address} closed the connection.", f"{command!r}: {e}") from e
 
     def do(self, command: str, expected: str, timeout: float = 1.0) -> None:
-        """Give an order; Refused with the controller's words when the answer is another than expected."""
+        """Send a command. Raise Refused, with the controller's text, for an answer other than `expected`."""
         answer = self.ask(command, timeout)
         if not answer.startswith(expected):
-            raise Refused(f"the controller refuses {command!r}: {answer}", f"dashboard {self.address}")
+            raise Refused(f"The controller refuses {command!r}: {answer}", f"dashboard {self.address}")
 
     def close(self) -> None:
-        """Close; harmless when closed. A question under way in another thread fails."""
+        """Close the connection; a command in progress on another thread fails."""
         open_socket = self._socket
         if open_socket is not None:
             with contextlib.suppress(OSError):
@@ -100,31 +99,31 @@ class Dashboard:
             self._shut()
 
     @contextlib.contextmanager
-    def _held(self, deadline: float):  # type: ignore[no-untyped-def]
+    def _locked(self, deadline: float) -> Iterator[None]:
         if not self._lock.acquire(timeout=max(deadline - time.monotonic(), 0.0)):
-            raise DeviceTimeout(f"dashboard {self.address} is busy with another question")
+            raise DeviceTimeout(f"Dashboard {self.address} is busy with another command.")
         try:
             yield
         finally:
             self._lock.release()
 
-    def _opened(self, deadline: float) -> socket.socket:
-        if self._socket is not None and self._quiet(self._socket):
+    def _connected(self, deadline: float) -> socket.socket:
+        if self._socket is not None and self._is_idle(self._socket):
             return self._socket
         self._shut()
         try:
-            self._socket = socket.create_connection(self._where, max(deadline - time.monotonic(), 0.001))
+            self._socket = socket.create_connection((self._host, self._port), max(deadline - time.monotonic(), 0.001))
             self._line(deadline)  # the greeting
         except TimeoutError:
             self._shut()
-            raise DeviceTimeout(f"dashboard {self.address} does not answer") from None
+            raise DeviceTimeout(f"Dashboard {self.address} does not answer.") from None
         except OSError as e:
             self._shut()
-            raise NotConnected(f"no dashboard server at {self.address}", str(e)) from e
+            raise NotConnected(f"No dashboard server at {self.address}.", str(e)) from e
         return self._socket
 
-    def _quiet(self, opened: socket.socket) -> bool:
-        """Tell whether the connection is open with nothing unasked in it: one that broke while idle is replaced."""
+    def _is_idle(self, opened: socket.socket) -> bool:
+        """Return whether the connection is open and nothing unexpected was received on it."""
         try:
             opened.settimeout(0.0)
             opened.recv(1, socket.MSG_PEEK)
@@ -138,7 +137,7 @@ class Dashboard:
         assert self._socket is not None
         while b"\n" not in self._buffer:
             if len(self._buffer) > MAX_LINE:
-                raise ConnectionError("an answer without end")
+                raise ConnectionError("the answer is too long")
             self._socket.settimeout(max(deadline - time.monotonic(), 0.001))
             data = self._socket.recv(MAX_LINE)
             if not data:
@@ -152,8 +151,3 @@ class Dashboard:
             self._socket.close()
             self._socket = None
         self._buffer = b""
-
-
-def absent(error: DeviceError) -> bool:
-    """Tell whether there is no dashboard server at all, as on PolyScope X."""
-    return isinstance(error, NotConnected)

@@ -1,4 +1,4 @@
-"""Reads the controller's state, every sample of it, in one thread, into a ring; everybody else reads from there."""
+"""Observation of the controller: one thread reads every sample of the RTDE stream into a ring."""
 
 import collections
 import threading
@@ -30,21 +30,23 @@ FIELDS: Final = [
     "output_int_register_18",
     "output_int_register_42",
 ]
-"""The handful that is used, in the order in which `Sample` has them."""
+"""Variables of the recipe, in the order of the fields of `Sample`."""
 STALLED: Final = 0.8
-"""Seconds without a new sample after which the connection is given up; the library itself needs 2.5 to notice."""
+"""Time without a sample after which the connection is lost, s; the library itself needs 2.5 s to notice."""
 FRESH: Final = 0.1
-"""Seconds: how old a sample may be by default; 50 samples of an e-series, 12 of a CB3."""
-AWAITED: Final = 0.5
-"""Seconds that a caller waits for a fresh sample: this process, or the observing thread, may not have had its turn."""
-KEPT: Final = 1024
-"""Samples in the ring: two seconds."""
-_LOOK: Final = 0.1
-"""Seconds the reader waits for a sample before it looks whether it should end."""
+"""Greatest age of a sample by default, s: 50 samples of an e-series, 12 of a CB3."""
+FRESH_WITHIN: Final = 0.5
+"""Time to wait for a fresh sample, s: a busy computer may delay the reading thread."""
+RING: Final = 1024
+"""Number of samples stored: two seconds."""
+READ_WAIT: Final = 0.1
+"""Time to wait for a sample before checking whether to end, s."""
+AT_REST: Final = 1e-3
+"""Joint speed below which a joint is at standstill, rad/s: the noise of a real arm's encoders."""
 
 
 class Sample(NamedTuple):
-    """One sample: the controller's time, ours (monotonic), and what is known then (rad, m, rad/s, N, N m)."""
+    """One sample: the controller's time, ours (monotonic), and the state at that time (rad, m, rad/s, N, N m)."""
 
     timestamp: float
     monotonic: float
@@ -65,33 +67,29 @@ class Sample(NamedTuple):
 
     @property
     def age(self) -> float:
-        """Give the seconds since it was taken."""
+        """Return the time since the sample was received, s."""
         return time.monotonic() - self.monotonic
 
     @property
     def moving(self) -> bool:
-        """Tell whether a joint moves."""
+        """Return whether a joint moves."""
         return max(map(abs, self.qd)) > AT_REST
 
     def operation(self, upper: bool) -> tuple[int, bool]:
-        """Give number and "running" of the control program's asynchronous operation, from its status register.
+        """Return number and "running" of the control program's asynchronous operation, from its status register.
 
-        Bit 15 says running, bits 24 to 30 count the operations begun.
+        Bit 15 is "running", bits 24 to 30 count the operations started.
         """
         status = self.asynchronous_upper if upper else self.asynchronous_lower
         return status >> 24 & 0x7F, bool(status & 1 << 15)
 
     def run(self, upper: bool) -> tuple[int, int]:
-        """Give number and state of the newest run of a program of our own."""
+        """Return number and state of the latest run of a motion program."""
         return divmod(self.run_upper if upper else self.run_lower, STATES)
 
 
-AT_REST: Final = 1e-3
-"""rad/s below which a joint counts as standing: the noise of the encoders of a real arm at rest."""
-
-
 class Observer:
-    """The observed controller. It never writes."""
+    """Observes the controller. It never writes."""
 
     def __init__(self, name: str, host: str) -> None:
         self.name = name
@@ -102,29 +100,24 @@ class Observer:
         self.period = 0.002
         self.samples_received = 0
         self.samples_missed = 0
-        self.ring: collections.deque[Sample] = collections.deque(maxlen=KEPT)
+        self.ring: collections.deque[Sample] = collections.deque(maxlen=RING)
         self.unsafe: Sample | None = None
-        """The newest sample in which the safety system forbade motion; a short stop is not missed by a slow reader."""
+        """The latest sample in which the safety system prevented motion; a slow reader does not miss a short stop."""
         self._newest: Sample | None = None
         self._stream: RtdeStream | None = None
         self.observing = Observing(f"{name} at {self.address}", self._open, self._watch, self._close)
 
-    def connect(self, timeout: float) -> None:
-        """Begin to observe. Raises NotConnected, DeviceTimeout, ConnectionLost, each naming host and port."""
-        self.observing.start(timeout)
-
-    def disconnect(self) -> None:
-        """Stop observing; harmless when it was not."""
-        self.observing.stop()
-
     def newest(self) -> Sample | None:
-        """Give the newest sample, however old."""
+        """Return the latest sample, whatever its age; None before the first."""
         return self._newest
 
     def sample(self, max_age: float = FRESH) -> Sample:
-        """Give the newest sample, waiting a moment for one that is fresh.
+        """Return the latest sample, waiting briefly for one that is fresh.
 
-        Raises NotConnected, ConnectionLost, or Stale when none comes that is as fresh as asked for.
+        Raises:
+            NotConnected: The controller is not observed.
+            ConnectionLost: The connection is lost.
+            Stale: No sample of at most `max_age` s arrived in time.
         """
         newest = self.newest()
         if newest is not None and newest.age <= max_age and self.observing.online:
@@ -132,15 +125,15 @@ class Observer:
         clock = RunningTime()
         while True:
             self.observing.check()
-            newest = self.newest()  # it may have come, and the connection back with it, since the first look
+            newest = self.newest()  # it may have arrived, and the connection come back, since the first check
             if newest is None:
-                raise NotConnected(f"{self.who} has sent no sample yet")
+                raise NotConnected(f"{self.who} has sent no sample yet.")
             if newest.age <= max_age:
                 return newest
-            if clock() > AWAITED:
+            if clock() > FRESH_WITHIN:
                 break
             time.sleep(self.period)
-        raise Stale(f"the newest sample of {self.who} is {newest.age:.2f} s old, {max_age:g} s asked for")
+        raise Stale(f"The latest sample of {self.who} is {newest.age:.2f} s old; at most {max_age:g} s is allowed.")
 
     # -------------------------------------------------------------------------------- on the observing thread
     def _open(self, timeout: float) -> None:
@@ -151,12 +144,12 @@ class Observer:
             raise type(e)(f"{self.name}: {e}", e.detail) from e
         self.version = stream.version
         self.period = 0.002 if self.version[0] >= 5 else 0.008
-        self.ring = collections.deque(maxlen=KEPT)  # others may be reading the old one
+        self.ring = collections.deque(maxlen=RING)  # other threads may be reading the old one
         while not self.ring:
             left = deadline - time.monotonic()
             if left <= 0.0:
-                raise DeviceTimeout(f"{self.who} sends no samples")
-            self._take(stream, left)
+                raise DeviceTimeout(f"{self.who} sends no samples.")
+            self._receive(stream, left)
 
     def _close(self) -> None:
         stream, self._stream = self._stream, None
@@ -166,21 +159,21 @@ class Observer:
     def _watch(self, stopping: threading.Event) -> None:
         stream = self._stream
         assert stream is not None
-        empty = 0  # looks, not seconds: while this process stands still nothing is missed
+        empty = 0  # reads, not seconds: while this process is not scheduled, no sample is missed
         while not stopping.is_set():
-            empty = 0 if self._take(stream, _LOOK) else empty + 1
-            if empty * _LOOK >= STALLED:
-                raise ConnectionLost(f"{self.who} has sent nothing for {STALLED:g} s")
+            empty = 0 if self._receive(stream, READ_WAIT) else empty + 1
+            if empty * READ_WAIT >= STALLED:
+                raise ConnectionLost(f"{self.who} has sent nothing for {STALLED:g} s.")
 
-    def _take(self, stream: RtdeStream, wait: float) -> bool:
-        """Put what has come into the ring; false when nothing has."""
+    def _receive(self, stream: RtdeStream, wait: float) -> bool:
+        """Store the samples that have arrived; return False if there are none."""
         rows = stream.read(wait)
         now = time.monotonic()
         for row in rows:
             timestamp = row[0]
             last = self.ring[-1].timestamp if self.ring else timestamp - self.period
-            parts = row[1:7], row[7:13], row[13:19], row[19:25]
-            self._newest = Sample(timestamp, now, *parts, *row[25:])  # type: ignore[arg-type]
+            vectors = row[1:7], row[7:13], row[13:19], row[19:25]
+            self._newest = Sample(timestamp, now, *vectors, *row[25:])  # type: ignore[arg-type]
             if self._newest.safety_mode not in MAY_MOVE_MODES:
                 self.unsafe = self._newest
             self.ring.append(self._newest)
@@ -188,11 +181,3 @@ class Observer:
             if timestamp > last:
                 self.samples_missed += max(round((timestamp - last) / self.period) - 1, 0)
         return bool(rows)
-
-    def lost_by(self) -> DeviceError | None:
-        """Give why the controller is not observed, None when it is."""
-        try:
-            self.observing.check()
-        except DeviceError as e:
-            return e
-        return None

@@ -1,8 +1,8 @@
-"""The primary port, 30001: read once for the arm's own kinematics, which the first robot state after connecting has.
+"""The primary port, 30001: the calibrated kinematics of this robot, in the first robot state after connecting.
 
-Layout from general knowledge of the interface: a message is its length (u32), its type (u8) and what follows; a robot
-state (type 16) holds packages of the same form, of which package 5 tells six checksums, theta, a, d and alpha of the
-six joints, and a status. Big-endian. Nothing is ever sent there.
+A message is its length (u32), its type (u8) and its content. A robot state (type 16) consists of packages of the same
+form. Package 5 has six checksums, then theta, a, d and alpha of the six joints, then a status. Numbers are big-endian.
+The layout is from general knowledge of the interface. Nothing is sent to this port.
 """
 
 import contextlib
@@ -18,18 +18,23 @@ from arcor2_hw.exceptions import ConnectionLost, DeviceTimeout, NotConnected
 
 PORT: Final = 30001
 TIMEOUT: Final = 2.0
-"""s: states come ten times a second, the first of them with the kinematics."""
+"""Time for the kinematics to arrive, s: the controller sends ten states per second."""
 MAX_MESSAGE: Final = 1 << 16
+"""Greatest size of a message, bytes."""
 _HEADER: Final = struct.Struct(">IB")
 _STATE: Final = 16
 _KINEMATICS: Final = 5
 _LAYOUT: Final = struct.Struct(">6I24dI")
 _LONGEST: Final = 1000.0
-"""m: nearly parallel axes may be told with d of metres, and back; more is nonsense."""
+"""Greatest plausible parameter, m or rad: nearly parallel axes may have a d of several metres."""
 
 
 def parts(buffer: bytes) -> tuple[list[tuple[int, bytes]], bytes]:
-    """Cut complete messages, or packages, (type, content) off a buffer; give them and the rest. ValueError for none."""
+    """Split a buffer into complete messages or packages (type, content) and the remaining bytes.
+
+    Raises:
+        ValueError: A length is impossible.
+    """
     found, at = [], 0
     while len(buffer) - at >= _HEADER.size:
         size, kind = _HEADER.unpack_from(buffer, at)
@@ -43,7 +48,7 @@ def parts(buffer: bytes) -> tuple[list[tuple[int, bytes]], bytes]:
 
 
 def calibration_in(message: bytes) -> KinematicCalibration | None:
-    """Find the kinematics in the content of a robot state; None when it has none. ValueError for nonsense."""
+    """Return the kinematics in the content of a robot state, or None. Raise ValueError for garbage."""
     packages, _ = parts(message)
     for kind, content in packages:
         if kind == _KINEMATICS:
@@ -52,16 +57,19 @@ def calibration_in(message: bytes) -> KinematicCalibration | None:
             numbers = _LAYOUT.unpack_from(content)
             theta, a, d, alpha = (numbers[at : at + 6] for at in (6, 12, 18, 24))
             if not all(math.isfinite(value) and abs(value) < _LONGEST for value in numbers[6:30]):
-                raise ValueError("kinematics that are no numbers")
+                raise ValueError("kinematics with impossible numbers")
             joints = [DhParameters(*row) for row in zip(theta, d, a, alpha, strict=True)]
             return KinematicCalibration(joints, "-".join(f"{checksum:08x}" for checksum in numbers[:6]))
     return None
 
 
 def read_calibration(host: str, timeout: float = TIMEOUT, port: int = PORT) -> KinematicCalibration:
-    """Connect, wait for the state that tells the kinematics, close.
+    """Connect, wait for the state with the kinematics, and close.
 
-    Raises NotConnected, DeviceTimeout, ConnectionLost, each naming host and port.
+    Raises:
+        NotConnected: The connection is refused.
+        DeviceTimeout: No kinematics arrived within `timeout` s.
+        ConnectionLost: The controller broke the exchange off.
     """
     address = f"{host}:{port}"
     try:
@@ -70,12 +78,12 @@ def read_calibration(host: str, timeout: float = TIMEOUT, port: int = PORT) -> K
                 if kind == _STATE and (found := calibration_in(content)) is not None:
                     return found
     except TimeoutError:
-        raise DeviceTimeout(f"UR controller {address} tells no kinematics within {timeout:g} s") from None
+        raise DeviceTimeout(f"UR controller {address} sent no kinematics within {timeout:g} s.") from None
     except ConnectionRefusedError as e:
-        raise NotConnected(f"no UR controller at {address}", str(e)) from e
+        raise NotConnected(f"No UR controller at {address}.", str(e)) from e
     except (OSError, ValueError) as e:
-        raise ConnectionLost(f"UR controller {address} broke off the exchange", str(e)) from e
-    raise ConnectionLost(f"UR controller {address} closed the connection")
+        raise ConnectionLost(f"UR controller {address} broke the exchange off.", str(e)) from e
+    raise ConnectionLost(f"UR controller {address} closed the connection.")
 
 
 def _messages(opened: socket.socket, deadline: float) -> Iterator[tuple[int, bytes]]:

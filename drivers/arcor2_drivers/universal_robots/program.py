@@ -1,9 +1,8 @@
-"""The URScript of our own motions: paths with blends, and lines that end at a force. Pure text, no I/O.
+"""URScript of our motion programs: paths with blends, and lines that end at a force. Pure text, no I/O.
 
-Beside ur_rtde's program because that one arms no watchdog before its path runs, and because a force is looked at in
-every control cycle there, not after two network hops. The program stops by its own watchdog, by a register, and at
-its force; what became of it stands in an output register. Source of the words: Universal Robots, "The URScript
-Programming Language".
+ur_rtde's own paths are not used: they arm no watchdog, and a force is checked only after two network hops. A motion
+program checks the force in every control cycle. It stops by its own watchdog, by a register and at its force, and
+writes the outcome to an output register. Source: Universal Robots, "The URScript Programming Language".
 """
 
 import enum
@@ -12,14 +11,14 @@ from typing import Final, NamedTuple
 
 from arcor2_hw.data.geometry import Pose
 
-from .frames import to_vector
+from .geometry import to_vector
 
 STATES: Final = 8
-"""The output register holds the number of the run times this, and the state of it."""
+"""The output register holds the number of the run times this, plus the state of the run."""
 
 
 class RunState(enum.IntEnum):
-    """How far a run is, in the output register."""
+    """State of a run."""
 
     RUNNING = 0
     ARRIVED = 1
@@ -32,7 +31,7 @@ ENDED: Final = frozenset({RunState.ARRIVED, RunState.PUSHED, RunState.STOPPED})
 
 
 class Registers(NamedTuple):
-    """The integer registers of a run: kicks and the wish to stop go in, its state comes out."""
+    """Integer registers of a run: inputs for the watchdog signal and the stop request, an output for the state."""
 
     kick: int
     stop: int
@@ -40,20 +39,20 @@ class Registers(NamedTuple):
 
     @classmethod
     def of(cls, upper: bool) -> "Registers":
-        """Give those that ur_rtde leaves to its users, in the half that is ours."""
+        """Return the registers that ur_rtde leaves free, in the upper or lower range."""
         first = 42 if upper else 18
         return cls(first, first + 1, first)
 
 
 class Limit(NamedTuple):
-    """A force at which a run ends, N; counted along a direction in the controller's base, or as a whole."""
+    """Force at which a run ends, N: along a direction in the controller's base, or the magnitude."""
 
     force: float
     direction: tuple[float, float, float] | None = None
 
 
 class Tool(NamedTuple):
-    """What hangs on the flange: TCP (in the flange), mass kg, centre of gravity m, inertia kg m² or None."""
+    """Tool at the flange: TCP in the flange, mass in kg, center of gravity in m, inertia in kg m² or None."""
 
     tcp: Pose
     mass: float
@@ -62,39 +61,39 @@ class Tool(NamedTuple):
 
 
 def numbers(values: Sequence[float]) -> str:
-    """Give numbers as a URScript list."""
+    """Return numbers as a URScript list."""
     return "[" + ", ".join(f"{value:.9g}" for value in values) + "]"
 
 
 def linear(vector: Sequence[float], speed: float, acceleration: float, blend: float = 0.0) -> str:
-    """Give a movel to a pose of the controller's base."""
+    """Return a movel to a pose of the controller's base."""
     return f"movel(p{numbers(vector)}, a={acceleration:.6g}, v={speed:.6g}, r={blend:.6g})"
 
 
 def joint(q: Sequence[float], speed: float, acceleration: float, blend: float = 0.0) -> str:
-    """Give a movej to joint values."""
+    """Return a movej to joint values."""
     return f"movej({numbers(q)}, a={acceleration:.6g}, v={speed:.6g}, r={blend:.6g})"
 
 
 def tool_lines(tool: Tool) -> list[str]:
-    """Give what tells the controller of its tool."""
-    told = [f"set_tcp(p{numbers(to_vector(tool.tcp))})"]
+    """Return the lines that set the tool."""
+    lines = [f"set_tcp(p{numbers(to_vector(tool.tcp))})"]
     if tool.inertia is None:
-        return [*told, f"set_payload({tool.mass:.6g}, {numbers(tool.cog)})"]
-    return [*told, f"set_target_payload({tool.mass:.6g}, {numbers(tool.cog)}, {numbers(tool.inertia)})"]
+        return [*lines, f"set_payload({tool.mass:.6g}, {numbers(tool.cog)})"]
+    return [*lines, f"set_target_payload({tool.mass:.6g}, {numbers(tool.cog)}, {numbers(tool.inertia)})"]
 
 
 def _push(limit: Limit) -> list[str]:
-    """Give the lines that set `push` to the change of the force since the start, and `pressed` to whether it grew.
+    """Return the lines that set `push` to the change of the force since the start, and `pressed` to whether it grew.
 
-    A force that becomes less is that of a contact that is left; whichever sign a contact has, it is felt.
+    A decreasing force is a contact being released. The sign of the force does not matter.
     """
 
     def along(force: str) -> str:
         if limit.direction is None:
             return f"norm([{force.format(0)}, {force.format(1)}, {force.format(2)}])"
-        parts = (f"{force.format(i)} * {value:.9g}" for i, value in enumerate(limit.direction))
-        return f"norm({' + '.join(parts)})"
+        terms = (f"{force.format(i)} * {value:.9g}" for i, value in enumerate(limit.direction))
+        return f"norm({' + '.join(terms)})"
 
     return [
         f"push = {along('(force[{0}] - rest[{0}])')}",
@@ -111,9 +110,19 @@ def motion_program(
     deceleration: float,
     limit: Limit | None = None,
 ) -> str:
-    """Give the program of one run: `watchdog` in Hz is armed before anything moves, `deceleration` in m/s²."""
+    """Return the program of a run.
 
-    def tell(state: RunState) -> str:
+    Args:
+        number: Number of the run.
+        moves: Lines of URScript that move the arm.
+        registers: Registers of the run.
+        watchdog: Watchdog frequency, Hz; it is armed before the arm moves.
+        tool: Tool to set.
+        deceleration: Deceleration of a stop, m/s².
+        limit: Force at which the run ends.
+    """
+
+    def report(state: RunState) -> str:
         return f"write_output_integer_register({registers.state}, {number * STATES + state})"
 
     watched: list[str] = []
@@ -129,7 +138,7 @@ def motion_program(
     lines = [
         "def arcor2_motion():",
         f'  rtde_set_watchdog("input_int_register_{registers.kick}", {watchdog:.6g}, "stop")',
-        f"  {tell(RunState.RUNNING)}",
+        f"  {report(RunState.RUNNING)}",
         *(f"  {line}" for line in tool_lines(tool)),
         f"  global state = {RunState.RUNNING}",
         "  thread moves():",
@@ -147,7 +156,7 @@ def motion_program(
         "    sync()",
         "  end",
         f"  if state != {RunState.ARRIVED}:",
-        f"    {tell(RunState.STOPPING)}",
+        f"    {report(RunState.STOPPING)}",
         "    kill mover",
         f"    stopl({deceleration:.6g})",
         "  end",

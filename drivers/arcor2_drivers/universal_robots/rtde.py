@@ -1,9 +1,9 @@
-"""The observing side of RTDE, port 30004: set up an output recipe, then take sample after sample.
+"""The observing side of RTDE, port 30004: set up an output recipe, then read the stream of samples.
 
-Source: Universal Robots, "RTDE guide" (protocol version 2). Beside the library's own receiver because that one wakes
-some ten times per sample and skips samples that nobody fetched in time, and because its constructor holds the
-interpreter and waits without end for a controller that accepts and then says nothing. The figures are in
-docs/devices/universal-robots.md.
+Source: Universal Robots, "RTDE guide" (protocol version 2). The library's own receiver is not used: it wakes about ten
+times per sample and skips samples that were not fetched in time, and its constructor holds the interpreter and waits
+without limit for a controller that accepts a connection and sends nothing. docs/devices/universal-robots.md has the
+measurements.
 """
 
 import socket
@@ -14,7 +14,8 @@ from typing import Final, Self
 from arcor2_hw.exceptions import ConnectionLost, DeviceFault, DeviceTimeout, NotConnected
 
 PORT: Final = 30004
-MAX_FRAME: Final = 4096  # a recipe of everything there is stays below
+MAX_FRAME: Final = 4096
+"""Greatest size of a frame, bytes; a recipe of all variables is smaller."""
 _PROTOCOL: Final = 2
 _HEADER: Final = struct.Struct(">HB")
 _VERSION, _CONTROLLER, _OUTPUTS, _START, _DATA, _TEXT = (ord(letter) for letter in "VvOSUM")
@@ -35,7 +36,7 @@ Version = tuple[int, int, int, int]
 
 
 def frames(buffer: bytes) -> tuple[list[tuple[int, bytes]], bytes]:
-    """Cut complete frames (type, payload) off a buffer; give them and the rest. ValueError for what is no frame."""
+    """Split a buffer into complete frames (type, payload) and the remaining bytes. Raise ValueError for garbage."""
     found, at, end = [], 0, len(buffer)
     while end - at >= _HEADER.size:
         size, kind = _HEADER.unpack_from(buffer, at)
@@ -49,23 +50,28 @@ def frames(buffer: bytes) -> tuple[list[tuple[int, bytes]], bytes]:
 
 
 def recipe(names: list[str], payload: bytes) -> tuple[int, struct.Struct]:
-    """Read the answer to an output set-up: the recipe's number and the layout of its data behind that number.
+    """Decode the answer to an output set-up.
 
-    DeviceFault names the variables that the controller does not have; ValueError for nonsense.
+    Returns:
+        The number of the recipe, and the layout of the data that follows this number in a frame.
+
+    Raises:
+        DeviceFault: The controller does not have a variable.
+        ValueError: The answer is garbage.
     """
     if not payload:
         raise ValueError("an empty recipe")
     types = payload[1:].decode("ascii", "replace").rstrip(",").split(",")
     missing = [name for name, kind in zip(names, types, strict=False) if kind == "NOT_FOUND"]
     if missing:
-        raise DeviceFault(f"the controller does not know {', '.join(missing)}", ", ".join(types))
+        raise DeviceFault(f"The controller does not have {', '.join(missing)}.", ", ".join(types))
     if len(types) != len(names) or not set(types) <= _FORMATS.keys():
         raise ValueError(f"a recipe of {', '.join(types)}")
     return payload[0], struct.Struct(">" + "".join(_FORMATS[kind] for kind in types))
 
 
 class RtdeStream:
-    """A started stream of one recipe. Make it by `open`; used by one thread."""
+    """A started stream of one recipe. Create it by `open`; for one thread."""
 
     def __init__(self, host: str, port: int, opened: socket.socket) -> None:
         self.address = f"{host}:{port}"
@@ -77,40 +83,42 @@ class RtdeStream:
 
     @classmethod
     def open(cls, host: str, names: list[str], timeout: float, port: int = PORT) -> Self:
-        """Connect, agree on the recipe and start it, all within `timeout` s.
+        """Connect, set the recipe up and start it, all within `timeout` s.
 
-        Raises NotConnected when nobody listens, DeviceTimeout when nothing is answered, ConnectionLost when the
-        exchange breaks off, each naming host and port; DeviceFault when a variable does not exist.
+        Raises:
+            NotConnected: The connection is refused, or the host is unreachable.
+            DeviceTimeout: The controller does not answer.
+            ConnectionLost: The controller breaks the exchange off.
+            DeviceFault: The controller does not have a variable.
         """
         deadline = time.monotonic() + timeout
         address = f"{host}:{port}"
         try:
             opened = socket.create_connection((host, port), timeout)
         except TimeoutError:
-            raise DeviceTimeout(f"UR controller {address} cannot be reached within {timeout:g} s") from None
-        except ConnectionResetError as e:  # it listens: the reset may overtake the news that it accepted
-            raise ConnectionLost(f"UR controller {address} broke off the exchange", str(e)) from e
+            raise DeviceTimeout(f"UR controller {address} cannot be reached within {timeout:g} s.") from None
+        except ConnectionResetError as e:  # the port is open: a reset may overtake the acceptance
+            raise ConnectionLost(f"UR controller {address} broke the exchange off.", str(e)) from e
         except OSError as e:
-            raise NotConnected(f"no UR controller at {address}: {e.strerror or e}", str(e)) from e
+            raise NotConnected(f"No UR controller at {address}: {e.strerror or e}.", str(e)) from e
         stream = cls(host, port, opened)
         try:
             opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             stream._set_up(names, deadline)
-        except TimeoutError:
+        except BaseException as e:
             stream.close()
-            raise DeviceTimeout(f"UR controller {address} accepts but does not answer within {timeout:g} s") from None
-        except (OSError, ValueError, struct.error) as e:
-            stream.close()
-            raise ConnectionLost(f"UR controller {address} broke off the exchange", str(e)) from e
-        except BaseException:
-            stream.close()
+            if isinstance(e, TimeoutError):
+                raise DeviceTimeout(f"UR controller {address} did not answer within {timeout:g} s.") from None
+            if isinstance(e, (OSError, ValueError, struct.error)):
+                raise ConnectionLost(f"UR controller {address} broke the exchange off.", str(e)) from e
             raise
         return stream
 
     def read(self, wait: float) -> list[tuple[float | int, ...]]:
-        """Give the samples that have come, after waiting at most `wait` s for the first; empty when none came.
+        """Return the samples received, waiting at most `wait` s for the first; none if none came.
 
-        Raises ConnectionLost when the controller closes, resets, or sends what is no RTDE.
+        Raises:
+            ConnectionLost: The controller closed or reset the connection, or sent garbage.
         """
         try:
             if self._socket.gettimeout() != wait:
@@ -119,17 +127,17 @@ class RtdeStream:
         except TimeoutError:
             return []
         except OSError as e:
-            raise ConnectionLost(f"the connection to UR controller {self.address} broke", str(e)) from e
+            raise ConnectionLost(f"The connection to UR controller {self.address} broke.", str(e)) from e
         if not data:
-            raise ConnectionLost(f"UR controller {self.address} closed the connection")
+            raise ConnectionLost(f"UR controller {self.address} closed the connection.")
         try:
             found, self._buffer = frames(self._buffer + data if self._buffer else data)
             return [self._layout.unpack(f[1:]) for kind, f in found if kind == _DATA and f[0] == self._number]
         except (ValueError, IndexError, struct.error) as e:
-            raise ConnectionLost(f"UR controller {self.address} sends what is no RTDE", str(e)) from e
+            raise ConnectionLost(f"UR controller {self.address} sends data that is not RTDE.", str(e)) from e
 
     def close(self) -> None:
-        """Close; harmless when closed."""
+        """Close the connection, if it is open."""
         self._socket.close()
 
     def _set_up(self, names: list[str], deadline: float) -> None:
@@ -147,16 +155,16 @@ class RtdeStream:
         self._socket.settimeout(max(deadline - time.monotonic(), 0.001))
         self._socket.sendall(_HEADER.pack(_HEADER.size + len(payload), kind) + payload)
         while True:
-            found, self._buffer = frames(self._buffer)
-            for number, (came, answer) in enumerate(found):
-                if came == kind:
-                    behind = b"".join(_HEADER.pack(_HEADER.size + len(f), k) + f for k, f in found[number + 1 :])
-                    self._buffer = behind + self._buffer
+            found, rest = frames(self._buffer)
+            for number, (received, answer) in enumerate(found):
+                if received == kind:
+                    later = (_HEADER.pack(_HEADER.size + len(f), k) + f for k, f in found[number + 1 :])
+                    self._buffer = b"".join(later) + rest
                     return answer
-                if came not in (_TEXT, _DATA):
-                    raise ValueError(f"a frame of type {came} instead of {kind}")
+                if received not in (_TEXT, _DATA):
+                    raise ValueError(f"a frame of type {received} instead of {kind}")
             self._socket.settimeout(max(deadline - time.monotonic(), 0.001))
             data = self._socket.recv(MAX_FRAME)
             if not data:
                 raise ConnectionError("closed by the controller")
-            self._buffer += data
+            self._buffer = rest + data

@@ -1,4 +1,4 @@
-"""The script port, 30003: a program goes in as text. There is no answer, only a stream of states."""
+"""The script port, 30003: takes a program as text. There is no answer, only a stream of states."""
 
 import contextlib
 import socket
@@ -12,7 +12,7 @@ _CHUNK: Final = 1 << 16
 
 
 class ScriptPort:
-    """One connection, kept until the program is seen to play: closing it early could throw the text away."""
+    """One connection. Keep it open until the program plays: closing it early could discard the text."""
 
     def __init__(self, address: str, opened: socket.socket) -> None:
         self.address = address
@@ -20,35 +20,35 @@ class ScriptPort:
 
     @classmethod
     def open(cls, host: str, timeout: float, port: int = PORT) -> Self:
-        """Connect. Raises NotConnected, DeviceTimeout."""
+        """Connect. Raise NotConnected or DeviceTimeout."""
         address = f"{host}:{port}"
         try:
             return cls(address, socket.create_connection((host, port), timeout))
         except TimeoutError:
-            raise DeviceTimeout(f"the script port {address} does not answer") from None
+            raise DeviceTimeout(f"The script port {address} does not answer.") from None
         except OSError as e:
-            raise NotConnected(f"no script port at {address}", str(e)) from e
+            raise NotConnected(f"No script port at {address}.", str(e)) from e
 
     def send(self, program: str, timeout: float) -> None:
-        """Send a program. Raises DeviceTimeout, ConnectionLost."""
-        until = time.monotonic() + timeout
-        left = memoryview(program.encode("ascii"))
+        """Send a program. Raise DeviceTimeout or ConnectionLost."""
+        deadline = time.monotonic() + timeout
+        rest = memoryview(program.encode("ascii"))
         try:
-            while left:
-                self._socket.settimeout(max(until - time.monotonic(), 0.001))
-                left = left[self._socket.send(left) :]
+            while rest:
+                self._socket.settimeout(max(deadline - time.monotonic(), 0.001))
+                rest = rest[self._socket.send(rest) :]
         except TimeoutError:
-            raise DeviceTimeout(f"the script port {self.address} took no program in {timeout:g} s") from None
+            raise DeviceTimeout(f"The script port {self.address} did not take a program in {timeout:g} s.") from None
         except OSError as e:
-            raise ConnectionLost(f"the script port {self.address} closed the connection", str(e)) from e
+            raise ConnectionLost(f"The script port {self.address} closed the connection.", str(e)) from e
 
     def drain(self) -> None:
-        """Throw away what the controller streams, so that it does not wait for us."""
+        """Discard the stream of the controller, so that its buffer does not fill."""
         with contextlib.suppress(OSError):
             self._socket.settimeout(0.0)
             while self._socket.recv(_CHUNK):
                 pass
 
     def close(self) -> None:
-        """Close."""
+        """Close the connection."""
         self._socket.close()

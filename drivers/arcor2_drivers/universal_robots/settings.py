@@ -1,4 +1,4 @@
-"""Settings of a Universal Robots arm, checked when they are given."""
+"""Settings of a Universal Robots arm."""
 
 import dataclasses
 import math
@@ -10,46 +10,48 @@ from arcor2_hw.objects.gripping import check_part_size
 from arcor2_hw.objects.settings import check_host
 
 SLOWEST_WATCHDOG = 2.5
-"""Hz: with less the arm could not stop within the time that the type declares (`loss_reaction`)."""
+"""Lowest watchdog frequency, Hz, with which the arm stops within the time that the type declares (`loss_reaction`)."""
 MANUAL_TCP_SPEED = 0.25
-"""m/s: the most a client may ask for in manual mode (ISO 10218-1, reduced speed)."""
+"""Highest TCP speed in manual mode, m/s (ISO 10218-1, reduced speed)."""
+OUTPUTS = 18
+"""Number of digital inputs, and of digital outputs: 8 standard, 8 configurable, 2 at the tool."""
 
 
 def within(name: str, value: float, low: float, high: float) -> None:
-    """Raise OutOfRange, naming the parameter, unless the value lies in the range."""
+    """Raise OutOfRange, naming the parameter, unless the value is in the range."""
     if not (math.isfinite(value) and low <= value <= high):
         raise OutOfRange(f"{name} must be {low:g} to {high:g}, not {value!r}")
 
 
 @dataclasses.dataclass
 class UrSettings(Settings):
-    """SI units. Poses of the TCP are in the flange; its orientation is a rotation vector.
+    """Settings in SI units. Poses of the TCP are in the flange; its orientation is a rotation vector.
 
-    :param host: address of the controller; its ports are fixed
-    :param payload_mass: mass at the flange, kg; negative: nobody has stated it, and control is refused
-    :param payload_cog_x: centre of gravity of the payload, m
-    :param payload_cog_y: centre of gravity of the payload, m
-    :param payload_cog_z: centre of gravity of the payload, m
-    :param tcp_x: tool centre point, m
-    :param tcp_y: tool centre point, m
-    :param tcp_z: tool centre point, m
-    :param tcp_rx: orientation at the tool centre point, rad
-    :param tcp_ry: orientation at the tool centre point, rad
-    :param tcp_rz: orientation at the tool centre point, rad
-    :param max_tcp_speed: what speed 1 means in a linear move, m/s
-    :param max_joint_speed: what speed 1 means in a joint move, rad/s
+    :param host: address of the controller
+    :param payload_mass: mass at the flange, kg; negative: not set. Required before the robot can move
+    :param payload_cog_x: center of gravity of the payload, m
+    :param payload_cog_y: center of gravity of the payload, m
+    :param payload_cog_z: center of gravity of the payload, m
+    :param tcp_x: tool center point, m
+    :param tcp_y: tool center point, m
+    :param tcp_z: tool center point, m
+    :param tcp_rx: orientation at the tool center point, rad
+    :param tcp_ry: orientation at the tool center point, rad
+    :param tcp_rz: orientation at the tool center point, rad
+    :param max_tcp_speed: TCP speed of a linear move at speed 1, m/s
+    :param max_joint_speed: joint speed of a joint move at speed 1, rad/s
     :param tcp_acceleration: acceleration of linear moves, m/s²
     :param joint_acceleration: acceleration of joint moves, rad/s²
     :param stop_deceleration: deceleration of a stop, m/s²
-    :param watchdog_frequency: the controller stops when it is not kicked that often, Hz; more needs an idle computer
-    :param use_upper_range_registers: leave registers 0 to 23 to a fieldbus, where ur_rtde can
-    :param gripper_output: digital output of the gripper, 0 to 17; -1: there is none
-    :param part_sensor_input: digital input that tells of a held part, 0 to 17; -1: there is none
+    :param watchdog_frequency: lowest rate of watchdog signals, Hz; below it the controller stops the arm
+    :param use_upper_range_registers: leave registers 0 to 23 to a fieldbus, if the controller supports it
+    :param gripper_output: digital output of the gripper, 0 to 17; -1: no gripper
+    :param part_sensor_input: digital input of the part sensor, 0 to 17; -1: no sensor
     :param gripper_time: time the gripper takes to open or close, s
-    :param part_size_x: edge of a gripped part along the x axis of the tool, m; 0: unknown, safe moves ignore the part
-    :param part_size_y: edge of a gripped part along the y axis of the tool, m
-    :param part_size_z: edge of a gripped part along the z axis of the tool, m
-    :param part_offset_z: from the tool center point to the center of a gripped part along the tool, m
+    :param part_size_x: size of a gripped part along the x axis of the tool, m; 0: unknown, safe moves ignore the part
+    :param part_size_y: size of a gripped part along the y axis of the tool, m
+    :param part_size_z: size of a gripped part along the z axis of the tool, m
+    :param part_offset_z: shift of a gripped part from the tool center point along the tool, m
     """
 
     host: str
@@ -92,22 +94,18 @@ class UrSettings(Settings):
         within("joint_acceleration", self.joint_acceleration, 0.05, 40.0)
         within("stop_deceleration", self.stop_deceleration, 0.5, 15.0)
         within("watchdog_frequency", self.watchdog_frequency, SLOWEST_WATCHDOG, 50.0)
-        if self.gripper_output != -1:
-            within("gripper_output", self.gripper_output, 0, 17)
-        if self.part_sensor_input != -1:
-            within("part_sensor_input", self.part_sensor_input, 0, 17)
+        for name in ("gripper_output", "part_sensor_input"):
+            within(name, getattr(self, name), -1, OUTPUTS - 1)
         within("gripper_time", self.gripper_time, 0.0, 10.0)
         check_part_size(self, within)
 
     @property
     def tcp(self) -> Pose:
-        """Give the TCP in the flange."""
-        return Pose(
-            Position(self.tcp_x, self.tcp_y, self.tcp_z),
-            Orientation.from_rotation_vector(self.tcp_rx, self.tcp_ry, self.tcp_rz),
-        )
+        """Return the TCP in the flange."""
+        orientation = Orientation.from_rotation_vector(self.tcp_rx, self.tcp_ry, self.tcp_rz)
+        return Pose(Position(self.tcp_x, self.tcp_y, self.tcp_z), orientation)
 
     @property
     def payload_cog(self) -> tuple[float, float, float]:
-        """Give the payload's centre of gravity in the flange, m."""
+        """Return the center of gravity of the payload in the flange, m."""
         return self.payload_cog_x, self.payload_cog_y, self.payload_cog_z

@@ -1,4 +1,4 @@
-"""The controller's numbers as the states of a robot: mode, safety, program; and what keeps it from moving.
+"""Numbers of the controller as states of a robot: mode, safety, program.
 
 Source: Universal Robots, "RTDE guide": robot_mode, safety_mode, runtime_state.
 """
@@ -10,7 +10,7 @@ from arcor2_hw.data.robot import Power, Safety
 
 
 class Runtime(enum.IntEnum):
-    """runtime_state."""
+    """Values of runtime_state."""
 
     STOPPING = 0
     STOPPED = 1
@@ -22,7 +22,7 @@ class Runtime(enum.IntEnum):
 
 MODE_IDLE: Final = 5
 MODE_RUNNING: Final = 7
-
+MODE_UPDATING: Final = 8
 MODE_NAMES: Final = {
     -1: "no controller",
     0: "disconnected",
@@ -30,10 +30,10 @@ MODE_NAMES: Final = {
     2: "booting",
     3: "power off",
     4: "power on",
-    5: "idle, brakes closed",
+    MODE_IDLE: "idle, brakes closed",
     6: "backdrive",
-    7: "running",
-    8: "updating firmware",
+    MODE_RUNNING: "running",
+    MODE_UPDATING: "updating firmware",
 }
 
 _SAFETY: Final = {
@@ -54,31 +54,31 @@ _SAFETY: Final = {
 
 MAY_MOVE: Final = frozenset({Safety.NORMAL, Safety.REDUCED})
 MAY_MOVE_MODES: Final = frozenset(mode for mode, safety in _SAFETY.items() if safety in MAY_MOVE)
-"""The numbers of safety_mode in which the arm may move."""
+"""Values of safety_mode in which the arm may move."""
 
 REMEDIES: Final = {
-    Safety.PROTECTIVE_STOP: "look why the arm was stopped, then acknowledge the protective stop",
-    Safety.SAFEGUARD_STOP: "close the guard, then start the motion again",
-    Safety.EMERGENCY_STOP: "release the emergency stop, then switch the arm on again",
-    Safety.ENABLING_STOP: "hold the enabling device in its middle position",
-    Safety.RECOVERY: "move the arm back within its limits at the pendant",
-    Safety.VIOLATION: "look why a safety limit was exceeded, then restart the safety system",
-    Safety.FAULT: "read the log at the pendant, then restart the safety system",
+    Safety.PROTECTIVE_STOP: "Find out why the arm was stopped, then acknowledge the protective stop.",
+    Safety.SAFEGUARD_STOP: "Close the guard, then start the motion again.",
+    Safety.EMERGENCY_STOP: "Release the emergency stop, then switch the arm on again.",
+    Safety.ENABLING_STOP: "Hold the enabling device in its middle position.",
+    Safety.RECOVERY: "Move the arm back within its limits at the pendant.",
+    Safety.VIOLATION: "Find out why a safety limit was exceeded, then restart the safety system.",
+    Safety.FAULT: "Read the log at the pendant, then restart the safety system.",
 }
 
 
 def safety_of(safety_mode: int) -> Safety:
-    """Give what safety_mode means; a number not known is a fault."""
+    """Return the safety state of a safety_mode; an unknown number counts as a fault."""
     return _SAFETY.get(safety_mode, Safety.FAULT)
 
 
 def power_of(robot_mode: int) -> Power:
-    """Give what robot_mode says of the drives."""
-    if robot_mode >= MODE_IDLE and robot_mode != 8:
-        return Power.IDLE_BRAKED if robot_mode == MODE_IDLE else Power.OPERATIONAL
-    return Power.OFF
+    """Return the state of the drives of a robot_mode."""
+    if robot_mode < MODE_IDLE or robot_mode == MODE_UPDATING:
+        return Power.OFF
+    return Power.IDLE_BRAKED if robot_mode == MODE_IDLE else Power.OPERATIONAL
 
 
 def program_plays(runtime: int) -> bool:
-    """Tell whether some program plays, or waits to go on."""
+    """Return whether a program is playing or paused."""
     return runtime not in (Runtime.STOPPED, Runtime.STOPPING)

@@ -1,32 +1,74 @@
-"""How long a motion may take: pure functions behind the driver's deadlines."""
+"""Time limits of the driver, and the longest time that a motion may take."""
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
+from arcor2_hw.data.geometry import Pose
+
 SLACK: Final = 1.5
-"""A move may take that many times what it should: the controller blends its own limits into ours."""
+"""Factor on the computed time of a move: the controller applies limits of its own, too."""
 GRACE: Final = 3.0
-"""Seconds on top: for the command to get there and the arm to come to rest."""
+"""Time added to that, s: for sending the command and for settling."""
 SLOWEST_FRACTION: Final = 0.05
-"""Time runs slower for a move while the speed slider is down, but not slower than this."""
+"""Lowest setting of the speed slider that extends the time of a move in full."""
 ROTATION_SPEED: Final = 0.5
-"""rad/s the tool turns at least in a linear move with the TCP's speed limited."""
+"""Lowest angular speed of the tool in a linear move, rad/s."""
+
+STREAM_FREQUENCY: Final = 100.0
+"""Frequency of ur_rtde's stream, Hz: a command takes 20 ms instead of 4, the process 5 % of a core instead of 10."""
+TAKE_TIMEOUT: Final = 5.0
+"""Time the controller may take to start the control program, s."""
+CALL_TIMEOUT: Final = 2.0
+"""Time for a command that moves nothing, s; 0.03 s on an idle computer. The library itself waits 4 to 300 s."""
+RESUME_TIMEOUT: Final = 4.0
+"""Time for the control program to play again after a motion program, s; it takes 0.1 s."""
+GUARD_PERIOD: Final = 0.01
+"""Time between two checks of the guard, s."""
+GUARD_ENDS: Final = 1.0
+"""Time the guard of an ended session may take to finish, s."""
+STOP_REACTION: Final = 0.08
+"""Time the control program may take to react to a stop before the dashboard is used, s: twice that of two commands."""
+SPEED_STOPPED: Final = 0.4
+"""Time for stopping a jog, s: the command returns when the arm is at standstill."""
+LAST_STOP: Final = 0.3
+"""Time for the dashboard to answer the stop at the end of a session, s."""
+PROGRAM_GONE: Final = 0.1
+"""Time for which our program may be reported as not playing before the session ends, s of the controller's clock: two
+streams report it at different times."""
+PROCESS_ENDS: Final = 0.2
+"""Time for the control process to report why our program is not playing, s."""
+POLL: Final = 0.005
+"""Time between two checks for the end of a motion, s."""
+REST_WITHIN: Final = 2.0
+"""Time after which a stopped arm must be at standstill, s; from full speed it takes 0.3 s."""
+STANDING: Final = 0.5
+"""Time an arm may be at standstill, short of its target and with no motion running, before the move has failed, s."""
+STARTS_WITHIN: Final = 1.0
+"""Time from sending a motion program to its first line, s; a controller takes some tens of milliseconds."""
 
 
 def trapezoid(distance: float, speed: float, acceleration: float) -> float:
-    """Give the seconds of a motion from rest to rest with trapezoidal speed."""
+    """Return the duration of a motion from standstill to standstill with a trapezoidal speed profile, s."""
     ramp = speed * speed / acceleration
     if distance >= ramp:
         return distance / speed + speed / acceleration
     return 2.0 * math.sqrt(distance / acceleration)
 
 
-def joint_budget(start: tuple[float, ...], target: list[float], speed: float, acceleration: float) -> float:
-    """Give the seconds at full speed slider that a joint motion may take."""
+def joint_budget(start: Sequence[float], target: Sequence[float], speed: float, acceleration: float) -> float:
+    """Return the longest time that a joint motion may take at full speed slider, s."""
     longest = max(abs(b - a) for a, b in zip(start, target, strict=True))
     return SLACK * trapezoid(longest, speed, acceleration) + GRACE
 
 
-def linear_budget(distance: float, angle: float, speed: float, acceleration: float) -> float:
-    """Give the seconds at full speed slider that a linear motion may take; m and rad."""
+def linear_budget(start: Pose, target: Pose, speed: float, acceleration: float) -> float:
+    """Return the longest time that a linear motion may take at full speed slider, s."""
+    distance = start.position.distance_to(target.position)
+    angle = start.orientation.angle_to(target.orientation)
     return SLACK * (trapezoid(distance, speed, acceleration) + angle / ROTATION_SPEED) + GRACE
+
+
+def path_budget(budgets: Sequence[float]) -> float:
+    """Return the longest time that consecutive motions may take, s, given that of each."""
+    return sum(budgets) - GRACE * (len(budgets) - 1)

@@ -1,47 +1,40 @@
-"""The Universal Robots e-series arms: UR5e, UR3e, UR10e."""
-
-import math
-from typing import ClassVar
+"""Object types of the Universal Robots e-series: UR3e, UR5e, UR10e."""
 
 from arcor2_hw.data.geometry import Pose
 
-from .geometry import UR3E, UR10E, Dimensions
+from .geometry import UR3E, UR5E, UR10E
 from .settings import UrSettings
-from .ur_tasks import UrTasks
+from .universal_robot import UniversalRobot
 
 
-class UR5e(UrTasks):
+class UR5e(UniversalRobot):
     """Universal Robots UR5e: six axes, 5 kg, 850 mm."""
 
     _ABSTRACT = False
     urdf_package_name = "ur5e.zip"
+    model = UR5E
 
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: UrSettings) -> None:
         super().__init__(obj_id, name, pose, settings)
 
 
-class UR3e(UrTasks):
+class UR3e(UniversalRobot):
     """Universal Robots UR3e: six axes, 3 kg, 500 mm."""
 
     _ABSTRACT = False
     urdf_package_name = "ur3e.zip"
-    max_payload: ClassVar[float] = 3.0
-    reach: ClassVar[float] = 0.5
-    dimensions: ClassVar[Dimensions] = UR3E
-    joint_limit: ClassVar[float] = 2.0 * math.pi
+    model = UR3E
 
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: UrSettings) -> None:
         super().__init__(obj_id, name, pose, settings)
 
 
-class UR10e(UrTasks):
+class UR10e(UniversalRobot):
     """Universal Robots UR10e: six axes, 12.5 kg, 1300 mm."""
 
     _ABSTRACT = False
     urdf_package_name = "ur10e.zip"
-    max_payload: ClassVar[float] = 12.5
-    reach: ClassVar[float] = 1.3
-    dimensions: ClassVar[Dimensions] = UR10E
+    model = UR10E
 
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: UrSettings) -> None:
         super().__init__(obj_id, name, pose, settings)

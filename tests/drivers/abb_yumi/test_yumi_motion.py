@@ -157,11 +157,11 @@ def test_stop_passes_and_tells_when_it_stands(fake: FakeYumi, ready: YuMi) -> No
 
 def test_a_stop_before_the_command_is_sent_wins(fake: FakeYumi, ready: YuMi) -> None:
     begun = fake.arm("left")["moves_begun"]
-    stops = ready._stops["left"]
+    guard = ready._control.stops["left"].guard()
     goal = [joint.value for joint in turned(ready, "left", 1, 0.5)]
     ready.stop("left")
     with pytest.raises(Cancelled):
-        ready._move_joints("left", goal, 0.5, stops)
+        ready._motion.to_joints("left", goal, 0.5, guard)
     assert fake.arm("left")["moves_begun"] == begun
 
 
@@ -180,7 +180,7 @@ def test_the_arms_keep_clear_of_each_other(fake: FakeYumi, ready: YuMi) -> None:
         with pytest.raises(Refused) as error:
             ready.move_to_pose("tcp", shifted(home, ACROSS), 0.5, safe=False, linear=linear, arm_id="left")
         assert "too close" in str(error.value)
-        assert "mm asked for" in error.value.detail
+        assert "required 20 mm" in error.value.detail
     assert fake.arm("left")["moves_begun"] == begun
 
 

@@ -103,7 +103,7 @@ def test_messages_come_in_any_pieces_and_nonsense_is_refused() -> None:
     assert read.joints[0].alpha == 0.1
     assert calibration_in(struct.pack(">IB", 9, 0) + bytes(4)) is None
     broken = struct.pack(">6I24dI", *range(6), math.nan, *([0.1] * 23), 0)
-    with pytest.raises(ValueError, match="no numbers"):
+    with pytest.raises(ValueError, match="impossible numbers"):
         calibration_in(struct.pack(">IB", 5 + len(broken), 5) + broken)
     with pytest.raises(ValueError, match=f"{primary.MAX_MESSAGE + 1} bytes"):
         parts(struct.pack(">IB", primary.MAX_MESSAGE + 1, 16))

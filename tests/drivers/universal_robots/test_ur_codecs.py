@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from arcor2_drivers.universal_robots import dashboard, timing
-from arcor2_drivers.universal_robots.frames import from_vector, to_vector, world_from_base
+from arcor2_drivers.universal_robots.geometry import from_vector, to_vector, world_from_base
 from arcor2_drivers.universal_robots.rtde import MAX_FRAME, frames, recipe
 from arcor2_drivers.universal_robots.settings import UrSettings
 from arcor2_drivers.universal_robots.states import power_of, safety_of
 from arcor2_hw.data.geometry import Orientation, Pose, Position
-from arcor2_hw.data.robot import Mode, Power, ProgramState, Safety
+from arcor2_hw.data.robot import Mode, Power, Safety
 from arcor2_hw.exceptions import DeviceFault, OutOfRange
 
 
@@ -55,7 +55,7 @@ def test_a_recipe_gives_the_layout_and_names_what_is_missing() -> None:
 @settings(deadline=None)
 @given(st.text(max_size=80))
 def test_dashboard_answers_are_understood_or_a_device_fault(answer: str) -> None:
-    for read in (dashboard.is_remote, dashboard.program):
+    for read in (dashboard.is_remote, dashboard.program_name):
         try:
             read(answer)
         except DeviceFault as e:
@@ -68,7 +68,7 @@ def test_dashboard_answers_are_understood_or_a_device_fault(answer: str) -> None
 def test_dashboard_answers_of_the_manual() -> None:
     assert dashboard.is_remote("true")
     assert not dashboard.is_remote("false\n")
-    assert dashboard.program("PLAYING a b.urp") == (ProgramState.PLAYING, "a b.urp")
+    assert dashboard.program_name("PLAYING a b.urp") == "a b.urp"
     assert dashboard.operational_mode("MANUAL", False) is Mode.MANUAL_REDUCED_SPEED
     assert dashboard.operational_mode("AUTOMATIC", True) is Mode.AUTOMATIC_EXTERNAL
     assert dashboard.operational_mode("NONE", True) is Mode.OTHER

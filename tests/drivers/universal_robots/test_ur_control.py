@@ -9,9 +9,9 @@ import psutil
 import pytest
 
 from arcor2_drivers.universal_robots import timing
-from arcor2_drivers.universal_robots.control import ControlSession
+from arcor2_drivers.universal_robots.move_actions import MoveType
+from arcor2_drivers.universal_robots.session import ControlSession
 from arcor2_drivers.universal_robots.ur5e import UR5e
-from arcor2_drivers.universal_robots.ur_tasks import MoveType
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import Joint, MoveEnd, ProgramState
 from arcor2_hw.exceptions import (
@@ -265,7 +265,7 @@ def test_a_move_that_does_not_end_in_its_time_is_stopped(
 ) -> None:
     monkeypatch.setattr(timing, "GRACE", 0.1)
     monkeypatch.setattr(timing, "SLACK", 0.1)
-    with pytest.raises(DeviceTimeout, match="time computed"):
+    with pytest.raises(DeviceTimeout, match="computed time"):
         ready.move_to_joints(turned(ready, 2.0), 0.5)
     at_rest(fake, 0.5)
     assert fake.truth()["q"][0] < 1.5
@@ -314,10 +314,11 @@ def test_the_dashboard_stops_when_the_control_process_hangs(ready: UR5e, fake: F
 
 def test_a_motion_that_waits_is_dropped_by_a_stop(ready: UR5e, fake: FakeUr) -> None:
     taken = len(fake.do("commands_taken"))
-    stops = ready._stops
+    guard = ready._control.stops.guard()
+    ready._control.stops.request()
     with pytest.raises(Cancelled):
-        ready._session.call(  # type: ignore[union-attr]
-            "a move", "moveJ", [0.0] * 6, 0.5, 0.5, True, valid=lambda: ready._stops != stops
+        ready._control.session.call(  # type: ignore[union-attr]
+            "a move", "moveJ", [0.0] * 6, 0.5, 0.5, True, stopped=guard.stopped
         )
     assert len(fake.do("commands_taken")) == taken
 
@@ -356,7 +357,7 @@ def test_without_a_dashboard_the_watchdog_keeps_a_safeguard_stop(start_fake: Cal
         fake.do("safeguard_stop", on=False)
         stays(fake)
         with pytest.raises(Refused, match="pendant"):
-            robot._order("stop", "Stopped")
+            robot._pendant.do("stop", "Stopped")
         wait(lambda: robot.state().safety.value == "normal")
         robot.take_control()
         doing = far_move(robot, fake)
@@ -463,7 +464,7 @@ def test_the_program_waits_for_a_slow_owner_but_not_for_ever(
 ) -> None:
     """From arming the watchdog on, the control process kicks without being asked; then the owner has to pulse."""
     monkeypatch.setattr(ControlSession, "_watch", lambda _: None)  # an owner whose guard does not run
-    session = ControlSession(robot._observer, robot._upper_registers(), 2.5)
+    session = ControlSession(robot._observer, robot._control.uses_upper_registers(), 2.5)
     session.open(8.0, dashboard=False)
     try:
         time.sleep(0.5)
@@ -478,9 +479,9 @@ def test_the_program_waits_for_a_slow_owner_but_not_for_ever(
 def test_a_program_stopped_at_the_pendant_ends_control(ready: UR5e, fake: FakeUr) -> None:
     doing = far_move(ready, fake)
     other = make(fake.host)
-    other._dashboard.do("stop", "Stopped")
-    other._dashboard.close()
-    with pytest.raises(NotInControl, match="not by this driver"):
+    other._pendant.dashboard.do("stop", "Stopped")
+    other._pendant.dashboard.close()
+    with pytest.raises(NotInControl, match="left remote control"):
         doing.result(1.0)
 
 

@@ -9,9 +9,10 @@ import time
 
 import pytest
 
+from arcor2_drivers.universal_robots import paths
+from arcor2_drivers.universal_robots.move_actions import MoveType
 from arcor2_drivers.universal_robots.program import Limit, Registers, RunState, Tool, linear, motion_program
 from arcor2_drivers.universal_robots.ur5e import UR5e
-from arcor2_drivers.universal_robots.ur_tasks import MoveType
 from arcor2_fakes.ur.language import parse
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import MoveEnd
@@ -81,7 +82,7 @@ def test_without_a_blend_each_waypoint_is_reached(ready: UR5e) -> None:
 def test_a_path_that_makes_no_sense_moves_nothing(ready: UR5e, fake: FakeUr) -> None:
     start, q, scripts = ready.get_end_effector_pose("tcp"), fake.truth()["q"], fake.truth()["scripts_taken"]
     near, far = shifted(start, y=-0.1), shifted(start, z=-3.0)
-    with pytest.raises(OutOfRange, match="half the way"):
+    with pytest.raises(OutOfRange, match="half the distance"):
         ready.move_path([near, shifted(start, y=-0.2)], blend=0.06)
     with pytest.raises(OutOfRange, match="waypoints"):
         ready.move_path([])
@@ -114,9 +115,9 @@ def test_a_hung_control_process_does_not_keep_a_path_from_stopping(ready: UR5e, 
     start = ready.get_end_effector_pose("tcp")
     doing = Doing(ready.move_path, [shifted(start, y=-0.4)], 0.0, True, 0.1)
     moving(fake)
-    assert ready._session is not None
-    assert ready._session._process is not None
-    os.kill(ready._session._process.pid, signal.SIGSTOP)
+    assert ready._control.session is not None
+    assert ready._control.session._process is not None
+    os.kill(ready._control.session._process.pid, signal.SIGSTOP)
     ready.stop()
     assert not fake.truth()["moving"]
     with pytest.raises((Cancelled, NotInControl)):
@@ -149,9 +150,9 @@ def test_a_path_stopped_at_the_pendant_ends_control(ready: UR5e, fake: FakeUr) -
     doing = Doing(ready.move_path, [shifted(start, y=-0.3)], 0.0, True, 0.1)
     moving(fake)
     other = make(fake.host)
-    other._dashboard.do("stop", "Stopped")
-    other._dashboard.close()
-    with pytest.raises(NotInControl, match="not by this driver"):
+    other._pendant.dashboard.do("stop", "Stopped")
+    other._pendant.dashboard.close()
+    with pytest.raises(NotInControl, match="left remote control"):
         doing.result(2.0)
 
 
@@ -170,9 +171,9 @@ def test_a_safeguard_stop_ends_a_path_for_good(ready: UR5e, fake: FakeUr) -> Non
 
 
 def test_a_path_that_takes_too_long_is_stopped(ready: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(UR5e, "_line_budget", staticmethod(lambda *_: 0.2))
+    monkeypatch.setattr(paths, "linear_budget", lambda *_: 0.2)
     start = ready.get_end_effector_pose("tcp")
-    with pytest.raises(DeviceTimeout, match="time computed"):
+    with pytest.raises(DeviceTimeout, match="computed time"):
         ready.move_path([shifted(start, y=-0.3)], speed=0.1)
     assert not fake.truth()["moving"]
     ready.move_to_joints(ready.robot_joints(), 0.5)
@@ -197,7 +198,7 @@ def test_a_move_ends_at_contact_and_the_wrench_is_told(fake: FakeUr) -> None:
         assert robot.wrench()[0] == pytest.approx(-12.0, abs=6.0), "it pushes against the way"
         assert abs(robot.wrench()[1]) < 1.0
         assert fake.truth()["safety"] == "NORMAL"
-        with pytest.raises(DeviceFault, match="met nothing") as fault:
+        with pytest.raises(DeviceFault, match="made no contact") as fault:
             robot.move_until_contact((-1.0, 0.0, 0.0), 12.0, 0.02, 0.05)
         assert fault.value.fault_code == "no_contact"
         assert robot.control_owner() == "us"
@@ -216,7 +217,7 @@ def test_a_careful_move_stops_at_a_force_from_the_side(ready: UR5e, fake: FakeUr
         assert fault.value.fault_code == "force_limit"
         assert 15.0 < fake.truth()["tcp_force"][2] < 45.0
         ready.move_carefully(start, 60.0, 0.1)  # away from it
-        with pytest.raises(DeviceFault, match="met nothing"):
+        with pytest.raises(DeviceFault, match="made no contact"):
             ready.move_to_contact(10.0, 0.02, 0.05)
         ready.move_to_contact(10.0, 0.1, 0.05)  # the tool points down
         assert ready.get_end_effector_pose("tcp").position.z == pytest.approx(start.position.z - 0.04, abs=0.01)
@@ -261,7 +262,7 @@ def test_an_inertia_reaches_the_controller(ready: UR5e, fake: FakeUr) -> None:
     inertia = (0.01, 0.02, 0.03, 0.0, 0.0, 0.001)
     ready.set_tool(Pose(Position(0.0, 0.0, 0.1)), 2.0, (0.0, 0.0, 0.05), inertia)
     assert fake.truth()["payload_inertia"] == pytest.approx(inertia)
-    assert ready.tool().inertia == inertia
+    assert ready._control.tool.inertia == inertia
     start = ready.get_end_effector_pose("tcp")
     ready.move_path([shifted(start, z=0.02)])
     truth = fake.truth()

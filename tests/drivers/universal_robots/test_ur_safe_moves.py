@@ -154,7 +154,7 @@ def test_the_tool_that_was_told_counts(ready: UR5e, around: Around) -> None:
 
 @pytest.mark.parametrize("tcp", [(0.0, 0.0, 0.2), (0.12, 0.05, 0.1), (0.0, -0.15, -0.05)])
 def test_the_tool_does_not_go_through_things(robot: UR5e, around: Around, tcp: tuple[float, float, float]) -> None:
-    robot._tool = robot._tool._replace(tcp=Pose(Position(*tcp)))
+    robot._control.stated_tool = robot._control.stated_tool._replace(tcp=Pose(Position(*tcp)))
     flange = Pose(Position(*(-value for value in tcp)))
     at = robot.safe_moves.forward("tcp", robot.robot_joints())
     base = (at * flange).position

@@ -166,13 +166,13 @@ def _acknowledged(robot: UR5e) -> bool:
 # ------------------------------------------------------------------------------------------------ jogging
 def test_a_late_jog_is_thrown_away(ready: UR5e, fake: FakeUr) -> None:
     """A jog that waits longer than it is valid moves nothing; one that was stopped meanwhile neither."""
-    session = ready._session
+    session = ready._control.session
     assert session is not None
     taken = len(fake.do("commands_taken"))
     with pytest.raises(Cancelled):
-        session.speed("speedJ", [0.5] + [0.0] * 5, 1.0, -0.01, lambda: True)
+        session.speed("speedJ", [0.5] + [0.0] * 5, 1.0, -0.01, lambda: False)
     with pytest.raises(Cancelled):
-        session.speed("speedJ", [0.5] + [0.0] * 5, 1.0, 1.0, lambda: False)
+        session.speed("speedJ", [0.5] + [0.0] * 5, 1.0, 1.0, lambda: True)
     assert len(fake.do("commands_taken")) == taken
     assert not fake.truth()["moving"]
 
@@ -274,7 +274,7 @@ def test_polyscope_x_leaves_to_the_pendant_what_needs_a_dashboard(start_fake: Ca
     robot.connect(3.0)
     try:
         assert robot.state().mode is Mode.OTHER
-        with pytest.raises(Refused, match="no dashboard server: 'power on' has to be done at the pendant"):
+        with pytest.raises(Refused, match=r"no dashboard server\. Use the pendant for 'power on'"):
             robot.power_on()
         with pytest.raises(Refused, match="not switched on"):
             robot.take_control()

@@ -1,0 +1,124 @@
+"""Parts shared by arm drivers: stop guards, exclusive motions, joint checks and alarms for safety stops."""
+
+import contextlib
+import threading
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Final
+
+from arcor2_hw.data.base import now
+from arcor2_hw.data.device import Alarm, Severity
+from arcor2_hw.data.robot import Joint, Safety
+from arcor2_hw.exceptions import Arcor2Error, Cancelled, InvalidData, NotFound, OutOfRange, Refused
+
+TCP: Final = "tcp"
+"""Name of the only end effector of an arm."""
+_CRITICAL: Final = frozenset({Safety.FAULT, Safety.VIOLATION})
+
+
+class StopCounter:
+    """Counts stop requests, so that no command given before a stop starts a motion after it."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def request(self) -> None:
+        """Cancel every command that was given until now."""
+        self.count += 1
+
+    def guard(self) -> "StopGuard":
+        """Return the guard of a command that is given now."""
+        return StopGuard(self)
+
+
+class StopGuard:
+    """Tells one command whether a stop was requested since it was given."""
+
+    def __init__(self, counter: StopCounter) -> None:
+        self._counter, self._count = counter, counter.count
+
+    def stopped(self) -> bool:
+        """Return whether a stop was requested."""
+        return self._counter.count != self._count
+
+    def check(self, what: str) -> None:
+        """Raise Cancelled, naming the command, if a stop was requested."""
+        if self.stopped():
+            raise Cancelled(f"{what} was stopped.")
+
+
+@contextlib.contextmanager
+def exclusive_motion(lock: threading.Lock, arm: str) -> Iterator[None]:
+    """Hold the motion lock of an arm. Raise Refused if the arm is executing another motion."""
+    if not lock.acquire(blocking=False):
+        raise Refused(f"{arm} is moving already. Wait until the motion ends, or stop it.")
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+def named_joints(names: Iterable[str], values: Iterable[float]) -> list[Joint]:
+    """Return joints with names and values."""
+    return [Joint(name, float(value)) for name, value in zip(names, values, strict=True)]
+
+
+def joint_values(
+    arm: str,
+    joints: list[Joint],
+    limits: Mapping[str, tuple[float, float]],
+    slack: float = 0.0,
+    wrong: type[Arcor2Error] = InvalidData,
+) -> list[float]:
+    """Return joint values in the order of `limits`.
+
+    Args:
+        arm: Name of the arm, for errors.
+        joints: Joints in any order.
+        limits: Lower and upper limit of every joint, rad.
+        slack: Tolerance beyond the limits, rad; values within it are clamped.
+        wrong: Error for joints that are not those of the arm.
+
+    Raises:
+        OutOfRange: A value is beyond its limits.
+    """
+    values = {joint.name: joint.value for joint in joints}
+    if len(values) != len(joints) or values.keys() != limits.keys():
+        raise wrong(f"The joints of {arm} are {', '.join(limits)}; received: {', '.join(values)}.")
+    for name, (low, high) in limits.items():
+        if not low - slack <= values[name] <= high + slack:
+            raise OutOfRange(f"{name} of {arm} must be {low:.3f} to {high:.3f} rad, not {values[name]!r}.")
+    return [min(max(values[name], low), high) for name, (low, high) in limits.items()]
+
+
+def check_end_effector(arm: str, end_effector: str) -> None:
+    """Raise NotFound unless the end effector is the only one of an arm."""
+    if end_effector != TCP:
+        raise NotFound(f"{arm} has no end effector {end_effector!r}, only {TCP!r}.")
+
+
+def check_confirmed(confirmed_by: str) -> None:
+    """Raise InvalidData unless a person is named who inspected the robot."""
+    if not confirmed_by.strip():
+        raise InvalidData("confirmed_by must name the person who inspected the robot.")
+
+
+class SafetyAlarm:
+    """Reports an active safety stop as an alarm, with the time at which it was first seen."""
+
+    def __init__(self, remedies: Mapping[Safety, str]) -> None:
+        self._remedies = remedies
+        self._since = Safety.NORMAL, now()
+
+    def alarms(self, safety: Safety) -> list[Alarm]:
+        """Return the alarm of a safety state; none while the arm may move."""
+        if safety is not self._since[0]:
+            self._since = safety, now()
+        if safety in (Safety.NORMAL, Safety.REDUCED):
+            return []
+        severity = Severity.CRITICAL if safety in _CRITICAL else Severity.ERROR
+        return [Alarm(safety.value, severity, label(safety), self._remedies.get(safety, ""), self._since[1])]
+
+
+def label(safety: Safety) -> str:
+    """Return a safety state in words."""
+    return safety.value.replace("_", " ")

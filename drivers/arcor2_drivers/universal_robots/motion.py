@@ -1,0 +1,248 @@
+"""Motion: moves of a UR arm by the control program, its kinematics, and stopping."""
+
+import contextlib
+import dataclasses
+import math
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.robot import MoveEnd, MoveResult
+from arcor2_hw.exceptions import Cancelled, DeviceFault, DeviceTimeout, NotInControl, Refused, SafetyStop
+from arcor2_hw.objects import Robot
+from arcor2_hw.objects.arm import StopGuard, exclusive_motion
+
+from .arm import Arm
+from .control import Control
+from .geometry import JOINTS, from_vector
+from .observer import Observer, Sample
+from .pendant import Pendant
+from .session import ControlSession
+from .settings import MANUAL_TCP_SPEED
+from .states import program_plays
+from .timing import POLL, REST_WITHIN, SLOWEST_FRACTION, STANDING, joint_budget, linear_budget
+
+JOINTS_REACHED = 0.01
+POSITION_REACHED = 0.002
+ANGLE_REACHED = 0.02
+"""Tolerances within which a target is reached: rad of a joint, m and rad of the TCP."""
+
+
+class Move(NamedTuple):
+    """A motion: name, command or lines of URScript, longest time in s, check for arrival, fraction of the maximum."""
+
+    name: str
+    command: Sequence[Any]
+    budget: float
+    reached: Callable[[Sample], bool]
+    fraction: float
+
+
+def at_pose(vector: Sequence[float]) -> Callable[[Sample], bool]:
+    """Return a check whether the TCP is at a pose in the controller's base."""
+    target = from_vector(vector)
+
+    def reached(sample: Sample) -> bool:
+        at = from_vector(sample.tcp)
+        near = at.position.distance_to(target.position) < POSITION_REACHED
+        return near and at.orientation.angle_to(target.orientation) < ANGLE_REACHED
+
+    return reached
+
+
+def at_joints(q: Sequence[float]) -> Callable[[Sample], bool]:
+    """Return a check whether the joints have their values."""
+    return lambda sample: max(abs(a - b) for a, b in zip(sample.q, q, strict=True)) < JOINTS_REACHED
+
+
+class Motion:
+    """Moves the arm, one motion at a time."""
+
+    def __init__(self, arm: Arm, observer: Observer, pendant: Pendant, control: Control, lock: threading.Lock) -> None:
+        self._arm, self._observer, self._pendant, self._control = arm, observer, pendant, control
+        self._lock = lock
+        self.last: MoveResult | None = None
+
+    @contextlib.contextmanager
+    def exclusive(self) -> Iterator[None]:
+        """Hold the arm for one motion. Raise Refused while it moves or is in hand teaching mode."""
+        with exclusive_motion(self._lock, self._arm.name):
+            self.check_not_teaching()
+            yield
+
+    def check_not_teaching(self) -> None:
+        """Raise Refused in hand teaching mode."""
+        if self._control.teaching:
+            raise Refused(f"{self._arm.name} is in hand teaching mode.")
+
+    # -------------------------------------------------------------------------------- moving
+    def to_pose(self, target: Pose, linear: bool, speed: float, acceleration: float, guard: StopGuard) -> MoveResult:
+        """Move the TCP to a pose in the world, in a line or by the joints of the controller's kinematics."""
+        self._arm.check_speed(speed, acceleration)
+        vector = self._arm.vector(target)
+        with self.exclusive():
+            session = self._control.current()
+            q = self.solve(session, vector, self._observer.sample().q)
+            move = self.line(vector, speed, acceleration) if linear else self.joints(q, speed, acceleration)
+            return self.run(session, move, guard)
+
+    def to_joints(self, q: list[float], speed: float, acceleration: float, guard: StopGuard) -> MoveResult:
+        """Move to joint values; all joints arrive together."""
+        self._arm.check_speed(speed, acceleration)
+        with self.exclusive():
+            return self.run(self._control.current(), self.joints(q, speed, acceleration), guard)
+
+    def line(self, vector: list[float], speed: float, acceleration: float = 1.0) -> Move:
+        """Return a linear move to a pose in the controller's base."""
+        settings = self._arm.settings
+        top, ramp = self.tcp_speed(speed), acceleration * settings.tcp_acceleration
+        budget = linear_budget(from_vector(self._observer.sample().tcp), from_vector(vector), top, ramp)
+        fraction = top / settings.max_tcp_speed
+        return Move("a linear move", ("moveL", vector, top, ramp, True), budget, at_pose(vector), fraction)
+
+    def joints(self, q: list[float], speed: float, acceleration: float = 1.0) -> Move:
+        """Return a joint move."""
+        settings = self._arm.settings
+        top, ramp = self.joint_speed(speed), acceleration * settings.joint_acceleration
+        budget = joint_budget(self._observer.sample().q, q, top, ramp)
+        return Move("a joint move", ("moveJ", q, top, ramp, True), budget, at_joints(q), top / settings.max_joint_speed)
+
+    def tcp_speed(self, fraction: float) -> float:
+        """Return the TCP speed for a fraction of the maximum, m/s; limited in manual mode."""
+        return min(fraction * self._arm.settings.max_tcp_speed, self._speed_limit())
+
+    def joint_speed(self, fraction: float) -> float:
+        """Return the joint speed for a fraction of the maximum, rad/s.
+
+        In manual mode the TCP keeps its limit even if every joint contributes with its whole lever.
+        """
+        levers = 3.0 * self._arm.model.reach + len(JOINTS) * math.hypot(*self._control.stated_tool.tcp.position)
+        return min(fraction * self._arm.settings.max_joint_speed, self._speed_limit() / levers)
+
+    def _speed_limit(self) -> float:
+        return MANUAL_TCP_SPEED if self._pendant.manual else math.inf
+
+    def run(self, session: ControlSession, move: Move, guard: StopGuard) -> MoveResult:
+        """Start an asynchronous motion and wait until it is observed to have ended."""
+        number, _ = self._observer.sample().operation(session.upper)
+        with self.recorded(move.fraction, session):
+            session.do(move.name, *move.command, stopped=guard.stopped)
+            self._wait_done(session, move, number, guard)
+        assert self.last is not None
+        return self.last
+
+    @contextlib.contextmanager
+    def recorded(self, fraction: float, session: ControlSession | None = None) -> Iterator["Record"]:
+        """Record the result of a motion in `last`; with a session, wait for standstill after a stop."""
+        started, record = time.monotonic(), Record()
+        try:
+            yield record
+            record.end = record.end or MoveEnd.DONE
+        except Cancelled:
+            record.end = MoveEnd.STOPPED
+            if session is not None:
+                self.wait_rest(session)
+            raise
+        except SafetyStop:
+            record.end = MoveEnd.SAFETY
+            raise
+        finally:
+            newest = self._observer.newest()
+            if record.end is not None and newest is not None:
+                self.last = MoveResult(self._arm.tcp(newest), fraction, time.monotonic() - started, record.end)
+
+    def _wait_done(self, session: ControlSession, move: Move, number: int, guard: StopGuard) -> None:
+        what = f"{move.name} of {self._arm.name}"
+        clock = Budget(move.budget)
+        standing: float | None = None  # by the controller's clock: this process may be delayed
+        while True:
+            guard.check(what)
+            if session.ended is not None:
+                raise session.ended
+            sample = self._observer.newest()
+            assert sample is not None
+            latest, running = sample.operation(session.upper)
+            if latest != number and not running and not sample.moving and move.reached(sample):
+                return
+            if sample.moving or running or standing is None:
+                standing = sample.timestamp
+            elif sample.timestamp - standing > STANDING:
+                raise DeviceFault(f"{what} ended before its target.")
+            if clock.exceeded(sample):
+                self._control.stops.request()
+                session.stop_motion(self._arm.settings.stop_deceleration)
+                raise DeviceTimeout(f"{what} did not end within the computed time. It was stopped.")
+            time.sleep(POLL)
+
+    # -------------------------------------------------------------------------------- stopping
+    def stop(self) -> None:
+        """Stop the arm and wait for standstill. Raise NotInControl while a foreign program moves it, DeviceTimeout."""
+        self._control.stops.request()
+        session = self._control.session
+        if session is None or session.ended is not None:
+            newest = self._observer.newest()
+            if newest is not None and newest.moving and program_plays(newest.runtime):
+                raise NotInControl(f"{self._arm.name} is being moved by {self._pendant.program()}. Stop it there.")
+            return
+        session.stop_motion(self._arm.settings.stop_deceleration)
+        if self._control.teaching and session.ended is None:
+            self._control.set_teaching(False)
+        self.wait_rest(session)
+        self._control.note_stop(session)
+        until = time.monotonic() + REST_WITHIN
+        while session.own is not None and session.ended is None and time.monotonic() < until:
+            time.sleep(POLL)  # until the control program accepts the next command
+
+    def wait_rest(self, session: ControlSession) -> None:
+        """Wait for standstill; use the dashboard when it takes too long. Raise DeviceTimeout."""
+        until, dashboard_at = time.monotonic() + REST_WITHIN, time.monotonic() + REST_WITHIN / 2
+        while True:
+            newest = self._observer.newest()
+            if newest is None or (session.ended is not None and not isinstance(session.ended, Cancelled)):
+                return  # the watchdog or the safety system stops the arm
+            if not newest.moving and newest.age < POLL + 2.0 * self._observer.period:
+                return
+            now = time.monotonic()
+            if now > until:
+                problem = f"{self._arm.name} did not come to a standstill within {REST_WITHIN:g} s of a stop."
+                raise DeviceTimeout(f"{problem} Press the emergency stop.")
+            if now > dashboard_at and session.ended is None:
+                session.stop_by_dashboard()
+            time.sleep(POLL)
+
+    # -------------------------------------------------------------------------------- kinematics of the controller
+    def solve(self, session: ControlSession, vector: list[float], near: Sequence[float]) -> list[float]:
+        """Return the joint values for a pose in the controller's base, nearest to `near`. Raise KinematicsException."""
+        # Checked first: without a solution get_inverse_kin ends the control program with an error.
+        q: list[float] = []
+        if session.ask("inverse kinematics", "getInverseKinematicsHasSolution", vector, list(near)):
+            q = session.ask("inverse kinematics", "getInverseKinematics", vector, list(near))
+        if len(q) != len(JOINTS) or not all(map(math.isfinite, q)):
+            position = ", ".join(f"{value:.3f}" for value in vector[:3])
+            raise Robot.KinematicsException(
+                f"{self._arm.name} cannot reach the pose.", f"in the controller's base: {position}"
+            )
+        return q
+
+
+@dataclasses.dataclass
+class Record:
+    """How a motion ended."""
+
+    end: MoveEnd | None = None
+
+
+class Budget:
+    """Remaining time of a motion. It elapses more slowly while the speed slider is down."""
+
+    def __init__(self, seconds: float) -> None:
+        self._left, self._last = seconds, time.monotonic()
+
+    def exceeded(self, sample: Sample) -> bool:
+        """Subtract the time since the last call; return whether none is left."""
+        now = time.monotonic()
+        self._left -= (now - self._last) * max(sample.speed_fraction, SLOWEST_FRACTION)
+        self._last = now
+        return self._left < 0.0
