@@ -1,4 +1,4 @@
-"""Settings of a YuMi, checked when they are given."""
+"""Settings of a YuMi."""
 
 import dataclasses
 import math
@@ -12,58 +12,58 @@ LEFT = "left"
 RIGHT = "right"
 ARMS = (LEFT, RIGHT)
 MAX_PAYLOAD = 0.5
-"""kg at the flange of an arm, hand included."""
+"""Greatest mass at the flange of an arm, hand included, kg."""
 
 
 def within(name: str, value: float, low: float, high: float) -> None:
-    """Raise OutOfRange, naming the parameter, unless the value lies in the range."""
+    """Raise OutOfRange, naming the parameter, unless the value is in the range."""
     if not (math.isfinite(value) and low <= value <= high):
         raise OutOfRange(f"{name} must be {low:g} to {high:g}, not {value!r}")
 
 
 LONGEST_WATCHDOG = 0.5
-"""s: up to this value an arm stops within the time that the type declares (`loss_reaction`)."""
+"""Longest watchdog, s, with which an arm stops within the time that the type declares (`loss_reaction`)."""
 
 
 @dataclasses.dataclass
 class YumiSettings(Settings):
-    """SI units. Poses of a TCP are in the flange of its arm (tool0); its orientation is a rotation vector.
+    """Settings in SI units. The pose of a TCP is in the flange of its arm (tool0); orientations are rotation vectors.
 
     :param host: address of the controller
     :param rws_port: port of Robot Web Services
-    :param user: user of the controller (UAS) who may change modes, run RAPID and hold mastership
-    :param password: the user's password
-    :param left_port: port of the left arm's motion server; its watch port is the next
-    :param right_port: port of the right arm's motion server; its watch port is the next
-    :param left_mass: mass at the left flange, hand included, kg; negative: nobody has stated it, control is refused
-    :param left_cog_x: centre of gravity of the left load, m
-    :param left_cog_y: centre of gravity of the left load, m
-    :param left_cog_z: centre of gravity of the left load, m
-    :param left_tcp_x: left tool centre point, m
-    :param left_tcp_y: left tool centre point, m
-    :param left_tcp_z: left tool centre point, m
-    :param left_tcp_rx: orientation at the left tool centre point, rad
-    :param left_tcp_ry: orientation at the left tool centre point, rad
-    :param left_tcp_rz: orientation at the left tool centre point, rad
-    :param right_mass: mass at the right flange, hand included, kg; negative: nobody has stated it
-    :param right_cog_x: centre of gravity of the right load, m
-    :param right_cog_y: centre of gravity of the right load, m
-    :param right_cog_z: centre of gravity of the right load, m
-    :param right_tcp_x: right tool centre point, m
-    :param right_tcp_y: right tool centre point, m
-    :param right_tcp_z: right tool centre point, m
-    :param right_tcp_rx: orientation at the right tool centre point, rad
-    :param right_tcp_ry: orientation at the right tool centre point, rad
-    :param right_tcp_rz: orientation at the right tool centre point, rad
+    :param user: user of the controller (UAS) with the grants to change modes, run RAPID and hold mastership
+    :param password: password of the user
+    :param left_port: port of the left arm's motion server; its watch port is the next one
+    :param right_port: port of the right arm's motion server; its watch port is the next one
+    :param left_mass: mass at the left flange with the hand, kg; negative: not set. Required before the robot can move
+    :param left_cog_x: center of gravity of the left load, m
+    :param left_cog_y: center of gravity of the left load, m
+    :param left_cog_z: center of gravity of the left load, m
+    :param left_tcp_x: left tool center point, m
+    :param left_tcp_y: left tool center point, m
+    :param left_tcp_z: left tool center point, m
+    :param left_tcp_rx: orientation at the left tool center point, rad
+    :param left_tcp_ry: orientation at the left tool center point, rad
+    :param left_tcp_rz: orientation at the left tool center point, rad
+    :param right_mass: mass at the right flange with the hand, kg; negative: not set. Required before the robot can move
+    :param right_cog_x: center of gravity of the right load, m
+    :param right_cog_y: center of gravity of the right load, m
+    :param right_cog_z: center of gravity of the right load, m
+    :param right_tcp_x: right tool center point, m
+    :param right_tcp_y: right tool center point, m
+    :param right_tcp_z: right tool center point, m
+    :param right_tcp_rx: orientation at the right tool center point, rad
+    :param right_tcp_ry: orientation at the right tool center point, rad
+    :param right_tcp_rz: orientation at the right tool center point, rad
     :param left_gripper: the left hand has fingers
     :param right_gripper: the right hand has fingers
     :param left_suction: the left hand has a suction cup
     :param right_suction: the right hand has a suction cup
-    :param max_tcp_speed: what speed 1 means in a linear move, m/s
-    :param max_joint_speed: what speed 1 means in a joint move, rad/s
-    :param clearance: the arms are kept that far apart, m, by capsules about nominal links
-    :param watchdog: an arm stops when it has heard nothing for that long, s
-    :param poll_period: pause between two looks at the controller, s
+    :param max_tcp_speed: TCP speed of a linear move at speed 1, m/s
+    :param max_joint_speed: joint speed of a joint move at speed 1, rad/s
+    :param clearance: smallest distance between the arms, m, by capsules around nominal links
+    :param watchdog: time without a keep-alive after which an arm stops, s
+    :param poll_period: time between two readings of the state, s
     """
 
     host: str
@@ -105,7 +105,7 @@ class YumiSettings(Settings):
     def __post_init__(self) -> None:
         check_host(self.host)
         if not self.user.strip():
-            raise OutOfRange("user must name a user of the controller")
+            raise OutOfRange("user must be a user of the controller, not empty")
         within("rws_port", self.rws_port, 1, 65535)
         for arm in ARMS:
             within(f"{arm}_port", self.port(arm), 1, 65534)
@@ -116,7 +116,7 @@ class YumiSettings(Settings):
                 within(f"{arm}_tcp_{axis}", getattr(self, f"{arm}_tcp_{axis}"), -0.5, 0.5)
                 within(f"{arm}_tcp_r{axis}", getattr(self, f"{arm}_tcp_r{axis}"), -2.0 * math.pi, 2.0 * math.pi)
         if abs(self.left_port - self.right_port) < 2:
-            raise OutOfRange(f"right_port must be 2 or more away from left_port {self.left_port}: each arm takes two")
+            raise OutOfRange(f"right_port must differ from left_port {self.left_port} by at least 2: an arm uses two")
         within("max_tcp_speed", self.max_tcp_speed, 0.01, 1.5)
         within("max_joint_speed", self.max_joint_speed, 0.01, math.pi)
         within("clearance", self.clearance, 0.0, 0.08)  # the shoulders themselves are 0.1 m apart
@@ -124,16 +124,16 @@ class YumiSettings(Settings):
         within("poll_period", self.poll_period, 0.02, 0.5)
 
     def port(self, arm: str) -> int:
-        """Give the port of an arm's motion server."""
+        """Return the port of an arm's motion server."""
         return self.left_port if arm == LEFT else self.right_port
 
     def tcp(self, arm: str) -> Pose:
-        """Give an arm's TCP in its flange."""
+        """Return an arm's TCP in its flange."""
         x, y, z, rx, ry, rz = (getattr(self, f"{arm}_tcp_{part}") for part in ("x", "y", "z", "rx", "ry", "rz"))
         return Pose(Position(x, y, z), Orientation.from_rotation_vector(rx, ry, rz))
 
     def load(self, arm: str) -> tuple[float, tuple[float, float, float]] | None:
-        """Give mass (kg) and centre of gravity (m) at an arm's flange; None when nobody has stated them."""
+        """Return mass (kg) and center of gravity (m) at an arm's flange; None if they are not set."""
         mass: float = getattr(self, f"{arm}_mass")
         x, y, z = (getattr(self, f"{arm}_cog_{axis}") for axis in "xyz")
         return (mass, (x, y, z)) if mass >= 0.0 else None

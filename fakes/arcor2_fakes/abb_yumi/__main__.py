@@ -1,4 +1,4 @@
-"""Starts the fake two-arm robot: `python -m arcor2_fakes.abb_yumi`."""
+"""Start the fake two-arm robot: `python -m arcor2_fakes.abb_yumi`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ app = App(name="arcor2_fakes.abb_yumi", help="Fake ABB YuMi: RWS 1.0 and a motio
 
 
 def register_commands(control: ControlServer, controller: Controller, http: HttpPort) -> None:
-    """Make what a test can do to the robot known to the control channel."""
+    """Register the commands of the control channel."""
 
     def arm_of(arm: str) -> str:
         if arm not in TASKS:
@@ -46,15 +46,15 @@ def register_commands(control: ControlServer, controller: Controller, http: Http
         controller.speed_ratio = percent
 
     def renew() -> None:
-        """Be as delivered: motors on, automatic, no sessions, both arms at home."""
+        """Reset to the state as delivered: motors on, automatic, no sessions, both arms at home."""
         http.end_all()
         controller.stop()
         controller.foreign_program(False)
         controller.hold_mastership(False)
         controller.operation_mode, controller.control_state = "AUTO", "motoron"
         controller.speed_ratio, controller.collision = 100, "INIT"
-        for told in controller.reset_to_main:
-            told()
+        for listener in controller.reset_to_main:
+            listener()
         for body in controller.arms.values():
             body.lead_through = False
             body.hand = Hand()
@@ -73,7 +73,7 @@ def register_commands(control: ControlServer, controller: Controller, http: Http
 
 
 async def live(controller: Controller, servers: list[MotionServer], http: HttpPort) -> None:
-    """Let time pass."""
+    """Advance the simulation."""
     loop = asyncio.get_running_loop()
     last = loop.time()
     while True:
@@ -98,17 +98,17 @@ def main(
     control: str = "127.0.0.1:0",
     time_scale: Annotated[float, Parameter(validator=validators.Number(gt=0, lte=100))] = 1.0,
 ) -> int:
-    """Start the fake; it prints one line `ready {json}` with its addresses and ends on SIGTERM.
+    """Start the fake; it prints one line `ready {json}` with its addresses, and exits on SIGTERM.
 
     Args:
-        host: address that all ports are on.
-        rws_port: port of Robot Web Services; a real controller has 80.
-        left_port: port of the left arm's commands; its watch port is the next.
-        right_port: port of the right arm's commands; its watch port is the next.
-        user: name for the digest authentication.
-        password: password for it.
+        host: Address of all ports.
+        rws_port: Port of Robot Web Services; a real controller uses 80.
+        left_port: Port of the left arm's commands; its watch port is the next one.
+        right_port: Port of the right arm's commands; its watch port is the next one.
+        user: User of the digest authentication.
+        password: Password of the user.
         control: HOST:PORT of the control channel; port 0 takes a free one.
-        time_scale: how much faster than in reality it moves.
+        time_scale: Speed of the simulation; 1 is real time.
     """
     try:
         control_address = parse_address(control)
@@ -134,7 +134,7 @@ def main(
         register_commands(channel, controller, http)
 
         def power_cycle() -> None:
-            """The main switch off and on: sessions and connections end, the motors are off."""
+            """Switch the controller off and on: sessions and connections end, the motors are off."""
             http.end_all()
             controller.stop()
             controller.hold_mastership(False)

@@ -1,4 +1,4 @@
-"""One arm of the fake in time: motion along a path of joints under speed and acceleration limits, and its hand."""
+"""One simulated arm: motion along a joint path under speed and acceleration limits, and its hand."""
 
 from collections.abc import Callable
 from typing import Final
@@ -8,18 +8,18 @@ import numpy as np
 from arcor2_fakes.abb_yumi.kinematics import LIMITS, MAX_SPEED, Array, Kinematics, turn, turned
 
 RAMP: Final = 0.2
-"""Seconds from rest to full speed."""
+"""Time from standstill to full speed, s."""
 STOP_RAMP: Final = 0.1
-"""Seconds from full speed to rest when stopped."""
+"""Time from full speed to standstill on a stop, s."""
 HAND_STROKE: Final = 0.025
-"""m: the width of the open hand."""
+"""Width of the open hand, m."""
 HAND_SPEED: Final = 0.025
-"""m/s of the fingers."""
+"""Speed of the fingers, m/s."""
 PART_WIDTH: Final = 0.01
 
 
 class Motion:
-    """A path of joints (n, 7), run in `duration` s from rest to rest, or slower where an axis cannot do it."""
+    """A joint path, shape (n, 7), run in `duration` s from standstill to standstill; slower if an axis is too slow."""
 
     def __init__(self, path: Array, duration: float) -> None:
         self.path = path
@@ -34,7 +34,7 @@ class Motion:
         self.stopping = False
 
     def at(self) -> Array:
-        """Give the joints at the present point of the path."""
+        """Return the joints at the current point of the path."""
         place = self.s * (len(self.path) - 1)
         low = min(int(place), max(len(self.path) - 2, 0))
         part = place - low
@@ -42,7 +42,7 @@ class Motion:
         return q
 
     def advance(self, dt: float, ratio: float) -> bool:
-        """Go on by `dt` s at a fraction of the speed; true when it is over."""
+        """Advance by `dt` s at a fraction of the speed; return whether the motion has ended."""
         if self.stopping:
             self.v -= self.cruise / STOP_RAMP * dt
             if self.v <= 0.0:
@@ -56,7 +56,7 @@ class Motion:
 
 
 class Hand:
-    """The SmartGripper: fingers that close on a part if one is there, and a suction cup."""
+    """The SmartGripper: fingers that close on a part, if there is one, and a suction cup."""
 
     def __init__(self) -> None:
         self.width, self.goal = HAND_STROKE, HAND_STROKE
@@ -68,21 +68,21 @@ class Hand:
 
     @property
     def moving(self) -> bool:
-        """Tell whether the fingers move."""
+        """Return whether the fingers move."""
         return abs(self.goal - self.width) > 1e-6
 
     def grip(self, force: float) -> None:
-        """Close with a force in N."""
+        """Close the fingers with a force, N."""
         self.force, self.goal = force, PART_WIDTH if self.part else 0.0
 
     def advance(self, dt: float) -> None:
-        """Let the fingers move."""
+        """Move the fingers for `dt` s."""
         step = HAND_SPEED * dt
         self.width += min(max(self.goal - self.width, -step), step)
 
 
 class Arm:
-    """An arm: joints, what it is doing, its hand and its tool."""
+    """An arm: joints, motion, hand and tool."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -99,32 +99,32 @@ class Arm:
 
     @property
     def moving(self) -> bool:
-        """Tell whether a motion is under way."""
+        """Return whether the arm moves."""
         return self.motion is not None
 
     def begin(self, path: Array, duration: float, ended: Callable[[], None]) -> None:
-        """Run a path; `ended` is called when it is over or was stopped."""
+        """Run a path; call `ended` when it has ended or was stopped."""
         self.motion, self.ended = Motion(path, duration), ended
         self.moves_begun += 1
 
     def stop(self) -> None:
-        """Brake on the path."""
+        """Brake along the path."""
         if self.motion is not None:
             self.motion.stopping = True
 
     def halt(self) -> None:
-        """Stand at once: the brakes fell."""
+        """Stop at once by the brakes."""
         self.motion, self.qd = None, np.zeros(7)
 
     def place(self, q: Array) -> None:
-        """Be somewhere, as put there by hand."""
+        """Place the arm at joint values."""
         if ((q < LIMITS[:, 0]) | (q > LIMITS[:, 1])).any():
-            raise ValueError("outside of the limits of the axes")
+            raise ValueError("joints are beyond the limits of the axes")
         self.halt()
         self.q = q.copy()
 
     def advance(self, dt: float, ratio: float) -> None:
-        """Let `dt` s pass at a fraction of the programmed speed."""
+        """Advance by `dt` s at a fraction of the programmed speed."""
         self.hand.advance(dt)
         motion = self.motion
         if motion is None:
@@ -137,7 +137,7 @@ class Arm:
             self.ended()
 
     def line(self, target: Array, angle: float) -> Array:
-        """Give joints along a straight line of the flange to a pose. Raises NotReachable."""
+        """Return joints along a straight line of the flange to a pose. Raise NotReachable."""
         start = self.kinematics.describe(self.q)
         distance = float(np.linalg.norm(target[:3, 3] - start.pose[:3, 3]))
         whole = turn(target[:3, :3] @ start.pose[:3, :3].T)

@@ -1,4 +1,4 @@
-"""The fake IRC5: panel, operating mode, mastership, RAPID execution, event log, and time for both arms."""
+"""The simulated IRC5 controller: panel, operating mode, mastership, RAPID, event log, and both arms."""
 
 import time
 from collections import deque
@@ -30,7 +30,7 @@ LONGEST_STEP: Final = 0.005  # s
 
 @dataclass
 class Holder:
-    """Who has mastership: the session's number, or 0 for somebody who is no client of ours."""
+    """Holder of mastership: number of its session, or 0 for a client outside of the fake."""
 
     session: int
     alias: str
@@ -50,7 +50,7 @@ class Event:
 
 
 class Controller:
-    """The controller's state and what may change it. `pace`: how much faster than in reality it all goes."""
+    """State of the controller. `pace` is the speed of the simulation; 1 is real time."""
 
     def __init__(self, pace: float = 1.0) -> None:
         self.pace = pace
@@ -70,18 +70,18 @@ class Controller:
         self._motors_due: float | None = None
         self._logged = 0
 
-    # -------------------------------------------------------------------------------- what clients do
+    # -------------------------------------------------------------------------------- commands of clients
     @property
     def ours(self) -> bool:
-        """Tell whether the programs of both tasks are the motion servers."""
+        """Return whether the programs of both tasks are the motion servers."""
         return self.programs == PROGRAMS
 
     def wrote(self, what: str) -> None:
-        """Count an act that changed something."""
+        """Count a command that changed the state."""
         self.writes[what] = self.writes.get(what, 0) + 1
 
     def motors(self, on: bool) -> bool:
-        """Switch the motors; false when the state does not allow it."""
+        """Switch the motors; return False if the state does not allow it."""
         if self.operation_mode != "AUTO" or self.control_state not in ("motoroff", "motoron"):
             return False
         self.wrote("motors")
@@ -92,7 +92,7 @@ class Controller:
         return True
 
     def start(self) -> bool:
-        """Start RAPID in both tasks; false when the state does not allow it."""
+        """Start RAPID in both tasks; return False if the state does not allow it."""
         if self.control_state != "motoron" or self.running or not self.at_main:
             return False
         self.wrote("start")
@@ -101,23 +101,23 @@ class Controller:
         return True
 
     def stop(self) -> None:
-        """Stop RAPID in both tasks; arms brake on their path."""
+        """Stop RAPID in both tasks; the arms brake along their paths."""
         self.wrote("stop")
         if self.running:
             self._stop_program(10125, 1, "Program stopped")
 
     def to_main(self) -> bool:
-        """Set the program pointers to main; false while RAPID runs."""
+        """Set the program pointers to main; return False while RAPID runs."""
         if self.running:
             return False
         self.wrote("resetpp")
         self.at_main = True
-        for told in self.reset_to_main:
-            told()
+        for listener in self.reset_to_main:
+            listener()
         return True
 
     def set_lead_through(self, arm: str, on: bool) -> bool:
-        """Make an arm movable by hand, or stiff; false when the state does not allow it."""
+        """Make an arm movable by hand, or stiff; return False if the state does not allow it."""
         if self.control_state != "motoron" or self.arms[arm].moving:
             return False
         self.wrote("lead-through")
@@ -125,13 +125,13 @@ class Controller:
         return True
 
     def log(self, code: int, kind: int, title: str) -> None:
-        """Put an entry into the event log; kind 1 information, 2 warning, 3 error."""
+        """Add an entry to the event log; kind 1 is information, 2 warning, 3 error."""
         self._logged += 1
         self.events.appendleft(Event(self._logged, code, kind, title))
 
-    # -------------------------------------------------------------------------------- what happens to it
+    # -------------------------------------------------------------------------------- commands of tests
     def set_control_state(self, state: str) -> None:
-        """Be in a state of the panel, as by an emergency stop and its release."""
+        """Set the control state, such as that of an emergency stop and its release."""
         if state not in CONTROL_STATES:
             raise ValueError(f"state is one of {', '.join(CONTROL_STATES)}")
         if state == "motoron":
@@ -141,7 +141,7 @@ class Controller:
         self._power_lost(state, code, f"{state} state")
 
     def set_operation_mode(self, mode: str) -> None:
-        """Turn the key: RAPID stops and the motors go off, as when a real key is turned."""
+        """Turn the key; RAPID stops and the motors switch off, as with a real key."""
         if mode not in OPERATION_MODES:
             raise ValueError(f"mode is one of {', '.join(OPERATION_MODES)}")
         if mode != self.operation_mode:
@@ -150,7 +150,7 @@ class Controller:
                 self._power_lost("motoroff" if mode == "AUTO" else "guardstop", 10011, "Motors OFF state")
 
     def foreign_program(self, on: bool = True, name: str = "Palletizing") -> None:
-        """Have another program loaded and run, or ours loaded and stopped."""
+        """Load and run another program, or load ours and leave it stopped."""
         if on:
             self._stop_program(10125, 1, "Program stopped")
             self.programs = dict.fromkeys(TASKS, name)
@@ -160,16 +160,16 @@ class Controller:
             self.programs = dict(PROGRAMS)
 
     def hold_mastership(self, on: bool = True, alias: str = "Operator", location: str = "Flexpendant") -> None:
-        """Have somebody else hold mastership of RAPID and motion."""
+        """Let another client hold mastership of RAPID and motion."""
         for domain in ("rapid", "motion"):
             self.mastership[domain] = Holder(0, alias, "RobotStudio", location) if on else None
 
     def rapid_error(self, code: int = 40512, title: str = "Missing external axis value") -> None:
-        """Have the program stop with an error."""
+        """Stop the program with an error."""
         self._stop_program(code, 3, title)
 
     def collide(self, arm: str) -> None:
-        """Have the motion supervision of an arm trip: all stops at once."""
+        """Trip the motion supervision of an arm; both arms stop at once."""
         unit = UNITS[arm]
         self.collision = "TRIGGERED"
         for each in self.arms.values():
@@ -177,13 +177,13 @@ class Controller:
         self._stop_program(50204, 3, f"Motion supervision triggered for axis 2 on {unit}")
 
     def session_ended(self, session: int) -> None:
-        """Give back what a session held."""
+        """Release the mastership of a session."""
         for domain, holder in self.mastership.items():
             if holder is not None and holder.session == session:
                 self.mastership[domain] = None
 
     def advance(self, dt: float) -> None:
-        """Let `dt` s of the real clock pass."""
+        """Advance by `dt` s of the real clock."""
         if self._motors_due is not None and time.monotonic() >= self._motors_due:
             self._motors_due = None
             if self.control_state == "motoroff":
@@ -212,11 +212,11 @@ class Controller:
             arm.ended = lambda: None
             arm.stop()
         self.log(code, kind, title)
-        for told in self.stopped:
-            told()
+        for listener in self.stopped:
+            listener()
 
     def truth(self) -> dict[str, Any]:
-        """Give what is so, for tests; joints in degrees, axes 1 to 7."""
+        """Return the true state, for tests; joints in degrees, axes 1 to 7."""
         flanges = {name: arm.kinematics.forward(arm.q) for name, arm in self.arms.items()}
         return {
             "control_state": self.control_state,

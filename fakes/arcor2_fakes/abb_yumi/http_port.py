@@ -1,4 +1,4 @@
-"""HTTP/1.1 of the fake controller: requests by h11, digest authentication (RFC 7616, MD5), sessions by cookie."""
+"""HTTP/1.1 port of the fake controller: digest authentication (RFC 7616, MD5), sessions by cookie."""
 
 import hashlib
 import json
@@ -18,7 +18,7 @@ from arcor2_fakes.wire import Connection
 REALM: Final = "validusers@robapi.abb"
 MOST_SESSIONS: Final = 70
 SESSION_LASTS: Final = 300.0
-"""Seconds after its last request that a session is forgotten, and what it held with it."""
+"""Time after its last request at which a session ends and its mastership is released, s."""
 LONGEST_BODY: Final = 65536
 COOKIE: Final = "-http-session-"
 _FIELD: Final = re.compile(r'(\w+)=(?:"([^"]*)"|([^\s,]+))')
@@ -26,7 +26,7 @@ _FIELD: Final = re.compile(r'(\w+)=(?:"([^"]*)"|([^\s,]+))')
 
 @dataclass
 class Request:
-    """A request of a client whose session is known."""
+    """A request of an authenticated client."""
 
     method: str
     path: str
@@ -37,7 +37,7 @@ class Request:
 
 @dataclass
 class Session:
-    """A session: number, who, when last heard of."""
+    """A session: number, user, time of the last request."""
 
     number: int
     key: str
@@ -48,7 +48,7 @@ class Session:
 
 @dataclass
 class Answer:
-    """What is answered: states as (type, title, fields), or an error of the controller."""
+    """An answer: states as (type, title, fields), or an error of the controller."""
 
     status: int = 200
     states: list[tuple[str, str, dict[str, str]]] = field(default_factory=list)
@@ -56,7 +56,7 @@ class Answer:
 
 
 class HttpPort:
-    """Speaks HTTP on each connection and hands requests of known users to `handle`."""
+    """Serves HTTP on each connection, and passes requests of authenticated users to `handle`."""
 
     def __init__(
         self,
@@ -105,13 +105,13 @@ class HttpPort:
         connection.received = received
 
     def expire(self) -> None:
-        """Forget sessions that have not been heard of."""
+        """End sessions without recent requests."""
         for session in list(self._sessions.values()):
             if time.monotonic() - session.heard > SESSION_LASTS:
                 self._end(session)
 
     def end_all(self) -> None:
-        """Forget all sessions."""
+        """End all sessions."""
         for session in list(self._sessions.values()):
             self._end(session)
 

@@ -1,6 +1,6 @@
 """Nominal kinematics of one arm of the fake: a Denavit-Hartenberg table (Craig) and numeric inverse kinematics.
 
-Joints are in the order of the wire: axes 1 to 6, then axis 7, which sits between 2 and 3. Units here: m and rad.
+Joints are in the order of the wire: axes 1 to 6, then axis 7, which is between 2 and 3. Units are m and rad.
 """
 
 import math
@@ -32,19 +32,19 @@ BASES: Final = {
     "left": ((0.05355, 0.0725, 0.41492), (0.9781, -0.5716, 2.3180)),
     "right": ((0.05355, -0.0725, 0.41492), (-0.9795, -0.5682, -2.3155)),
 }
-"""Position and roll, pitch, yaw of the foot of each arm on the body."""
+"""Position and roll, pitch, yaw of the base of each arm on the body."""
 HOME: Final = {
     "left": np.radians([0.0, -130.0, 30.0, 0.0, 40.0, 0.0, 135.0]),
     "right": np.radians([0.0, -130.0, 30.0, 0.0, 40.0, 0.0, -135.0]),
 }
-_ANGLE_WEIGHT: Final = 0.2  # m/rad that an error of the arm angle counts against one of position
-_TURN_WEIGHT: Final = 0.3  # the same for the orientation
+_ANGLE_WEIGHT: Final = 0.2  # m/rad: weight of an error of the arm angle against one of the position
+_TURN_WEIGHT: Final = 0.3  # m/rad: weight of an error of the orientation
 _STEP: Final = 1e-6
 _CLOSE: Final = 1e-6
 
 
 class NotReachable(Exception):
-    """No joints were found for the target."""
+    """No joints reach the target."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def _fixed(roll: float, pitch: float, yaw: float, position: tuple[float, float, 
 
 
 def quaternion(rotation: Array) -> tuple[float, float, float, float]:
-    """Give w, x, y, z of a rotation matrix."""
+    """Return w, x, y, z of a rotation matrix."""
     m = rotation
     values = np.array(
         [
@@ -92,7 +92,7 @@ def quaternion(rotation: Array) -> tuple[float, float, float, float]:
 
 
 def pose_of(position: tuple[float, float, float], wxyz: tuple[float, float, float, float]) -> Array:
-    """Give the matrix of a position and a quaternion w, x, y, z. Raises ValueError when that is none."""
+    """Return the matrix of a position and a quaternion w, x, y, z. Raise ValueError unless it is a unit quaternion."""
     norm = math.sqrt(sum(v * v for v in wxyz))
     if not 0.99 < norm < 1.01:
         raise ValueError("not a unit quaternion")
@@ -108,7 +108,7 @@ def pose_of(position: tuple[float, float, float], wxyz: tuple[float, float, floa
 
 
 def turn(rotation: Array) -> Array:
-    """Give axis times angle of a rotation matrix."""
+    """Return axis times angle of a rotation matrix."""
     w, x, y, z = quaternion(rotation)
     if w < 0.0:
         w, x, y, z = -w, -x, -y, -z
@@ -117,7 +117,7 @@ def turn(rotation: Array) -> Array:
 
 
 def turned(vector: Array) -> Array:
-    """Give the rotation matrix of axis times angle."""
+    """Return the rotation matrix of axis times angle."""
     angle = float(np.linalg.norm(vector))
     half = math.sin(angle / 2) / angle if angle > 1e-12 else 0.5
     w, (x, y, z) = math.cos(angle / 2), vector * half
@@ -125,7 +125,7 @@ def turned(vector: Array) -> Array:
 
 
 class Kinematics:
-    """One arm: `base` is where its foot stands."""
+    """Kinematics of one arm; `base` is its pose on the body."""
 
     def __init__(self, arm: str) -> None:
         position, (roll, pitch, yaw) = BASES[arm]
@@ -133,7 +133,7 @@ class Kinematics:
         self._base = _fixed(roll, pitch, yaw, position)
 
     def frames(self, q: Array) -> Array:
-        """Give the frames of the seven links in the world, shape (n, 7, 4, 4), of joints of shape (n, 7)."""
+        """Return the frames of the seven links in the world, shape (n, 7, 4, 4), of joints of shape (n, 7)."""
         at = np.broadcast_to(self._base, (len(q), 4, 4))
         out = np.empty((len(q), 7, 4, 4))
         for link, (axis, (alpha, a, d, offset)) in enumerate(zip(CHAIN, TABLE, strict=True)):
@@ -149,12 +149,12 @@ class Kinematics:
         return out
 
     def forward(self, q: Array) -> Array:
-        """Give the flange in the world for seven joints."""
+        """Return the flange in the world for seven joints."""
         flange: Array = self.frames(q[None, :])[0, 6]
         return flange
 
     def _angles(self, frames: Array) -> Array:
-        """Give the arm angle: the elbow about the line from shoulder to wrist, against the vertical plane."""
+        """Return the arm angle: the elbow about the line from shoulder to wrist, from the vertical plane."""
         shoulder, elbow, wrist = frames[:, 1, :3, 3], frames[:, 3, :3, 3], frames[:, 4, :3, 3]
         line = wrist - shoulder
         line = line / np.linalg.norm(line, axis=1)[:, None]
@@ -166,7 +166,7 @@ class Kinematics:
         return angles
 
     def describe(self, q: Array) -> Target:
-        """Give the robtarget of joints."""
+        """Return the robtarget of joints."""
         frames = self.frames(q[None, :])
         quadrants = [math.floor(math.degrees(q[axis]) / 90.0) for axis in (0, 3, 5)]
         cfx = 4 * (q[4] < 0.0) + 2 * (q[2] < 0.0) + (q[1] < 0.0)
@@ -175,9 +175,9 @@ class Kinematics:
         )
 
     def solve(self, pose: Array, angle: float | None, seed: Array, rounds: int = 60) -> Array:
-        """Give joints within the limits that put the flange there, with an arm angle if one is given.
+        """Return joints within the limits for a pose of the flange, and for an arm angle if one is given.
 
-        Raises NotReachable when the descent from the seed does not get there.
+        Raise NotReachable if the descent from the seed does not converge.
         """
         q = np.clip(seed, LIMITS[:, 0], LIMITS[:, 1])
         damping = 1e-3
@@ -206,7 +206,7 @@ class Kinematics:
         raise NotReachable
 
     def reach(self, target: Target, present: Array) -> Array:
-        """Give joints of a robtarget: of its configuration and arm angle. Raises NotReachable."""
+        """Return joints of a robtarget: of its configuration and arm angle. Raise NotReachable."""
         quadrant = dict(zip((0, 3, 5), target.configuration[:3], strict=True))
         middle = present.copy()
         for axis, number in quadrant.items():
@@ -226,7 +226,7 @@ class Kinematics:
         raise NotReachable
 
     def _linearised(self, q: Array, pose: Array, angle: float | None) -> tuple[Array, Array]:
-        """Give what is missing to the target, and how it shrinks with each joint."""
+        """Return the error to the target, and its Jacobian."""
         frames = self.frames(q[None, :] if angle is None else q[None, :] + np.vstack([np.zeros(7), _STEP * np.eye(7)]))
         flange, axes, origins = frames[0, 6], frames[0, :, :3, 2], frames[0, :, :3, 3]
         missing = np.concatenate([pose[:3, 3] - flange[:3, 3], _TURN_WEIGHT * turn(pose[:3, :3] @ flange[:3, :3].T)])

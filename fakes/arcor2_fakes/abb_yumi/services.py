@@ -1,4 +1,4 @@
-"""The resources of Robot Web Services 1.0 that the fake has: panel, RAPID, mastership, motion system, event log."""
+"""Resources of Robot Web Services 1.0: panel, RAPID, mastership, motion system, event log."""
 
 import math
 import re
@@ -9,7 +9,7 @@ from arcor2_fakes.abb_yumi.controller import DOMAINS, TASKS, UNITS, Controller, 
 from arcor2_fakes.abb_yumi.http_port import Answer, Request
 from arcor2_fakes.abb_yumi.kinematics import quaternion
 
-# The numbers stand for the controller's own; which number means what differs from release to release.
+# Placeholders for the controller's own numbers, which differ between releases.
 NOT_FOUND: Final = Answer(404, error=(-1073442814, "resource not found"))
 NOT_HELD: Final = Answer(403, error=(-1073445859, "mastership of the domain is not held by this session"))
 BAD_VALUE: Final = Answer(400, error=(-1073442811, "invalid value"))
@@ -29,7 +29,7 @@ def _done(held: bool) -> Answer:
 
 
 class Services:
-    """Answers requests from the controller's state."""
+    """Answers requests with the state of the controller."""
 
     def __init__(self, controller: Controller) -> None:
         self._controller = controller
@@ -174,7 +174,7 @@ class Services:
 
     def _execute(self, action: str, request: Request) -> Answer:
         c = self._controller
-        if action == "stop":  # as on the pendant, whoever asks
+        if action == "stop":  # from any client, as at the pendant
             c.stop()
             return Answer(204)
         if action not in ("start", "resetpp"):

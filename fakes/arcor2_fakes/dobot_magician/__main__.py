@@ -1,4 +1,4 @@
-"""Starts the fake arm: `python -m arcor2_fakes.dobot_magician`."""
+"""Start the fake arm: `python -m arcor2_fakes.dobot_magician`."""
 
 from __future__ import annotations
 

@@ -213,7 +213,7 @@ class Arm:
         )
 
     def truth(self) -> dict[str, Any]:
-        """Give what is really so."""
+        """Return what is really so."""
         return {
             "joints": self.joints,
             "tool": self.tool,

@@ -9,7 +9,7 @@ _SHORTEST = 2  # id and control
 
 
 def build(command: int, control: int, parameters: bytes = b"") -> bytes:
-    """Give a whole frame."""
+    """Return a whole frame."""
     payload = bytes((command, control)) + parameters
     return bytes((_HEAD, _HEAD, len(payload))) + payload + bytes(((0x100 - sum(payload) % 0x100) % 0x100,))
 
@@ -25,7 +25,7 @@ class Cutter:
         self._bytes.clear()
 
     def cut(self, data: bytes) -> Iterator[tuple[int, int, bytes]]:
-        """Give id, control and parameters of each frame completed by `data`."""
+        """Return id, control and parameters of each frame completed by `data`."""
         self._bytes += data
         while len(self._bytes) >= 3:
             if self._bytes[0] != _HEAD or self._bytes[1] != _HEAD or self._bytes[2] < _SHORTEST:

@@ -16,7 +16,7 @@ Four = tuple[float, float, float, float]
 
 
 def tool_at(joints: Four, bias: tuple[float, float, float]) -> Four:
-    """Give x, y, z, r of the tool."""
+    """Return x, y, z, r of the tool."""
     one, two, three = (math.radians(angle) for angle in joints[:3])
     out = REAR * math.sin(two) + FORE * math.cos(three) + bias[0]
     across = bias[1]
@@ -29,7 +29,7 @@ def tool_at(joints: Four, bias: tuple[float, float, float]) -> Four:
 
 
 def joints_for(tool: Four, bias: tuple[float, float, float]) -> Four | None:
-    """Give the joint angles for x, y, z, r; None when the links do not reach."""
+    """Return the joint angles for x, y, z, r; None when the links do not reach."""
     x, y, z, r = tool
     square = x * x + y * y - bias[1] * bias[1]
     if square <= 0.0:
@@ -50,7 +50,7 @@ def joints_for(tool: Four, bias: tuple[float, float, float]) -> Four | None:
 
 
 def beyond(joints: Four) -> int | None:
-    """Give the alarm of the first joint that is beyond a limit: 40h and on, positive and negative by turns."""
+    """Return the alarm of the first joint that is beyond a limit: 40h and on, positive and negative by turns."""
     for number, (angle, low, high) in enumerate(zip(joints, LOWEST, HIGHEST, strict=True)):
         if angle > high + 1e-3:
             return 0x40 + 2 * number

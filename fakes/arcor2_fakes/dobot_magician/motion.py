@@ -10,7 +10,7 @@ from arcor2_fakes.dobot_magician.geometry import Four
 
 
 def between(a: Four, b: Four, share: float) -> Four:
-    """Give the point at a share of the way from `a` to `b`."""
+    """Return the point at a share of the way from `a` to `b`."""
     return (
         a[0] + (b[0] - a[0]) * share,
         a[1] + (b[1] - a[1]) * share,
@@ -29,19 +29,19 @@ class Trapezoid:
 
     @property
     def _ramp(self) -> float:
-        """Give the time of one ramp, s; without a plateau when the distance is short."""
+        """Return the time of one ramp, s; without a plateau when the distance is short."""
         return min(self.speed / self.acceleration, math.sqrt(self.distance / self.acceleration))
 
     @property
     def duration(self) -> float:
-        """Give the time it takes, s."""
+        """Return the time it takes, s."""
         ramp = self._ramp
         if ramp <= 0.0:
             return 0.0
         return ramp + self.distance / (self.acceleration * ramp)
 
     def share(self, time: float) -> float:
-        """Give how much of the distance is done after `time` s, 0 to 1."""
+        """Return how much of the distance is done after `time` s, 0 to 1."""
         whole, ramp = self.duration, self._ramp
         if time >= whole:
             return 1.0

@@ -1,4 +1,4 @@
-"""Starts the fake two-axis robot: `python -m arcor2_fakes.two_axis_robot`."""
+"""Start the fake two-axis robot: `python -m arcor2_fakes.two_axis_robot`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ app = App(name="arcor2_fakes.two_axis_robot", help="Fake servos on a pty, Dynami
 
 
 def truth(bus: Bus, line: PtyLine) -> dict[str, Any]:
-    """Give what is really so, whatever the line says; angles in rad from the middle."""
+    """Return what is really so, whatever the line says; angles in rad from the middle."""
     found = {}
     for number, servo in bus.servos.items():
         servo.advance()
@@ -38,7 +38,7 @@ def truth(bus: Bus, line: PtyLine) -> dict[str, Any]:
 
 
 def motion(bus: Bus) -> dict[str, Any]:
-    """Give the angles alone, rad from the middle: the world asks for them a hundred times a second."""
+    """Return the angles alone, rad from the middle: the world asks for them a hundred times a second."""
     for servo in bus.servos.values():
         servo.advance()
     return {"angles": {str(n): (s.position - TICKS / 2) * math.tau / TICKS for n, s in bus.servos.items()}}

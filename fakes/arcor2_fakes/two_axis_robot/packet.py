@@ -25,7 +25,7 @@ _TABLE = _table()
 
 
 def crc16(data: bytes) -> int:
-    """Give the checksum: polynomial 8005h, initial value 0, not reflected."""
+    """Return the checksum: polynomial 8005h, initial value 0, not reflected."""
     value = 0
     for byte in data:
         value = ((value << 8) & 0xFFFF) ^ _TABLE[(value >> 8) ^ byte]
@@ -47,14 +47,14 @@ class BadCrc(NamedTuple):
 
 
 def packet(servo: int, code: int, parameters: bytes) -> bytes:
-    """Give a whole packet, stuffed and with its checksum."""
+    """Return a whole packet, stuffed and with its checksum."""
     body = (bytes([code]) + parameters).replace(STUFFED, STUFFED + b"\xfd")
     head = HEADER + bytes([servo]) + (len(body) + 2).to_bytes(2, "little")
     return head + body + crc16(head + body).to_bytes(2, "little")
 
 
 def status(servo: int, error: int, parameters: bytes = b"") -> bytes:
-    """Give a status packet."""
+    """Return a status packet."""
     return packet(servo, STATUS, bytes([error]) + parameters)
 
 
@@ -69,7 +69,7 @@ class Receiver:
         self._buffer.clear()
 
     def feed(self, data: bytes) -> Iterator[Instruction | BadCrc]:
-        """Give the packets that `data` completes."""
+        """Return the packets that `data` completes."""
         self._buffer += data
         while True:
             start = self._buffer.find(HEADER)

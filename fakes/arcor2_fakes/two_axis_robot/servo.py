@@ -104,16 +104,16 @@ class Servo:
 
     @property
     def position(self) -> float:
-        """Give where the horn stands as the servo counts it, ticks."""
+        """Return where the horn stands as the servo counts it, ticks."""
         return self._shaft + self._values["homing_offset"]
 
     @property
     def speed(self) -> float:
-        """Give the speed, ticks/s."""
+        """Return the speed, ticks/s."""
         return self._speed
 
     def place(self, position: float) -> None:
-        """Turn the horn by hand. Raises ValueError under torque."""
+        """Turn the horn by hand. Raise ValueError under torque."""
         self.advance()
         if self._values["torque"]:
             raise ValueError(f"servo {self.number} holds: torque is on")
@@ -142,7 +142,7 @@ class Servo:
 
     @property
     def answers(self) -> bool:
-        """Tell whether it is there and awake."""
+        """Return whether it is there and awake."""
         return not self.absent and self._clock() >= self._away_until
 
     def _move_until(self, until: float) -> None:
@@ -173,7 +173,7 @@ class Servo:
     # ------------------------------------------------------------------------------------------------ the bus' side
     @property
     def alert(self) -> int:
-        """Give the alert bit of its status packets."""
+        """Return the alert bit of its status packets."""
         return ALERT if self._values["hardware_error"] else 0
 
     def hear(self) -> None:
@@ -182,7 +182,7 @@ class Servo:
         self._heard = self._now
 
     def read(self, address: int, size: int) -> bytes | int:
-        """Give bytes of the table, or an error."""
+        """Return bytes of the table, or an error."""
         if size < 1 or address + size > TABLE_END:
             return BAD_RANGE
         values = self._values

@@ -27,7 +27,7 @@ class Obstacle:
         return cls((point[0], point[1], point[2]), (x, y, z), stiffness)
 
     def force(self, tip: Sequence[float]) -> tuple[float, float, float]:
-        """Give the force on the tool, N in base axes: that of a spring, once the tip is behind the plane."""
+        """Return the force on the tool, N in base axes: that of a spring, once the tip is behind the plane."""
         depth = sum(n * (p - t) for n, p, t in zip(self.normal, self.point, tip, strict=False))
         if depth <= 0.0:
             return (0.0, 0.0, 0.0)

@@ -2,7 +2,7 @@
 
 Poses are in the controller's base: rigid transforms here, x, y, z and rotation vector on the wire. A real arm has a
 calibration of its own and differs from this by millimetres. Source of the parameters: Universal Robots, "DH Parameters
-for calculations of kinematics and dynamics", e-Series table. The inverse follows from the geometry: the wrist centre
+for calculations of kinematics and dynamics", e-Series table. The inverse follows from the geometry: the wrist center
 gives joint 1, the offset along the normal of joint 1's plane gives joint 5, and two links are left for joints 2 to 4.
 """
 
@@ -138,7 +138,7 @@ def difference(a: Transform, b: Transform) -> tuple[Vector, Vector]:
 
 
 class Chain:
-    """The six joints of one model with the tool centre point mounted on the flange."""
+    """The six joints of one model with the tool center point mounted on the flange."""
 
     def __init__(self, model: str = "ur5e") -> None:
         if model not in MODELS:

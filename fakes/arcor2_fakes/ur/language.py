@@ -51,7 +51,7 @@ class Statement:
 
 
 def parse(text: str) -> list[Statement]:
-    """Give the statements of a program. Raises `ValueError` naming the line that cannot be read."""
+    """Return the statements of a program. Raises `ValueError` naming the line that cannot be read."""
     lines = iter([line.split("#", 1)[0].strip() for line in text.splitlines()])
     body, end = _block(lines)
     if end:
@@ -60,7 +60,7 @@ def parse(text: str) -> list[Statement]:
 
 
 def _block(lines: Iterator[str]) -> tuple[list[Statement], str]:
-    """Give statements up to the line that ends them, and that line."""
+    """Return statements up to the line that ends them, and that line."""
     found: list[Statement] = []
     for line in lines:
         if not line:
@@ -221,7 +221,7 @@ class WrittenProgram(Program):
 
     # ------------------------------------------------------------------------------------------------ expressions
     def value(self, node: ast.expr | None) -> Any:
-        """Give what an expression is worth now. Raises `ValueError`, `LookupError`, `TypeError`."""
+        """Return what an expression is worth now. Raises `ValueError`, `LookupError`, `TypeError`."""
         match node:
             case ast.Constant():
                 return node.value

@@ -15,7 +15,7 @@ from arcor2_drivers.abb_yumi import nominal
 from arcor2_drivers.abb_yumi.arm_line import ArmLine
 from arcor2_drivers.abb_yumi.motion_lines import LONGEST_LINE, Code, answer, check, line
 from arcor2_drivers.abb_yumi.settings import YumiSettings
-from arcor2_fakes.abb_yumi import kinematics, motion_server
+from arcor2_fakes.abb_yumi import kinematics, protocol
 from arcor2_hw.exceptions import DeviceFault, DeviceTimeout, NotInControl, OutOfRange
 
 WRONG = [
@@ -78,7 +78,7 @@ part = st.floats(-1.0, 1.0)
 def test_seven_joints_fit_and_the_server_reads_them(sequence: int, joints: list[float]) -> None:
     made = line(sequence, Code.STAGE_JOINTS, joints)
     assert len(made) <= LONGEST_LINE + 1
-    number, code, values = motion_server.parsed(made.decode().rstrip("\n"))
+    number, code, values = protocol.parsed(made.decode().rstrip("\n"))
     assert (number, code) == (sequence, 20)
     assert values == pytest.approx(joints, abs=5.1e-4)
 
@@ -143,8 +143,8 @@ def pair() -> Iterator[tuple[ArmLine, socket.socket]]:
             while data := kept.recv(4096):
                 *lines, rest = (rest + data).split(b"\n")
                 for each in lines:
-                    sequence, code, _ = motion_server.parsed(each.decode())
-                    kept.sendall(motion_server.framed(f"{sequence} {code} 0 0 1"))
+                    sequence, code, _ = protocol.parsed(each.decode())
+                    kept.sendall(protocol.framed(f"{sequence} {code} 0 0 1"))
 
     answering = threading.Thread(target=keep_answering)
     answering.start()
@@ -169,9 +169,9 @@ def test_a_late_answer_answers_no_later_question(pair: tuple[ArmLine, socket.soc
     asking.start()
     second = server.recv(200).decode().split()[0]
     assert second != sequence
-    server.sendall(motion_server.framed(f"{sequence} 41 0 1 1 1 1"))
-    server.sendall(motion_server.framed(f"{second} 40 0 2 2 2 2"))  # another command's code
-    server.sendall(motion_server.framed(f"{second} 41 0 3 3 3 3"))
+    server.sendall(protocol.framed(f"{sequence} 41 0 1 1 1 1"))
+    server.sendall(protocol.framed(f"{second} 40 0 2 2 2 2"))  # another command's code
+    server.sendall(protocol.framed(f"{second} 41 0 3 3 3 3"))
     asking.join(3.0)
     assert answered == [(3.0, 3.0, 3.0, 3.0)]
 
@@ -182,7 +182,7 @@ def test_an_answer_in_pieces_is_one(pair: tuple[ArmLine, socket.socket]) -> None
     asking = threading.Thread(target=lambda: answered.append(made.ask(Code.HAND_STATE)))
     asking.start()
     sequence = server.recv(200).decode().split()[0]
-    whole = motion_server.framed(f"{sequence} 53 0 12.5")
+    whole = protocol.framed(f"{sequence} 53 0 12.5")
     for each in (whole[:3], whole[3:9], whole[9:]):
         server.sendall(each)
     asking.join(3.0)

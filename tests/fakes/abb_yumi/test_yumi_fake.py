@@ -13,7 +13,7 @@ import pytest
 
 from arcor2_fakes.abb_yumi.arm import Motion
 from arcor2_fakes.abb_yumi.kinematics import HOME, LIMITS, Kinematics, NotReachable, quaternion
-from arcor2_fakes.abb_yumi.motion_server import Rejected, framed, parsed
+from arcor2_fakes.abb_yumi.protocol import Rejected, framed, parsed
 from tests.fakes.conftest import FakeProcess
 
 HOST = "127.77.3.1"
