@@ -1,4 +1,4 @@
-"""Object type source to metadata, from text alone: what is read is never imported."""
+"""Reads metadata of object types from their source, without importing it."""
 
 from arcor2_hw.analysis.enumerations import Enumeration
 from arcor2_hw.analysis.installed import GROUP, InstalledType, installed_types

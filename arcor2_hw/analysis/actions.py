@@ -1,4 +1,4 @@
-"""Methods as actions (protocol, 9.3 and 9.4)."""
+"""Actions of object types (protocol, sections 9.3 and 9.4)."""
 
 import ast
 import functools
@@ -38,11 +38,11 @@ class ActionReader:
 
     # -------------------------------------------------------------------------------- which methods are actions
     def mark(self, owner: ClassInfo, name: str, node: FunctionNode) -> ActionMetadata | None:
-        """Give how a method is marked as an action: by the decorator, or by `method.__action__ = ActionMetadata()`."""
+        """Return the metadata of an action, marked by the decorator or by `method.__action__ = ActionMetadata()`."""
         expression = owner.marks.get((name, "__action__"))
         if expression is not None:
             if not isinstance(expression, ast.Call):
-                raise owner.problem(f"{name}.__action__ is no ActionMetadata(...)", expression)
+                raise owner.problem(f"{name}.__action__ must be ActionMetadata(...)", expression)
             return self._metadata(owner, expression)
         for decorator in node.decorator_list:
             plain = decorator.func if isinstance(decorator, ast.Call) else decorator
@@ -58,9 +58,9 @@ class ActionReader:
         return ActionMetadata(**values)
 
     def actions(self, info: ClassInfo, seen_from: ClassInfo) -> dict[str, ObjectAction]:
-        """Give the actions that `info` itself defines, by name, with what `seen_from` says of them.
+        """Return the actions that `info` itself defines, by name, with attributes as seen from `seen_from`.
 
-        Hidden ones are left out; so are what our bases only offer: abstract methods and hooks.
+        Hidden actions, abstract methods and optional methods that are not implemented are excluded.
         """
         result: dict[str, ObjectAction] = {}
         shown = of_type(seen_from, self._hierarchy)
@@ -79,7 +79,7 @@ class ActionReader:
         return result
 
     def _renamed(self, owner: ClassInfo, node: FunctionNode) -> dict[str, list[str]]:
-        """Return the former names of parameters that `@action(renamed=...)` states, by their present names."""
+        """Return the former names of parameters declared by `@action(renamed=...)`, by their present names."""
         found: dict[str, list[str]] = {}
         for decorator in node.decorator_list:
             if not isinstance(decorator, ast.Call):
@@ -99,7 +99,7 @@ class ActionReader:
         return found
 
     def _marked(self, info: ClassInfo) -> list[tuple[FunctionNode, ActionMetadata | Broken]]:
-        """Give the methods of a class that are actions to be told of, by name; or what is wrong with their mark."""
+        """Return the methods of a class that are visible actions, by name, with their metadata or the error in it."""
         if info in self._known_marks:
             return self._known_marks[info]
         marked: list[tuple[FunctionNode, ActionMetadata | Broken]] = []
@@ -144,23 +144,23 @@ class ActionReader:
 
     def _check_form(self, info: ClassInfo, node: FunctionNode) -> None:
         if isinstance(node, ast.AsyncFunctionDef):
-            raise info.problem(f"{node.name}: an action is synchronous", node)
+            raise info.problem(f"{node.name}: an action must be synchronous", node)
         if self._hierarchy.decorated(node, info, *_NOT_ORDINARY):
-            raise info.problem(f"{node.name}: an action is an ordinary method", node)
+            raise info.problem(f"{node.name}: an action must be an ordinary method", node)
         arguments = node.args
         if arguments.vararg or arguments.kwarg:
-            raise info.problem(f"{node.name}: an action names its parameters (no * and **)", node)
+            raise info.problem(f"{node.name}: the parameters of an action need names (no * and **)", node)
         if not (arguments.posonlyargs or arguments.args):
-            raise info.problem(f"{node.name}: an action has self as its first parameter", node)
+            raise info.problem(f"{node.name}: the first parameter of an action must be self", node)
         every = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs][1:]
         if not every or every[-1].arg != "an":
-            raise info.problem(f"{node.name}: the last parameter of an action is `an: str | None = None`", node)
+            raise info.problem(f"{node.name}: the last parameter of an action must be `an: str | None = None`", node)
         hint = every[-1].annotation
         if hint is None:
-            raise info.problem(f"{node.name}: `an` is annotated `str | None`", node)
+            raise info.problem(f"{node.name}: `an` must be annotated `str | None`", node)
         inner, optional = without_none(hint, info.module, self._resolver)
         if not optional or self._resolver.expression(inner, info.module, info) != External("builtins.str"):
-            raise info.problem(f"{node.name}: `an` is annotated `str | None`", hint)
+            raise info.problem(f"{node.name}: `an` must be annotated `str | None`", hint)
         if node.returns is None:
             raise info.problem(f"{node.name}: the return annotation is missing", node)
 
@@ -227,7 +227,7 @@ class ActionReader:
             return {str(name): {str(parent) for parent in parents} for name, (_, parents) in declared.items()}
         except (AttributeError, TypeError, ValueError):
             raise seen_from.problem(
-                "DYNAMIC_PARAMS is {parameter: (name of a method, set of parameters it needs)}"
+                "DYNAMIC_PARAMS must be {parameter: (name of a method, set of parameters it needs)}"
             ) from None
 
     def _extra(
@@ -249,7 +249,7 @@ class ActionReader:
             if limits is None:
                 return unit_extra(description)
             if {type(limits.low), type(limits.high)} != {_LITERALS[kind.name]}:
-                raise info.problem(f"the range in `assert` has to be of type {kind.name} too", limits.node)
+                raise info.problem(f"the range in `assert` must be of type {kind.name} too", limits.node)
             return encode(Extra(minimum=limits.low, maximum=limits.high, unit=unit_in(description) or UNSET))
         except InvalidData as error:
             raise info.problem(str(error), enumeration.node if enumeration else None) from None
@@ -257,9 +257,10 @@ class ActionReader:
     def default(
         self, info: ClassInfo, kind: ParameterType, enumeration: ClassInfo | None, expression: ast.expr | None
     ) -> str | Unset:
-        """Give a default as JSON. Raises Broken when it is of another type, or cannot be told from the source.
+        """Return a default as JSON. Poses, positions, joints and images have none, because they belong to a project.
 
-        Poses, positions, joints and pictures have none: what a project refers to cannot stand in a source.
+        Raises:
+            Broken: It has another type, or cannot be determined from the source.
         """
         if expression is None or (enumeration is None and kind.name not in _LITERALS):
             return UNSET
@@ -268,7 +269,7 @@ class ActionReader:
             if isinstance(value, EnumMember) and value.owner is enumeration:
                 value = value.value
             elif value not in (enum_members(enumeration, self._resolver) or {}).values():
-                raise info.problem(f"the default is no member of {enumeration.name}", expression)
+                raise info.problem(f"the default is not a member of {enumeration.name}", expression)
         try:
             return kind.encode(value)
         except InvalidData as error:
@@ -276,7 +277,7 @@ class ActionReader:
 
 
 def _former_names(owner: ClassInfo, action: str) -> list[str]:
-    """Return the names that a class body gives to an action besides its own: `random_integer = random_int`."""
+    """Return further names that a class body gives to an action: `random_integer = random_int`."""
     return [
         name
         for name, member in owner.members.items()
@@ -285,13 +286,13 @@ def _former_names(owner: ClassInfo, action: str) -> list[str]:
 
 
 def unit_extra(description: str) -> str | Unset:
-    """Give what is said of a number without a range: its unit, if its description names one."""
+    """Return the extra of a number without a range: its unit, if its description states one."""
     unit = unit_in(description)
     return UNSET if unit is None else encode(Extra(unit=unit))
 
 
 class _Limits:
-    """An `assert a <= p <= b`."""
+    """A range declared by `assert a <= p <= b`."""
 
     def __init__(self, node: ast.AST, low: Any, high: Any) -> None:
         self.node = node
@@ -300,9 +301,9 @@ class _Limits:
 
 
 def _ranges(node: FunctionNode) -> dict[str, _Limits]:
-    """Give the ranges that a body asserts for its parameters; of several for one parameter the first.
+    """Return the ranges that a body asserts for its parameters, for each parameter the first one.
 
-    As in the protocol only plain literals count: a negative bound (an operator and a literal) tells no range.
+    As in the protocol, only plain literals count. A negative bound (an operator and a literal) is not a range.
     """
     result: dict[str, _Limits] = {}
     for statement in node.body:
@@ -322,7 +323,7 @@ def _ranges(node: FunctionNode) -> dict[str, _Limits]:
 
 @functools.lru_cache(maxsize=1024)
 def described_parameters(docstring: str | None) -> Mapping[str, str]:
-    """Give what a docstring, indented as it is, says of each parameter; in any of the usual styles."""
+    """Return the description of each parameter in a docstring, in any of the usual styles."""
     if not docstring:
         return {}
     if ":param" in docstring:

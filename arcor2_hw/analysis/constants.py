@@ -1,4 +1,4 @@
-"""Values that stand in a source: literals, names of literals, members of enumerations, simple arithmetic."""
+"""Constants in a source: literals, names of literals, members of enumerations, simple arithmetic."""
 
 import ast
 import math
@@ -32,7 +32,7 @@ class EnumMember:
 
 
 def enum_kind(info: ClassInfo, resolver: Resolver, depth: int = _DEPTH) -> str | None:
-    """Give StrEnum or IntEnum for an enumeration derived from the framework's, None for any other class."""
+    """Return StrEnum or IntEnum for an enumeration derived from ours, None for any other class."""
     for base in info.node.bases:
         symbol = resolver.expression(base, info.module)
         name = framework_name(symbol)
@@ -44,9 +44,10 @@ def enum_kind(info: ClassInfo, resolver: Resolver, depth: int = _DEPTH) -> str |
 
 
 def enum_members(info: ClassInfo, resolver: Resolver) -> dict[str, str | int] | None:
-    """Give the members of an enumeration of the framework's kind by name; None when it is no such class.
+    """Return the members of an enumeration by name, None for any other class.
 
-    Raises Broken when a value cannot be told from the source.
+    Raises:
+        Broken: A value cannot be determined from the source.
     """
     kind = enum_kind(info, resolver)
     if kind is None:
@@ -62,7 +63,9 @@ def enum_members(info: ClassInfo, resolver: Resolver) -> dict[str, str | int] | 
         else:
             value = constant(member.expression, info.module, info, resolver)
         if type(value) is not (str if kind == "StrEnum" else int):
-            raise info.problem(f"{info.name}.{name} is no {kind} member: {value!r:.40}", member.expression)
+            raise info.problem(
+                f"{info.name}.{name} must be a member of type {kind}, not {value!r:.40}", member.expression
+            )
         result[name] = value
     return result
 
@@ -76,7 +79,11 @@ def _is_auto(expression: ast.expr, info: ClassInfo, resolver: Resolver) -> bool:
 def constant(
     expression: ast.expr, module: Module, owner: ClassInfo | None, resolver: Resolver, depth: int = _DEPTH
 ) -> Any:
-    """Give the value of an expression; Broken, naming the line, when it cannot be told without running it."""
+    """Return the value of an expression.
+
+    Raises:
+        Broken: It cannot be determined without running it; the error has the line.
+    """
 
     def again(part: ast.expr) -> Any:
         return constant(part, module, owner, resolver, depth - 1)
@@ -127,7 +134,7 @@ def constant(
 
 
 def _unreadable(expression: ast.expr, module: Module) -> Broken:
-    return module.problem(f"the value {_shown(expression)} cannot be told from the source", expression.lineno)
+    return module.problem(f"the value {_shown(expression)} cannot be determined from the source", expression.lineno)
 
 
 def _named(expression: ast.expr, module: Module, owner: ClassInfo | None, resolver: Resolver, depth: int) -> Any:

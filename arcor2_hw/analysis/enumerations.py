@@ -1,4 +1,4 @@
-"""Which enumeration an action's parameter takes: where it is defined and what its members are called."""
+"""Enumerations of actions' parameters: where they are defined, and the names of their members."""
 
 from collections.abc import Iterable
 from typing import Final
@@ -25,7 +25,7 @@ class Enumeration(Data, frozen=True):
 def enumerations_of(
     info: ClassInfo, actions: Iterable[ObjectAction], hierarchy: Hierarchy
 ) -> dict[tuple[str, str], Enumeration]:
-    """Give the enumerations that the actions of a class take, by action and parameter."""
+    """Return the enumerations of the actions of a class, by action and parameter."""
     found: dict[tuple[str, str], Enumeration] = {}
     for action in actions:
         wanted = {parameter.name for parameter in action.parameters if parameter.type in _KINDS}
@@ -62,7 +62,7 @@ def _taken(owner: ClassInfo, node: FunctionNode, parameter: str, hierarchy: Hier
 
 
 def _path(kind: ClassInfo) -> str | None:
-    """Give the name by which a class is reached in its module, None when it is hidden in a function."""
+    """Return the name of a class in its module, None when it is local to a function."""
     top = kind.module.bindings
     if top.get(kind.name) is kind:
         return kind.name

@@ -1,4 +1,4 @@
-"""Where a class comes from: its bases over any number of files, in the order in which Python looks them up."""
+"""Base classes of a class over any number of files, in Python's lookup order."""
 
 import ast
 import sys
@@ -16,7 +16,7 @@ DRIVER_BASES: Final = ("Connected", "PointActions")
 
 
 class Hierarchy:
-    """Gives bases and lookup order of classes; every answer is remembered."""
+    """Determines bases and lookup order of classes, with a cache."""
 
     def __init__(self, resolver: Resolver) -> None:
         self.resolver = resolver
@@ -26,26 +26,34 @@ class Hierarchy:
         self._underway: list[ClassInfo] = []
 
     def bases(self, info: ClassInfo) -> "list[ClassInfo | External]":
-        """Give the classes in the class statement. Raises Broken when one cannot be obtained."""
+        """Return the classes in the class statement.
+
+        Raises:
+            Broken: A base cannot be read.
+        """
         result: list[ClassInfo | External] = []
         for expression in info.node.bases:
-            # Generic[T] of typing: the subscript says nothing about inheritance.
+            # Generic[T] of typing: the subscript does not affect inheritance.
             plain = expression.value if isinstance(expression, ast.Subscript) else expression
             symbol = self.resolver.expression(plain, info.module)
             if isinstance(symbol, ClassInfo | External):
                 result.append(symbol)
             else:
                 shown = getattr(plain, "id", None) or getattr(plain, "attr", None) or "base"
-                raise info.problem(f"{info.name}: the base {shown} cannot be obtained", expression)
+                raise info.problem(f"{info.name}: the base {shown} cannot be read", expression)
         return result
 
     def base(self, info: ClassInfo) -> ClassInfo | None:
-        """Give the base of an object type: the last one, everything before it is a mixin."""
+        """Return the base of an object type: the last one; all before it are mixins."""
         bases = self.bases(info)
         return bases[-1] if bases and isinstance(bases[-1], ClassInfo) else None
 
     def lineage(self, info: ClassInfo) -> Lineage:
-        """Give the class and its ancestors in Python's lookup order (C3). Raises Broken for a circle."""
+        """Return the class and its ancestors in Python's lookup order (C3).
+
+        Raises:
+            Broken: There is a circle, or the orders of the bases contradict each other.
+        """
         if info in self._lineages:
             return self._lineages[info]
         if info in self._underway:
@@ -71,7 +79,7 @@ class Hierarchy:
                 if not any(candidate in other[1:] for other in sequences):
                     break
             else:
-                raise info.problem(f"{info.name}: its bases contradict each other in their order")
+                raise info.problem(f"{info.name}: the orders of its bases contradict each other")
             result.append(candidate)
             for sequence in sequences:
                 if sequence[0] == candidate:
@@ -79,44 +87,48 @@ class Hierarchy:
         return result
 
     def ancestors(self, info: ClassInfo) -> Iterator[ClassInfo]:
-        """Give the class and those of its ancestors that can be read."""
+        """Yield the class and those of its ancestors that can be read."""
         return (each for each in self.lineage(info) if isinstance(each, ClassInfo))
 
     def derives_from(self, info: ClassInfo, name: str) -> bool:
-        """Tell whether our base `name` is the class itself or an ancestor."""
+        """Return whether our base class `name` is the class itself or an ancestor."""
         if info not in self._ours:
             self._ours[info] = frozenset(found for each in self.lineage(info) if (found := framework_name(each)))
         return name in self._ours[info]
 
     def find(self, info: ClassInfo, name: str) -> tuple[ClassInfo, Binding] | None:
-        """Give the class that binds a member as it is seen from `info`, and the binding."""
+        """Return the class that binds a member as seen from `info`, and the binding."""
         for each in self.ancestors(info):
             if name in each.members:
                 binding = each.members[name]
                 if isinstance(binding, Value) and binding.expression is None:
-                    continue  # annotated only: bound nowhere at run time
+                    continue  # only annotated, not bound at run time
                 return each, binding
         return None
 
     def method(self, info: ClassInfo, name: str) -> tuple[ClassInfo, FunctionNode] | None:
-        """Give a method as it is seen from `info`, with the class that defines it."""
+        """Return a method as seen from `info`, with the class that defines it."""
         found = self.find(info, name)
         if found is None or not isinstance(found[1], ast.FunctionDef | ast.AsyncFunctionDef):
             return None
         return found[0], found[1]
 
     def attribute(self, info: ClassInfo, name: str, default: Any = None) -> Any:
-        """Give the value of a class attribute. Raises Broken when it cannot be told from the source."""
+        """Return the value of a class attribute.
+
+        Raises:
+            Broken: It cannot be determined from the source.
+        """
         found = self.find(info, name)
         if found is None:
             return default
         owner, binding = found
         if not isinstance(binding, Value) or binding.expression is None:
-            raise owner.problem(f"{owner.name}.{name} is no plain value")
+            raise owner.problem(f"{owner.name}.{name} is not a plain value")
         return constant(binding.expression, owner.module, owner, self.resolver)
 
     def decorated(self, node: FunctionNode, owner: ClassInfo, *names: str) -> bool:
-        """Tell whether a function has one of these decorators, by their dotted names."""
+        """Return whether a function has one of these decorators, by their dotted names."""
         for decorator in node.decorator_list:
             plain = decorator.func if isinstance(decorator, ast.Call) else decorator
             symbol = self.resolver.expression(plain, owner.module, owner)
@@ -125,11 +137,11 @@ class Hierarchy:
         return False
 
     def is_abstract(self, node: FunctionNode, owner: ClassInfo) -> bool:
-        """Tell whether a method is abstract."""
+        """Return whether a method is abstract."""
         return self.decorated(node, owner, "abc.abstractmethod", "abc.abstractproperty")
 
     def unimplemented(self, info: ClassInfo) -> list[str]:
-        """Give the names of the abstract methods that nobody implements."""
+        """Return the names of the abstract methods that are not implemented."""
         seen: set[str] = set()
         missing: list[str] = []
         for each in self.ancestors(info):
@@ -142,7 +154,7 @@ class Hierarchy:
         return missing
 
     def is_hook_only(self, node: FunctionNode, owner: ClassInfo) -> bool:
-        """Tell whether a body is nothing but a raise of the framework's not-implemented error."""
+        """Return whether a body only raises our not-implemented error."""
         body = node.body
         if body and isinstance(body[0], ast.Expr) and isinstance(body[0].value, ast.Constant):
             body = body[1:]
@@ -153,7 +165,7 @@ class Hierarchy:
         return framework_name(symbol) == "Arcor2NotImplemented"
 
     def _offers(self, base: ClassInfo) -> list[str]:
-        """Give the optional methods that one of our bases declares."""
+        """Return the optional methods that one of our bases declares."""
         if base not in self._offered:
             self._offered[base] = [
                 name
@@ -165,9 +177,9 @@ class Hierarchy:
         return self._offered[base]
 
     def implemented_hooks(self, info: ClassInfo) -> frozenset[str]:
-        """Return the optional methods of our bases that the type, or an ancestor of its own, really implements.
+        """Return the optional methods of our bases that the type, or one of its own ancestors, implements.
 
-        A base for drivers implements what it defines; another of our bases, what a further one leaves open.
+        A base for drivers implements what it defines; another of our bases, what a further one does not implement.
         """
         ours = [each for each in self.ancestors(info) if is_framework(each)]
         for_drivers = [each for each in ours if any(self.derives_from(each, name) for name in DRIVER_BASES)]
@@ -183,7 +195,7 @@ class Hierarchy:
         return frozenset(result)
 
     def _fills_in(self, name: str, bases: list[ClassInfo]) -> bool:
-        """Tell whether one of our bases leaves a method open, by a body that only raises."""
+        """Return whether one of our bases does not implement a method, with a body that only raises."""
         declared = (each.function(name) for each in bases)
         return any(
             node is not None and self.is_hook_only(node, each) for node, each in zip(declared, bases, strict=True)
@@ -191,6 +203,6 @@ class Hierarchy:
 
 
 def is_known_library(symbol: External) -> bool:
-    """Tell whether this belongs to Python's library or to us, so that it certainly is no object type."""
+    """Return whether this belongs to the standard library or to us, so that it cannot be an object type."""
     top = symbol.dotted.partition(".")[0]
     return top in sys.stdlib_module_names or top in {"builtins", "arcor2_hw", "arcor2"}

@@ -14,17 +14,21 @@ _PICTURE: Final = "PIL.Image.Image"
 
 
 def plain(hint: ast.expr, module: Module) -> ast.expr:
-    """Give a hint without quotes around it. Raises Broken when what is quoted is no expression."""
+    """Return a hint without quotes around it.
+
+    Raises:
+        Broken: The quoted text is not an expression.
+    """
     if isinstance(hint, ast.Constant) and isinstance(hint.value, str):
         try:
             return ast.copy_location(ast.parse(hint.value.strip(), mode="eval").body, hint)
         except (SyntaxError, ValueError, RecursionError, MemoryError):
-            raise module.problem(f"{hint.value[:40]!r} is no type hint", hint.lineno) from None
+            raise module.problem(f"{hint.value[:40]!r} is not a type hint", hint.lineno) from None
     return hint
 
 
 def without_none(hint: ast.expr, module: Module, resolver: Resolver) -> tuple[ast.expr, bool]:
-    """Give what `X | None`, `Optional[X]` or `Union[X, None]` is about, and whether None is allowed."""
+    """Return the type X of `X | None`, `Optional[X]` or `Union[X, None]`, and whether None is allowed."""
     hint = plain(hint, module)
     members = [plain(member, module) for member in _members(hint, module, resolver)]
     rest = [member for member in members if not _is_none(member)]
@@ -61,14 +65,18 @@ def _is_none(hint: ast.expr) -> bool:
 
 
 def meaning(hint: ast.expr, module: Module, owner: ClassInfo | None, resolver: Resolver) -> Symbol | None:
-    """Give what a hint names."""
+    """Return the symbol that a hint names."""
     return resolver.expression(plain(hint, module), module, owner)
 
 
 def parameter_type_of(
     hint: ast.expr, module: Module, owner: ClassInfo | None, resolver: Resolver
 ) -> tuple[ParameterType, ClassInfo | None]:
-    """Give the parameter type that a hint means, with the enumeration when it is one. Raises Broken naming the hint."""
+    """Return the parameter type of a hint, and its enumeration if it has one.
+
+    Raises:
+        Broken: The hint is not a parameter type; the message names it.
+    """
     symbol = meaning(hint, module, owner, resolver)
     found: ParameterType | None = None
     if isinstance(symbol, ClassInfo):
@@ -85,7 +93,7 @@ def parameter_type_of(
 
 
 def unsupported(hint: ast.expr, module: Module, symbol: Symbol | None) -> Broken:
-    """Make the error that says that a hint is no parameter type."""
+    """Return the error for a hint that is not a parameter type."""
     shown = shown_hint(plain(hint, module))
     if symbol is None and isinstance(plain(hint, module), ast.Name):
         return module.problem(f"the name {shown} is not defined", hint.lineno)
@@ -93,7 +101,7 @@ def unsupported(hint: ast.expr, module: Module, symbol: Symbol | None) -> Broken
 
 
 def shown_hint(hint: ast.expr) -> str:
-    """Give a hint as it is written."""
+    """Return a hint as source text."""
     try:
         return ast.unparse(hint)[:60]
     except (RecursionError, ValueError):
@@ -101,7 +109,7 @@ def shown_hint(hint: ast.expr) -> str:
 
 
 def results(hint: ast.expr, module: Module, resolver: Resolver) -> list[ast.expr]:
-    """Give the hints of the results: none for None, several for `tuple[A, B]`, else one."""
+    """Return the hints of the results: none for None, several for `tuple[A, B]`, otherwise one."""
     hint = plain(hint, module)
     if _is_none(hint):
         return []
@@ -113,7 +121,7 @@ def results(hint: ast.expr, module: Module, resolver: Resolver) -> list[ast.expr
 
 
 def normal(hint: ast.expr | None, module: Module, resolver: Resolver) -> str:
-    """Give a hint in a form in which equal meanings are equal: older spellings, quotes and order do not count."""
+    """Return a hint in a normal form, in which equivalent spellings, quotes and orders are equal."""
     if hint is None:
         return ""
     hint = plain(hint, module)

@@ -1,4 +1,4 @@
-"""The object types of installed distributions, found by their entry points without importing anything."""
+"""Object types of installed distributions, found by their entry points without importing them."""
 
 import importlib.util
 import sys
@@ -11,14 +11,17 @@ from arcor2_hw.analysis.source import Problem, SourceFile
 from arcor2_hw.data.base import Data
 
 GROUP: Final = "arcor2_hw.object_types"
-"""The entry point group in which a distribution names its object types: `UR5e = "package.module:UR5e"`."""
+"""Entry point group of object types: `UR5e = "package.module:UR5e"`."""
 
 
 class InstalledType(Data, frozen=True):
     """An object type of an installed distribution.
 
-    entry_point: `module:Class`, for who imports it. folder: where its file lies with those that belong to it.
-    file: None, and `problem` set, when the file cannot be found or read.
+    Attributes:
+        entry_point: `module:Class`.
+        folder: Folder of its file and the files that belong to it.
+        file: None when it cannot be found or read.
+        problem: Why it cannot be found or read.
     """
 
     name: str
@@ -31,7 +34,7 @@ class InstalledType(Data, frozen=True):
 
 
 def installed_types() -> list[InstalledType]:
-    """Give the object types of all installed distributions, by name; of two with one name the first."""
+    """Return the object types of all installed distributions by name, for equal names the first one."""
     found: dict[str, InstalledType] = {}
     for point in entry_points(group=GROUP):
         each = _installed(point)
@@ -51,14 +54,14 @@ def _installed(point: EntryPoint) -> InstalledType:
     try:
         source = _read(str(path), path.stat().st_mtime_ns)
     except OSError as error:
-        problem = Problem(f"this cannot be read: {error.strerror}", str(path), 1)
+        problem = Problem(f"the file cannot be read: {error.strerror}", str(path), 1)
         return InstalledType(name, point.value, *origin, str(path.parent), None, problem)
     file = SourceFile(name, point.module, source, str(path), is_package)
     return InstalledType(name, point.value, *origin, str(path.parent), file)
 
 
 def _locate(dotted: str) -> tuple[Path, bool] | None:
-    """Find a module's file; only the finder of the top-level package is asked, no package is imported."""
+    """Find the file of a module. Only the finder of the top-level package is used; no package is imported."""
     top, *rest = dotted.split(".")
     if not all(part.isidentifier() for part in (top, *rest)):
         return None
@@ -72,7 +75,7 @@ def _locate(dotted: str) -> tuple[Path, bool] | None:
 
 
 def _top_level(name: str) -> list[Path]:
-    """Give the folders of a top-level package, also of one in an editable installation or without `__init__.py`."""
+    """Return the folders of a top-level package, also of an editable installation or a namespace package."""
     loaded = sys.modules.get(name)
     if loaded is not None and getattr(loaded, "__path__", None):
         return [Path(place) for place in loaded.__path__]

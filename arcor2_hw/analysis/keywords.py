@@ -1,4 +1,4 @@
-"""Which parameters of actions have to be given by name."""
+"""Keyword-only parameters of actions."""
 
 from collections.abc import Iterable
 
@@ -8,7 +8,7 @@ from arcor2_hw.data.object_type import ObjectAction
 
 
 def keyword_only(info: ClassInfo, actions: Iterable[ObjectAction], hierarchy: Hierarchy) -> frozenset[tuple[str, str]]:
-    """Give the parameters behind a bare `*` of the actions of a class, by action and parameter, without `an`."""
+    """Return the parameters after a bare `*` of the actions of a class, except `an`, by action and parameter."""
     found: set[tuple[str, str]] = set()
     for action in actions:
         defined = (each.function(action.name) for each in hierarchy.ancestors(info))

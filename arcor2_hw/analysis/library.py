@@ -1,4 +1,4 @@
-"""The sources of all object types, and what follows from them."""
+"""The sources of all object types, and their analyses."""
 
 import ast
 import contextlib
@@ -35,10 +35,10 @@ BUILT_IN: Final = (
     "Robot",
     "VirtualCollisionObject",
 )
-"""The object types that the protocol names as built in; our other bases are no types of their own for clients."""
+"""Object types that are built in according to the protocol. Our other bases are not visible to clients."""
 
 UPLOADED: Final = "object_types"
-"""The package in which uploaded types lie beside each other."""
+"""The package of uploaded types."""
 
 NO_DESCRIPTION: Final = "No description available."
 
@@ -46,14 +46,14 @@ _OURS: Final = Path(__file__).resolve().parents[1]
 
 
 class Library:
-    """Sources by type name; our bases are built in. Nothing that is read is imported. For use on one thread."""
+    """Sources by type name; our bases are built in. Sources are never imported. For use by one thread."""
 
     def __init__(self, files: Iterable[SourceFile] = ()) -> None:
         self._files: dict[str, SourceFile] = {}
         self._by_module: dict[str, SourceFile] = {}
         self._roots: dict[str, Path] = {"arcor2_hw": _OURS.parent}
         self._modules: dict[str, Module | Broken | None] = {}
-        self._parsed: dict[str, Module] = {}  # what was read before; it is read again only when its text changed
+        self._parsed: dict[str, Module] = {}  # parsed files; a file is parsed again only when its text changed
         self._analyses: dict[str, TypeAnalysis] = {}
         self.stamps: dict[str, Stamp | None] = {}
         """Stamps of the files that were looked for on the disk, None for a missing one."""
@@ -63,7 +63,11 @@ class Library:
 
     # -------------------------------------------------------------------------------- content
     def add(self, file: SourceFile) -> None:
-        """Put a source in, in the place of one of the same name. InvalidData for the name of a built-in type."""
+        """Add a source, replacing one of the same name.
+
+        Raises:
+            InvalidData: The name is that of a built-in type, or empty.
+        """
         if file.name in BUILT_IN:
             raise InvalidData(f"{file.name} is built in and cannot be replaced")
         if not file.name:
@@ -83,7 +87,11 @@ class Library:
         self._forget()
 
     def remove(self, name: str) -> None:
-        """Take a source out; NotFound when there is none of that name."""
+        """Remove a source.
+
+        Raises:
+            NotFound: There is no source of that name.
+        """
         file = self._file(name)
         del self._files[name]
         self._by_module.pop(_dotted(file), None)
@@ -95,18 +103,22 @@ class Library:
         self._forget()
 
     def names(self) -> list[str]:
-        """Give the names of all types, the built-in ones first."""
+        """Return the names of all types, built-in ones first."""
         return [*BUILT_IN, *self._files]
 
     def __contains__(self, name: object) -> bool:
         return name in BUILT_IN or name in self._files
 
     def file(self, name: str) -> SourceFile:
-        """Give the source of an added type; NotFound."""
+        """Return the source of an added type.
+
+        Raises:
+            NotFound: There is no source of that name.
+        """
         return self._file(name)
 
     def put_analyses(self, analyses: Mapping[str, TypeAnalysis], stamps: Mapping[str, Stamp | None]) -> None:
-        """Take over results that were made from the same sources, and the stamps of the files read for them."""
+        """Use results of an earlier analysis of the same sources, and the stamps of the files read for them."""
         self._analyses = dict(analyses)
         self.stamps = dict(stamps)
 
@@ -125,7 +137,11 @@ class Library:
 
     # -------------------------------------------------------------------------------- modules
     def _load(self, dotted: str) -> Module | None:
-        """Give a module by its full name: uploaded, of an added distribution, or ours. Raises Broken."""
+        """Return a module by its full name: uploaded, of an added distribution, or ours.
+
+        Raises:
+            Broken: It cannot be parsed.
+        """
         if dotted not in self._modules:
             try:
                 file = self._by_module.get(dotted) or self._on_disk(dotted)
@@ -150,7 +166,7 @@ class Library:
         if root is None or not rest or not all(part.isidentifier() for part in rest.split(".")):
             return None
         if top == "arcor2_hw" and not rest.startswith("objects"):
-            return None  # parameter types and data classes are known by their names
+            return None  # parameter types and data classes are known by name
         base = root.joinpath(*dotted.split("."))
         for path, is_package in ((base.with_suffix(".py"), False), (base / "__init__.py", True)):
             self.stamps[str(path)] = stamp_of(path)
@@ -159,11 +175,15 @@ class Library:
             except (FileNotFoundError, NotADirectoryError):
                 continue
             except OSError as error:
-                raise Broken(f"this cannot be read: {error.strerror}", str(path), 1) from None
+                raise Broken(f"the file cannot be read: {error.strerror}", str(path), 1) from None
         return None
 
     def _needed(self, module: Module) -> list[SourceFile]:
-        """Give the files that a module needs, each after those it needs itself. Raises Broken when one is missing."""
+        """Return the files that a module needs, each after those it needs itself.
+
+        Raises:
+            Broken: A file is missing.
+        """
         done: dict[str, SourceFile] = {}
         seen = {module.dotted}
 
@@ -179,7 +199,7 @@ class Library:
         return list(done.values())
 
     def _imported(self, module: Module, found: Import) -> list[Module]:
-        """Give the modules that an import statement runs, as far as they are read at all."""
+        """Return the modules that an import statement runs, as far as they are read."""
         if not found.guarded and (lacking := not_offered(found.module, found.name)) is not None:
             raise module.problem(lacking, found.line)
         try:
@@ -191,16 +211,17 @@ class Library:
             raise
         if found.relative and first is None and second is None and not found.guarded:
             shown = found.module.rpartition(".")[2]
-            raise module.problem(f"the module {shown} that it imports does not exist", found.line)
+            raise module.problem(f"the imported module {shown} does not exist", found.line)
         if second is not None and first is not None and found.name in first.bindings:
-            second = None  # the name is one of the package, not the module of the same name
+            second = None  # a name in the package, not the module of that name
         return [each for each in (first, second) if each is not None]
 
     # -------------------------------------------------------------------------------- analysis
     def analyse(self, name: str) -> TypeAnalysis:
-        """Tell what the source of a type says; NotFound for an unknown name.
+        """Analyse the source of a type. Errors in it are reported in `problem`, which disables the type.
 
-        What is wrong with the source is told in `problem`, and disables the type; it never raises.
+        Raises:
+            NotFound: There is no source of that name.
         """
         if name not in self._analyses:
             with _all_stays():
@@ -222,7 +243,7 @@ class Library:
             assert module is not None
             info = module.bindings.get(name)
             if isinstance(info, Import | Value) or (info is None and self._declares_object_type(module)):
-                raise module.problem(f"there is no class {name} here", 1)
+                raise module.problem(f"the file has no class {name}", 1)
             needed = tuple(self._needed(module))
             if not isinstance(info, ClassInfo) or not info.node.bases or not self._is_object_type(info):
                 return TypeAnalysis(ObjectTypeMeta(name, abstract=True), modules=needed, is_object_type=False)
@@ -231,7 +252,7 @@ class Library:
             problem = error.problem
         except (RecursionError, MemoryError):
             path = file.path or f"{_dotted(file).replace('.', '/')}.py"
-            problem = Problem("this is nested too deeply to be read", sendable(path), 1)
+            problem = Problem("the source is nested too deeply", sendable(path), 1)
         meta = ObjectTypeMeta(name, NO_DESCRIPTION, base=base, abstract=True, disabled=True, problem=str(problem))
         return TypeAnalysis(meta, modules=needed, problem=problem)
 
@@ -240,17 +261,23 @@ class Library:
         return any(self._hierarchy.derives_from(each, "Generic") for each in classes)
 
     def _is_object_type(self, info: ClassInfo) -> bool:
-        """Tell whether a class derives from Generic. Raises Broken when that cannot be known, or by the wrong base."""
+        """Return whether a class derives from Generic.
+
+        Raises:
+            Broken: It cannot be determined, or the base is wrong.
+        """
         hierarchy = self._hierarchy
         last = info.node.bases[-1]
         if not hierarchy.derives_from(info, "Generic"):
             for each in hierarchy.lineage(info):
                 if isinstance(each, External) and not is_known_library(each):
-                    raise info.problem(f"{info.name}: the base {each.dotted} cannot be obtained", last)
+                    raise info.problem(f"{info.name}: the base {each.dotted} cannot be read", last)
             return False
         base = hierarchy.base(info)
         if base is None or not hierarchy.derives_from(base, "Generic"):
-            raise info.problem(f"{info.name}: the last base is no object type; mixins come before the base", last)
+            raise info.problem(
+                f"{info.name}: the last base is not an object type; mixins must come before the base", last
+            )
         return True
 
     def _of_class(self, name: str, info: ClassInfo, needed: tuple[SourceFile, ...]) -> TypeAnalysis:
@@ -296,18 +323,18 @@ class Library:
         )
 
     def _type_name(self, info: ClassInfo) -> str | None:
-        """Give the name under which clients know a class, None when they do not."""
+        """Return the name under which clients know a class, None when they do not."""
         if is_framework(info):
             return info.name if info.name in BUILT_IN else None
         file = self._files.get(info.name)
         return info.name if file is not None and _dotted(file) == info.module.dotted else None
 
     def _bases(self, info: ClassInfo) -> list[str]:
-        """Give the object types that a class derives from by its bases, nearest first."""
+        """Return the object types that a class derives from by its bases, nearest first."""
         return [name for each in self._chain(info)[1:] if (name := self._type_name(each)) is not None]
 
     def _chain(self, info: ClassInfo) -> list[ClassInfo]:
-        """Give a class, its base, the base of that and so on: mixins do not count."""
+        """Return a class, its base, the base of that and so on, without mixins."""
         chain: list[ClassInfo] = []
         current: ClassInfo | None = info
         while current is not None and current not in chain:
@@ -316,9 +343,9 @@ class Library:
         return chain
 
     def _all_actions(self, info: ClassInfo, bases: list[str]) -> list[ObjectAction]:
-        """Give own and inherited actions, nearest ancestors first, each level by name.
+        """Return own and inherited actions, nearest ancestors first, each level by name.
 
-        What a mixin or a class unknown to clients defines belongs to the type that brings it in.
+        Actions of a mixin, or of a class unknown to clients, belong to the type that adds it.
         """
         if self._type_name(info) in BUILT_IN:
             return list(self._actions.actions(info, info).values())
@@ -344,7 +371,7 @@ class Library:
         return result
 
     def _homes(self, info: ClassInfo) -> dict[ClassInfo, str]:
-        """Give for each ancestor the known type that brought it in first."""
+        """Return for each ancestor the known type that added it first."""
         chain = self._chain(info)
         names: list[str] = []
         for each in chain:
@@ -358,7 +385,7 @@ class Library:
 
 @contextlib.contextmanager
 def _all_stays() -> Iterator[None]:
-    """Do without the garbage collector: syntax trees are many objects that all stay, which doubles the time."""
+    """Disable the garbage collector: syntax trees are many objects that all remain, and it would double the time."""
     was_on = gc.isenabled()
     gc.disable()
     try:
@@ -369,7 +396,7 @@ def _all_stays() -> Iterator[None]:
 
 
 def _dotted(file: SourceFile) -> str:
-    """Give the full name of a file's module; uploaded ones are given a package."""
+    """Return the full name of a file's module; uploaded files get a package."""
     return file.module if "." in file.module else f"{UPLOADED}.{file.module}"
 
 

@@ -1,4 +1,4 @@
-"""One module as it is bound: which names stand for which classes, functions, imports and values."""
+"""The names bound in one module: classes, functions, imports and values."""
 
 import ast
 from collections.abc import Iterator, Sequence
@@ -12,7 +12,7 @@ FunctionNode: TypeAlias = ast.FunctionDef | ast.AsyncFunctionDef
 
 @dataclass(slots=True)
 class Import:
-    """A name that comes from elsewhere; `name` is None for the module itself."""
+    """An imported name; `name` is None for the module itself."""
 
     module: str
     name: str | None
@@ -35,27 +35,31 @@ Binding: TypeAlias = "ClassInfo | FunctionNode | Import | Value"
 
 @dataclass(slots=True, eq=False)
 class ClassInfo:
-    """A class statement with its members, in the order in which they were first bound."""
+    """A class statement with its members, in the order in which they are first bound."""
 
     name: str
     node: ast.ClassDef
     module: "Module"
     members: dict[str, Binding] = field(default_factory=dict)
     marks: dict[tuple[str, str], ast.expr] = field(default_factory=dict)
-    """What is assigned to attributes of members: {("move", "__action__"): expression}."""
+    """Values assigned to attributes of members: {("move", "__action__"): expression}."""
 
     def problem(self, text: str, node: ast.AST | None = None) -> Broken:
-        """Make the error that says `text` at `node`, or at the class statement."""
+        """Return an error at `node`, or at the class statement."""
         return self.module.problem(text, getattr(node, "lineno", self.node.lineno))
 
     def function(self, name: str) -> FunctionNode | None:
-        """Give the method that the class itself defines under this name."""
+        """Return the method that the class itself defines under this name."""
         found = self.members.get(name)
         return found if isinstance(found, ast.FunctionDef | ast.AsyncFunctionDef) else None
 
 
 class Module:
-    """A parsed source file. Raises Broken, with file and line, when it cannot be parsed."""
+    """A parsed source file.
+
+    Raises:
+        Broken: It cannot be parsed; the error has file and line.
+    """
 
     def __init__(self, file: SourceFile) -> None:
         self.file = file
@@ -68,18 +72,18 @@ class Module:
         try:
             tree = ast.parse(file.source)
         except SyntaxError as error:
-            raise self.problem(f"this is not Python: {error.msg}", error.lineno or 1) from None
+            raise self.problem(f"this is not valid Python: {error.msg}", error.lineno or 1) from None
         except (RecursionError, MemoryError):
-            raise self.problem("this is nested too deeply to be read", 1) from None
+            raise self.problem("the source is nested too deeply", 1) from None
         except ValueError as error:
-            raise self.problem(f"this is not text: {error}", 1) from None
+            raise self.problem(f"the file is not text: {error}", 1) from None
         try:
             self._bind(tree.body, self.bindings, None)
         except RecursionError:
-            raise self.problem("this is nested too deeply to be read", 1) from None
+            raise self.problem("the source is nested too deeply", 1) from None
 
     def problem(self, text: str, line: int) -> Broken:
-        """Make the error that says `text` at `line` of this file."""
+        """Return an error at `line` of this file."""
         return Broken(text, self.path, line)
 
     # -------------------------------------------------------------------------------- binding
@@ -146,20 +150,20 @@ class Module:
                 _set(scope, alias.asname or alias.name, found, sure)
 
     def _absolute(self, statement: ast.ImportFrom) -> str:
-        """Give the full name of the module that a `from` statement names."""
+        """Return the full name of the module in a `from` statement."""
         if statement.level == 0:
             return statement.module or ""
         parts = self.dotted.split(".")
         up = statement.level - (1 if self.file.is_package else 0)
         if up >= len(parts):
-            raise self.problem("this relative import leads out of the package", statement.lineno)
+            raise self.problem("the relative import leads outside of the package", statement.lineno)
         return ".".join([*parts[: len(parts) - up], *([statement.module] if statement.module else [])])
 
 
 def _statements(body: Sequence[ast.stmt], sure: bool = True) -> Iterator[tuple[ast.stmt, bool]]:
-    """Give the statements that run when the module is imported, each with whether it certainly does.
+    """Yield the statements that run when the module is imported, each with whether it certainly does.
 
-    Of alternatives the first one counts: what `try` binds, not what its handlers put in its place.
+    Of alternatives the first one counts: the bindings in `try`, not those in its handlers.
     """
     for statement in body:
         match statement:
@@ -184,7 +188,7 @@ def _set(scope: dict[str, Binding], name: str, binding: Binding, sure: bool) -> 
 
 
 def _extends_property(node: FunctionNode) -> bool:
-    """Tell whether this is the setter of a property that stands above it."""
+    """Return whether this is the setter of a property defined above it."""
     return any(
         isinstance(decorator, ast.Attribute) and decorator.attr in {"setter", "getter", "deleter"}
         for decorator in node.decorator_list

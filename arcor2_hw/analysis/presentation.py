@@ -1,4 +1,4 @@
-"""How the editor shows a type and its actions: category and icon, as the class says."""
+"""Category and icon of a type and its actions in the editor."""
 
 import ast
 import re
@@ -16,16 +16,16 @@ _LONGEST: Final = 40
 
 
 class Presentation(NamedTuple):
-    """`category`: under which heading something is offered. `icon`: the name of a symbol of the editor."""
+    """Category and icon name in the editor."""
 
     category: str | Unset = UNSET
     icon: str | Unset = UNSET
 
 
 def of_type(info: ClassInfo, hierarchy: Hierarchy) -> Presentation:
-    """Give what the class data `category` and `icon` say, own or inherited.
+    """Return the class attributes `category` and `icon`, own or inherited.
 
-    Anything but suitable text is left out, and is no fault: an older type may mean something else by these names.
+    Invalid values are ignored without an error, because an older type may use these names for something else.
     """
 
     def text(name: str) -> object:
@@ -38,7 +38,7 @@ def of_type(info: ClassInfo, hierarchy: Hierarchy) -> Presentation:
 
 
 def of_action(node: FunctionNode, owner: ClassInfo, inherited: Presentation, hierarchy: Hierarchy) -> Presentation:
-    """Give what `@action(category=..., icon=...)` says; what it does not say is as the type has it."""
+    """Return the arguments of `@action(category=..., icon=...)`; default: those of the type."""
     resolver = hierarchy.resolver
     for decorator in node.decorator_list:
         if not isinstance(decorator, ast.Call):
@@ -52,7 +52,7 @@ def of_action(node: FunctionNode, owner: ClassInfo, inherited: Presentation, hie
         category, icon = _category(given.get("category")), _icon(given.get("icon"))
         for name, value in (("category", category), ("icon", icon)):
             if name in given and isinstance(value, Unset):
-                raise owner.problem(f"{node.name}: {given[name]!r:.60} is no {name}", decorator)
+                raise owner.problem(f"{node.name}: {given[name]!r:.60} is not a valid {name}", decorator)
         return Presentation(
             inherited.category if isinstance(category, Unset) else category,
             inherited.icon if isinstance(icon, Unset) else icon,

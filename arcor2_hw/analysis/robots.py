@@ -1,4 +1,4 @@
-"""What a robot type can do (protocol, 9.5)."""
+"""Features of a robot type (protocol, section 9.5)."""
 
 import ast
 
@@ -24,13 +24,16 @@ _OURS = {
     "acknowledge_stop": ("acknowledge_protective_stop", "restart_safety"),
     "kinematic_calibration": ("kinematic_calibration",),
 }
-"""Beside the protocol: left out where a type does not have it."""
+"""Features that are not in ARCOR2; omitted where a type does not have them."""
 
 
 def robot_meta(name: str, info: ClassInfo, hierarchy: Hierarchy) -> RobotMeta:
-    """Give what clients know of a robot type. Raises Broken when its kind cannot be told.
+    """Return the metadata of a robot type.
 
-    `urdf_package_filename` is what the type names; whether such a file exists is not known here.
+    `urdf_package_filename` is the name declared by the type; the file need not exist.
+
+    Raises:
+        Broken: The type of robot cannot be determined.
     """
     urdf = hierarchy.attribute(info, "urdf_package_name")
     return RobotMeta(
@@ -60,11 +63,11 @@ def _robot_type(info: ClassInfo, hierarchy: Hierarchy) -> RobotType:
             return RobotType(constant(binding.expression, owner.module, owner, hierarchy.resolver))
         except (Broken, ValueError):
             pass
-    raise owner.problem("robot_type is no member of RobotType", getattr(binding, "expression", None))
+    raise owner.problem("robot_type must be a member of RobotType", getattr(binding, "expression", None))
 
 
 def _has(info: ClassInfo, method: str, hierarchy: Hierarchy) -> bool:
-    """Tell whether a method is implemented: called as ours, and more than a raise; some of our bases do so, too."""
+    """Return whether a method is implemented, by the type or by some of our bases."""
     found = hierarchy.method(info, method)
     if found is None:
         return False

@@ -1,4 +1,4 @@
-"""The settings of an object type: the dataclass that its constructor asks for."""
+"""Settings of an object type: the dataclass in the signature of its constructor."""
 
 import ast
 from typing import Final, NamedTuple
@@ -21,7 +21,7 @@ _KINDS: Final = frozenset({"boolean", "integer", "double", "string", "string_enu
 
 
 class _Field(NamedTuple):
-    """A field of a dataclass. `secret` and `address` are None where its metadata does not say."""
+    """A field of a dataclass. `secret` and `address` are None where its metadata does not declare them."""
 
     default: ast.expr | None
     in_constructor: bool = True
@@ -39,12 +39,16 @@ class SettingsReader:
         self._actions = actions
 
     def settings(self, info: ClassInfo) -> list[ParameterMeta]:
-        """Give the settings in the order of the constructor. Raises Broken when they cannot be told."""
+        """Return the settings in the order of the constructor.
+
+        Raises:
+            Broken: They cannot be determined.
+        """
         found = self._class(info)
         return [] if found is None else self._fields(found)
 
     def _class(self, info: ClassInfo) -> ClassInfo | None:
-        """Give the dataclass that `settings` of `__init__` is annotated with; None when the type has no settings."""
+        """Return the dataclass that annotates `settings` of `__init__`, None when the type has no settings."""
         constructor = self._hierarchy.method(info, "__init__")
         if constructor is None or is_framework(constructor[0]):
             return None
@@ -57,12 +61,12 @@ class SettingsReader:
             hint, _ = without_none(argument.annotation, owner.module, self._resolver)
             symbol = meaning(hint, owner.module, owner, self._resolver)
             if not isinstance(symbol, ClassInfo) or not self._hierarchy.derives_from(symbol, "Settings"):
-                raise owner.problem(f"{owner.name}: settings is no dataclass derived from Settings", argument)
+                raise owner.problem(f"{owner.name}: settings must be a dataclass derived from Settings", argument)
             return symbol
         return None
 
     def _fields(self, info: ClassInfo) -> list[ParameterMeta]:
-        """Give the fields as dataclasses do: those of ancestors first, a repeated one at its first place."""
+        """Return the fields in the order of dataclasses: ancestors first, a repeated field at its first place."""
         ordinary: dict[str, ParameterMeta] = {}
         keyword_only: set[str] = set()
         for each in reversed(list(self._hierarchy.ancestors(info))):
@@ -109,7 +113,7 @@ class SettingsReader:
         ) == External("dataclasses.field"):
             given = {keyword.arg: keyword.value for keyword in expression.keywords}
             if "default_factory" in given:
-                raise info.problem("the default of a setting has to stand in the source", expression)
+                raise info.problem("the default of a setting must be a constant in the source", expression)
             in_constructor = not _is(given.get("init"), False)
             secret, address = (_declared(given.get("metadata"), key) for key in ("secret", "address"))
             return _Field(given.get("default"), in_constructor, _is(given.get("kw_only"), True), secret, address)
@@ -155,7 +159,7 @@ def _is(expression: ast.expr | None, value: bool) -> bool:
 
 
 def _declared(metadata: ast.expr | None, name: str) -> bool | None:
-    """Return what `field(metadata={name: ...})` says, None where it says nothing."""
+    """Return the value of `field(metadata={name: ...})`, None where it is missing."""
     if isinstance(metadata, ast.Dict):
         for key, value in zip(metadata.keys, metadata.values, strict=True):
             if isinstance(key, ast.Constant) and key.value == name and isinstance(value, ast.Constant):

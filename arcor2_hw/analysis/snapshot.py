@@ -1,4 +1,4 @@
-"""Results of an analysis, stored so that the next process with the same sources needs to parse nothing."""
+"""Stored results of an analysis, so that the next process with the same sources need not parse them."""
 
 import hashlib
 import sys
@@ -15,11 +15,11 @@ from arcor2_hw.data.base import Data
 
 _LIBRARY: Final = Path(__file__).resolve().parents[1]
 _CODE: Final = ("analysis", "data", "actions")
-"""Our packages on which a result depends without being read by the analysis."""
+"""Packages of ours on which a result depends in addition to the sources."""
 
 
 class StoredSource(Data, frozen=True, array_like=True):
-    """A SourceFile whose text and bytes are apart: a decoder could not tell which of the two it reads."""
+    """A SourceFile with separate fields for text and bytes, which a decoder could not distinguish."""
 
     name: str
     module: str
@@ -35,7 +35,7 @@ class StoredSource(Data, frozen=True, array_like=True):
         return cls(file.name, file.module, file.path, file.is_package, text, content)
 
     def file(self) -> SourceFile:
-        """Return the file as it was."""
+        """Return the original file."""
         source = self.content if self.text is None else self.text
         return SourceFile(self.name, self.module, source, self.path, self.is_package)
 
@@ -47,11 +47,11 @@ class StoredAnalysis(TypeAnalysis, frozen=True):
 
 
 class Snapshot(Data, frozen=True):
-    """The analyses of all types of a library, and what they were made from.
+    """The analyses of all types of a library, and their inputs.
 
     Attributes:
-        inputs: Digest of the sources that were added and of the code that analysed them.
-        stamps: Every file that was looked for on the disk, with its stamp; None where there was none.
+        inputs: Digest of the added sources and of the code of the analysis.
+        stamps: Every file that was looked for on the disk, with its stamp; None for a missing one.
         analyses: Results by type name.
         sources: The modules that the types need.
     """
@@ -78,11 +78,11 @@ def take(library: Library) -> bytes:
 
 
 def restore(library: Library, encoded: bytes) -> bool:
-    """Put the analyses of an earlier process into a library that holds the same sources.
+    """Add the stored analyses to a library with the same sources.
 
     Returns:
-        False, with the library unchanged, if anything differs: a source, a file that was read or that was missing, our
-        own code, the Python version, or if `encoded` is damaged.
+        False, with the library unchanged, if anything differs: a source, a file that was read or missing, our own code,
+        the Python version, or if `encoded` is damaged.
     """
     try:
         snapshot = msgspec.msgpack.decode(encoded, type=Snapshot)

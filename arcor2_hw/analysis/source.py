@@ -1,4 +1,4 @@
-"""What is read: a source file, and how its problems are told."""
+"""Source files, and problems in them."""
 
 from pathlib import Path
 
@@ -8,15 +8,15 @@ from arcor2_hw.data.base import Data
 
 
 def module_name(type_name: str) -> str:
-    """Give the name of the module that holds an object type: `DobotM1` -> `dobot_m1` (protocol, 9.1).
+    """Return the name of the module of an object type: `DobotM1` -> `dobot_m1` (protocol, section 9.1).
 
-    A name made only of capitals and digits stays as it is.
+    A name of capitals and digits only is unchanged.
     """
     return str(humps.depascalize(type_name))
 
 
 Stamp = tuple[int, int]
-"""Time of the last change in ns, and size in bytes, of a file: what tells a changed one apart without reading it."""
+"""Modification time in ns and size in bytes of a file, to detect changes without reading it."""
 
 
 def stamp_of(path: Path) -> Stamp | None:
@@ -29,11 +29,12 @@ def stamp_of(path: Path) -> Stamp | None:
 
 
 class SourceFile(Data, frozen=True):
-    """The whole Python module of an object type, as text or as the bytes of its file.
+    """The Python module of an object type, as text or as the bytes of its file.
 
-    name: the class; empty for a file that is only needed by others. module: dotted name; uploaded types are neighbours
-    of each other (`module_name(name)`), those of a distribution have their full name. path: where it lies, empty when
-    it lies nowhere; it is shown in problems, and neighbours are looked for beside it.
+    Attributes:
+        name: Name of the class; empty for a file that is only needed by others.
+        module: Dotted name; `module_name(name)` for uploaded types, the full name for those of a distribution.
+        path: Path of the file, or empty; it is shown in problems, and files are looked for next to it.
     """
 
     name: str
@@ -44,7 +45,7 @@ class SourceFile(Data, frozen=True):
 
 
 class Problem(Data, frozen=True):
-    """What is wrong with a source, and where."""
+    """An error in a source, and its place."""
 
     text: str
     path: str
@@ -55,14 +56,14 @@ class Problem(Data, frozen=True):
 
 
 class Broken(Exception):
-    """Reading cannot go on; it never leaves the analysis."""
+    """Reading cannot continue. It is caught inside the analysis."""
 
     def __init__(self, text: str, path: str, line: int) -> None:
         super().__init__(text)
-        # Text may come out of the source; lone surrogates could never be sent to a client.
+        # The text may come from the source; lone surrogates could not be sent to a client.
         self.problem = Problem(sendable(text), sendable(path), line)
 
 
 def sendable(text: str) -> str:
-    """Give `text` without what UTF-8 cannot hold."""
+    """Return `text` without characters that UTF-8 cannot encode."""
     return text.encode("utf-8", "replace").decode("utf-8")

@@ -1,4 +1,4 @@
-"""From a name in one module to what it means, through the imports of any number of files."""
+"""Resolution of names through the imports of any number of files."""
 
 import ast
 import builtins
@@ -12,7 +12,7 @@ from arcor2_hw.data.older_names import OLDER_NAMES, OLDER_PACKAGES
 
 @dataclass(frozen=True, slots=True)
 class External:
-    """Something in a module that is not read: `builtins.int`, `numpy.ndarray`, `arcor2_hw.data.geometry.Pose`."""
+    """A name in a module that is not read: `builtins.int`, `numpy.ndarray`, `arcor2_hw.data.geometry.Pose`."""
 
     dotted: str
 
@@ -26,7 +26,7 @@ class ModuleSymbol:
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """A name bound to an expression, with the module and class in which its own names are looked up."""
+    """A name bound to an expression, with the module and class in which its own names are resolved."""
 
     value: Value
     module: Module
@@ -47,19 +47,19 @@ Load: TypeAlias = Callable[[str], Module | None]
 _BASES: Final = "arcor2_hw.objects"
 
 FRAMEWORK: Final = OLDER_PACKAGES | {"arcor2_hw"}
-"""Top-level packages whose names are ours."""
+"""Top-level packages that are ours."""
 
 _DEPTH: Final = 40
-"""So many steps from import to import are followed; more are a circle."""
+"""Maximum number of steps from import to import; more are a circle."""
 
 
 def our_spelling(module: str, name: str) -> tuple[str, str]:
-    """Give module and name as we spell them for what older object types import (protocol, 9.6)."""
+    """Return our module and name for what older object types import (protocol, section 9.6)."""
     return OLDER_NAMES.get(module, {}).get(name, (module, name))
 
 
 def dotted_name(expression: ast.expr) -> list[str] | None:
-    """Give the parts of `a.b.c`, None for any other expression."""
+    """Return the parts of `a.b.c`, None for any other expression."""
     parts: list[str] = []
     while isinstance(expression, ast.Attribute):
         parts.append(expression.attr)
@@ -72,20 +72,20 @@ def dotted_name(expression: ast.expr) -> list[str] | None:
 
 
 class Resolver:
-    """Finds what names mean; `load` gives a module by its dotted name, None when it is not to be read."""
+    """Resolves names. `load` returns a module by its dotted name, None when it is not to be read."""
 
     def __init__(self, load: Load) -> None:
         self._load = load
 
     def expression(self, expression: ast.expr, module: Module, owner: ClassInfo | None = None) -> Symbol | None:
-        """Give what a dotted name means; None when it is bound nowhere, or is no dotted name."""
+        """Return the symbol of a dotted name, None when it is not bound, or is not a dotted name."""
         parts = dotted_name(expression)
         return None if parts is None else self.parts(parts, module, owner)
 
     def parts(
         self, parts: list[str], module: Module, owner: ClassInfo | None = None, depth: int = _DEPTH
     ) -> Symbol | None:
-        """Give what the dotted name made of `parts` means, seen from `module`, or from the body of `owner`."""
+        """Return the symbol of the dotted name of `parts`, as seen from `module`, or from the body of `owner`."""
         if depth <= 0:
             return None
         found: Symbol | None = None
@@ -98,7 +98,7 @@ class Resolver:
         return found
 
     def name(self, name: str, module: Module, depth: int = _DEPTH) -> Symbol | None:
-        """Give what a name means at the top level of a module."""
+        """Return the symbol of a name at the top level of a module."""
         if (found := self._own(name, module, depth)) is not None:
             return found
         return External(f"builtins.{name}") if hasattr(builtins, name) else None
@@ -126,7 +126,7 @@ class Resolver:
             case Import():
                 return self._imported(binding, depth)
             case Value(expression=expression):
-                # A name for a name: `Joints = ProjectRobotJoints`.
+                # An alias: `Joints = ProjectRobotJoints`.
                 parts = dotted_name(expression) if expression is not None else None
                 if parts is not None and depth > 0:
                     aliased = self.parts(parts, module, owner, depth - 1)
@@ -170,7 +170,7 @@ class Resolver:
 
 
 def framework_name(symbol: Symbol | None) -> str | None:
-    """Give the last name of something of ours, None for anything else."""
+    """Return the last part of one of our names, None for any other symbol."""
     if isinstance(symbol, External):
         top, _, rest = symbol.dotted.partition(".")
         return rest.rpartition(".")[2] if top in FRAMEWORK and rest else None
@@ -180,6 +180,6 @@ def framework_name(symbol: Symbol | None) -> str | None:
 
 
 def is_framework(info: ClassInfo) -> bool:
-    """Tell whether this is one of our abstract bases (stock types are ordinary types)."""
+    """Return whether this is one of our abstract bases; stock types are ordinary types."""
     dotted = info.module.dotted
     return dotted.startswith(_BASES) and not dotted.startswith(f"{_BASES}.stock")

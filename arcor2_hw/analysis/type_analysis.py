@@ -1,4 +1,4 @@
-"""The result of reading one object type."""
+"""The result of analysing one object type."""
 
 from msgspec import field
 
@@ -10,18 +10,18 @@ from arcor2_hw.data.robot import RobotMeta
 
 
 class TypeAnalysis(Data, frozen=True):
-    """The content of one object type's source.
+    """The analysis of one object type's source.
 
     Attributes:
-        is_object_type: False for a helper or mixin that does not derive from Generic; clients see no such type.
-        robot: None for a type that is no robot, and for one that may not be placed.
-        implemented: The optional methods of our bases that the type really implements.
+        is_object_type: False for a helper class or mixin that does not derive from Generic; it is hidden from clients.
+        robot: None for a type that is not a robot, or cannot be added to a scene.
+        implemented: The optional methods of our bases that the type implements.
         bases: The object types it derives from, nearest first.
         mixins: Classes before its base.
-        enumerations: The enumerations that its actions take, by action and parameter.
-        keyword_only: Parameters that are passed by name only, as (action, parameter).
+        enumerations: The enumerations of its actions, by action and parameter.
+        keyword_only: Keyword-only parameters, as (action, parameter).
         modules: The other files it needs, each after those that it needs itself; without ours, and without packages
-            that merely contain them.
+            that only contain them.
     """
 
     meta: ObjectTypeMeta

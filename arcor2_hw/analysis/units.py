@@ -1,8 +1,7 @@
-"""The unit of a number, from what a docstring says of it.
+"""Recognition of units in docstrings.
 
-Written as people write it: in brackets (`how fast [m/s]`), behind a comma at the end of a clause (`how fast, m/s`),
-first (`seconds to wait`, `m/s, negative backwards`), or alone (`kg`). Only known units count, so that no other word is
-taken for one.
+A unit may be in brackets (`speed [m/s]`), after a comma at the end of a clause (`speed, m/s`), at the beginning
+(`seconds to wait`, `m/s, negative backwards`), or alone (`kg`). Only known units are recognized.
 """
 
 import re
@@ -46,7 +45,7 @@ _WORDS: Final = {
 
 
 def unit_in(description: str) -> str | None:
-    """Give the unit that a description names, None when it names none."""
+    """Return the unit in a description, None when there is none."""
     text = description.strip()
     if (found := _IN_BRACKETS.search(text)) is not None:
         return found[1]

@@ -1,4 +1,4 @@
-"""The analysis of a library in a process of its own: parsing one huge source keeps the interpreter lock for seconds.
+"""Analysis of a library in a separate process, because parsing one huge source holds the interpreter lock for seconds.
 
 `python -m arcor2_hw.analysis.worker` reads the sources from standard input and writes the results to standard output.
 """
@@ -17,9 +17,10 @@ from arcor2_hw.data.object_type import ObjectTypeMeta
 from arcor2_hw.exceptions import InvalidData
 
 HUGE: Final = 64 * 1024
-"""Characters of a source that is analysed in a process of its own; a shorter one is parsed in some 20 ms."""
+"""Number of characters above which a source is analysed in a separate process; a shorter one is parsed in about 20 ms.
+"""
 WITHIN: Final = 30.0
-"""Seconds for the analysis of all sources."""
+"""Time limit of the analysis of all sources, s."""
 _encode = msgspec.msgpack.Encoder().encode
 
 
@@ -28,12 +29,12 @@ def _huge(library: Library) -> list[str]:
 
 
 def is_needed(library: Library) -> bool:
-    """Return whether a library holds a source that is too long to be parsed in the process of the server."""
+    """Return whether a library has a source that is too long to be parsed in the process of the server."""
     return bool(_huge(library))
 
 
 def give_up(library: Library, reason: str) -> None:
-    """Disable the types of huge sources, whose analysis failed."""
+    """Disable the types of huge sources after their analysis failed."""
     library.put_analyses(
         {
             name: TypeAnalysis(
@@ -49,7 +50,7 @@ async def analyse(library: Library) -> bytes:
     """Analyse all types of a library in another process, and return the results encoded for `snapshot.restore`.
 
     Raises:
-        InvalidData: The process failed, or took longer than `WITHIN` seconds and was ended.
+        InvalidData: The process failed, or exceeded `WITHIN` and was ended.
     """
     sources = [StoredSource.of(library.file(name)) for name in library.names() if name not in BUILT_IN]
     process = await asyncio.create_subprocess_exec(
@@ -73,7 +74,7 @@ async def analyse(library: Library) -> bytes:
 
 
 def main() -> None:
-    """Analyse what comes by standard input."""
+    """Analyse the sources on standard input."""
     sources = msgspec.msgpack.decode(sys.stdin.buffer.read(), type=list[StoredSource])
     sys.stdout.buffer.write(take(Library(stored.file() for stored in sources)))
 

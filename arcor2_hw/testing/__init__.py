@@ -1,1 +1,1 @@
-"""The driver conformance suite: what every driver has to keep, as test cases that run on anybody's driver."""
+"""The driver conformance suite: test cases that every driver has to pass, for use on any driver."""

@@ -1,4 +1,4 @@
-"""Cases of acting: control, stop, cancelling, one act at a time."""
+"""Test cases of acting: control, stop, cancellation, one act at a time."""
 
 import contextlib
 import random
@@ -14,15 +14,15 @@ from arcor2_hw.testing.connecting_cases import DISCONNECTS_WITHIN
 from arcor2_hw.testing.life import SLACK, raised, stays, timed, wait_until
 
 WITH_THE_ACT: Final = 20.0
-"""s that a bench's `ask` may take on a device that is sound: with some it is a motion."""
+"""Time limit of a bench's `ask` on a working device, s; for some devices it is a motion."""
 
 
 class ActingCases:
-    """Who acts, and how it is stopped."""
+    """Cases of control and stopping."""
 
     @needs("foreign", "writes")
     def test_control_is_refused(self, arcor2_bench: Bench) -> None:
-        """Control that somebody else has is refused, naming who, and nothing is written (rule 1)."""
+        """Taking control is refused while another client has it; the error names it, nothing is written (rule 1)."""
         device = arcor2_bench.connected()
         with arcor2_bench.foreign():
             wait_until(lambda: device.control_owner() not in (None, "us"), 2.0, "seeing that somebody else has control")
@@ -36,7 +36,7 @@ class ActingCases:
 
     @needs("command", "writes")
     def test_command_needs_control(self, arcor2_bench: Bench) -> None:
-        """A command without control is refused and does nothing; with control it acts."""
+        """A command without control is refused without effect; with control it acts."""
         device = arcor2_bench.connected()
         before = arcor2_bench.writes()
         raised(
@@ -52,7 +52,7 @@ class ActingCases:
 
     @needs("run_long", "running")
     def test_stop_passes(self, arcor2_bench: Bench) -> None:
-        """stop() comes past a running act, which ends as cancelled; the device stands and stays (rule 5)."""
+        """stop() interrupts a running act, which ends as cancelled; the device stops and stays stopped (rule 5)."""
         device = arcor2_bench.controlled()
         stop = stop_of(device)
         for pause in (0.0, 0.13):
@@ -66,7 +66,7 @@ class ActingCases:
 
     @needs("run_long", "running")
     def test_one_act_at_a_time(self, arcor2_bench: Bench) -> None:
-        """A second act beside the first is refused, and the first goes on (rule 8)."""
+        """A second act during the first is refused, and the first continues (rule 8)."""
         device = arcor2_bench.controlled()
         act = under_way(arcor2_bench, device)
         raised(
@@ -78,7 +78,7 @@ class ActingCases:
 
     @needs("run_long", "running")
     def test_disconnecting_ends_an_act(self, arcor2_bench: Bench) -> None:
-        """disconnect in the middle of an act takes 1 s at most; the act ends, typed, and nobody waits for ever."""
+        """disconnect during an act takes at most 1 s; the act ends with a typed error."""
         device = arcor2_bench.controlled()
         act = under_way(arcor2_bench, device)
         timed(device.disconnect, DISCONNECTS_WITHIN, "disconnecting in an act")
@@ -87,7 +87,7 @@ class ActingCases:
 
     @needs("run_long", "running", like="stop_passes")
     def test_stop_at_random_phases(self, arcor2_bench: Bench, arcor2_phases: random.Random) -> None:
-        """At whatever moment of an act the stop comes: the act ends as cancelled, and the device stands and stays."""
+        """At whatever moment the stop comes, the act ends as cancelled, and the device stops and stays stopped."""
         device = arcor2_bench.controlled()
         held = on_lanes(device)
         try:
@@ -110,7 +110,7 @@ class ActingCases:
 
     @needs("run_long", "running", "observe", like="stop_passes")
     def test_cancelling_leaves_the_line_usable(self, arcor2_bench: Bench) -> None:
-        """After a call was cancelled on its lane, the next calls get answers, and their own (rule 8)."""
+        """After a call was cancelled on its lane, the next calls get their own answers (rule 8)."""
         device = arcor2_bench.controlled()
         kinds = type(arcor2_bench.observe(device))
         held = on_lanes(device)

@@ -1,4 +1,4 @@
-"""Steps that several cases take: an act under way, a device lost, back, observed and asked again."""
+"""Steps of several cases: start an act, lose the device, wait until it is back, observe and ask it."""
 
 import time
 from collections.abc import Callable
@@ -14,16 +14,16 @@ from arcor2_hw.testing.bench import Bench
 from arcor2_hw.testing.life import POLL, Beside, wait_until
 
 WATCHED: Final = 0.5
-"""s for which nothing may begin to move again."""
+"""Time for which nothing may start to move again, s."""
 STARTS_WITHIN: Final = 15.0
-"""s until a long act is seen to be under way; a process that imports a vendor's library needs some."""
+"""Time limit until a long act is running at the device, s; a process that imports a vendor library needs some time."""
 GONE: Final = (NotConnected, ConnectionLost, DeviceTimeout, Stale)
-"""What a call on a device that does not answer may raise."""
+"""Errors that a call on a device that does not answer may raise."""
 UP: Final = (Connection.ONLINE, Connection.BACK)
 
 
 def under_way(bench: Bench, device: Generic) -> Beside:
-    """Begin the long act and wait until it is seen at the device."""
+    """Start the long act and wait until it is running at the device."""
     act = Beside(lambda: bench.run_long(device))
     wait_until(lambda: bench.running() or act.over, STARTS_WITHIN, "the act of run_long")
     assert not act.over, f"the act of run_long ended at once: {act.error!r}"
@@ -31,7 +31,7 @@ def under_way(bench: Bench, device: Generic) -> Beside:
 
 
 def lose(bench: Bench, device: Generic) -> None:
-    """Cut the cable and wait until the driver says so."""
+    """Cut the cable and wait until the driver reports it."""
     bench.cut()
     wait_until(lambda: device.connection is Connection.LOST, bench.lost_within, "telling that the connection is lost")
 
@@ -42,17 +42,17 @@ def back(bench: Bench, device: Generic) -> None:
 
 
 def observed(bench: Bench, device: Generic) -> bool:
-    """Tell whether a reading can be had."""
+    """Return whether a reading is available."""
     try:
         bench.observe(device)
-    except (Stale, ConnectionLost):  # the first reading is still to come
+    except (Stale, ConnectionLost):  # the first reading has not arrived yet
         time.sleep(POLL)
         return False
     return True
 
 
 def seen_again(bench: Bench, device: Generic) -> None:
-    """Wait until a reading can be had after a loss, whether or not the loss was long enough to be told."""
+    """Wait until a reading is available after a connection loss, even if the loss was too short to be reported."""
 
     def holds() -> bool:
         try:
@@ -65,14 +65,14 @@ def seen_again(bench: Bench, device: Generic) -> None:
 
 
 def on_lanes(device: Generic) -> Device:
-    """Put an object on the lanes that the cell host would give it; `release_lanes` ends them."""
+    """Run an object on lanes like those of the cell host; `release_lanes` ends them."""
     held = Device(Recipe(SceneObject(device.name, type(device).__name__, id=device.id), type(device), (), {}, ""))
     held.instance = device
     return held
 
 
 def stop_of(device: Generic) -> Callable[[], object]:
-    """Give what stops a device."""
+    """Return the method that stops a device."""
     stop = device.halt if isinstance(device, Axis) else getattr(device, "stop", None)
     assert callable(stop), "what runs for long needs a stop()"
     return stop

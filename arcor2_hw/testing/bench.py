@@ -1,4 +1,4 @@
-"""Bench: how the suite gets at one driver and at the device, real or fake, behind it."""
+"""Bench: the suite's access to one driver and to its device, real or simulated."""
 
 import abc
 import contextlib
@@ -16,12 +16,12 @@ from arcor2_hw.testing.wire import Wire
 
 
 def missing(name: str) -> NotImplementedError:
-    """Give the error of a hook that a bench does not have; the suite asks `Bench.has` before."""
+    """Return the error of a hook that a bench does not have; the suite checks `Bench.has` before."""
     return NotImplementedError(f"this bench has no hook {name}")
 
 
 class Check(NamedTuple):
-    """A reading of the driver and what the device itself says, both in SI units; they differ by `within` at most."""
+    """A reading of the driver and the device's own value, both in SI units, and their maximum difference."""
 
     what: str
     by_driver: float
@@ -30,14 +30,23 @@ class Check(NamedTuple):
 
 
 class Bench(abc.ABC):
-    """One driver on one device. A hook that is overridden is there; a case whose hooks are not all there is not run,
-    which quality.yaml has to give the reason of.
+    """One driver on one device.
 
-    object_type: the driver's class. label: the name of the device where a cell has several of one type. guessed: it
-    was made from settings alone. real: it stands in front of a real device, and is run only with `--real` and named by
-    `--real-device`. connect_timeout: s given to connect. call_within: s after which a call on a silent device has
-    failed. stale_after: s from the cut on after which no old value is given. lost_within, back_within: s until the
-    connection tells so. stops_within: s from `stop` to standstill.
+    A hook is available when it is overridden. A case whose hooks are not all available is skipped; quality.yaml has to
+    state
+    the reason.
+
+    Attributes:
+        object_type: The driver's class.
+        label: Name of the device where a cell has several of one type.
+        guessed: Whether it was created from settings alone.
+        real: Whether it uses a real device; it runs only with `--real` and the device named by `--real-device`.
+        connect_timeout: Time limit passed to connect, s.
+        call_within: Time in which a call on a silent device fails, s.
+        stale_after: Time from the cut after which no old value is returned, s.
+        lost_within: Time until the connection is reported as lost, s.
+        back_within: Time until the connection is reported as online again, s.
+        stops_within: Time from `stop` to standstill, s.
     """
 
     object_type: ClassVar[type[Generic]]
@@ -52,9 +61,9 @@ class Bench(abc.ABC):
     stops_within: ClassVar[float] = 1.0
 
     wire: Wire | None = None
-    """What lies between driver and device, when `start` has put something there; it gives the hooks of the cable."""
+    """The wire between driver and device, if `start` created one; it provides the hooks of the cable."""
     frames: Frames | None = None
-    """How the driver's frames on the wire are read."""
+    """Reader of the driver's frames on the wire."""
 
     def __init__(self) -> None:
         self._made: list[Generic] = []
@@ -63,38 +72,38 @@ class Bench(abc.ABC):
     @property
     @abc.abstractmethod
     def address(self) -> str:
-        """Give what an error has to contain to say which device is meant: a host, a port."""
+        """Return the text by which an error has to identify the device: a host or a port."""
 
     @abc.abstractmethod
     def make(self) -> Generic:
-        """Give a new object for the device, not connected."""
+        """Return a new object for the device, not connected."""
 
     def start(self) -> None:  # noqa: B027
-        """Start the fake, or reserve the device; once, before all cases."""
+        """Start the fake, or reserve the device; called once before all cases."""
 
     def end(self) -> None:  # noqa: B027
         """End what `start` started."""
 
     def reset(self) -> None:  # noqa: B027
-        """Bring the device to rest, whole and free; before each case, and harmless at any time."""
+        """Bring the device to standstill, without faults and free; called before each case."""
 
     # -------------------------------------------------------------------------------- optional hooks
     def absent(self) -> tuple[Generic, str]:
-        """Give an object for a device that is not there, and its address."""
+        """Return an object for a missing device, and its address."""
         raise missing("absent")
 
     def actuating(self) -> Iterable[str]:
-        """Give, in words, the frames on the wire since the last case that act on the device."""
+        """Return descriptions of the frames since the last case that act on the device."""
         if self.wire is None or self.frames is None:
             raise missing("actuating")
         return self.wire.acting(self.frames)
 
     def writes(self) -> Any:
-        """Give all that was ever written, switched or moved at the device; equal when nothing was in between."""
+        """Return everything that was written, switched or moved at the device; equal values mean that nothing was."""
         raise missing("writes")
 
     def cut(self) -> None:
-        """Make the device silent, as when the cable is drawn."""
+        """Make the device silent, as when the cable is unplugged."""
         if self.wire is None:
             raise missing("cut")
         self.wire.cut()
@@ -106,27 +115,27 @@ class Bench(abc.ABC):
         self.wire.heal()
 
     def reset_link(self) -> None:
-        """Break the connection once; it can be opened anew at once."""
+        """Break the connection once; it can be opened again at once."""
         if self.wire is None:
             raise missing("reset_link")
         self.wire.reset()
 
     def half_frame(self) -> None:
-        """Let the next answer of the device break off in the middle, and nothing come after it."""
+        """Interrupt the next answer of the device in the middle; nothing follows."""
         if self.wire is None:
             raise missing("half_frame")
         self.wire.half_frame()
 
     def observe(self, device: Generic) -> object:
-        """Take a reading of the device by the driver, one that goes stale."""
+        """Take a reading of the device with the driver that can become stale."""
         raise missing("observe")
 
     def command(self, device: Generic) -> object:
-        """Give a command that acts on the device and needs control."""
+        """Execute a command that acts on the device and needs control."""
         raise missing("command")
 
     def ask(self, device: Generic) -> object:
-        """Call something that speaks with the device, and therefore fails on a silent one."""
+        """Call a method that communicates with the device, and therefore fails on a silent one."""
         raise missing("ask")
 
     def run_long(self, device: Generic) -> object:
@@ -134,35 +143,35 @@ class Bench(abc.ABC):
         raise missing("run_long")
 
     def running(self) -> bool:
-        """Tell, from the device and past the driver, whether the act of `run_long` is under way."""
+        """Return whether the act of `run_long` is running, read from the device without the driver."""
         raise missing("running")
 
     def foreign(self) -> AbstractContextManager[None]:
-        """Have somebody else control the device."""
+        """Have another client control the device."""
         raise missing("foreign")
 
     def orphan(self) -> list[str]:
-        """Give the command line of a process that connects, takes control and does `run_long`; it will be killed."""
+        """Return the command line of a process that connects, takes control and does `run_long`; it will be killed."""
         raise missing("orphan")
 
     # -------------------------------------------------------------------------------- hooks that level silver asks for
     def readings(self, device: Generic) -> Iterable[Check]:
-        """Give readings of a connected driver beside the device's own truth: units, signs and frames."""
+        """Return readings of a connected driver next to the device's own values: units, signs and frames."""
         raise missing("readings")
 
     def beyond_limits(self, device: Generic) -> Mapping[str, Callable[[], object]]:
-        """Give, by what they are, calls with values that device or driver must refuse; it is controlled."""
+        """Return calls with values that device or driver must refuse, by description; the device is controlled."""
         raise missing("beyond_limits")
 
     def works(self, device: Generic) -> Mapping[str, Callable[[], object]]:
-        """Give, by the name of the optional method, a call that shows that it works; the device is controlled."""
+        """Return for each optional method a call that shows that it works; the device is controlled."""
         if capabilities.to_be_shown(self.object_type):
             raise missing("works")
         return {}
 
     # -------------------------------------------------------------------------------- for the suite
     def has(self, hook: str) -> bool:
-        """Tell whether the bench has a hook: its own, or one of the wire's."""
+        """Return whether the bench has a hook: its own, or one of the wire."""
         if getattr(type(self), hook) is not getattr(Bench, hook):
             return True
         if hook == "works":
@@ -170,48 +179,48 @@ class Bench(abc.ABC):
         return self.wire is not None and (hook in OF_THE_WIRE or (hook == "actuating" and self.frames is not None))
 
     def why_not(self, hook: str) -> str | None:
-        """Give the reason in words why the bench cannot have a hook; None when it should have it."""
+        """Return why the bench cannot have a hook, None when it should have it."""
         return None
 
     @classmethod
     def type_name(cls) -> str:
-        """Give the name of the object type."""
+        """Return the name of the object type."""
         return cls.object_type.__name__
 
     @classmethod
     def name(cls) -> str:
-        """Give the name under which the suite runs the bench."""
+        """Return the name of the bench in the suite."""
         return cls.label or cls.type_name()
 
     @classmethod
     def quality_file(cls) -> Path:
-        """Give where the driver's quality.yaml has to be: beside the module of the object type."""
+        """Return the path of the driver's quality.yaml: next to the module of the object type."""
         return Path(inspect.getfile(cls.object_type)).parent / quality.FILE
 
     def new(self) -> Generic:
-        """Give an object that is disconnected after the case."""
+        """Return an object that is disconnected after the case."""
         return self.keep(self.make())
 
     def keep(self, device: Generic) -> Generic:
-        """Have an object disconnected after the case."""
+        """Disconnect an object after the case."""
         self._made.append(device)
         return device
 
     def connected(self) -> Generic:
-        """Give a connected object."""
+        """Return a connected object."""
         device = self.new()
         device.connect(self.connect_timeout)
         return device
 
     def controlled(self) -> Generic:
-        """Give an object that is connected and in control, where the type knows control."""
+        """Return an object that is connected and, where the type has control, in control."""
         device = self.connected()
         if knows_control(type(device)):
             device.take_control()
         return device
 
     def release(self) -> None:
-        """Disconnect all objects that were given out; what a broken driver raises there is of another case."""
+        """Disconnect all objects. Errors of a broken driver are ignored here, because another case checks them."""
         while self._made:
             with contextlib.suppress(Arcor2Error):
                 self._made.pop().disconnect()
@@ -222,13 +231,13 @@ class Bench(abc.ABC):
 HOOKS: Final = frozenset(
     name for name, member in vars(Bench).items() if callable(member) and "missing(" in inspect.getsource(member)
 )
-"""The names of the optional hooks."""
+"""Names of the optional hooks."""
 OF_THE_WIRE: Final = frozenset({"cut", "heal", "reset_link", "half_frame"})
-"""The hooks that a wire gives."""
+"""Hooks that a wire provides."""
 
 
 def knows_control(kind: type[Generic]) -> bool:
-    """Tell whether control of the type is taken by an act of its own."""
+    """Return whether the type has a separate call to take control."""
     return kind.take_control is not Generic.take_control
 
 
@@ -237,8 +246,10 @@ def needs(
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Mark a case of the suite with the hooks that it uses.
 
-    for_silver: a bench that lacks them need not give a reason before it claims level silver. like: another case, whose
-    reason for not being run is the reason of this one too.
+    Args:
+        hooks: The hooks.
+        for_silver: Whether a bench without them must give a reason only for level silver.
+        like: Another case whose reason for being skipped also applies to this one.
     """
     if unknown := set(hooks) - HOOKS:
         raise ValueError(f"a bench has no hook {', '.join(sorted(unknown))}")

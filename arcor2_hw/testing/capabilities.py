@@ -1,4 +1,4 @@
-"""What a type says it can do, what it really has, and what is asked of it without any argument."""
+"""Declared and implemented capabilities of a type, and methods that can be tried without arguments."""
 
 import inspect
 from functools import lru_cache
@@ -14,7 +14,7 @@ from arcor2_hw.testing import described
 
 OURS: Final = "arcor2_hw.objects"
 STOPPABLE_FROM: Final = 1.0
-"""Seconds: an action that may last longer has to be stoppable."""
+"""Duration above which an action has to be stoppable, s."""
 READS: Final = frozenset(
     {
         "alarms",
@@ -38,17 +38,17 @@ READS: Final = frozenset(
         "wrench",
     }
 )
-"""Methods of the bases that read and need neither argument nor control, so that they can be tried on any device."""
+"""Methods of the bases that only read, without arguments or control, so that they can be tried on any device."""
 
 
 @lru_cache(maxsize=64)
 def declared(kind: type[Generic]) -> frozenset[str]:
-    """Give the optional methods that analysis says a type has."""
+    """Return the optional methods that a type has according to the analysis."""
     return Library([described.source_of(kind)]).analyse(kind.__name__).implemented
 
 
 def hooks(kind: type[Generic]) -> dict[str, Any]:
-    """Give the optional methods of our bases whose body there is nothing but the not-implemented error."""
+    """Return the optional methods of our bases that are not implemented there."""
     found: dict[str, Any] = {}
     for base in kind.__mro__:
         if not base.__module__.startswith(OURS):
@@ -76,13 +76,13 @@ def _required(function: Any) -> int:
 
 @lru_cache(maxsize=64)
 def to_be_shown(kind: type[Generic]) -> frozenset[str]:
-    """Give the optional methods that are declared and act, so that somebody has to show that they work."""
+    """Return the declared optional methods that act, so that the bench has to show that they work."""
     said = declared(kind)
     return (said & set(hooks(kind))) - set(readable(kind, said))
 
 
 def contradictions(device: Generic, said: frozenset[str]) -> list[str]:
-    """Give, one sentence each, where a disconnected object does not have what analysis says, or has more."""
+    """Return a sentence for each difference between the analysis and a disconnected object."""
     kind = type(device)
     wrong = []
     for name, hook in hooks(kind).items():
@@ -102,7 +102,7 @@ def _is_of_ours(kind: type, name: str, member: object) -> bool:
 
 
 def _says_not_implemented(device: Generic, name: str) -> bool:
-    """Call an optional method on an object that is not connected: what is not there says so before anything else."""
+    """Return whether an optional method raises the not-implemented error on an object that is not connected."""
     method = getattr(device, name)
     try:
         method(*[None] * _required(method))
@@ -114,7 +114,7 @@ def _says_not_implemented(device: Generic, name: str) -> bool:
 
 
 def readable(kind: type[Generic], said: frozenset[str]) -> list[str]:
-    """Give the methods of a type that can be tried at once on a connected device."""
+    """Return the methods of a type that can be tried on a connected device."""
     mandatory = {name for base in kind.__mro__ for name in getattr(base, "__abstractmethods__", ())}
     return sorted(
         name
@@ -128,9 +128,9 @@ def _required_beyond_self(function: Any) -> bool:
 
 
 def unstoppable(kind: type[Generic]) -> list[str]:
-    """Return the actions of a type that may last longer than STOPPABLE_FROM s and that nothing stops.
+    """Return the actions of a type that may last longer than STOPPABLE_FROM and cannot be stopped.
 
-    An action is stopped by `stop()` of its type (`halt()` of an axis), or by the method that CANCEL_MAPPING names.
+    An action is stopped by `stop()` of its type (`halt()` of an axis), or by the method in CANCEL_MAPPING.
     """
     stop = getattr(kind, "stop", None)
     if issubclass(kind, Axis) or (callable(stop) and stop not in NO_STOP):
@@ -149,7 +149,7 @@ def unstoppable(kind: type[Generic]) -> list[str]:
 
 
 def unhinted(kind: type[Generic]) -> list[str]:
-    """Give the public methods and properties of a type and its bases, ours excepted, that lack a hint."""
+    """Return the public methods and properties of a type and its bases, except ours, without a type hint."""
     lacking = []
     for base in kind.__mro__:
         if base.__module__.startswith("arcor2_hw.") or base.__module__ in ("builtins", "abc", "typing"):

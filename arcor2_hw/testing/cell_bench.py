@@ -1,4 +1,4 @@
-"""CellBench: a bench of a device in a cell.yaml, made from its type and settings, with a wire put before the device."""
+"""CellBench: a bench of a device in a cell.yaml, created from its type and settings, with a wire."""
 
 import contextlib
 import dataclasses
@@ -25,9 +25,9 @@ from arcor2_hw.testing.places import Place, places
 from arcor2_hw.testing.serial_wire import SerialWire
 
 READ: Final = ("machine_state", "robot_joints", "position", "state", "status", "vacuum", "identify")
-"""What is read of a device that nobody has described, the first that there is."""
+"""Methods of which the first available one is used for readings of an unknown device."""
 ASKED: Final = ("identify", "machine_state", "position", "status")
-"""What goes to the device and back."""
+"""Methods that communicate with the device."""
 
 
 class CellBench(Bench):
@@ -64,7 +64,7 @@ class CellBench(Bench):
     # -------------------------------------------------------------------------------- the device
     @property
     def address(self) -> str:
-        """Give what errors have to name."""
+        """Return the text by which errors have to identify the device."""
         if self.place is None:
             return self.entry.name
         if self.wire is None:
@@ -72,7 +72,7 @@ class CellBench(Bench):
         return str(self._moved[self.place.settings[-1]]) if not self.place.url else self.wire.address
 
     def make(self) -> Generic:
-        """Make the object as the cell host does, at the near end of the wire."""
+        """Create the object like the cell host does, at the near end of the wire."""
         return self._made_with(self._moved)
 
     def _made_with(self, moved: Mapping[str, Any]) -> Generic:
@@ -87,7 +87,7 @@ class CellBench(Bench):
         return recipe(scene_object, self.object_type, None).make()
 
     def start(self) -> None:
-        """Put the wire before the device."""
+        """Put the wire in front of the device."""
         self.wire = None if self.place is None else self.place.wire()
         if self.wire is not None and self.place is not None:
             self.wire.start()
@@ -103,31 +103,31 @@ class CellBench(Bench):
         return None
 
     def end(self) -> None:
-        """Take the wire away."""
+        """Remove the wire."""
         if self.wire is not None:
             self.wire.close()
         if self._closed is not None:
             self._closed.close()
 
     def reset(self) -> None:
-        """Mend the wire; what else is not at rest, nobody can know."""
+        """Repair the wire; other states of the device are unknown."""
         if self.wire is not None:
             self.wire.heal()
 
     # -------------------------------------------------------------------------------- hooks
     def absent(self) -> tuple[Generic, str]:
-        """Give an object at a port that nobody listens at, or that is not there."""
+        """Return an object at a port without a listener, or at a port that does not exist."""
         assert self.place is not None
         if self._closed is None:
             self._closed = socket.socket()
-            self._closed.bind(("127.0.0.1", 0))  # and does not listen, so that nobody else takes the port
+            self._closed.bind(("127.0.0.1", 0))  # without listening, so that no other process takes the port
         port = int(self._closed.getsockname()[1])
         path = str(Path(tempfile.gettempdir()) / "arcor2-hw-no-such-port")
         there = self.place.moved("127.0.0.1", port, path)
         return self._made_with(there), path if self.place.path else str(port)
 
     def writes(self) -> Any:
-        """Give the frames that act, as the wire saw them."""
+        """Return the acting frames that the wire recorded."""
         return list(self.actuating())
 
     def observe(self, device: Generic) -> object:
@@ -135,7 +135,7 @@ class CellBench(Bench):
         return self._call(device, self._read)
 
     def ask(self, device: Generic) -> object:
-        """Ask the device something."""
+        """Call a method that communicates with the device."""
         return self._call(device, self._asked)
 
     def _call(self, device: Generic, name: str) -> object:
@@ -145,27 +145,27 @@ class CellBench(Bench):
         return call()
 
     def has(self, hook: str) -> bool:
-        """Tell whether the bench has a hook."""
+        """Return whether the bench has a hook."""
         own = getattr(type(self), hook) is not getattr(CellBench, hook)
         if own or self._lack(hook) is None:
             return super().has(hook)
         return False
 
     def why_not(self, hook: str) -> str | None:
-        """Give the reason why a hook cannot be guessed."""
+        """Return why a hook cannot be guessed."""
         return self._lack(hook)
 
     def _lack(self, hook: str) -> str | None:
         if hook in OF_THE_WIRE and self.wire is None:
-            return "no wire can be put before the device: `wire` has to name host and port, or the port, or fixed ports"
+            return "no wire is possible: `wire` must name host and port, or the port, or fixed ports"
         if hook == "absent" and (self.place is None or len(self.place.ports) > 1 or not self.place.told_as):
-            return "its settings do not say where else it could be looked for"
+            return "its settings do not tell where a missing device could be"
         if hook in ("writes", "actuating") and (self.wire is None or self.frames is None):
-            return "how its frames are read is not said: quality.yaml has no `frames` for this wire"
+            return "its frames are unknown: quality.yaml has no `frames` for this wire"
         if hook in ("observe", "ask") and not self._read:
-            return "it has nothing that is read without an argument"
+            return "it has no reading without arguments"
         if hook in _UNKNOWN and not (hook == "works" and super().has(hook)):
-            return "how it is made to act cannot be guessed from settings: name a bench by `bench: module:Class`"
+            return "its commands are unknown: name a bench by `bench: module:Class`"
         return None
 
 
@@ -184,13 +184,17 @@ def _named(entry: CellDevice) -> list[str | int]:
 
 
 def all_settings(entry: CellDevice, kind: type[Generic]) -> dict[str, Any]:
-    """Give the settings of a device with their defaults. Raises InvalidData naming device and setting."""
+    """Return the settings of a device with their defaults.
+
+    Raises:
+        InvalidData: A setting is invalid; the message names device and setting.
+    """
     filled = fill_settings(kind, entry.name, {name: _parameter(name, value) for name, value in entry.settings.items()})
     return {} if filled is None else dataclasses.asdict(filled)
 
 
 def is_real(entry: CellDevice, kind: type[Generic]) -> bool:
-    """Tell whether a device counts as real: it says so, or not everything that it is reached by is on this machine."""
+    """Return whether a device counts as real: it is declared real, or its address is not on this machine."""
     if not isinstance(entry.real, Unset):
         return entry.real
     found = places(all_settings(entry, kind))
@@ -198,7 +202,11 @@ def is_real(entry: CellDevice, kind: type[Generic]) -> bool:
 
 
 def bench_of(entry: CellDevice) -> type[Bench]:
-    """Make the bench of a device. Raises Arcor2Error naming the device and what is wrong."""
+    """Create the bench of a device.
+
+    Raises:
+        Arcor2Error: It cannot be created; the message names the device.
+    """
     base: type[Bench] = CellBench
     if not isinstance(entry.bench, Unset):
         base = _bench_named(entry)
@@ -207,12 +215,12 @@ def bench_of(entry: CellDevice) -> type[Bench]:
     except Arcor2Error as error:
         raise type(error)(f"{entry.name}: {error}") from error
     if kind.__name__ != entry.type:
-        raise InvalidData(f"{entry.name}: the bench {entry.bench} is one of {kind.__name__}, not of {entry.type}")
+        raise InvalidData(f"{entry.name}: the bench {entry.bench} is for {kind.__name__}, not for {entry.type}")
     try:
         places(all_settings(entry, kind), _named(entry))
     except KeyError as error:
-        raise InvalidData(f"{entry.name}: wire names {error}, which is no setting of {entry.type}") from None
-    # A bench of somebody's own that takes no settings of the cell brings its own device, and says itself what it is.
+        raise InvalidData(f"{entry.name}: wire names {error}, which is not a setting of {entry.type}") from None
+    # A custom bench without settings from the cell has its own device, and decides itself whether it is real.
     own = not issubclass(base, CellBench) and not entry.settings and isinstance(entry.real, Unset)
     real = base.real or (not own and is_real(entry, kind))
     members = {"entry": entry, "object_type": kind, "label": entry.name, "guessed": base is CellBench, "real": real}
@@ -226,14 +234,18 @@ def _bench_named(entry: CellDevice) -> type[Bench]:
     except ImportError as error:
         raise InvalidData(f"{entry.name}: the bench {entry.bench} cannot be imported: {error}") from error
     if not (isinstance(found, type) and issubclass(found, Bench)):
-        raise InvalidData(f"{entry.name}: {entry.bench} is no bench")
+        raise InvalidData(f"{entry.name}: {entry.bench} is not a bench")
     return found
 
 
 def benches_of_files(files: Iterable[str]) -> list[type[Bench]]:
-    """Give the benches of all devices of some cell.yaml, which must differ in name. Raises Arcor2Error."""
+    """Return the benches of all devices of several cell.yaml files, which must have different names.
+
+    Raises:
+        Arcor2Error: A bench cannot be created, or a name is repeated.
+    """
     entries = [entry for file in files for entry in read_cell(Path(file)).devices]
     names = [entry.name for entry in entries]
     if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise InvalidData(f"named in more than one cell.yaml: {', '.join(twice)}")
+        raise InvalidData(f"several cell.yaml files have devices of the same name: {', '.join(twice)}")
     return [bench_of(entry) for entry in entries]

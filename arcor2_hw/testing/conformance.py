@@ -1,4 +1,4 @@
-"""Conformance: the cases that every driver has to pass, on each bench of a subclass.
+"""Conformance: the cases that every driver has to pass, for each bench of a subclass.
 
 class TestMyDrivers(Conformance):
     benches = (PressBench, OvenBench)
@@ -18,18 +18,18 @@ from arcor2_hw.testing.written_cases import WrittenCases
 
 
 class Conformance(ActingCases, LossCases, ConnectingCases, WrittenCases):
-    """The cases. A subclass named Test... sets `benches`; each needs the hooks named at it."""
+    """The test cases. A subclass named Test... sets `benches`; each case needs the hooks in its mark."""
 
     benches: ClassVar[Iterable[type[Bench]]] = ()
 
     @classmethod
     def benches_of(cls, config: pytest.Config) -> list[type[Bench]]:  # noqa: ARG003 - for subclasses
-        """Give the benches of a run; what depends on its options says so here."""
+        """Return the benches of a run; override it for benches that depend on options."""
         return list(cls.benches)
 
     @classmethod
     def cases(cls) -> frozenset[str]:
-        """Give the names of the cases, without the one that judges the level."""
+        """Return the names of the cases, except the one that judges the level."""
         return frozenset(
             name.removeprefix("test_")
             for base in Conformance.__mro__
@@ -45,7 +45,7 @@ class Conformance(ActingCases, LossCases, ConnectingCases, WrittenCases):
             metafunc.parametrize("arcor2_running_bench", benches, indirect=True, ids=names, scope="class")
 
     def test_level(self, arcor2_running_bench: Bench, arcor2_verdict: Verdict) -> None:
-        """The level that quality.yaml claims is reached; otherwise what is missing is named. Comes last."""
+        """The level claimed in quality.yaml is reached; otherwise the failure names what is missing. Runs last."""
         if arcor2_verdict.not_judged:
             pytest.skip(arcor2_verdict.not_judged)
         assert arcor2_verdict.reached >= arcor2_verdict.claimed, (

@@ -1,4 +1,4 @@
-"""Cases of connecting: nothing is opened, acted on or left behind; a device that is not there."""
+"""Test cases of connecting: no side effects, nothing left behind, missing devices."""
 
 from typing import Final
 
@@ -9,21 +9,21 @@ from arcor2_hw.testing.bench import Bench, knows_control, needs
 from arcor2_hw.testing.life import held, left_behind, named, raised, timed
 
 DISCONNECTS_WITHIN: Final = 1.0
-"""s that disconnect may take, whatever the wire does."""
+"""Time limit of disconnect, s, whatever the wire does."""
 
 
 class ConnectingCases:
-    """From the constructor to disconnect."""
+    """Cases from the constructor to disconnect."""
 
     def test_constructor_opens_nothing(self, arcor2_bench: Bench) -> None:
-        """The constructor stores; there is no thread, no socket and no connection after it."""
+        """The constructor only stores: it creates no thread, socket or connection."""
         before = held()
         device = timed(arcor2_bench.new, 0.5, "the constructor")
         assert not (new := held() - before), f"the constructor opened {', '.join(sorted(new))}"
         assert device.connection is Connection.OFFLINE, f"it is {device.connection} before it was connected"
 
     def test_connect_is_idempotent(self, arcor2_bench: Bench) -> None:
-        """Connecting twice is once, within the time-out."""
+        """Connecting twice is the same as once, within the time limit."""
         device = arcor2_bench.new()
         for what in ("connect", "a second connect"):
             timed(lambda: device.connect(arcor2_bench.connect_timeout), arcor2_bench.connect_timeout, what)
@@ -34,7 +34,7 @@ class ConnectingCases:
         assert not (new := now - before), f"a second connect opened {', '.join(sorted(new))}"
 
     def test_disconnect_is_idempotent(self, arcor2_bench: Bench) -> None:
-        """Disconnecting is harmless at any time, takes 1 s at most, and the object can be connected again."""
+        """Disconnecting is possible at any time, takes at most 1 s, and the object can be connected again."""
         device = arcor2_bench.new()
         device.disconnect()
         for _ in range(2):
@@ -44,7 +44,7 @@ class ConnectingCases:
                 assert device.connection is Connection.OFFLINE, f"after {what} it is {device.connection}"
 
     def test_nothing_is_left_behind(self, arcor2_bench: Bench) -> None:
-        """After disconnect there is no thread, socket or port left of three connections."""
+        """After three connections no thread, socket or port is left."""
         before = held()
         for _ in range(3):
             device = arcor2_bench.controlled()
@@ -70,7 +70,7 @@ class ConnectingCases:
 
     @needs("absent")
     def test_absent_device(self, arcor2_bench: Bench) -> None:
-        """Where there is no device, connect says so within the time-out, naming object and address."""
+        """For a missing device, connect fails within the time limit with an error that names object and address."""
         device, address = arcor2_bench.absent()
         arcor2_bench.keep(device)
         before = held()
@@ -85,7 +85,7 @@ class ConnectingCases:
 
     @needs("cut", "heal")
     def test_connecting_to_a_silent_device(self, arcor2_bench: Bench) -> None:
-        """A device that does not answer is a typed error within the time-out; once it answers, connect works."""
+        """For a silent device, connect fails with a typed error in time; when it answers again, connect works."""
         device = arcor2_bench.new()
         arcor2_bench.cut()
         error = raised(lambda: device.connect(1.0), *GONE, within=1.0, what="connecting to a silent device")

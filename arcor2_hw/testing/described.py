@@ -1,4 +1,4 @@
-"""What the source of a driver has to say, found by analysis: nothing is imported, no device is needed."""
+"""Checks of a driver's source by analysis, without importing it and without a device."""
 
 import ast
 import inspect
@@ -13,23 +13,23 @@ from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.testing import quality
 
 STOCK: Final = "arcor2_hw.objects."
-"""Where the types lie that are no drivers."""
+"""Package of the stock types, which are not drivers."""
 MOTION: Final = ("move_to_pose", "move_to_joints", "move_path", "move_until_contact", "jog")
 
 
 def drivers() -> list[InstalledType]:
-    """Give the installed object types that are drivers, by name; nothing is imported."""
+    """Return the installed object types that are drivers by name, without importing them."""
     return [each for each in installed_types() if not each.entry_point.startswith(STOCK)]
 
 
 def source_of(kind: type) -> SourceFile:
-    """Give the source of an imported type."""
+    """Return the source of an imported type."""
     path = Path(inspect.getfile(kind))
     return SourceFile(kind.__name__, kind.__module__, path.read_bytes(), str(path), path.stem == "__init__")
 
 
 def faults(file: SourceFile) -> list[str]:
-    """Give, one sentence each, what the source or the quality.yaml of a driver lacks; empty when all is well."""
+    """Return a sentence for each fault of the source or the quality.yaml of a driver."""
     library = Library([file])
     found = library.analyse(file.name)
     if found.problem is not None:

@@ -1,4 +1,4 @@
-"""Frames: where a driver's frames begin and end on a recorded wire, and which of them act on the device."""
+"""Frames: splitting a recorded stream into a driver's frames, and recognizing those that act on the device."""
 
 import re
 import struct
@@ -9,14 +9,14 @@ from arcor2_hw.exceptions import InvalidData
 
 
 class Frames(Protocol):
-    """How a protocol is read, in the direction from the driver to the device."""
+    """Reader of a protocol in the direction from the driver to the device."""
 
     def split(self, stream: bytes) -> list[bytes]:
-        """Give the frames of a stream; what is incomplete or no frame at all is the last one."""
+        """Return the frames of a stream; the last one may be incomplete or invalid."""
         ...
 
     def acting(self, frame: bytes) -> str:
-        """Give what a frame does to the device, in words; empty when it only asks."""
+        """Return what a frame does to the device, empty when it only reads."""
         ...
 
 
@@ -35,7 +35,7 @@ class ModbusTcp:
     """Modbus TCP: a header of transaction, protocol 0, length, unit; then the function (MBAP)."""
 
     def split(self, stream: bytes) -> list[bytes]:
-        """Split by the length of the header."""
+        """Split by the length in the header."""
         frames = []
         while len(stream) >= 8 and len(stream) >= (end := 6 + struct.unpack_from(">H", stream, 4)[0]) >= 8:
             frames.append(stream[:end])
@@ -43,17 +43,17 @@ class ModbusTcp:
         return [*frames, stream] if stream else frames
 
     def acting(self, frame: bytes) -> str:
-        """Name the functions that write; what is no frame acts too, for nobody knows what it does."""
+        """Name the functions that write; an invalid frame counts as acting, because its effect is unknown."""
         if len(frame) < 8 or frame[2:4] != b"\0\0":
-            return f"no Modbus TCP frame: {frame.hex(' ')}"
+            return f"invalid Modbus TCP frame: {frame.hex(' ')}"
         return _modbus(frame[7], frame[8:])
 
 
 class ModbusRtu:
-    """Modbus RTU: unit, function, data, CRC; requests are told apart by their functions' lengths."""
+    """Modbus RTU: unit, function, data, CRC; requests are split by the lengths of their functions."""
 
     _LENGTHS: Final = {1: 8, 2: 8, 3: 8, 4: 8, 5: 8, 6: 8, 7: 4, 8: 8, 11: 4, 12: 4, 17: 4, 22: 10, 43: 7}
-    _COUNTED: Final = {15: 6, 16: 6, 23: 10}  # where the number of bytes that follow stands
+    _COUNTED: Final = {15: 6, 16: 6, 23: 10}  # position of the byte count
 
     def _length(self, stream: bytes) -> int:
         function = stream[1] if len(stream) > 1 else 0
@@ -71,9 +71,9 @@ class ModbusRtu:
         return [*frames, stream] if stream else frames
 
     def acting(self, frame: bytes) -> str:
-        """Name the functions that write; what is no frame acts too."""
+        """Name the functions that write; an invalid frame counts as acting."""
         if len(frame) != self._length(frame):
-            return f"no Modbus RTU frame: {frame.hex(' ')}"
+            return f"invalid Modbus RTU frame: {frame.hex(' ')}"
         return _modbus(frame[1], frame[2:])
 
 
@@ -86,7 +86,7 @@ def _modbus(function: int, data: bytes) -> str:
 
 
 class Lines:
-    """Lines of text, ended by CR, LF or both; those that begin with one of some words act."""
+    """Lines of text ended by CR, LF or both; those that start with certain words act."""
 
     def __init__(self, words: Sequence[str]) -> None:
         self._words = tuple(word.encode() for word in words)
@@ -96,12 +96,12 @@ class Lines:
         return [line for line in re.split(rb"[\r\n]+", stream) if line]
 
     def acting(self, frame: bytes) -> str:
-        """Give the line when it acts."""
+        """Return the line when it acts."""
         return frame.decode(errors="replace") if frame.lstrip().startswith(self._words) else ""
 
 
 class CanopenSlcan:
-    """CANopen in lines of slcan: NMT, process data and SDO downloads act, but for downloads to declared objects."""
+    """CANopen in slcan lines: NMT, process data and SDO downloads act, except downloads to declared objects."""
 
     def __init__(self, declared: Sequence[str] = ()) -> None:
         self._declared = {int(each, 16) for each in declared}
@@ -111,7 +111,7 @@ class CanopenSlcan:
         return [line for line in stream.split(b"\r") if line]
 
     def acting(self, frame: bytes) -> str:
-        """Tell what a frame with an 11 bit identifier does (CiA 301); other lines speak with the adapter."""
+        """Return what a frame with an 11-bit identifier does (CiA 301); other lines are for the adapter."""
         if not re.fullmatch(rb"t[0-7][0-9A-Fa-f]{2}[0-8]([0-9A-Fa-f]{2})*", frame):
             return ""
         cob, data = int(frame[1:4], 16), bytes.fromhex(frame[5:].decode())
@@ -121,19 +121,24 @@ class CanopenSlcan:
             return f"process data {cob:03x}h"
         if cob & 0x780 == 0x600 and len(data) == 8 and data[0] >> 5 in (0, 1, 6):
             index = data[1] | data[2] << 8
-            if data[0] >> 5 == 0 or index not in self._declared:  # a segment says not what it belongs to
+            if data[0] >> 5 == 0 or index not in self._declared:  # a segment does not name its object
                 return f"SDO download to {index:04x}h"
         return ""
 
 
 KINDS: Final = ("modbus-tcp", "modbus-rtu", "lines", "canopen-slcan")
-"""What quality.yaml may name under `frames`."""
+"""Values of `frames` in quality.yaml."""
 
 
 def reader(kind: str, words: Sequence[str]) -> Frames:
-    """Give how a kind of protocol is read. words: the beginnings of lines that act, or objects that may be written.
+    """Return the reader of a protocol.
 
-    Raises InvalidData for a kind that is not known.
+    Args:
+        kind: Name of the protocol.
+        words: First words of lines that act, or objects that may be written.
+
+    Raises:
+        InvalidData: The protocol is unknown.
     """
     if kind == "modbus-tcp":
         return ModbusTcp()
@@ -143,4 +148,4 @@ def reader(kind: str, words: Sequence[str]) -> Frames:
         return Lines(words)
     if kind == "canopen-slcan":
         return CanopenSlcan(words)
-    raise InvalidData(f"frames of the kind {kind} cannot be read; there are {', '.join(KINDS)}")
+    raise InvalidData(f"frames of the kind {kind} are not supported. Available: {', '.join(KINDS)}")

@@ -1,4 +1,4 @@
-"""Measures of the suite: what a process holds, how long a call takes, what it raises, a call beside others."""
+"""Measurements of the suite: resources of the process, duration and errors of calls, concurrent calls."""
 
 import gc
 import threading
@@ -11,13 +11,13 @@ from arcor2_hw.exceptions import DeviceError
 
 POLL: Final = 0.01
 SLACK: Final = 0.5
-"""Seconds that a busy machine may add to any time limit."""
+"""Time that a busy machine may add to any time limit, s."""
 GRACE: Final = 2.0
-"""Seconds in which threads and sockets end after they were told to."""
+"""Time in which threads and sockets have to end, s."""
 
 
 def held() -> set[str]:
-    """Give the threads and open sockets and serial ports of this process."""
+    """Return the threads, open sockets and serial ports of this process."""
     found = {f"thread {thread.name} ({thread.ident})" for thread in threading.enumerate()}
     for descriptor in Path("/proc/self/fd").glob("*"):
         try:
@@ -30,7 +30,7 @@ def held() -> set[str]:
 
 
 def left_behind(before: set[str]) -> set[str]:
-    """Give what this process holds that it did not before, after a moment to end."""
+    """Return the resources that this process did not have before, after waiting for them to end."""
     until = time.monotonic() + GRACE
     while (left := held() - before) and time.monotonic() < until:
         gc.collect()
@@ -39,7 +39,7 @@ def left_behind(before: set[str]) -> set[str]:
 
 
 def wait_until(holds: Callable[[], bool], within: float, what: str) -> float:
-    """Wait until something holds; give the seconds it took. Fails after `within` s, saying what was waited for."""
+    """Wait until a condition holds and return the time it took in s. Fail after `within` s."""
     began = time.monotonic()
     while not holds():
         assert time.monotonic() - began < within, f"{what}: not within {within:g} s"
@@ -48,7 +48,7 @@ def wait_until(holds: Callable[[], bool], within: float, what: str) -> float:
 
 
 def stays(holds: Callable[[], bool], seconds: float, what: str) -> None:
-    """Fail when something ceases to hold within some seconds."""
+    """Fail when a condition ceases to hold within some seconds."""
     until = time.monotonic() + seconds
     while time.monotonic() < until:
         assert holds(), what
@@ -56,7 +56,7 @@ def stays(holds: Callable[[], bool], seconds: float, what: str) -> None:
 
 
 def timed(call: Callable[[], Any], within: float, what: str) -> Any:
-    """Call; give the result. Fails when it took longer than `within` s and the slack."""
+    """Call and return the result. Fail when it took longer than `within` s plus the slack."""
     began = time.monotonic()
     try:
         return call()
@@ -66,7 +66,7 @@ def timed(call: Callable[[], Any], within: float, what: str) -> Any:
 
 
 def raised(call: Callable[[], Any], *kinds: type[DeviceError], within: float, what: str) -> DeviceError:
-    """Call, and give the typed error it has to raise within some seconds. Fails when it returns, or raises another."""
+    """Call and return the typed error it has to raise in time. Fail when it returns, or raises another."""
     given: object = None
     error: Exception | None = None
     try:
@@ -82,14 +82,14 @@ def raised(call: Callable[[], Any], *kinds: type[DeviceError], within: float, wh
 
 
 def named(error: DeviceError, name: str, address: str, what: str) -> None:
-    """Fail unless an error says which device is meant, and where."""
+    """Fail unless an error names the device and its address."""
     text = f"{error} {error.detail}"
     assert name in text, f"the error of {what} does not name {name!r}: {text}"
     assert address in text, f"the error of {what} does not name the address {address}: {text}"
 
 
 class Beside:
-    """A call on a thread of its own."""
+    """A call on its own thread."""
 
     def __init__(self, call: Callable[[], Any]) -> None:
         self.error: BaseException | None = None
@@ -105,11 +105,11 @@ class Beside:
 
     @property
     def over(self) -> bool:
-        """Tell whether the call has ended."""
+        """Return whether the call has ended."""
         return not self._thread.is_alive()
 
     def outcome(self, within: float, what: str) -> BaseException | None:
-        """Wait for the end; give what was raised. Fails when it does not end in time."""
+        """Wait for the end and return the raised error. Fail when the call does not end in time."""
         self._thread.join(within + SLACK)
         assert self.over, f"{what} has not ended within {within:g} s"
         return self.error

@@ -1,4 +1,4 @@
-"""Cases of loss: silence, reset, half a frame, a killed process; nothing resumes by itself."""
+"""Test cases of connection loss: silence, reset, half a frame, a killed process; nothing resumes by itself."""
 
 import subprocess
 import time
@@ -12,11 +12,11 @@ from arcor2_hw.testing.life import SLACK, named, raised, stays, timed, wait_unti
 
 
 class LossCases:
-    """The device is gone, and comes back."""
+    """Cases in which the device is lost and comes back."""
 
     @needs("cut", "heal", "ask")
     def test_silence_in_a_call(self, arcor2_bench: Bench) -> None:
-        """A call on a device that fell silent raises a typed error in time, naming object and address."""
+        """A call on a silent device raises a typed error in time that names object and address."""
         device = arcor2_bench.controlled()
         arcor2_bench.cut()
         error = raised(lambda: arcor2_bench.ask(device), *GONE, within=arcor2_bench.call_within, what="the call")
@@ -25,7 +25,7 @@ class LossCases:
 
     @needs("cut", "heal", "observe")
     def test_stale_is_an_error(self, arcor2_bench: Bench) -> None:
-        """A reading from before the silence is not given out after `stale_after` s (rule 6)."""
+        """A reading from before the silence is not returned after `stale_after` (rule 6)."""
         device = arcor2_bench.connected()
         arcor2_bench.observe(device)
         arcor2_bench.cut()
@@ -37,7 +37,7 @@ class LossCases:
 
     @needs("cut", "heal", "observe")
     def test_observation_comes_back(self, arcor2_bench: Bench) -> None:
-        """A loss is told as lost; when the device answers again, observing goes on by itself."""
+        """A loss is reported as lost; when the device answers again, observation resumes by itself."""
         device = arcor2_bench.connected()
         lose(arcor2_bench, device)
         arcor2_bench.heal()
@@ -46,7 +46,7 @@ class LossCases:
 
     @needs("cut", "heal", "command")
     def test_control_does_not_come_back(self, arcor2_bench: Bench) -> None:
-        """After a loss commands are refused until a person takes control again (rules 1 and 3)."""
+        """After a loss, commands are refused until a user takes control again (rules 1 and 3)."""
         device = arcor2_bench.controlled()
         assert device.control_owner() == "us"
         lose(arcor2_bench, device)
@@ -63,7 +63,7 @@ class LossCases:
 
     @needs("cut", "heal", "run_long", "running")
     def test_nothing_resumes(self, arcor2_bench: Bench) -> None:
-        """An act that was cut off ends with a typed error; when the device is back, nothing begins again (rule 3)."""
+        """An interrupted act ends with a typed error; when the device is back, nothing starts again (rule 3)."""
         device = arcor2_bench.controlled()
         act = under_way(arcor2_bench, device)
         arcor2_bench.cut()
@@ -78,7 +78,7 @@ class LossCases:
 
     @needs("orphan", "running")
     def test_loss_reaction(self, arcor2_bench: Bench) -> None:
-        """When the driver's process is killed in an act, the device reacts as declared (rule 2)."""
+        """When the driver's process is killed during an act, the device reacts as declared (rule 2)."""
         reaction = arcor2_bench.object_type.loss_reaction
         process = subprocess.Popen(arcor2_bench.orphan())  # noqa: S603 - the bench's own words
         try:
@@ -94,16 +94,16 @@ class LossCases:
 
     @needs("reset_link", "observe", for_silver=True)
     def test_reset_and_back(self, arcor2_bench: Bench) -> None:
-        """A connection that is reset is opened again by itself, whether or not that was long enough to be told."""
+        """A connection that is reset is opened again by itself, even if the loss was too short to be reported."""
         device = arcor2_bench.connected()
         arcor2_bench.observe(device)
         arcor2_bench.reset_link()
-        time.sleep(arcor2_bench.stale_after)  # until then, what is read may be from before
+        time.sleep(arcor2_bench.stale_after)  # until then, a reading may be from before
         seen_again(arcor2_bench, device)
 
     @needs("half_frame", "heal", "ask", "observe", for_silver=True)
     def test_half_a_frame(self, arcor2_bench: Bench) -> None:
-        """An answer that breaks off is a typed error in time and never a value; afterwards all goes on."""
+        """An incomplete answer is a typed error in time, never a value; afterwards everything works again."""
         device = arcor2_bench.controlled()
         arcor2_bench.observe(device)
         arcor2_bench.half_frame()

@@ -1,4 +1,4 @@
-"""Outcomes: what became of each case on each bench, and the level that follows; a claim is checked, not believed."""
+"""Results of each case on each bench, and the level they show."""
 
 import enum
 from collections.abc import Mapping, Sequence
@@ -10,13 +10,13 @@ from arcor2_hw.testing.quality import Level
 LEVEL_CASE: Final = "level"
 """The case that judges the others."""
 RECOVERY: Final = frozenset({"silence_in_a_call", "observation_comes_back", "reset_and_back", "half_a_frame"})
-"""The cases that silver cannot do without, whatever reason is given."""
+"""Cases required for silver, whatever reason is given."""
 PROPERTY: Final = "arcor2_case"
-"""The property of a pytest report that says of which bench and case it is."""
+"""Property of a pytest report that names bench and case."""
 
 
 class Kind(enum.StrEnum):
-    """What became of a case. NOT_RUN: with a reason in quality.yaml. LACKING: without a hook, which bronze allows."""
+    """Result of a case. NOT_RUN: with a reason in quality.yaml. LACKING: without a hook, which bronze allows."""
 
     PASSED = "passed"
     FAILED = "failed"
@@ -26,7 +26,7 @@ class Kind(enum.StrEnum):
 
 @dataclass
 class Ran:
-    """What ran on one bench: outcomes and reasons by case."""
+    """Results of one bench: results and reasons by case."""
 
     type_name: str
     real: bool = False
@@ -38,15 +38,15 @@ class Ran:
     missing: Sequence[str] = ()
 
     def count(self, kind: Kind) -> int:
-        """Count the cases that ended so."""
+        """Return the number of cases with that result."""
         return sum(each is kind for each, _ in self.outcomes.values())
 
 
 class Outcomes(dict[str, Ran]):
-    """All that ran, by the name of the bench."""
+    """All results, by the name of the bench."""
 
     def add(self, properties: Sequence[tuple[str, Any]], passed: bool, failed: bool, when: str, text: str) -> None:
-        """Note a report of pytest; one that is not of the suite is left alone."""
+        """Add a report of pytest; reports of other tests are ignored."""
         told: dict[str, Any] = next((value for key, value in reversed(properties) if key == PROPERTY), {})
         if not told:
             return
@@ -68,7 +68,12 @@ class Outcomes(dict[str, Ran]):
 
 @dataclass(frozen=True)
 class Verdict:
-    """The level of one bench. not_judged: why it could not be told. missing: what the next level asks for."""
+    """The level of one bench.
+
+    Attributes:
+        not_judged: Why it could not be judged.
+        missing: What the next level requires.
+    """
 
     claimed: Level = Level.NONE
     reached: Level = Level.NONE
@@ -79,7 +84,7 @@ class Verdict:
 def judge(
     outcomes: Mapping[str, tuple[Kind, str]], tests_missing: Sequence[str], report_missing: Sequence[str]
 ) -> tuple[Level, list[str]]:
-    """Give the level that is reached, and what the next one lacks. outcomes: of all cases of the suite."""
+    """Return the level reached, and what the next one requires, from the results of all cases of the suite."""
     if lacks := [f"{case} failed" for case, (kind, _) in sorted(outcomes.items()) if kind is Kind.FAILED]:
         return Level.NONE, lacks
     lacks = [f"{case}: {why}" for case, (kind, why) in sorted(outcomes.items()) if kind is Kind.LACKING]

@@ -1,4 +1,4 @@
-"""Places: where the settings of a device say that it is reached, whether that is on this machine, and a wire to it."""
+"""Places: the address of a device in its settings, whether it is on this machine, and a wire to it."""
 
 import ipaddress
 import itertools
@@ -16,13 +16,18 @@ from arcor2_hw.testing.wire import Wire
 HOSTS: Final = ("host", "hostname", "address", "ip")
 SERIAL: Final = ("port", "serial_port", "device", "channel", "path")
 OTHER: Final = ("interface", "channel", "serial", "mxid")
-"""Settings that name a device which is neither on TCP nor on a serial port: a CAN interface, a camera on USB."""
+"""Settings of a device that is neither on TCP nor on a serial port: a CAN interface, a camera on USB."""
 PORT_OF: Final = {"http": 80, "opc.tcp": 4840, "ws": 80}
 _numbers = itertools.count(1)
 
 
 class Place(Data, frozen=True):
-    """Where a device is reached. settings: those that say so: host and port, or one alone. ports: of TCP."""
+    """The address of a device.
+
+    Attributes:
+        settings: The settings with the address: host and port, or one of them.
+        ports: TCP ports.
+    """
 
     settings: tuple[str, ...]
     host: str = ""
@@ -32,7 +37,7 @@ class Place(Data, frozen=True):
 
     @property
     def here(self) -> bool:
-        """Tell whether it can only be something on this machine that is no device: loopback, or a pseudo terminal."""
+        """Return whether it must be a simulation on this machine: on loopback, or a pseudo terminal."""
         if self.path:
             return os.path.realpath(self.path).startswith("/dev/pts/")
         if self.host.lower() == "localhost":
@@ -44,23 +49,23 @@ class Place(Data, frozen=True):
 
     @property
     def told_as(self) -> str:
-        """Give what an error has to contain."""
+        """Return the text that an error has to contain."""
         if self.path:
             return self.path
         return str(self.ports[0]) if len(self.settings) == 2 or self.url else self.host
 
     def wire(self) -> Wire | None:
-        """Give a wire to it, not started; None when there is no place for one."""
+        """Return a wire to it, not started; None when no wire is possible."""
         if self.path:
             return SerialWire(self.path)
         if not self.ports:
             return None
-        if len(self.settings) == 1 and not self.url:  # the ports are the device's own
+        if len(self.settings) == 1 and not self.url:  # fixed ports of the device
             return TcpWire(self.host, self.ports, _own_loopback(), fixed=True)
         return TcpWire(self.host, self.ports)
 
     def moved(self, host: str, port: int, path: str) -> dict[str, Any]:
-        """Give the settings for the same device at another place."""
+        """Return the settings for the same device at another address."""
         if self.path:
             return {self.settings[0]: path}
         if self.url:
@@ -69,7 +74,7 @@ class Place(Data, frozen=True):
         return dict(zip(self.settings, (host, port), strict=False))
 
     def behind(self, wire: Wire) -> dict[str, Any]:
-        """Give the settings that lead to the device by way of a wire."""
+        """Return the settings that lead to the device through a wire."""
         if isinstance(wire, TcpWire):
             return self.moved(wire.host, wire.ports[0], "")
         return self.moved("", 0, wire.address)
@@ -81,9 +86,14 @@ def _own_loopback() -> str:
 
 
 def places(settings: Mapping[str, Any], named: Sequence[str | int] = ()) -> list[Place]:
-    """Give where the settings say that a device is reached; `named` limits that to some settings, and adds ports.
+    """Return the addresses of a device in its settings.
 
-    Raises KeyError for a name that is no setting.
+    Args:
+        settings: The settings.
+        named: Settings to use, and fixed ports; default: all settings.
+
+    Raises:
+        KeyError: A name is not a setting.
     """
     keys = [each for each in named if isinstance(each, str)]
     fixed = tuple(each for each in named if isinstance(each, int))

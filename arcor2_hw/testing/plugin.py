@@ -1,4 +1,4 @@
-"""The pytest plugin: options and fixtures of the suite. It costs nothing until a test class asks for the suite."""
+"""The pytest plugin: options and fixtures of the suite. It does nothing until a test class uses the suite."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ pytest.register_assert_rewrite(*(f"arcor2_hw.testing.{each}" for each in _REWRIT
 
 OUTCOMES: pytest.StashKey[Outcomes] = pytest.StashKey()
 COLLECTED: pytest.StashKey[Mapping[str, frozenset[str]]] = pytest.StashKey()
-"""By path of a collected file, the names of its tests."""
+"""Names of collected tests by path of their file."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -62,7 +62,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 # ---------------------------------------------------------------------------------------------------- what ran
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Note what was collected, before anything of it is deselected."""
+    """Record the collected tests before any is deselected."""
     found: dict[str, set[str]] = {}
     for item in items:
         found.setdefault(str(item.path), set()).add(getattr(item, "originalname", None) or item.name)
@@ -71,7 +71,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """With `--dist loadgroup`, run the cases of a bench in one process: they share a fake, or a device."""
+    """With `--dist loadgroup`, run the cases of a bench in one process, because they share a fake or a device."""
     if config.getvalue("dist") != "loadgroup":
         return None
     from xdist.scheduler import LoadGroupScheduling  # type: ignore[import-untyped]
@@ -97,7 +97,7 @@ def _bench_of(item: pytest.Item) -> type[Bench] | None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Let the reports of a case say of which bench they are; that travels between the processes of xdist too."""
+    """Store the bench in the reports of a case, also for the processes of xdist."""
     from arcor2_hw.testing.outcomes import PROPERTY
 
     kind = _bench_of(item)
@@ -116,13 +116,13 @@ def _told(item: pytest.Item) -> dict[str, Any]:
 
 
 class _Listening:
-    """Notes the reports of the suite; in the process that tells the user, and in those that run the cases."""
+    """Records the reports of the suite, in the main process and in those that run the cases."""
 
     def __init__(self, config: pytest.Config) -> None:
         self._config = config
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Note one report."""
+        """Record one report."""
         if any(key == "arcor2_case" for key, _ in report.user_properties):
             from arcor2_hw.testing.outcomes import Outcomes
 
@@ -132,12 +132,12 @@ class _Listening:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Begin to listen."""
+    """Start recording."""
     config.pluginmanager.register(_Listening(config), "arcor2_hw_outcomes")
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Write the report that was asked for; with xdist, in the process that has all outcomes."""
+    """Write the requested report; with xdist, in the main process, which has all results."""
     file = session.config.getoption("--report")
     if file and not hasattr(session.config, "workerinput"):
         from arcor2_hw.testing import report
@@ -147,7 +147,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    """Tell the level of each driver."""
+    """Print the level of each driver."""
     outcomes = config.stash.get(OUTCOMES, None)
     judged = {} if outcomes is None else {name: ran for name, ran in outcomes.items() if ran.reached is not None}
     if judged:
@@ -168,7 +168,7 @@ def _line(name: str, ran: Ran) -> str:
 # ---------------------------------------------------------------------------------------------------- fixtures
 @pytest.fixture(scope="class")
 def arcor2_running_bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
-    """Give the bench with its fake running, one for all cases of a class."""
+    """Return the bench with its fake running, for all cases of a class."""
     kind: type[Bench] = request.param
     option = request.config.getoption
     if kind.real and not (option("--real") and kind.name() in option("--real-device")):
@@ -183,7 +183,7 @@ def arcor2_running_bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
 
 @pytest.fixture(scope="class")
 def arcor2_identity(request: pytest.FixtureRequest, arcor2_running_bench: Bench) -> dict[str, str]:
-    """Give who the device says it is, asked once when a report is written."""
+    """Return the identity of the device, read once when a report is written."""
     from arcor2_hw.exceptions import Arcor2Error
 
     if not request.config.getoption("--report"):
@@ -201,7 +201,7 @@ def arcor2_identity(request: pytest.FixtureRequest, arcor2_running_bench: Bench)
 def arcor2_bench(
     request: pytest.FixtureRequest, arcor2_running_bench: Bench, arcor2_identity: dict[str, str]
 ) -> Iterator[Bench]:
-    """Give the bench, reset, for one case that it has the hooks for; otherwise a written reason is asked for."""
+    """Return the bench, reset, for one case for which it has the hooks; otherwise a reason is required."""
     bench = arcor2_running_bench
     told = _told(request.node)
     told |= {"address": bench.address, "identity": arcor2_identity}
@@ -215,7 +215,7 @@ def arcor2_bench(
 
 
 def _fit(request: pytest.FixtureRequest, bench: Bench, told: dict[str, Any]) -> None:
-    """Skip or fail a case that the bench lacks hooks for, or that quality.yaml says is not run."""
+    """Skip or fail a case for which the bench lacks hooks, or that quality.yaml excludes."""
     from arcor2_hw.exceptions import Arcor2Error
     from arcor2_hw.testing.outcomes import Kind
 
@@ -229,7 +229,7 @@ def _fit(request: pytest.FixtureRequest, bench: Bench, told: dict[str, Any]) -> 
     except Arcor2Error as error:
         if not bench.guessed:
             pytest.fail(str(error), pytrace=False)
-        reason = None  # what a cell holds need not be in order to be tried; the case `described` tells it
+        reason = None  # a faulty quality.yaml must not prevent the cases; the case `described` reports it
 
     def skip(kind: Kind, why: str) -> None:
         told.update(kind=kind.value, reason=why)
@@ -243,14 +243,14 @@ def _fit(request: pytest.FixtureRequest, bench: Bench, told: dict[str, Any]) -> 
         skip(Kind.LACKING, f"the bench has no hook {', '.join(lacking)}")
     if lacking:
         pytest.fail(
-            f"the bench of {bench.type_name()} lacks {', '.join(lacking)}: implement it, or give the reason in "
-            f"quality.yaml under not_run, as {case}",
+            f"the bench of {bench.type_name()} lacks {', '.join(lacking)}: implement it, or give the reason "
+            f"in quality.yaml under not_run, as {case}",
             pytrace=False,
         )
     if reason is not None and bench.guessed:
         skip(Kind.NOT_RUN, reason)
     if reason is not None:
-        pytest.fail(f"quality.yaml says that {case} is not run, but the bench can run it", pytrace=False)
+        pytest.fail(f"quality.yaml excludes {case}, but the bench can run it", pytrace=False)
 
 
 def _claims(bench: Bench) -> Quality:
@@ -261,7 +261,7 @@ def _claims(bench: Bench) -> Quality:
 
 @pytest.fixture
 def arcor2_phases(request: pytest.FixtureRequest) -> random.Random:
-    """Give the moments at which a case stops, from a seed that is printed."""
+    """Return the moments at which a case stops, from a seed that is printed."""
     seed = request.config.getoption("--phases")
     seed = random.SystemRandom().randrange(1 << 32) if seed is None else seed
     print(f"the moments of this case again: --phases {seed}")  # noqa: T201 - pytest shows it where the case fails
@@ -270,14 +270,14 @@ def arcor2_phases(request: pytest.FixtureRequest) -> random.Random:
 
 @pytest.fixture
 def arcor2_verdict(request: pytest.FixtureRequest, arcor2_running_bench: Bench) -> Verdict:
-    """Give the level that the bench's cases have reached, of which each must have run in this process."""
+    """Return the level reached by the cases of the bench, all of which must have run in this process."""
     from arcor2_hw.exceptions import Arcor2Error
     from arcor2_hw.testing import outcomes, report, rules
     from arcor2_hw.testing.quality import Level
 
     bench, config = arcor2_running_bench, request.config
     if bench.guessed:
-        return outcomes.Verdict(not_judged="a bench made from settings alone cannot judge a level")
+        return outcomes.Verdict(not_judged="a bench created from settings alone cannot judge a level")
     ran = config.stash.get(OUTCOMES, outcomes.Outcomes()).get(bench.name())
     there = {} if ran is None else ran.outcomes
     if lacking := request.cls.cases() - set(there):

@@ -1,4 +1,4 @@
-"""quality.yaml: what a driver claims of itself, beside its source, as a checked form."""
+"""quality.yaml: the claims of a driver, next to its source."""
 
 import enum
 from pathlib import Path
@@ -15,14 +15,14 @@ FILE: Final = "quality.yaml"
 
 
 class Conformance(enum.StrEnum):
-    """Whether the suite runs on the driver: by a bench, or not yet."""
+    """Whether the suite runs on the driver."""
 
     BENCH = "bench"
     PENDING = "pending"
 
 
 class Level(enum.IntEnum):
-    """What is shown of a driver: bronze, the cases on its fake; silver, recovery and faults; gold, a real device."""
+    """Evidence for a driver: bronze: cases on its fake; silver: recovery and faults; gold: a real device."""
 
     NONE = 0
     BRONZE = 1
@@ -31,7 +31,7 @@ class Level(enum.IntEnum):
 
 
 class OutputsOnLoss(enum.StrEnum):
-    """What the device's outputs do when it loses us."""
+    """What the outputs of the device do when it loses the connection."""
 
     HOLD = "hold"
     OFF = "off"
@@ -41,7 +41,7 @@ class OutputsOnLoss(enum.StrEnum):
 
 
 class VersionsTried(Data, frozen=True, forbid_unknown_fields=True):
-    """What the driver was tried with; `hardware` names model and firmware, or is "none"."""
+    """Versions with which the driver was tested; `hardware` names model and firmware, or is "none"."""
 
     library: str
     controller: list[str]
@@ -49,15 +49,19 @@ class VersionsTried(Data, frozen=True, forbid_unknown_fields=True):
 
 
 class Quality(Data, frozen=True, forbid_unknown_fields=True):
-    """What is written of one driver folder.
+    """The claims of one driver folder.
 
-    rules: by rule, numbered as in docs/reference/object-types.md, the tests that show it. not_run: by case of the
-    suite, or by `Type.case`, why it cannot be run; a whole type by its name. actions: of all types, or by type.
-    outputs_on_loss: YAML reads off and on as false and true, which are taken too. level: what is claimed; the suite
-    checks it. tests: the folder of the tests that `rules` names, from the project's root; where it is not given they
-    are looked for in all test folders. report: beside this file, what `--report` wrote in a run on the real device.
-    frames: how the driver's frames are read, by kind (`arcor2_hw.testing.frames`), with the beginnings of lines that
-    act, or the objects that may be written only to observe.
+    Attributes:
+        rules: By rule, numbered as in docs/reference/object-types.md, the tests that show it.
+        not_run: By case of the suite, or by `Type.case`, why it cannot be run; a whole type by its name.
+        actions: Actions of all types, or by type.
+        outputs_on_loss: YAML reads off and on as false and true, which are accepted.
+        level: The claimed level; the suite checks it.
+        tests: Folder of the tests in `rules`, from the project's root; default: all test folders.
+        report: File next to this one, written by `--report` in a run on the real device.
+        frames: How the driver's frames are read, by kind (`arcor2_hw.testing.frames`), with the first words of
+            lines that
+            act, or the objects that may be written for observation.
     """
 
     types: list[str]
@@ -77,7 +81,7 @@ class Quality(Data, frozen=True, forbid_unknown_fields=True):
 
     @property
     def claimed(self) -> Level:
-        """Give the level that is claimed."""
+        """Return the claimed level."""
         return Level[self.level.upper()]
 
     def __post_init__(self) -> None:
@@ -85,16 +89,16 @@ class Quality(Data, frozen=True, forbid_unknown_fields=True):
             raise ValueError("types names no object type")
         for what, reason in self.not_run.items():
             if len(reason.split()) < 3:
-                raise ValueError(f"not_run: {what} needs a reason that a reader understands, not {reason!r}")
+                raise ValueError(f"not_run: {what} needs an understandable reason, not {reason!r}")
         if unknown := set(self.frames) - set(KINDS):
-            raise ValueError(f"frames: there is no kind {', '.join(sorted(unknown))}; there are {', '.join(KINDS)}")
+            raise ValueError(f"frames: unknown kind {', '.join(sorted(unknown))}. Available: {', '.join(KINDS)}")
 
     def actions_of(self, type_name: str) -> list[str]:
-        """Give the actions that are claimed for a type."""
+        """Return the claimed actions of a type."""
         return self.actions.get(type_name, []) if isinstance(self.actions, dict) else self.actions
 
     def reason(self, type_name: str, case: str) -> str | None:
-        """Give the written reason for which a case is not run on a type; None when there is none."""
+        """Return the reason why a case is not run on a type, None when there is none."""
         for key in (f"{type_name}.{case}", case):
             if key in self.not_run:
                 return self.not_run[key]
@@ -102,12 +106,12 @@ class Quality(Data, frozen=True, forbid_unknown_fields=True):
 
 
 def is_bench(path: Path) -> bool:
-    """Tell whether the file asks for the whole suite, also where the rest of it is not in order."""
+    """Return whether the file requests the complete suite, even if the rest of it is invalid."""
     return _Declared.of(path).conformance == Conformance.BENCH
 
 
 class _Declared(msgspec.Struct):
-    """The one key that decides whether a problem of the file is a failure."""
+    """The key that decides whether a problem of the file is a failure."""
 
     conformance: str = Conformance.PENDING.value
 
@@ -129,8 +133,13 @@ def _read(path: Path) -> bytes:
 
 
 def read(path: Path) -> Quality:
-    """Read a quality.yaml. Raises NotFound, or InvalidData naming folder, key and what is wrong there."""
+    """Read a quality.yaml.
+
+    Raises:
+        NotFound: There is no such file.
+        InvalidData: It is invalid; the message names folder, key and error.
+    """
     try:
         return msgspec.yaml.decode(_read(path), type=Quality)
-    except msgspec.DecodeError as error:  # also for a wrong value
+    except msgspec.DecodeError as error:  # also raised for a wrong value
         raise InvalidData(f"{path.parent.name}/{FILE}: {error}") from None

@@ -1,4 +1,4 @@
-"""Report: what a run of the suite on real devices leaves as evidence for level gold, and whether it fits a claim."""
+"""Report: evidence for level gold from a run of the suite on real devices, and its check against a claim."""
 
 import importlib.metadata
 import platform
@@ -17,14 +17,14 @@ from arcor2_hw.testing.quality import Quality
 
 
 class CaseResult(Data, frozen=True):
-    """What became of one case, with the reason where it did not pass."""
+    """Result of one case, with the reason if it did not pass."""
 
     result: Kind
     reason: str = ""
 
 
 class DeviceRun(Data, frozen=True):
-    """The cases on one device. `distribution`, `version`: of the driver. libraries: versions that were imported."""
+    """The cases on one device. `distribution`, `version`: of the driver. `libraries`: versions of imported ones."""
 
     device: str
     type: str
@@ -48,7 +48,7 @@ class Report(Data, frozen=True):
 
 
 def origin(type_name: str) -> tuple[str, str]:
-    """Give the distribution that a type comes from and its version; empty when it is not installed."""
+    """Return the distribution of a type and its version; empty when it is not installed."""
     for each in installed_types():
         if each.name == type_name:
             return each.distribution, each.version
@@ -56,7 +56,7 @@ def origin(type_name: str) -> tuple[str, str]:
 
 
 def _libraries(distribution: str) -> dict[str, str]:
-    """Give the installed versions of what a distribution requires."""
+    """Return the installed versions of the requirements of a distribution."""
     found = {}
     try:
         required = importlib.metadata.requires(distribution) or [] if distribution else []
@@ -80,7 +80,11 @@ def _run(name: str, ran: Ran) -> DeviceRun:
 
 
 def write(path: Path, outcomes: Outcomes) -> None:
-    """Write the report of a run. Raises OSError."""
+    """Write the report of a run.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
     report = Report(
         now(),
         importlib.metadata.version("arcor2-hw"),
@@ -92,14 +96,14 @@ def write(path: Path, outcomes: Outcomes) -> None:
 
 
 def unmatched(folder: Path, claims: Quality, type_name: str, outcomes: Mapping[str, tuple[Kind, str]]) -> list[str]:
-    """Give, one sentence each, what keeps the report that is named from being the evidence for gold."""
+    """Return a sentence for each reason why the named report is not evidence for gold."""
     if not isinstance(claims.report, str):
         return ["quality.yaml names no report of a --real run"]
     path = folder / claims.report
     try:
         report = msgspec.json.decode(path.read_bytes(), type=Report)
     except FileNotFoundError:
-        return [f"the report {claims.report} is not there"]
+        return [f"the report {claims.report} does not exist"]
     except (OSError, msgspec.DecodeError) as error:
         return [f"the report {claims.report} cannot be read: {error}"]
     runs = [run for run in report.devices if run.type == type_name and run.real]

@@ -1,4 +1,4 @@
-"""Rules: whether the tests that quality.yaml names for the rules of behaviour exist and would be collected."""
+"""Checks that the tests named in quality.yaml exist and are collected."""
 
 import ast
 from collections.abc import Iterable, Mapping, Sequence
@@ -11,10 +11,13 @@ _Test = ast.FunctionDef | ast.AsyncFunctionDef
 def missing_tests(
     rules: Mapping[str, Sequence[str]], folders: Iterable[Path], near: str, collected: Mapping[str, frozenset[str]]
 ) -> list[str]:
-    """Give, one sentence each, what is wrong with the tests that are named; empty when all is well.
+    """Return a sentence for each problem of the named tests.
 
-    folders: where tests lie. near: the name of the driver's folder, which tells files of one name apart. collected: by
-    path of a file that pytest has collected, the names of its tests.
+    Args:
+        rules: Tests by rule.
+        folders: Folders of tests.
+        near: Name of the driver's folder, which distinguishes files of the same name.
+        collected: Names of collected tests by path of their file.
     """
     named = [(rule, test) for rule, tests in rules.items() for test in tests]
     if not named:
@@ -44,7 +47,7 @@ def _files(folders: tuple[Path, ...]) -> dict[str, list[Path]]:
 
 def _lack(path: Path, name: str, collected: frozenset[str] | None) -> str:
     if not (path.name.startswith("test_") or path.name.endswith("_test.py")):
-        return "lies in a file that pytest does not collect"
+        return "is in a file that pytest does not collect"
     test = _tests(path).get(name.rpartition("::")[2])
     if test is None:
         return "does not exist"

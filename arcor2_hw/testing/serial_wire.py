@@ -1,4 +1,4 @@
-"""The wire of a device on a serial port: a pseudo terminal in the port's place, which can be pulled out."""
+"""The wire of a device on a serial port: a pseudo terminal in place of the port, which can be unplugged."""
 
 import contextlib
 import os
@@ -14,17 +14,19 @@ from arcor2_hw.testing.wire import Wire
 
 _CHUNK: Final = 4096
 _LOOK: Final = 0.1
-"""s between looks for a port that has gone."""
+"""Time between checks for an unplugged port, s."""
 
 
 class SerialWire(Wire):
-    """For the port at `path`. Baud rate, parity and stop bits that the driver sets are set there too."""
+    """A wire for the port at `path`. It adopts the baud rate, parity and stop bits that the driver sets."""
 
     def __init__(self, path: str) -> None:
         super().__init__()
         self._path = path
         self._device = -1
-        self._ends: tuple[int, int] | None = None  # ours, and the driver's, held so that a driver may come and go
+        self._ends: tuple[int, int] | None = (
+            None  # ours, and the driver's, kept open so that a driver may close and open it
+        )
         self._mode: list[object] = []
         self._thread: threading.Thread | None = None
         self._folder: tempfile.TemporaryDirectory[str] | None = None
@@ -32,7 +34,7 @@ class SerialWire(Wire):
 
     @property
     def address(self) -> str:
-        """Give the path that the driver opens; it stays the same when the port is pulled and plugged."""
+        """Return the path that the driver opens; it stays the same when the port is unplugged and plugged in."""
         return str(self._link)
 
     @property
@@ -74,7 +76,7 @@ class SerialWire(Wire):
             tty.setraw(descriptor)
         except termios.error:
             os.close(descriptor)
-            raise OSError(f"{self._path} is no serial port") from None
+            raise OSError(f"{self._path} is not a serial port") from None
         return descriptor
 
     def _plug(self) -> None:
@@ -97,14 +99,14 @@ class SerialWire(Wire):
 
     # -------------------------------------------------------------------------------- faults
     def reset(self) -> None:
-        """Pull the port out and plug it in again."""
+        """Unplug the port and plug it in again."""
         with self._lock:
             self._unplug()
             self._plug()
         os.write(self._alarm, b"!")
 
     def _mended(self) -> None:
-        """Keep nothing: what a cut line carried is lost."""
+        """Discard everything: data on a cut line is lost."""
 
     # -------------------------------------------------------------------------------- forwarding
     def _run(self) -> None:
@@ -114,7 +116,7 @@ class SerialWire(Wire):
             watched = [each for each in (self._alarm_in, device, ends[0] if ends else -1) if each >= 0]
             try:
                 ready, _, _ = select.select(watched, [], [], _LOOK if device < 0 else None)
-            except OSError:  # pulled out since
+            except OSError:  # unplugged since
                 continue
             with self._lock:
                 if self._alarm_in in ready:
@@ -172,7 +174,7 @@ class SerialWire(Wire):
 
     @staticmethod
     def _write(end: int, data: bytes) -> None:
-        """Write what there is room for: when nobody reads, what a serial line carries is lost."""
+        """Write what fits into the buffer: unread data of a serial line is lost."""
         while data:
             try:
                 data = data[os.write(end, data) :]

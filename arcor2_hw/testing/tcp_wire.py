@@ -1,4 +1,4 @@
-"""The wire of a device on TCP: listens in the device's place and passes on, one connection for each of the driver's."""
+"""The wire of a TCP device: it listens in place of the device, and forwards each connection of the driver."""
 
 import contextlib
 import ipaddress
@@ -14,28 +14,28 @@ from arcor2_hw.testing.wire import MAX_HELD, Side, Wire
 _RESETS: Final = struct.pack("ii", 1, 0)  # struct linger: on, 0 s: closing sends RST
 _CHUNK: Final = 65536
 _REACH_WITHIN: Final = 3.0
-"""s that the device has to take a connection."""
+"""Time limit of a connection to the device, s."""
 
 
 class _Link:
-    """A connection of the driver and the one to the device that belongs to it."""
+    """A connection of the driver and its connection to the device."""
 
     def __init__(self, number: int, driver: socket.socket, device: socket.socket | None) -> None:
         self.number = number
         self.ends: dict[Side, socket.socket] = {"driver": driver}
         if device is not None:
             self.ends["device"] = device
-        self.waiting: dict[Side, bytearray] = {"driver": bytearray(), "device": bytearray()}  # by who sent it
+        self.waiting: dict[Side, bytearray] = {"driver": bytearray(), "device": bytearray()}  # by sender
         self.ended: set[Side] = set()
         self.shut: set[Side] = set()
-        self.torn = device is None  # opened while the cable was cut: nobody has ever heard of it
+        self.torn = device is None  # opened while the cable was cut: unknown to the device
 
     def end_of(self, by: Side) -> socket.socket | None:
         return self.ends.get("device" if by == "driver" else "driver")
 
 
 class TcpWire(Wire):
-    """For a device at `host` and `ports`. Listens at `listen_at`, on the same ports when they are `fixed`."""
+    """A wire to a device at `host` and `ports`. It listens at `listen_at`, on the same ports when they are `fixed`."""
 
     def __init__(self, host: str, ports: Sequence[int], listen_at: str = "127.0.0.1", fixed: bool = False) -> None:
         super().__init__()
@@ -47,17 +47,17 @@ class TcpWire(Wire):
 
     @property
     def address(self) -> str:
-        """Give `host:port` of the first port."""
+        """Return `host:port` of the first port."""
         return f"{self._listen_at}:{self.ports[0]}"
 
     @property
     def host(self) -> str:
-        """Give where it listens."""
+        """Return the address that it listens on."""
         return self._listen_at
 
     @property
     def ports(self) -> list[int]:
-        """Give the ports that it listens on, in the order of the device's."""
+        """Return the ports that it listens on, in the order of the device's."""
         return [listener.getsockname()[1] for listener in self._listeners]
 
     # -------------------------------------------------------------------------------- life
@@ -115,7 +115,7 @@ class TcpWire(Wire):
 
     def _mended(self) -> None:
         for link in {link for link, _ in self._links.values()}:
-            # There is no way back into step for what was torn. Who has closed meanwhile will send nothing again.
+            # A torn stream cannot be synchronized again. An end that was closed meanwhile will send nothing again.
             if link.torn or "driver" in link.ended:
                 self._drop(link)
             else:
@@ -147,13 +147,13 @@ class TcpWire(Wire):
         if not self._cut:
             try:
                 device = socket.create_connection((self._host, self._listeners[listener]), _REACH_WITHIN)
-            except OSError:  # the device is not there; the nearest that can be told of it is a reset
+            except OSError:  # the device is missing; a reset is the closest equivalent
                 _abort(driver)
                 return
         with self._lock:
             self._count += 1
             link = _Link(self._count, driver, device)
-            if resets != self._resets:  # it was being made when the wire was reset, and is reset with the others
+            if resets != self._resets:  # opened during the reset, so it is reset like the others
                 self._drop(link)
                 return
             for side, end in link.ends.items():
@@ -175,7 +175,7 @@ class TcpWire(Wire):
                 self._write(link, "driver")
                 self._write(link, "device")
         except OSError:
-            if self._cut:  # who is cut off hears nothing of the other's end
+            if self._cut:  # a cut end does not notice what the other end does
                 link.ended |= {side}
                 link.torn = True
             else:
@@ -214,7 +214,7 @@ class TcpWire(Wire):
             target.shutdown(socket.SHUT_WR)
 
     def _arm(self, link: _Link) -> None:
-        """Wait for what is to be read, and for room where something waits to be written."""
+        """Wait for readability, and for writability where data is waiting."""
         for side, end in link.ends.items():
             other: Side = "device" if side == "driver" else "driver"
             events = 0

@@ -1,4 +1,4 @@
-"""What `pytest --pyargs arcor2_hw.testing --device my_cell.yaml` collects: the suite on every device of the cell."""
+"""Collected by `pytest --pyargs arcor2_hw.testing --device my_cell.yaml`: the suite on every device of the cell."""
 
 import pytest
 
@@ -9,11 +9,11 @@ from arcor2_hw.testing.conformance import Conformance
 
 
 class TestCell(Conformance):
-    """The cases, for each device that is named in the files of `--device`."""
+    """The cases, for each device in the files of `--device`."""
 
     @classmethod
     def benches_of(cls, config: pytest.Config) -> list[type[Bench]]:
-        """Give a bench for each device."""
+        """Return a bench for each device."""
         files = config.getoption("--device")
         if not files:
             raise pytest.Collector.CollectError("name a cell.yaml by --device FILE")

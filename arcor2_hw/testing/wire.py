@@ -1,4 +1,4 @@
-"""Wire: the cable between a driver and its device, real or fake: it can be cut and torn, and keeps what passed."""
+"""Wire: the cable between a driver and its device, real or simulated; it can be cut, and records its traffic."""
 
 import abc
 import collections
@@ -11,15 +11,15 @@ from arcor2_hw.data.base import Data
 from arcor2_hw.testing.frames import Frames
 
 LONGEST_RECORD: Final = 200_000
-"""Pieces that are kept; a picture a frame of 30 a second for an hour would be half of it."""
+"""Maximum number of recorded pieces; a camera with 30 images per second fills half of it in an hour."""
 MAX_HELD: Final = 1 << 20
-"""Bytes that a cut cable holds back, as the buffers of the two ends would."""
+"""Data that a cut cable holds back, bytes, like the buffers of both ends."""
 
 Side = Literal["driver", "device"]
 
 
 class Piece(Data, frozen=True):
-    """What one end sent at one moment: monotonic time in s, who sent it, on which of its connections."""
+    """Data that one end sent at one moment: monotonic time in s, sender, number of the connection."""
 
     at: float
     by: Side
@@ -28,7 +28,7 @@ class Piece(Data, frozen=True):
 
 
 class Wire(abc.ABC):
-    """Forwards bytes both ways on a thread of its own. For one driver; all methods may be called from any thread."""
+    """Forwards bytes both ways on its own thread. For one driver; all methods may be called from any thread."""
 
     def __init__(self) -> None:
         self._record: collections.deque[Piece] = collections.deque(maxlen=LONGEST_RECORD)
@@ -40,37 +40,41 @@ class Wire(abc.ABC):
     @property
     @abc.abstractmethod
     def address(self) -> str:
-        """Give what the driver has to open instead of the device: `host:port`, or a path."""
+        """Return what the driver has to open instead of the device: `host:port`, or a path."""
 
     @abc.abstractmethod
     def start(self) -> None:
-        """Begin to forward. Raises OSError when the own end cannot be opened."""
+        """Start forwarding.
+
+        Raises:
+            OSError: The near end cannot be opened.
+        """
 
     @abc.abstractmethod
     def close(self) -> None:
-        """Close both ends; harmless at any time."""
+        """Close both ends. It does nothing when they are closed."""
 
     # -------------------------------------------------------------------------------- faults
     @abc.abstractmethod
     def reset(self) -> None:
-        """Break the connection once, told to both ends; a new one is taken at once."""
+        """Break the connection once at both ends; a new one is accepted at once."""
 
     @abc.abstractmethod
     def _mended(self) -> None:
-        """Deal with what was held back, the lock held."""
+        """Handle data that was held back; the lock is held."""
 
     def cut(self) -> None:
-        """Let nothing pass any more and tell nobody, as when the cable is drawn."""
+        """Forward nothing from now on and notify nobody, as when the cable is unplugged."""
         with self._lock:
             self._cut = True
 
     def half_frame(self) -> None:
-        """Let half of what the device sends next pass, and nothing from then on."""
+        """Forward half of what the device sends next, and nothing from then on."""
         with self._lock:
             self._tear_next = True
 
     def heal(self) -> None:
-        """Undo `cut` and `half_frame`; harmless at any time."""
+        """Undo `cut` and `half_frame`."""
         with self._lock:
             self._tear_next = False
             if self._cut:
@@ -78,7 +82,7 @@ class Wire(abc.ABC):
                 self._mended()
 
     def _torn(self, data: bytes) -> tuple[bytes, bool]:
-        """Give what passes of the device's bytes, and whether the rest was torn off; the lock is held."""
+        """Return the part of the device's bytes to forward, and whether the rest was torn off; the lock is held."""
         if not self._tear_next:
             return data, False
         self._tear_next, self._cut = False, True
@@ -89,17 +93,17 @@ class Wire(abc.ABC):
         self._record.append(Piece(time.monotonic(), by, link, data))
 
     def record(self) -> Sequence[Piece]:
-        """Give what passed since `forget`, in order of time."""
+        """Return what was forwarded since `forget`, in order of time."""
         with self._lock:
             return tuple(self._record)
 
     def forget(self) -> None:
-        """Begin a new record."""
+        """Start a new record."""
         with self._lock:
             self._record.clear()
 
     def frames(self, protocol: Frames, by: Side = "driver") -> list[bytes]:
-        """Give the frames that one side sent, connection by connection."""
+        """Return the frames that one side sent, connection by connection."""
         streams: dict[int, bytearray] = {}
         for piece in self.record():
             if piece.by == by:
@@ -107,5 +111,5 @@ class Wire(abc.ABC):
         return [frame for _, stream in sorted(streams.items()) for frame in protocol.split(bytes(stream))]
 
     def acting(self, protocol: Frames) -> list[str]:
-        """Give, in words, the driver's frames that act on the device."""
+        """Return descriptions of the driver's frames that act on the device."""
         return [words for frame in self.frames(protocol) if (words := protocol.acting(frame))]

@@ -1,4 +1,4 @@
-"""Cases that read what is written: metadata, capabilities, types."""
+"""Test cases of declarations: metadata, capabilities, types."""
 
 from arcor2_hw.exceptions import InvalidData, KinematicsError, NotFound, OutOfRange, Refused
 from arcor2_hw.testing import capabilities, described
@@ -7,21 +7,21 @@ from arcor2_hw.testing.life import raised
 
 
 class WrittenCases:
-    """What a driver says of itself."""
+    """Cases that compare what a driver declares with what it does."""
 
     def test_described(self, arcor2_bench: Bench) -> None:
-        """Metadata, docstrings, stop and state, loss_reaction and quality.yaml are in order; nothing is abstract."""
+        """Metadata, docstrings, stop and state, loss_reaction and quality.yaml are valid; nothing is abstract."""
         wrong = described.faults(described.source_of(arcor2_bench.object_type))
         assert not wrong, "; ".join(wrong)
         assert not arcor2_bench.object_type.abstract()
 
     def test_types_complete(self, arcor2_bench: Bench) -> None:
-        """Every public method has a hint for each parameter and for what it returns."""
+        """Every public method has a type hint for each parameter and for the result."""
         lacking = capabilities.unhinted(arcor2_bench.object_type)
         assert not lacking, f"there is no hint at {', '.join(lacking)}"
 
     def test_long_actions_can_be_stopped(self, arcor2_bench: Bench) -> None:
-        """Every action that can last longer than 1 s is ended by stop() or by what CANCEL_MAPPING names for it."""
+        """Every action that may last longer than 1 s is ended by stop() or by its method in CANCEL_MAPPING."""
         found = capabilities.unstoppable(arcor2_bench.object_type)
         assert not found, (
             f"nothing stops {', '.join(found)}: define stop(), name a method in CANCEL_MAPPING, or declare that an "
@@ -29,26 +29,26 @@ class WrittenCases:
         )
 
     def test_capabilities_declared(self, arcor2_bench: Bench) -> None:
-        """An optional method is there where analysis sees it, and says not-implemented where it does not."""
+        """An optional method exists where the analysis finds it, and raises not-implemented elsewhere."""
         said = capabilities.declared(arcor2_bench.object_type)
         wrong = capabilities.contradictions(arcor2_bench.new(), said)
         assert not wrong, "; ".join(wrong)
 
     def test_readings_can_be_read(self, arcor2_bench: Bench) -> None:
-        """What needs neither argument nor control is given, or refused by a typed error, on a connected device."""
+        """Readings that need neither arguments nor control return, or raise a typed error, on a connected device."""
         device = arcor2_bench.connected()
         said = capabilities.declared(arcor2_bench.object_type)
         for name in capabilities.readable(type(device), said):
             try:
                 getattr(device, name)()
             except (Refused, InvalidData, NotFound):
-                continue  # not in this state, or not without saying of which part
+                continue  # not in this state, or not without arguments
             except Exception as error:
                 raise AssertionError(f"{name}() raised {type(error).__name__}: {error}") from error
 
     @needs("works", for_silver=True)
     def test_capabilities_work(self, arcor2_bench: Bench) -> None:
-        """Every optional method that is declared and acts is shown to work; what only reads is tried elsewhere."""
+        """Every declared optional method that acts works; readings are tried elsewhere."""
         device = arcor2_bench.controlled()
         said, wanted = (each(type(device)) for each in (capabilities.declared, capabilities.to_be_shown))
         shown = dict(arcor2_bench.works(device))
@@ -62,7 +62,7 @@ class WrittenCases:
 
     @needs("readings", for_silver=True)
     def test_units_and_frames(self, arcor2_bench: Bench) -> None:
-        """Readings are what the device itself says, in SI units, with its signs and in the stated frame."""
+        """Readings equal the values of the device itself, in SI units, with its signs and in the declared frame."""
         checks = list(arcor2_bench.readings(arcor2_bench.connected()))
         assert checks, "the bench compares no reading"
         for each in checks:
@@ -75,7 +75,7 @@ class WrittenCases:
 
     @needs("beyond_limits", for_silver=True)
     def test_limits_are_refused(self, arcor2_bench: Bench) -> None:
-        """What lies beyond a limit is refused with a typed error that names the device; nothing is done."""
+        """Values beyond a limit are refused with a typed error that names the device, without effect."""
         device = arcor2_bench.controlled()
         calls = arcor2_bench.beyond_limits(device)
         assert calls, "the bench tries no limit"

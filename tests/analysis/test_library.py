@@ -494,16 +494,16 @@ AN = "*, an: str | None = None"
         (f"def act(self, {AN}) -> list[int]: ...", "act: result: the type list\\[int\\] is not supported"),
         ("def act(self, *, an: str = '') -> None: ...", "`an` is annotated"),
         ("def act(self, *, an=None) -> None: ...", "`an` is annotated"),
-        ("def act(self, a: int) -> None: ...", "the last parameter of an action is `an"),
-        ("def act(self, an: str | None, a: int) -> None: ...", "the last parameter of an action is `an"),
+        ("def act(self, a: int) -> None: ...", "the last parameter of an action must be `an"),
+        ("def act(self, an: str | None, a: int) -> None: ...", "the last parameter of an action must be `an"),
         ("def act(self, *a: int, an: str | None = None) -> None: ...", "names its parameters"),
         (f"async def act(self, {AN}) -> None: ...", "synchronous"),
         (f"def act(self, a: float, {AN}) -> None:\n    assert 0 <= a <= 1", "has to be of type double too"),
         (f"def act(self, a: int = 'x', {AN}) -> None: ...", "parameter a: default: 'x' is not an integer"),
         (f"def act(self, a: bool = 1, {AN}) -> None: ...", "parameter a: default: 1 is not true or false"),
         (f"def act(self, a: float = None, {AN}) -> None: ...", "parameter a: default: None is not a number"),
-        (f"def act(self, a: float = compute(), {AN}) -> None: ...", r"compute\(\) cannot be told from the source"),
-        (f"def act(self, a: E = 'c', {AN}) -> None: ...", "the default is no member of E"),
+        (f"def act(self, a: float = compute(), {AN}) -> None: ...", r"compute\(\) cannot be determined from the source"),
+        (f"def act(self, a: E = 'c', {AN}) -> None: ...", "the default is not a member of E"),
         (f"def act(self, a: Empty, {AN}) -> None: ...", "the enumeration Empty has no members"),
         (f"def act(self, a: Odd, {AN}) -> None: ...", "Odd.A is no StrEnum member: 1"),
         (f"def act(self, a: enum.Enum, {AN}) -> None: ...", "the type enum.Enum is not supported"),
@@ -764,7 +764,7 @@ def test_a_robot_with_several_arms() -> None:
                 self.soft()
     """)
     assert found.problem is not None
-    assert "robot_type is no member of RobotType" in found.problem.text
+    assert "robot_type must be a member of RobotType" in found.problem.text
     good = analyse("""
         class T(MultiArmRobot):
             _ABSTRACT = False
@@ -790,21 +790,21 @@ def test_a_robot_with_several_arms() -> None:
 @pytest.mark.parametrize(
     ("source", "text", "line"),
     [
-        ("class T(Generic:\n", "this is not Python", 6),
-        ("class Other(Generic): ...\n", "there is no class T here", 1),
-        ("\nclass T(Nothing): ...\n", "the base Nothing cannot be obtained", 7),
-        ("from vendor_sdk import Base\nclass T(Base): ...\n", "the base vendor_sdk.Base cannot be obtained", 7),
-        ("from .missing import Base\nclass T(Base): ...\n", "the module missing that it imports does not exist", 6),
-        ("from arcor2_hw.objects import Nope\nclass T(Nope): ...\n", "the base Nope cannot be obtained", 7),
-        ("from ..far import Base\nclass T(Base): ...\n", "leads out of the package", 6),
+        ("class T(Generic:\n", "this is not valid Python", 6),
+        ("class Other(Generic): ...\n", "the file has no class T", 1),
+        ("\nclass T(Nothing): ...\n", "the base Nothing cannot be read", 7),
+        ("from vendor_sdk import Base\nclass T(Base): ...\n", "the base vendor_sdk.Base cannot be read", 7),
+        ("from .missing import Base\nclass T(Base): ...\n", "the imported module missing does not exist", 6),
+        ("from arcor2_hw.objects import Nope\nclass T(Nope): ...\n", "the base Nope cannot be read", 7),
+        ("from ..far import Base\nclass T(Base): ...\n", "leads outside of the package", 6),
         ("class T(T): ...\n", "its own ancestor", 6),
         ("class A(Generic): ...\nclass T(Generic, A): ...\n", "contradict each other", 7),
-        ("class M: ...\nclass T(Generic, M): ...\n", "mixins come before the base", 7),
-        ("import sdk\nclass B(sdk.Base): ...\nclass T(B): ...\n", "the base sdk.Base cannot be obtained", 8),
-        ("class T(Generic):\n    _ABSTRACT = compute()\n", "cannot be told from the source", 7),
+        ("class M: ...\nclass T(Generic, M): ...\n", "mixins must come before the base", 7),
+        ("import sdk\nclass B(sdk.Base): ...\nclass T(B): ...\n", "the base sdk.Base cannot be read", 8),
+        ("class T(Generic):\n    _ABSTRACT = compute()\n", "cannot be determined from the source", 7),
         (
             "class T(Generic):\n    def __init__(self, settings: int): ...\n",
-            "settings is no dataclass derived from Settings",
+            "settings must be a dataclass derived from Settings",
             7,
         ),
         (
@@ -829,7 +829,7 @@ def test_a_problem_in_another_file_names_that_file() -> None:
         Broken="class Broken(Generic)\n",
         T="from .broken import Broken\nclass T(Broken): ...\n",
     )
-    assert str(lib.analyse("T").problem).startswith("object_types/broken.py:6: this is not Python")
+    assert str(lib.analyse("T").problem).startswith("object_types/broken.py:6: this is not valid Python")
     lib.add(SourceFile("Broken", "broken", NEW.replace("    ", "") + "class Broken(Generic): ...\n"))
     assert lib.analyse("T").problem is None
     assert lib.analyse("T").meta.base == "Broken"

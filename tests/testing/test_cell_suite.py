@@ -129,7 +129,7 @@ def test_without_a_cell_it_says_what_is_missing(tmp_path: Path) -> None:
         ({"settings": {"hots": "127.0.0.1"}}, "far: FunctionalTester has no setting hots"),
         ({"settings": {"host": "127.0.0.1"}, "wire": ["gate"]}, "far: wire names 'gate'"),
         ({"bench": "no_such_module:Bench"}, "far: the bench no_such_module:Bench cannot be imported"),
-        ({"bench": "arcor2_hw.testing.life:Beside"}, "far: arcor2_hw.testing.life:Beside is no bench"),
+        ({"bench": "arcor2_hw.testing.life:Beside"}, "far: arcor2_hw.testing.life:Beside is not a bench"),
     ],
 )
 def test_a_mistake_in_a_cell_names_the_device(changes: dict[str, object], told: str) -> None:
@@ -141,7 +141,7 @@ def test_a_mistake_in_a_cell_names_the_device(changes: dict[str, object], told: 
 def test_one_name_in_two_cells_is_refused(tmp_path: Path) -> None:
     for file in ("a.yaml", "b.yaml"):
         (tmp_path / file).write_text("devices: [{name: far, type: FunctionalTester, settings: {host: 127.0.0.1}}]\n")
-    with pytest.raises(Arcor2Error, match=r"named in more than one cell\.yaml: far"):
+    with pytest.raises(Arcor2Error, match=r"several cell\.yaml files have devices of the same name: far"):
         benches_of_files([str(tmp_path / "a.yaml"), str(tmp_path / "b.yaml")])
 
 

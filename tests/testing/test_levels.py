@@ -144,7 +144,7 @@ def test_a_report_that_does_not_fit_says_why(tmp_path: Path, changes: dict[str, 
 
 
 def test_a_report_that_is_not_there_or_none_is_told(tmp_path: Path) -> None:
-    assert report.unmatched(tmp_path, claims(), TYPE, {}) == ["the report real.json is not there"]
+    assert report.unmatched(tmp_path, claims(), TYPE, {}) == ["the report real.json does not exist"]
     (tmp_path / "real.json").write_text("{}")
     assert "cannot be read" in report.unmatched(tmp_path, claims(), TYPE, {})[0]
     assert "names no report" in report.unmatched(tmp_path, claims(report=msgspec.UNSET), TYPE, {})[0]

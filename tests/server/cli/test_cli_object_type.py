@@ -76,7 +76,7 @@ def test_a_family_of_types_is_brought_in_together_and_one_by_one(
     assert object_type(server, "add", helper).stdout == "gains added\n"
     lonely = object_type(server, "add", arm)
     assert lonely.returncode == ExitStatus.ANALYSIS_PROBLEMS
-    assert "arm_m1.py:3: the module abstract_arm that it imports does not exist" in lonely.stderr
+    assert "arm_m1.py:3: the imported module abstract_arm does not exist" in lonely.stderr
     together = object_type(server, "add", arm, base, mixin)
     assert (together.returncode, together.stderr) == (0, "")
     assert together.stdout.split() == ["AbstractArm", "added", "KinematicsMixin", "added", "ArmM1", "added"]
