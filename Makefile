@@ -43,6 +43,7 @@ check: lint types layers check-editor
 lint: .make/dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/codespell
 
 types: .make/dev
 	$(BIN)/mypy

@@ -49,9 +49,7 @@ class RobotSurface:
 
     @classmethod
     def of_links(cls, links: Iterable[tuple[Floats, Indices, Floats]], name: str = "the robot") -> "RobotSurface":
-        """Combine links: for each link its vertices in its own frame, its triangles, and base_from_link as a (4, 4)
-        matrix.
-        """
+        """Combine links, each as vertices in its own frame, triangles, and base_from_link (4, 4)."""
         vertices: list[Floats] = []
         triangles: list[Indices] = []
         count = 0

@@ -307,8 +307,8 @@ class Rest:
         """Save the scene, project and object types of a package.
 
         Args:
-            content: The package. overwrite: overwrite_scene, overwrite_project, overwrite_object_types,
-            overwrite_project_sources,
+            content: The package.
+            **overwrite: overwrite_scene, overwrite_project, overwrite_object_types, overwrite_project_sources,
                 overwrite_collision_models, update_project_from_script.
 
         Raises:

@@ -23,8 +23,9 @@ _Span = tuple[float, float]
 
 
 def entry(shape: Shape, start: Array, way: Array, inflation: float = 0.0) -> float | None:
-    """Return the position along a line, 0 to 1, at which it enters a shape: 0 when it starts inside, None when it does
-    not.
+    """Return the position along a line, 0 to 1, at which it enters a shape, None when it does not.
+
+    The position is 0 for a line that starts inside.
 
     Edges, heights and radii are enlarged by `inflation`, as the protocol demands; the planes of a hull are moved out by
     half of it; a mesh is met where a triangle is nearer than half of it.

@@ -201,9 +201,7 @@ def levers(robot: CollisionRobot) -> Array:
 
 
 def _slides(robot: CollisionRobot) -> list[float | None]:
-    """Return for each body of Pinocchio's model the maximum displacement of its prismatic joint, m; None for a revolute
-    one.
-    """
+    """Return for each body of Pinocchio's model the maximum travel of its prismatic joint, m, or None."""
     found: list[float | None] = [None]
     joints = {joint.name: joint for joint in robot.model.description.joints}
     for name in list(robot.tree.model.names)[1:]:

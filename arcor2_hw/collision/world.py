@@ -213,8 +213,9 @@ class CollisionWorld(WorldState):
                         yield _gap(part, their), part, their.object, _name(other, their)
 
     def ray(self, start: Position, end: Position, ignore: Iterable[str] = (), inflation: float = 0.0) -> RayHit | None:
-        """Return the first thing that a straight line meets, None when the line is free. Robots are at their present
-        joints.
+        """Return the first thing that a straight line meets, None when the line is free.
+
+        Robots are at their present joint values.
 
         Args:
             start: Start of the line.

@@ -273,7 +273,7 @@ class Robot(GenericWithPose):
         raise Arcor2NotImplemented("release_brakes")
 
     def home(self) -> None:
-        """Reference the axes."""
+        """Move the axes to their references."""
         raise Arcor2NotImplemented("home")
 
     def is_referenced(self) -> bool:

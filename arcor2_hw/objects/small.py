@@ -202,7 +202,7 @@ class Axis(Generic):
 
     @abc.abstractmethod
     def home(self) -> None:
-        """Reference the axis."""
+        """Move the axis to its reference."""
 
     @abc.abstractmethod
     def move_absolute(self, position: float, velocity: float) -> None:

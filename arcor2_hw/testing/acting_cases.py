@@ -78,7 +78,7 @@ class ActingCases:
 
     @needs("run_long", "running")
     def test_disconnecting_ends_an_act(self, arcor2_bench: Bench) -> None:
-        """disconnect during an act takes at most 1 s; the act ends with a typed error."""
+        """Calling disconnect during an act takes at most 1 s; the act ends with a typed error."""
         device = arcor2_bench.controlled()
         act = under_way(arcor2_bench, device)
         timed(device.disconnect, DISCONNECTS_WITHIN, "disconnecting in an act")

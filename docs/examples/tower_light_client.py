@@ -1,4 +1,4 @@
-"""Shows on a tower light what a server does. `python tower_light_client.py --help`; docs/how-to/follow-a-server.md"""
+"""Shows on a tower light what a server does. `python tower_light_client.py --help`; docs/how-to/follow-a-server.md."""
 
 import asyncio
 import logging
