@@ -1,4 +1,4 @@
-"""Keeping a device's watchdog quiet from a child process, so that a busy interpreter does not stop the device."""
+"""Feeding a device's watchdog from a child process, so that a busy interpreter does not stop the device."""
 
 import contextlib
 import os
@@ -17,35 +17,38 @@ from arcor2_hw.keep_alive_process import FROZEN_AFTER as FROZEN_AFTER
 from arcor2_hw.keep_alive_process import PULSE
 
 PULSE_PERIOD: Final = 0.05
-"""Seconds between pulses, where a driver does not work at a rhythm of its own."""
+"""Time between pulses for drivers without a cycle of their own, s."""
 BUSY_FOR: Final = 0.3
-"""Seconds of running time that a caller waits for a fresh reading which a busy process may not have taken yet."""
+"""Running time that a caller waits for a fresh reading which a busy process may not have taken yet, s."""
 STARTS_WITHIN: Final = 5.0
-"""Seconds for the child process to start; it takes 0.03 on an idle computer."""
+"""Time limit of the start of the child process, s; it takes 0.03 s on an idle computer."""
 LONGEST_STEP: Final = 0.05
-"""Most seconds that `RunningTime` counts between two readings."""
+"""Maximum time that `RunningTime` counts between two readings, s."""
 TOO_SLOW: Final = "this computer was too slow for the {}'s watchdog"
-"""What to report when a watchdog tripped because this computer was busy."""
+"""Message for a watchdog that tripped because this computer was busy."""
 _SCRIPT: Final = Path(__file__).with_name("keep_alive_process.py")
 T = TypeVar("T")
 
 
 def pulse() -> bytes:
-    """Return the line that reports to a child process that the thread which supervises the device works."""
+    """Return the line that reports to a child process that the thread which supervises the device is alive."""
     return PULSE + b"%.6f\n" % time.monotonic()
 
 
 class KeepAlive:
-    """A child process that writes `message` to the open line `fd` of a device each `period` s.
+    """A child process that writes `message` to the open line `fd` of a device every `period` s.
 
-    It stops when this process ends, when `close` is called, and when no `pulse` was sent for FROZEN_AFTER s. Pulses are
-    sent by the thread that supervises the device, only while all is well: the kicks stop when that thread does.
+    It stops when this process ends, when `close` is called, and when no `pulse` was sent for FROZEN_AFTER s. The thread
+    that supervises the device sends the pulses while all is well, so the messages stop when that thread does.
 
-    fd: file descriptor of the device's line; `message` must be taken by the device in the middle of other traffic.
-    quiet: seconds without a pulse before the first message, for lines where messages could collide with answers.
+    Args:
+        fd: File descriptor of the device's line.
+        message: Message that the device accepts in the middle of other traffic.
+        period: Time between two messages, s.
+        quiet: Time without a pulse before the first message, s, for lines where messages could collide with answers.
 
     Raises:
-        DeviceTimeout: the process did not start; arm the watchdog only afterwards.
+        DeviceTimeout: The process did not start. Arm the watchdog only afterwards.
     """
 
     def __init__(self, fd: int, message: bytes, period: float, quiet: float = 0.0) -> None:
@@ -54,7 +57,7 @@ class KeepAlive:
             stdin=subprocess.PIPE,
             stdout=fd,
             stderr=subprocess.PIPE,
-            start_new_session=True,  # its own share of a busy computer
+            start_new_session=True,  # with its own share of a busy computer
         )
         assert self._process.stdin is not None
         assert self._process.stderr is not None
@@ -62,7 +65,7 @@ class KeepAlive:
         with self._process.stderr as ready:
             if not (select.select([ready], [], [], STARTS_WITHIN)[0] and ready.read(1)):
                 self.close()
-                raise DeviceTimeout(f"The process that keeps watchdogs quiet did not start within {STARTS_WITHIN:g} s.")
+                raise DeviceTimeout(f"The process that feeds watchdogs did not start within {STARTS_WITHIN:g} s.")
         self.pulse()
 
     @property
@@ -71,13 +74,13 @@ class KeepAlive:
         return self._process.pid
 
     def pulse(self) -> None:
-        """Report that the device is supervised; to be called at least each 0.1 s."""
+        """Report that the device is supervised; call it at least every 0.1 s."""
         assert self._process.stdin is not None
         with contextlib.suppress(OSError, ValueError):  # closed, or the child died: the device has its watchdog
             os.write(self._process.stdin.fileno(), pulse())
 
     def close(self) -> None:
-        """End the child process; does nothing the second time."""
+        """End the child process. It does nothing the second time."""
         if self._process.stdin is not None and not self._process.stdin.closed:
             self._process.kill()
             self._process.stdin.close()
@@ -87,7 +90,7 @@ class KeepAlive:
 class RunningTime:
     """A stopwatch of the time in which this process ran: a longer gap between two readings counts as LONGEST_STEP.
 
-    A deadline on another thread of this process is judged by it, which a stall of the process has delayed as well.
+    It judges time limits of another thread of this process, which a stall of the process delays as well.
     """
 
     def __init__(self) -> None:
@@ -95,7 +98,7 @@ class RunningTime:
         self._elapsed = 0.0
 
     def __call__(self) -> float:
-        """Return the seconds since it was made."""
+        """Return the seconds since its creation."""
         now = time.monotonic()
         self._elapsed += min(now - self._read, LONGEST_STEP)
         self._read = now
@@ -106,7 +109,7 @@ def result_within(future: "Future[T]", timeout: float) -> T:
     """Return the result of a future that a thread of this process sets, within `timeout` s of running time.
 
     Raises:
-        TimeoutError: no result was set in time.
+        TimeoutError: No result was set in time.
     """
     clock = RunningTime()
     while True:
@@ -118,7 +121,7 @@ def result_within(future: "Future[T]", timeout: float) -> T:
 
 
 def acquire_within(lock: threading.Lock, timeout: float) -> bool:
-    """Return whether a lock was acquired within `timeout` s of running time: its owner may have been held up too."""
+    """Return whether a lock was acquired within `timeout` s of running time, because its owner may be delayed too."""
     clock = RunningTime()
     while not lock.acquire(timeout=LONGEST_STEP / 2.0):
         if clock() >= timeout:
@@ -127,7 +130,7 @@ def acquire_within(lock: threading.Lock, timeout: float) -> bool:
 
 
 def once_within(holds: Callable[[], Any], timeout: float, pause: float) -> bool:
-    """Return whether `holds` becomes true within `timeout` s of running time; it is asked each `pause` s."""
+    """Return whether `holds` becomes true within `timeout` s of running time; it is called every `pause` s."""
     clock = RunningTime()
     while not holds():
         if clock() >= timeout:

@@ -1,10 +1,10 @@
-"""The child process behind `KeepAlive`, and how any child process judges whether its parent is alive, busy or frozen.
+"""The child process of `KeepAlive`, and how any child process judges whether its parent is alive, busy or frozen.
 
-A busy parent may hold its interpreter for some tenths of a second. That must not trip a device's watchdog, so the
-kicks come from a child. The parent reports by pulses that its supervising thread works. The child ends at once when the
-parent dies (end of its standard input), and when no pulse was sent for FROZEN_AFTER s.
+A busy parent may hold its interpreter for some tenths of a second. That must not trip a device's watchdog, so a child
+process feeds it. The parent reports by pulses that its supervising thread works. The child ends at once when the parent
+dies (end of its standard input), and when no pulse was sent for FROZEN_AFTER s.
 
-Only the standard library is imported here, so that the child starts in some 20 ms. A driver with a child process of
+Only the standard library is imported here, so that the child starts in about 20 ms. A driver with a child process of
 its own uses `Parent`.
 """
 
@@ -15,7 +15,7 @@ import sys
 import time
 
 FROZEN_AFTER = 0.8
-"""Seconds without a pulse after which the parent counts as frozen. A parent is often busy for 0.5 s."""
+"""Time without a pulse after which the parent counts as frozen, s. A parent is often busy for 0.5 s."""
 PULSE = b"="
 """First byte of a line that is a pulse; the time it was sent follows, in seconds of the monotonic clock."""
 
@@ -28,17 +28,17 @@ class ParentEnd(enum.Enum):
 
 
 class Parent:
-    """The parent of this process as seen from a file descriptor that it writes lines to. For one thread."""
+    """The parent of this process, which writes lines to a file descriptor. For use by one thread."""
 
     def __init__(self, fd: int = 0) -> None:
         self.ended: ParentEnd | None = None
         self.pulse = time.monotonic()
-        """When the newest pulse was sent (monotonic clock, the same in all processes)."""
+        """Time of the newest pulse on the monotonic clock, which is the same in all processes, s."""
         self._fd = fd
         self._rest = b""
 
     def lines(self, timeout: float) -> list[bytes]:
-        """Wait at most `timeout` s for lines from the parent and return them, without pulses; sets `ended`."""
+        """Wait at most `timeout` s for lines from the parent and return them without pulses; set `ended`."""
         left = self.pulse + FROZEN_AFTER - time.monotonic()
         ready, _, _ = select.select([self._fd], [], [], max(min(timeout, left), 0.0))
         if not ready:
@@ -57,7 +57,7 @@ class Parent:
 
 
 def main(message: bytes, period: float, quiet: float) -> None:
-    """Write `message` to standard output each `period` s while the parent lives and was silent for `quiet` s.
+    """Write `message` to standard output every `period` s while the parent lives and was silent for `quiet` s.
 
     A line on standard error reports that it is ready.
     """
@@ -70,7 +70,7 @@ def main(message: bytes, period: float, quiet: float) -> None:
             try:
                 os.write(1, message)
             except BlockingIOError:
-                pass  # the line is full: whoever wrote that much keeps the device's watchdog quiet as well
+                pass  # the line is full: other traffic feeds the watchdog as well
             except OSError:  # the line is gone; the parent notices by itself
                 return
             sent = time.monotonic()

@@ -1,1 +1,1 @@
-"""Stock object types for programs: flow, logic, time, chance and counting. Ordinary types, one module each."""
+"""Stock object types for programs: flow, logic, time, random numbers and counters. They are ordinary object types."""

@@ -1,4 +1,4 @@
-"""Counting: one counter per object."""
+"""A counter for programs."""
 
 import dataclasses
 
@@ -8,13 +8,13 @@ from arcor2_hw.objects import Generic, Settings
 
 @dataclasses.dataclass
 class CounterSettings(Settings):
-    """What the counter begins with."""
+    """Initial value of the counter."""
 
     start: int = 0
 
 
 class CounterActions(Generic):
-    """A counter. Place one object for each thing to be counted."""
+    """A counter. Add one object for each quantity to count."""
 
     category = "Program"
     icon = "counter"
@@ -27,9 +27,9 @@ class CounterActions(Generic):
 
     @action
     def increment(self, by: int = 1, *, an: str | None = None) -> int:
-        """Count up and give the new value.
+        """Increase the counter and return the new value.
 
-        :param by: how many to add
+        :param by: amount to add
         """
         assert 0 <= by <= 1000000
 
@@ -38,9 +38,9 @@ class CounterActions(Generic):
 
     @action
     def decrement(self, by: int = 1, *, an: str | None = None) -> int:
-        """Count down and give the new value.
+        """Decrease the counter and return the new value.
 
-        :param by: how many to take away
+        :param by: amount to subtract
         """
         assert 0 <= by <= 1000000
 
@@ -49,34 +49,34 @@ class CounterActions(Generic):
 
     @action
     def value(self, *, an: str | None = None) -> int:
-        """Give the present value."""
+        """Return the present value."""
         return self._value
 
     @action
     def set_value(self, new_value: int, *, an: str | None = None) -> None:
         """Set the counter to a value.
 
-        :param new_value: what it shall show
+        :param new_value: new value
         """
         self._value = new_value
 
     @action
     def reset(self, *, an: str | None = None) -> None:
-        """Go back to what the counter began with."""
+        """Reset the counter to its initial value."""
         self._value = self._start
 
     @action
     def below(self, limit: int, *, an: str | None = None) -> bool:
-        """Tell whether the counter is below a limit.
+        """Return whether the counter is below a limit.
 
-        :param limit: the first value that is not below
+        :param limit: first value that is not below the limit
         """
         return self._value < limit
 
     @action
     def reached(self, limit: int, *, an: str | None = None) -> bool:
-        """Tell whether the counter has reached a limit.
+        """Return whether the counter has reached a limit.
 
-        :param limit: the first value that counts as reached
+        :param limit: first value that reaches the limit
         """
         return self._value >= limit

@@ -1,4 +1,4 @@
-"""Flow: end the program, wait, repeat a number of times."""
+"""Program flow: end the program, wait, repeat."""
 
 import threading
 from typing import ClassVar
@@ -23,14 +23,14 @@ class FlowActions(Generic):
 
     @action
     def finish(self, *, an: str | None = None) -> None:
-        """End the program here, as meant."""
+        """End the program."""
         raise ProgramFinished
 
     @action(deadline=None)
     def wait(self, seconds: float = 1.0, *, an: str | None = None) -> None:
-        """Wait before going on.
+        """Wait before the next action.
 
-        :param seconds: how long, s
+        :param seconds: duration, s
         """
         assert 0.0 <= seconds <= 86400.0
 
@@ -39,16 +39,16 @@ class FlowActions(Generic):
             raise Cancelled(f"{self.name}: the wait was cancelled")
 
     def cancel(self) -> None:
-        """End the present wait."""
+        """Cancel the present wait."""
         self._cancelled.set()
 
     @action
     def repeat(self, times: int = 2, *, an: str | None = None) -> bool:
-        """Tell whether to go on repeating: true that many times, then once false, and from the beginning.
+        """Return true the given number of times, then once false, then start again: a loop condition.
 
-        Each action counts for itself, by its name.
+        Each action has its own count, by its name.
 
-        :param times: how many times the branch for true is taken
+        :param times: number of times that the branch for true is taken
         """
         assert 0 <= times <= 1000000
 

@@ -1,11 +1,11 @@
-"""Logic: comparisons of numbers and text, and what follows from truths. All give a boolean to branch on."""
+"""Logic: comparisons of numbers and texts, and operations on booleans. All return a boolean for conditions."""
 
 from arcor2_hw.actions import action
 from arcor2_hw.objects import Generic
 
 
 class LogicActions(Generic):
-    """Compares values and combines truths."""
+    """Compares values and combines booleans."""
 
     category = "Program"
     icon = "logic"
@@ -14,131 +14,131 @@ class LogicActions(Generic):
     # ------------------------------------------------------------------------------------ numbers with a fraction
     @action
     def equals(self, value: float, other: float, tolerance: float = 1e-9, *, an: str | None = None) -> bool:
-        """Tell whether two numbers are equal.
+        """Return whether two numbers are equal.
 
-        :param value: one number
-        :param other: the other number
-        :param tolerance: how far apart they may be
+        :param value: first number
+        :param other: second number
+        :param tolerance: maximum difference
         """
         return abs(value - other) <= tolerance
 
     @action
     def greater_than(self, value: float, other: float, *, an: str | None = None) -> bool:
-        """Tell whether a number is greater than another.
+        """Return whether a number is greater than another.
 
-        :param value: the number
-        :param other: what it is compared with
+        :param value: first number
+        :param other: second number
         """
         return value > other
 
     @action
     def less_than(self, value: float, other: float, *, an: str | None = None) -> bool:
-        """Tell whether a number is less than another.
+        """Return whether a number is less than another.
 
-        :param value: the number
-        :param other: what it is compared with
+        :param value: first number
+        :param other: second number
         """
         return value < other
 
     @action
     def within(self, value: float, minimum: float, maximum: float, *, an: str | None = None) -> bool:
-        """Tell whether a number lies in a range, its ends included.
+        """Return whether a number is in a range, including its ends.
 
-        :param value: the number
-        :param minimum: the low end
-        :param maximum: the high end
+        :param value: number
+        :param minimum: lower end
+        :param maximum: upper end
         """
         return minimum <= value <= maximum
 
     # ------------------------------------------------------------------------------------ whole numbers
     @action
     def integer_equals(self, value: int, other: int, *, an: str | None = None) -> bool:
-        """Tell whether two whole numbers are equal.
+        """Return whether two integers are equal.
 
-        :param value: one number
-        :param other: the other number
+        :param value: first integer
+        :param other: second integer
         """
         return value == other
 
     @action
     def integer_greater_than(self, value: int, other: int, *, an: str | None = None) -> bool:
-        """Tell whether a whole number is greater than another.
+        """Return whether an integer is greater than another.
 
-        :param value: the number
-        :param other: what it is compared with
+        :param value: first integer
+        :param other: second integer
         """
         return value > other
 
     @action
     def integer_less_than(self, value: int, other: int, *, an: str | None = None) -> bool:
-        """Tell whether a whole number is less than another.
+        """Return whether an integer is less than another.
 
-        :param value: the number
-        :param other: what it is compared with
+        :param value: first integer
+        :param other: second integer
         """
         return value < other
 
     @action
     def integer_within(self, value: int, minimum: int, maximum: int, *, an: str | None = None) -> bool:
-        """Tell whether a whole number lies in a range, its ends included.
+        """Return whether an integer is in a range, including its ends.
 
-        :param value: the number
-        :param minimum: the low end
-        :param maximum: the high end
+        :param value: integer
+        :param minimum: lower end
+        :param maximum: upper end
         """
         return minimum <= value <= maximum
 
     # ------------------------------------------------------------------------------------ text
     @action
     def string_equals(self, text: str, other: str, *, an: str | None = None) -> bool:
-        """Tell whether two texts are the same, letter by letter.
+        """Return whether two texts are equal.
 
-        :param text: one text
-        :param other: the other text
+        :param text: first text
+        :param other: second text
         """
         return text == other
 
     @action
     def string_contains(self, text: str, part: str, *, an: str | None = None) -> bool:
-        """Tell whether a text contains another.
+        """Return whether a text contains another.
 
-        :param text: where it is looked for
-        :param part: what is looked for
+        :param text: text to search in
+        :param part: text to search for
         """
         return part in text
 
     # ------------------------------------------------------------------------------------ truths
     @action
     def logical_and(self, first: bool, second: bool, *, an: str | None = None) -> bool:
-        """Tell whether both are true.
+        """Return whether both values are true.
 
-        :param first: one truth
-        :param second: the other
+        :param first: first value
+        :param second: second value
         """
         return first and second
 
     @action
     def logical_or(self, first: bool, second: bool, *, an: str | None = None) -> bool:
-        """Tell whether at least one is true.
+        """Return whether at least one value is true.
 
-        :param first: one truth
-        :param second: the other
+        :param first: first value
+        :param second: second value
         """
         return first or second
 
     @action
     def logical_xor(self, first: bool, second: bool, *, an: str | None = None) -> bool:
-        """Tell whether exactly one is true.
+        """Return whether exactly one value is true.
 
-        :param first: one truth
-        :param second: the other
+        :param first: first value
+        :param second: second value
         """
         return first is not second
 
     @action
     def logical_not(self, value: bool, *, an: str | None = None) -> bool:
-        """Tell whether it is false.
+        """Return the opposite of a value.
 
-        :param value: the truth to turn round
+        :param value: value to negate
         """
         return not value

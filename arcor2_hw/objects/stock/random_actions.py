@@ -1,4 +1,4 @@
-"""Chance: random numbers and decisions."""
+"""Random numbers and decisions."""
 
 import dataclasses
 import random
@@ -10,13 +10,13 @@ from arcor2_hw.objects import Generic, Settings
 
 @dataclasses.dataclass
 class RandomSettings(Settings):
-    """Zero gives another sequence each time, any other seed always its own."""
+    """Seed of the sequence; zero gives a different sequence each time."""
 
     seed: int = 0
 
 
 class RandomActions(Generic):
-    """Draws numbers and decides by chance."""
+    """Returns random numbers and decisions."""
 
     category = "Program"
     icon = "random"
@@ -28,7 +28,7 @@ class RandomActions(Generic):
 
     @action(renamed={"minimum": "range_min", "maximum": "range_max"})
     def random_double(self, range_min: float = 0.0, range_max: float = 1.0, *, an: str | None = None) -> float:
-        """Return a random number from a range, all equally likely.
+        """Return a random number from a range, uniformly distributed.
 
         :param range_min: smallest possible number
         :param range_max: largest possible number
@@ -38,7 +38,7 @@ class RandomActions(Generic):
 
     @action(renamed={"minimum": "range_min", "maximum": "range_max"})
     def random_int(self, range_min: int = 1, range_max: int = 6, *, an: str | None = None) -> int:
-        """Return a random integer from a range, both ends included, all equally likely.
+        """Return a random integer from a range, including its ends, uniformly distributed.
 
         :param range_min: smallest possible integer
         :param range_max: largest possible integer
@@ -54,9 +54,9 @@ class RandomActions(Generic):
 
     @action
     def random_bool(self, probability: float = 0.5, *, an: str | None = None) -> bool:
-        """Give true by chance.
+        """Return a random boolean.
 
-        :param probability: how likely true is
+        :param probability: probability of true
         """
         assert 0.0 <= probability <= 1.0
 

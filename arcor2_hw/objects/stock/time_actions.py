@@ -1,4 +1,4 @@
-"""Time: sleep, the present time, stopwatches."""
+"""Time: sleep, present time, stopwatches."""
 
 import threading
 import time
@@ -10,7 +10,7 @@ from arcor2_hw.objects import Generic, Settings
 
 
 class TimeActions(Generic):
-    """Sleeps, tells the time and measures it."""
+    """Sleeps, returns the time and measures durations."""
 
     category = "Program"
     icon = "time"
@@ -24,9 +24,9 @@ class TimeActions(Generic):
 
     @action(deadline=None)
     def sleep(self, seconds: float = 1.0, *, an: str | None = None) -> None:
-        """Do nothing for a while.
+        """Wait for some time.
 
-        :param seconds: how long, s
+        :param seconds: duration, s
         """
         assert 0.0 <= seconds <= 86400.0
 
@@ -35,27 +35,27 @@ class TimeActions(Generic):
             raise Cancelled(f"{self.name}: the sleep was cancelled")
 
     def cancel(self) -> None:
-        """End the present sleep."""
+        """Cancel the present sleep."""
         self._cancelled.set()
 
     @action
     def time_ns(self, *, an: str | None = None) -> int:
-        """Give the present time: nanoseconds since 1970 in UTC."""
+        """Return the present time: nanoseconds since 1970 in UTC."""
         return time.time_ns()
 
     @action
     def start_stopwatch(self, stopwatch: str = "stopwatch", *, an: str | None = None) -> None:
         """Start a stopwatch from zero.
 
-        :param stopwatch: its name; each name is a stopwatch of its own
+        :param stopwatch: name of the stopwatch
         """
         self._started[stopwatch] = time.monotonic()
 
     @action
     def elapsed(self, stopwatch: str = "stopwatch", *, an: str | None = None) -> float:
-        """Give the seconds since a stopwatch was started; it runs on. Not touched by changes of the clock.
+        """Return the time since a stopwatch was started, s. It continues to run, and ignores changes of the clock.
 
-        :param stopwatch: its name
+        :param stopwatch: name of the stopwatch
         """
         try:
             return time.monotonic() - self._started[stopwatch]
