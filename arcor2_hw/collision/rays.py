@@ -1,25 +1,20 @@
 """Intersections of straight lines with shapes, computed exactly in the frame of the shape."""
 
-import math
 from typing import Final
 
 import numpy as np
 
+from arcor2_hw.collision import lines
 from arcor2_hw.kinematics.shapes import (
     Array,
-    Box,
-    Capsule,
-    Cylinder,
     Hull,
     Shape,
-    Sphere,
     TriangleMesh,
     coal_geometry,
 )
 
 _TINY: Final = 1e-12
 _CONTACTS: Final = 1000
-_Span = tuple[float, float]
 
 
 def entry(shape: Shape, start: Array, way: Array, inflation: float = 0.0) -> float | None:
@@ -36,59 +31,13 @@ def entry(shape: Shape, start: Array, way: Array, inflation: float = 0.0) -> flo
         way: Vector from start to end, (3).
         inflation: Length added to sizes, m.
     """
-    a, d = start.tolist(), way.tolist()
-    half = inflation / 2.0
     match shape:
-        case Box():
-            sizes = (shape.x, shape.y, shape.z)
-            return _common([_slab(a[i], d[i], size / 2.0 + half) for i, size in enumerate(sizes)])
-        case Sphere():
-            return _common([_round(a, d, shape.radius + inflation)])
-        case Cylinder():
-            around = _round(a[:2], d[:2], shape.radius + inflation)
-            return _common([around, _slab(a[2], d[2], shape.length / 2.0 + half)])
-        case Capsule():
-            return _capsule(a, d, shape.radius + inflation, shape.length / 2.0)
         case Hull():
-            return _hull(shape, start, way, half)
+            return _hull(shape, start, way, inflation / 2.0)
         case TriangleMesh():
-            return _mesh(shape, start, way, half)
-
-
-def _common(spans: list[_Span | None]) -> float | None:
-    """Return the beginning of the intersection of all spans with the line, None when it is empty."""
-    low, high = 0.0, 1.0
-    for span in spans:
-        if span is None:
-            return None
-        low, high = max(low, span[0]), min(high, span[1])
-    return low if low <= high else None
-
-
-def _slab(a: float, d: float, half: float) -> _Span | None:
-    if abs(d) < _TINY:
-        return (-math.inf, math.inf) if abs(a) <= half else None
-    one, other = (-half - a) / d, (half - a) / d
-    return min(one, other), max(one, other)
-
-
-def _round(a: list[float], d: list[float], radius: float) -> _Span | None:
-    square = math.fsum(x * x for x in d)
-    beyond = math.fsum(x * x for x in a) - radius * radius
-    if square < _TINY * _TINY:
-        return (-math.inf, math.inf) if beyond <= 0.0 else None
-    middle = math.fsum(x * y for x, y in zip(a, d, strict=True))
-    discriminant = middle * middle - square * beyond
-    if discriminant < 0.0:
-        return None
-    root = math.sqrt(discriminant)
-    return (-middle - root) / square, (-middle + root) / square
-
-
-def _capsule(a: list[float], d: list[float], radius: float, half: float) -> float | None:
-    found = [_common([_round(a[:2], d[:2], radius), _slab(a[2], d[2], half)])]
-    found += [_common([_round([a[0], a[1], a[2] - end], d, radius)]) for end in (-half, half)]
-    return min((each for each in found if each is not None), default=None)
+            return _mesh(shape, start, way, inflation / 2.0)
+        case _:
+            return lines.entry(shape, start.tolist(), way.tolist(), inflation)
 
 
 def _hull(shape: Hull, start: Array, way: Array, half: float) -> float | None:

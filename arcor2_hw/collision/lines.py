@@ -1,0 +1,74 @@
+"""Intersections of straight lines with primitive shapes, in the frame of the shape. Imports no numerics."""
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+from arcor2_hw.kinematics.primitives import Box, Capsule, Cylinder, Sphere
+
+_TINY: Final = 1e-12
+_Span = tuple[float, float]
+
+
+def entry(
+    shape: Box | Cylinder | Capsule | Sphere, start: Sequence[float], way: Sequence[float], inflation: float = 0.0
+) -> float | None:
+    """Return the position along a line, 0 to 1, at which it enters a shape, None when it does not.
+
+    The position is 0 for a line that starts inside. Edges, lengths and radii are enlarged by `inflation`, as the
+    protocol demands.
+
+    Args:
+        shape: The shape.
+        start: Start of the line, (3).
+        way: Vector from start to end, (3).
+        inflation: Length added to sizes, m.
+    """
+    half = inflation / 2.0
+    match shape:
+        case Box():
+            sizes = (shape.x, shape.y, shape.z)
+            return _common([_slab(start[i], way[i], size / 2.0 + half) for i, size in enumerate(sizes)])
+        case Sphere():
+            return _common([_round(start, way, shape.radius + inflation)])
+        case Cylinder():
+            around = _round(start[:2], way[:2], shape.radius + inflation)
+            return _common([around, _slab(start[2], way[2], shape.length / 2.0 + half)])
+        case Capsule():
+            return _capsule(start, way, shape.radius + inflation, shape.length / 2.0)
+
+
+def _common(spans: list[_Span | None]) -> float | None:
+    """Return the beginning of the intersection of all spans with the line, None when it is empty."""
+    low, high = 0.0, 1.0
+    for span in spans:
+        if span is None:
+            return None
+        low, high = max(low, span[0]), min(high, span[1])
+    return low if low <= high else None
+
+
+def _slab(a: float, d: float, half: float) -> _Span | None:
+    if abs(d) < _TINY:
+        return (-math.inf, math.inf) if abs(a) <= half else None
+    one, other = (-half - a) / d, (half - a) / d
+    return min(one, other), max(one, other)
+
+
+def _round(a: Sequence[float], d: Sequence[float], radius: float) -> _Span | None:
+    square = math.fsum(x * x for x in d)
+    beyond = math.fsum(x * x for x in a) - radius * radius
+    if square < _TINY * _TINY:
+        return (-math.inf, math.inf) if beyond <= 0.0 else None
+    middle = math.fsum(x * y for x, y in zip(a, d, strict=True))
+    discriminant = middle * middle - square * beyond
+    if discriminant < 0.0:
+        return None
+    root = math.sqrt(discriminant)
+    return (-middle - root) / square, (-middle + root) / square
+
+
+def _capsule(a: Sequence[float], d: Sequence[float], radius: float, half: float) -> float | None:
+    found = [_common([_round(a[:2], d[:2], radius), _slab(a[2], d[2], half)])]
+    found += [_common([_round([a[0], a[1], a[2] - end], d, radius)]) for end in (-half, half)]
+    return min((each for each in found if each is not None), default=None)
