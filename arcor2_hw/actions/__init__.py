@@ -1,6 +1,6 @@
 """Actions: the decorator that marks a method as an action, and the types of its parameters."""
 
-from arcor2_hw.actions.marking import DEFAULT_DEADLINE, IntEnum, StrEnum, action, deadline_of, metadata_of
+from arcor2_hw.actions.decorator import DEFAULT_DEADLINE, IntEnum, StrEnum, action, deadline_of, metadata_of
 from arcor2_hw.actions.parameter_types import PARAMETER_TYPES, ParameterType, ScriptNames, by_annotation, parameter_type
 
 __all__ = [

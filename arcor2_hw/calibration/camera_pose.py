@@ -10,6 +10,7 @@ import numpy as np
 from arcor2_hw.calibration.averaging import averaged, weight_of
 from arcor2_hw.calibration.boards import check_pose
 from arcor2_hw.calibration.camera_results import CameraPose, MarkerError, PoseOptions
+from arcor2_hw.calibration.detection import detect_layout
 from arcor2_hw.calibration.drawing import GOOD, Canvas, error_picture
 from arcor2_hw.calibration.layout import Layout
 from arcor2_hw.calibration.lens import Array, Lens
@@ -19,7 +20,6 @@ from arcor2_hw.calibration.pose_search import Found, search
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.calibration.results import Grade
 from arcor2_hw.calibration.rigid import inverted
-from arcor2_hw.calibration.sight import sight_of
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.exceptions import InvalidData
@@ -56,13 +56,13 @@ def find_camera_pose(
         raise InvalidData(f"1 to {MOST_PICTURES} images are needed, not {len(pictures)}")
     greys = list(one_by_one(pictures)) if len(pictures) > 1 else [grey_of(pictures[0])]
     lens = Lens(parameters, greys[0].shape[1], greys[0].shape[0])
-    sighting = sight_of(greys, lens, layout, options.blur_threshold, options.largest_blur)
-    _check_still(sighting.seen)
+    detection = detect_layout(greys, lens, layout, options.blur_threshold, options.largest_blur)
+    _check_still(detection.seen)
     if options.method == "averaged":
-        found = averaged(lens, sighting.seen, hints, options)
+        found = averaged(lens, detection.seen, hints, options)
     else:
-        found = search(lens, sighting.seen, hints, options)
-    return _result(found, sighting.seen, layout, options, sighting.blur, len(pictures))
+        found = search(lens, detection.seen, hints, options)
+    return _result(found, detection.seen, layout, options, detection.blur, len(pictures))
 
 
 def _hints(options: PoseOptions) -> Hints:
@@ -230,7 +230,7 @@ def draw_camera_pose(picture: Picture, parameters: CameraParameters, layout: Lay
     """
     grey = grey_of(picture)
     lens = Lens(parameters, grey.shape[1], grey.shape[0])
-    seen = sight_of([grey], lens, layout, 0.0, math.inf).seen
+    seen = detect_layout([grey], lens, layout, 0.0, math.inf).seen
     if isinstance(result.parameters, CameraParameters):
         lens = Lens(result.parameters, grey.shape[1], grey.shape[0])
     camera_from_origin = inverted(result.pose.matrix())

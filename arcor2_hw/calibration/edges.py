@@ -143,14 +143,14 @@ def measure(
     for index in range(_ROUNDS):
         if moved > _AS_BEFORE:
             at, slopes = lens.pixels_and_slopes(_mapped(h, chart.points))
-            sight = _sight(h, chart, slopes)
+            view = _edge_view(h, chart, slopes)
         else:
             at = lens.pixels(_mapped(h, chart.points))
-        step = _crossings(picture, at - first, sight, blur)
+        step = _crossings(picture, at - first, view, blur)
         if step is None:
             return None
         offsets, valid, blur, contrast = step
-        wanted = np.column_stack((sight.by_h, np.ones(len(offsets))))
+        wanted = np.column_stack((view.by_h, np.ones(len(offsets))))
         residual = offsets - shift
         weights = _tukey(residual, valid)
         prior = np.zeros(9)
@@ -169,7 +169,7 @@ def measure(
             return None
         h = h + change[:8]
         shift += float(change[8])
-        moved = float(np.abs(sight.by_h @ change[:8]).max())
+        moved = float(np.abs(view.by_h @ change[:8]).max())
         if not math.isfinite(moved) or moved > 6.0:
             return None
         if index and moved < 0.01:
@@ -185,7 +185,7 @@ def measure(
     pixels, corner_slopes = lens.pixels_and_slopes(corner_rays)
     by_corner = np.einsum("nij,njk->nik", corner_slopes, _by_h(h, chart.corners, corner_rays)).reshape(8, 8)
     covariance = by_corner @ covariance_h @ by_corner.T + _CORNER_FLOOR**2 * np.eye(8)
-    return Measured(number, pixels, np.linalg.inv(covariance), blur, _median(sight.cell), shift, contrast)
+    return Measured(number, pixels, np.linalg.inv(covariance), blur, _median(view.cell), shift, contrast)
 
 
 def _mapped(h: Array, points: Array) -> Array:
@@ -206,7 +206,7 @@ def _by_h(h: Array, points: Array, rays: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class _Sight:
+class _EdgeView:
     """Appearance of edges in the image.
 
     Attributes:
@@ -226,7 +226,7 @@ class _Sight:
     by_h: Array
 
 
-def _sight(h: Array, chart: Chart, slopes: Array) -> _Sight:
+def _edge_view(h: Array, chart: Chart, slopes: Array) -> _EdgeView:
     points = chart.points
     rays = _mapped(h, points)
     q = points @ h[6:8] + 1.0
@@ -246,20 +246,18 @@ def _sight(h: Array, chart: Chart, slopes: Array) -> _Sight:
     slant = np.abs(slant)
     by_pixel = np.einsum("ni,nij->nj", normals, slopes)
     by_h = np.einsum("nj,njk->nk", by_pixel, _by_h(h, points, rays))
-    return _Sight(normals, ways, cell, slant, chart.free * length * slant, by_h)
+    return _EdgeView(normals, ways, cell, slant, chart.free * length * slant, by_h)
 
 
 def _crossings(
-    picture: npt.NDArray[np.float32], at: Array, sight: _Sight, blur: float
+    picture: npt.NDArray[np.float32], at: Array, view: _EdgeView, blur: float
 ) -> tuple[Array, npt.NDArray[np.bool_], float, float] | None:
     """Measure the offsets of edges along their normals; return offsets, their validity, the blur and the contrast."""
-    reach = np.minimum(
-        np.maximum(0.45 * sight.cell, _NARROWEST), max(_WIDEST, 3.0 * blur) / np.maximum(sight.slant, 0.3)
-    )
+    reach = np.minimum(np.maximum(0.45 * view.cell, _NARROWEST), max(_WIDEST, 3.0 * blur) / np.maximum(view.slant, 0.3))
     across = reach[:, None] * _UNIT
-    map_x = (at[:, 0:1] + sight.ways[:, 0:1] * across).astype(np.float32)
-    map_y = (at[:, 1:2] + sight.ways[:, 1:2] * across).astype(np.float32)
-    valid = (sight.slant > 0.3) & (sight.room > min(_CLEAR * blur, 4.0))
+    map_x = (at[:, 0:1] + view.ways[:, 0:1] * across).astype(np.float32)
+    map_y = (at[:, 1:2] + view.ways[:, 1:2] * across).astype(np.float32)
+    valid = (view.slant > 0.3) & (view.room > min(_CLEAR * blur, 4.0))
     for ends, last in ((map_x[:, ::16], picture.shape[1] - 1), (map_y[:, ::16], picture.shape[0] - 1)):
         valid &= ((ends >= 0) & (ends <= last)).all(axis=1)
     places = int(np.count_nonzero(valid))
@@ -280,8 +278,8 @@ def _crossings(
     if np.count_nonzero(valid) < _LEAST_SHARE * places:
         return None
     parts = (values - dark[:, None]) / np.where(valid, difference, 1.0)[:, None]
-    offsets = reach * (1.0 - parts @ _WEIGHTS) * sight.slant
-    share = valid / np.maximum(reach * sight.slant, 0.1)
+    offsets = reach * (1.0 - parts @ _WEIGHTS) * view.slant
+    share = valid / np.maximum(reach * view.slant, 0.1)
     mean = share @ parts
     steepest = float(np.max(mean[2:] - mean[:-2])) / ((_UNIT[2] - _UNIT[0]) * max(np.count_nonzero(valid), 1))
     return offsets, valid, 1.0 / (max(steepest, 1e-3) * math.sqrt(math.tau)), contrast

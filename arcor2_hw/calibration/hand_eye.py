@@ -16,6 +16,7 @@ from arcor2_hw.calibration.camera_results import (
     Mounting,
     PoseOptions,
 )
+from arcor2_hw.calibration.detection import detect_layout
 from arcor2_hw.calibration.drawing import error_picture
 from arcor2_hw.calibration.hand_eye_methods import METHODS
 from arcor2_hw.calibration.hand_eye_problem import Mount, Station, refined
@@ -27,7 +28,6 @@ from arcor2_hw.calibration.pose_search import search
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.calibration.results import Grade
 from arcor2_hw.calibration.rigid import crossed, inverted, mean_rotation, motion, rotation_vector
-from arcor2_hw.calibration.sight import sight_of
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.exceptions import InvalidData
@@ -84,7 +84,7 @@ def find_hand_eye(
         flange = samples[index].flange.matrix()
         hand = flange if mounting == "eye_in_hand" else inverted(flange)
         try:
-            seen = sight_of([grey], lens, target, options.blur_threshold, options.largest_blur).seen
+            seen = detect_layout([grey], lens, target, options.blur_threshold, options.largest_blur).seen
             found = search(lens, seen, Hints(), PoseOptions(largest_deviation=_TARGET_DEVIATION))
         except CalibrationRefused as error:
             problems[index] = str(error)

@@ -7,8 +7,8 @@ from arcor2_hw.compute import glb
 from arcor2_hw.compute.mesh_tasks import PrepareAsset, PreparedAsset
 from arcor2_hw.compute.worker_state import WorkerState
 from arcor2_hw.kinematics.errors import BadMesh, ModelError
-from arcor2_hw.kinematics.markup import parse_xml
-from arcor2_hw.kinematics.source import MAX_PACKAGE, Package
+from arcor2_hw.kinematics.model_package import MAX_PACKAGE, Package
+from arcor2_hw.kinematics.xml_parser import parse_xml
 
 MAX_SHOWN: Final = 256 * 1024 * 1024
 """Maximum size of a mesh file for display, bytes; larger than that of a collision mesh."""

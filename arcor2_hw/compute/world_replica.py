@@ -18,7 +18,7 @@ from arcor2_hw.kinematics import model, shapes
 from arcor2_hw.kinematics.errors import BadMesh
 from arcor2_hw.kinematics.inverse import InverseKinematics
 from arcor2_hw.kinematics.meshes import read_mesh
-from arcor2_hw.kinematics.source import MAX_MESH
+from arcor2_hw.kinematics.model_package import MAX_MESH
 from arcor2_hw.planning.reachability import Reachability
 
 MESHES: Final = 64

@@ -21,8 +21,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from arcor2_hw.kinematics.errors import JointLoop, ModelError, UnsafeDescription
-from arcor2_hw.kinematics.markup import parse_xml
 from arcor2_hw.kinematics.shapes import Array
+from arcor2_hw.kinematics.xml_parser import parse_xml
 
 JointKind = Literal["revolute", "continuous", "prismatic", "fixed"]
 KINDS: Final[tuple[JointKind, ...]] = ("revolute", "continuous", "prismatic", "fixed")

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arcor2_hw.kinematics.errors import BadMesh
+from arcor2_hw.kinematics.model_package import MAX_MESH
 from arcor2_hw.kinematics.shapes import Array, TriangleMesh, Triangles
-from arcor2_hw.kinematics.source import MAX_MESH
 
 MAX_TRIANGLES: Final = 1_000_000
 KINDS: Final = ("stl", "obj", "ply", "off", "dae", "glb")

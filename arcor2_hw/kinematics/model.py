@@ -12,14 +12,14 @@ from typing import Final, Self
 import numpy as np
 
 from arcor2_hw.exceptions import NotFound
-from arcor2_hw.kinematics import adjusting, shapes
+from arcor2_hw.kinematics import adjustment, shapes
 from arcor2_hw.kinematics.arm import Arm, Step
 from arcor2_hw.kinematics.description import Description, EndEffector, Geometry, Joint, MeshFile, describe
 from arcor2_hw.kinematics.errors import ZeroLength
 from arcor2_hw.kinematics.joints import JointSet
 from arcor2_hw.kinematics.meshes import read_mesh
+from arcor2_hw.kinematics.model_package import MAX_MESH, Package
 from arcor2_hw.kinematics.shapes import Array, MeshUse, Shape
-from arcor2_hw.kinematics.source import MAX_MESH, Package
 from arcor2_hw.kinematics.tree import Tree
 
 _PARALLEL: Final = 1e-6
@@ -84,7 +84,7 @@ class RobotModel(JointSet):
         package = Package.open(source, name)
         beside, content = package.urdf()
         description = describe(content, package.name)
-        return cls(adjusting.with_settings(description, settings or {}), package, beside, mesh_use)
+        return cls(adjustment.with_settings(description, settings or {}), package, beside, mesh_use)
 
     def with_origins(self, origins: Mapping[str, Array]) -> Self:
         """Return a model with other origins of joints in their parent links, (4, 4) each.
@@ -92,7 +92,7 @@ class RobotModel(JointSet):
         Raises:
             ModelError: There is no such joint.
         """
-        moved = adjusting.with_origins(self.description, origins)
+        moved = adjustment.with_origins(self.description, origins)
         return type(self)(moved, self._package, self._beside, self._mesh_use)
 
     # -------------------------------------------------------------------------------- poses

@@ -88,7 +88,7 @@ class RobotTools:
         """
         from arcor2_hw.kinematics import shapes
         from arcor2_hw.kinematics.meshes import read_mesh
-        from arcor2_hw.kinematics.source import MAX_MESH
+        from arcor2_hw.kinematics.model_package import MAX_MESH
 
         model = obstacle.model
         if not isinstance(model, Mesh):

@@ -19,7 +19,7 @@ import msgspec
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.cell import CellDevice, parameters_of, read_cell
 from arcor2_hw.data.device import Alarm, Connection, Health
-from arcor2_hw.data.found import Checked
+from arcor2_hw.data.discovery import Checked
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error, Arcor2NotImplemented

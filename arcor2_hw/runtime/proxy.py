@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, cast
 
 from arcor2_hw.actions import deadline_of, metadata_of
-from arcor2_hw.actions.marking import with_present_names
+from arcor2_hw.actions.decorator import with_present_names
 from arcor2_hw.exceptions import InvalidData, ProgramFinished, ProgramStopped
 from arcor2_hw.objects import Generic
 from arcor2_hw.runtime.device import PLAIN, STOP_DEADLINE, Device

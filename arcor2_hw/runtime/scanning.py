@@ -14,7 +14,7 @@ from typing import Any, Final
 
 import msgspec
 
-from arcor2_hw.data.found import Found
+from arcor2_hw.data.discovery import Found
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotConnected, NotFound
 
 LISTENS: Final = 1.2

@@ -10,8 +10,8 @@ from typing import Any, Final
 
 import msgspec
 
+from arcor2_hw.actions.decorator import with_present_names
 from arcor2_hw.actions.json_values import decode_json, decode_picture, encode
-from arcor2_hw.actions.marking import with_present_names
 from arcor2_hw.exceptions import InvalidData
 
 OBJECTS: Final = "arcor2_hw.objects"

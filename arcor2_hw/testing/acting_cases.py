@@ -8,10 +8,10 @@ from typing import Final
 from arcor2_hw.exceptions import Cancelled, DeviceError, DeviceFault, NotInControl, Refused
 from arcor2_hw.runtime.device import OVERTAKES_WITHIN
 from arcor2_hw.runtime.lane import Job
-from arcor2_hw.testing.acts import STARTS_WITHIN, WATCHED, on_lanes, stop_of, under_way
 from arcor2_hw.testing.bench import Bench, needs
 from arcor2_hw.testing.connecting_cases import DISCONNECTS_WITHIN
 from arcor2_hw.testing.life import SLACK, raised, stays, timed, wait_until
+from arcor2_hw.testing.steps import STARTS_WITHIN, WATCHED, on_lanes, stop_of, under_way
 
 WITH_THE_ACT: Final = 20.0
 """Time limit of a bench's `ask` on a working device, s; for some devices it is a motion."""

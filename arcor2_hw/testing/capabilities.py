@@ -5,12 +5,12 @@ from functools import lru_cache
 from typing import Any, Final
 
 from arcor2_hw.actions import deadline_of, metadata_of
-from arcor2_hw.actions.marking import is_quick
+from arcor2_hw.actions.decorator import is_quick
 from arcor2_hw.analysis import Library
 from arcor2_hw.exceptions import Arcor2NotImplemented
 from arcor2_hw.objects import Axis, Generic
 from arcor2_hw.runtime.device import NO_STOP
-from arcor2_hw.testing import described
+from arcor2_hw.testing import declarations
 
 OURS: Final = "arcor2_hw.objects"
 STOPPABLE_FROM: Final = 1.0
@@ -44,7 +44,7 @@ READS: Final = frozenset(
 @lru_cache(maxsize=64)
 def declared(kind: type[Generic]) -> frozenset[str]:
     """Return the optional methods that a type has according to the analysis."""
-    return Library([described.source_of(kind)]).analyse(kind.__name__).implemented
+    return Library([declarations.source_of(kind)]).analyse(kind.__name__).implemented
 
 
 def hooks(kind: type[Generic]) -> dict[str, Any]:

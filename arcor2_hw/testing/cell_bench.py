@@ -20,8 +20,8 @@ from arcor2_hw.exceptions import Arcor2Error, InvalidData
 from arcor2_hw.objects import Generic, GenericWithPose, IOBlock
 from arcor2_hw.runtime.creation import fill_settings, find_type, recipe
 from arcor2_hw.testing import capabilities, frames, quality
+from arcor2_hw.testing.addresses import Place, places
 from arcor2_hw.testing.bench import OF_THE_WIRE, Bench
-from arcor2_hw.testing.places import Place, places
 from arcor2_hw.testing.serial_wire import SerialWire
 
 READ: Final = ("machine_state", "robot_joints", "position", "state", "status", "vacuum", "identify")

@@ -4,9 +4,9 @@ from typing import Final
 
 from arcor2_hw.data.device import Connection
 from arcor2_hw.exceptions import DeviceTimeout, NotConnected
-from arcor2_hw.testing.acts import GONE
 from arcor2_hw.testing.bench import Bench, knows_control, needs
 from arcor2_hw.testing.life import held, left_behind, named, raised, timed
+from arcor2_hw.testing.steps import GONE
 
 DISCONNECTS_WITHIN: Final = 1.0
 """Time limit of disconnect, s, whatever the wire does."""

@@ -5,10 +5,10 @@ import time
 
 from arcor2_hw.data.device import LossKind
 from arcor2_hw.exceptions import DeviceError, NotInControl
-from arcor2_hw.testing.acts import GONE, STARTS_WITHIN, WATCHED, back, lose, observed, seen_again, under_way
 from arcor2_hw.testing.bench import Bench, needs
 from arcor2_hw.testing.connecting_cases import DISCONNECTS_WITHIN
 from arcor2_hw.testing.life import SLACK, named, raised, stays, timed, wait_until
+from arcor2_hw.testing.steps import GONE, STARTS_WITHIN, WATCHED, back, lose, observed, seen_again, under_way
 
 
 class LossCases:

@@ -1,7 +1,7 @@
 """Test cases of declarations: metadata, capabilities, types."""
 
 from arcor2_hw.exceptions import InvalidData, KinematicsError, NotFound, OutOfRange, Refused
-from arcor2_hw.testing import capabilities, described
+from arcor2_hw.testing import capabilities, declarations
 from arcor2_hw.testing.bench import Bench, needs
 from arcor2_hw.testing.life import raised
 
@@ -11,7 +11,7 @@ class WrittenCases:
 
     def test_described(self, arcor2_bench: Bench) -> None:
         """Metadata, docstrings, stop and state, loss_reaction and quality.yaml are valid; nothing is abstract."""
-        wrong = described.faults(described.source_of(arcor2_bench.object_type))
+        wrong = declarations.faults(declarations.source_of(arcor2_bench.object_type))
         assert not wrong, "; ".join(wrong)
         assert not arcor2_bench.object_type.abstract()
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from arcor2_hw.kinematics import meshes, source
+from arcor2_hw.kinematics import meshes, model_package
 from arcor2_hw.kinematics.errors import BadMesh, JointLoop, MissingMesh, ModelError, UnsafeDescription, ZeroLength
 from arcor2_hw.kinematics.meshes import read_mesh
 from arcor2_hw.kinematics.model import RobotModel
@@ -174,7 +174,7 @@ def test_packages_that_are_none_or_not_safe(tmp_path: Path, monkeypatch: pytest.
     (tmp_path / "arm" / "arm.stl").symlink_to(tmp_path / "secret")
     with pytest.raises(UnsafeDescription, match=r"arm\.stl is a link to a file outside"):
         RobotModel.load(tmp_path / "arm")
-    monkeypatch.setattr(source, "MAX_PACKAGE", 100)
+    monkeypatch.setattr(model_package, "MAX_PACKAGE", 100)
     with pytest.raises(UnsafeDescription, match="larger than 100 bytes"):
         RobotModel.load(packed(a_dot_urdf=urdf(GOOD)))
 
@@ -280,10 +280,10 @@ def test_an_archive_that_lies_of_its_sizes_is_read_no_further_than_allowed() -> 
     content = bytearray(packed(a_dot_urdf=b" " * 3_000_000))
     honest = struct.pack("<I", 3_000_000)
     assert content.count(honest) == 4  # compressed and not, in the header and the directory
-    package = source.Package.open(bytes(content))
+    package = model_package.Package.open(bytes(content))
     with pytest.raises(UnsafeDescription, match="larger than 1000 bytes"):
         package.read("a.urdf", 1000)
-    lying = source.Package.open(bytes(content.replace(honest, struct.pack("<I", 500))))
+    lying = model_package.Package.open(bytes(content.replace(honest, struct.pack("<I", 500))))
     with pytest.raises(ModelError, match=r"damaged|larger than"):
         lying.read("a.urdf", 1000)
 

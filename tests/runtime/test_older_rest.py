@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from arcor2_hw.actions import action, deadline_of
-from arcor2_hw.actions.marking import DEFAULT_DEADLINE, OLDER_DEADLINE, StrEnum
+from arcor2_hw.actions.decorator import DEFAULT_DEADLINE, OLDER_DEADLINE, StrEnum
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import ActionMetadata
 from arcor2_hw.exceptions import DeviceError

@@ -8,9 +8,9 @@ import pytest
 
 from arcor2_hw.data.device import Identity
 from arcor2_hw.testing import report, rules
+from arcor2_hw.testing.addresses import places
 from arcor2_hw.testing.conformance import Conformance
 from arcor2_hw.testing.outcomes import Kind, Outcomes, judge
-from arcor2_hw.testing.places import places
 from arcor2_hw.testing.quality import Level, Quality, VersionsTried
 from arcor2_hw.testing.report import CaseResult, DeviceRun, Report, origin
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from arcor2_hw.analysis import SourceFile
-from arcor2_hw.testing import described
+from arcor2_hw.testing import declarations
 from arcor2_hw.testing.conformance import Conformance
 
 HERE = Path(__file__).parent
@@ -134,7 +134,7 @@ def test_a_quality_file_that_is_not_in_order_is_named(tmp_path: Path, old: str, 
     assert old in QUALITY
     (tmp_path / "quality.yaml").write_text(QUALITY.replace(old, new))
     source = (PACKAGE / "toy_press.py").read_bytes()
-    wrong = described.faults(SourceFile("ToyPress", "broken.toy_press", source, str(tmp_path / "toy_press.py")))
+    wrong = declarations.faults(SourceFile("ToyPress", "broken.toy_press", source, str(tmp_path / "toy_press.py")))
     assert len(wrong) == 1
     assert told in wrong[0]
 

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from arcor2_hw.data.cell import Cell, exported, read_cell, write_cell
-from arcor2_hw.data.found import Checked
+from arcor2_hw.data.discovery import Checked
 from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.cli.server_connection import HERE, Server, run

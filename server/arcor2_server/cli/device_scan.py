@@ -8,7 +8,7 @@ import msgspec
 from cyclopts import Parameter
 from rich.table import Table
 
-from arcor2_hw.data.found import Found
+from arcor2_hw.data.discovery import Found
 from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.cli.tables import console
 

@@ -1,6 +1,6 @@
 """A workplace of the size that people have, to build a package from: every kind of argument, two branches, a join."""
 
-from arcor2_hw.actions.marking import StrEnum
+from arcor2_hw.actions.decorator import StrEnum
 from arcor2_hw.analysis import Enumeration
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.geometry import Orientation, Pose, Position

@@ -22,7 +22,7 @@ _SHARP: Final = 1.4
 
 
 @dataclass(frozen=True)
-class Sighting:
+class Detection:
     """Detected targets, and the blur: standard deviation of edges, px, 0 where it could not be measured."""
 
     seen: list[Seen]
@@ -30,7 +30,7 @@ class Sighting:
 
 
 @dataclass
-class _Look:
+class _ImageContent:
     """Content of one image.
 
     Attributes:
@@ -49,7 +49,9 @@ class _Look:
     strangers: set[int] = field(default_factory=set)
 
 
-def sight_of(greys: Sequence[Grey], lens: Lens, layout: Layout, blur_threshold: float, largest_blur: float) -> Sighting:
+def detect_layout(
+    greys: Sequence[Grey], lens: Lens, layout: Layout, blur_threshold: float, largest_blur: float
+) -> Detection:
     """Find the targets of a layout in images.
 
     Raises:
@@ -63,35 +65,35 @@ def sight_of(greys: Sequence[Grey], lens: Lens, layout: Layout, blur_threshold: 
         raise CalibrationRefused(
             "No marker is configured. Configure the markers and their poses.", reason=Reason.NO_MARKER
         )
-    looks = []
+    contents = []
     for picture, grey in enumerate(greys):
         name = "The picture" if len(greys) == 1 else f"Picture {picture}"
-        look = _in_picture(grey, picture, lens, layout, name)
-        _check_sharp(grey, look, name, blur_threshold, largest_blur)
-        looks.append(look)
-    seen = [each for look in looks for each in look.seen]
+        content = _in_picture(grey, picture, lens, layout, name)
+        _check_sharp(grey, content, name, blur_threshold, largest_blur)
+        contents.append(content)
+    seen = [each for content in contents for each in content.seen]
     if not seen:
-        raise CalibrationRefused(_missing(layout, looks), reason=Reason.NO_MARKER)
-    blurs = [blur for look in looks for blur in look.blurs]
-    return Sighting(seen, float(np.median(blurs)) if blurs else 0.0)
+        raise CalibrationRefused(_missing(layout, contents), reason=Reason.NO_MARKER)
+    blurs = [blur for content in contents for blur in content.blurs]
+    return Detection(seen, float(np.median(blurs)) if blurs else 0.0)
 
 
-def _check_sharp(grey: Grey, look: _Look, name: str, blur_threshold: float, largest_blur: float) -> None:
+def _check_sharp(grey: Grey, content: _ImageContent, name: str, blur_threshold: float, largest_blur: float) -> None:
     """Require a sharp image.
 
     Raises:
         CalibrationRefused: It is blurred.
     """
-    relative = [blur / min(largest_blur, max(_RESOLVED * cell, _SHARP)) for blur, cell in look.widths]
+    relative = [blur / min(largest_blur, max(_RESOLVED * cell, _SHARP)) for blur, cell in content.widths]
     if relative and np.median(relative) > 1.0:
         raise CalibrationRefused(
-            f"{name} is blurred: the markers' edges are {np.median([blur for blur, _ in look.widths]):.1f} px wide. Is "
-            "the camera in focus, and did it stand still?",
+            f"{name} is blurred: the markers' edges are {np.median([blur for blur, _ in content.widths]):.1f} px wide."
+            " Check the focus, and hold the camera still.",
             f"at most {largest_blur:.1f} px, and a quarter of a cell",
             Reason.BLURRED,
         )
     # Sharp edges were measured, or something was at least recognized: sharpness is not what is missing.
-    if look.blurs or ((look.strangers or look.pieces) and not look.unclear):
+    if content.blurs or ((content.strangers or content.pieces) and not content.unclear):
         return
     if (sharpness := sharpness_of(grey)) < blur_threshold:
         raise CalibrationRefused(
@@ -101,7 +103,7 @@ def _check_sharp(grey: Grey, look: _Look, name: str, blur_threshold: float, larg
         )
 
 
-def _in_picture(grey: Grey, picture: int, lens: Lens, layout: Layout, name: str) -> _Look:
+def _in_picture(grey: Grey, picture: int, lens: Lens, layout: Layout, name: str) -> _ImageContent:
     """Detect and measure the targets in one image."""
     found: dict[MarkerDictionary, list[tuple[int, Array]]] = {}
     for dictionary in {layout.dictionary} | {board.dictionary for board in layout.boards}:
@@ -110,31 +112,31 @@ def _in_picture(grey: Grey, picture: int, lens: Lens, layout: Layout, name: str)
         found[dictionary] = detect(grey, dictionary, enough or min(2, len(layout.markers)))
     listed = {marker.marker_id: marker for marker in layout.markers}
     own = [each for each in found[layout.dictionary] if each[0] in listed]
-    look = _Look()
+    content = _ImageContent()
     for each in measured(grey, lens, layout.dictionary, own):
         marker = listed[each.number]
         if not np.isfinite(each.blur):
-            look.unclear.add(each.number)
+            content.unclear.add(each.number)
             continue
         size = float(marker.size) if isinstance(marker.size, float | int) else layout.size
-        look.seen.append(_seen_marker(each, marker.pose.matrix(), size, picture))
-        look.widths.append((each.blur, each.cell))
-    numbers = [each.key[1] for each in look.seen]
+        content.seen.append(_seen_marker(each, marker.pose.matrix(), size, picture))
+        content.widths.append((each.blur, each.cell))
+    numbers = [each.key[1] for each in content.seen]
     for number in set(numbers):
         if numbers.count(number) > 1:
             raise CalibrationRefused(
                 f"{name} shows marker {number} {numbers.count(number)} times: remove or cover the others.",
                 reason=Reason.IMPLAUSIBLE,
             )
-    look.blurs = [blur for blur, _ in look.widths]
+    content.blurs = [blur for blur, _ in content.widths]
     known = {(layout.dictionary, number) for number, _ in own}
     for index, board in enumerate(layout.boards):
         own_numbers = {(board.dictionary, number) for number, _ in found[board.dictionary]} & _numbers_of(board)
-        look.pieces |= bool(own_numbers)
+        content.pieces |= bool(own_numbers)
         known |= own_numbers
-        _look_for_board(look, grey, lens, board, index, picture, found[board.dictionary])
-    look.strangers = {n for dictionary, each in found.items() for n, _ in each if (dictionary, n) not in known}
-    return look
+        _detect_board(content, grey, lens, board, index, picture, found[board.dictionary])
+    content.strangers = {n for dictionary, each in found.items() for n, _ in each if (dictionary, n) not in known}
+    return content
 
 
 def _numbers_of(board: CharucoBoard) -> set[tuple[MarkerDictionary, int]]:
@@ -143,15 +145,21 @@ def _numbers_of(board: CharucoBoard) -> set[tuple[MarkerDictionary, int]]:
     return {(board.dictionary, number) for number in range(board.first_id, board.first_id + count)}
 
 
-def _look_for_board(
-    look: _Look, grey: Grey, lens: Lens, board: CharucoBoard, index: int, picture: int, found: list[tuple[int, Array]]
+def _detect_board(
+    content: _ImageContent,
+    grey: Grey,
+    lens: Lens,
+    board: CharucoBoard,
+    index: int,
+    picture: int,
+    found: list[tuple[int, Array]],
 ) -> None:
     """Measure a board if it is visible."""
     made = board_of(board)
     fine = measured_board(grey, lens, board, made, found)
     if fine is not None:
         pixels, points, root = fine[0].corners, fine[1], _root_of(fine[0])
-        look.blurs.append(fine[0].blur)
+        content.blurs.append(fine[0].blur)
     else:
         points, pixels = seen_of_board(grey, board, made, found)
         root = np.eye(2 * len(points)) / CORNER_DEVIATION
@@ -159,7 +167,7 @@ def _look_for_board(
         placed = board.pose.matrix()
         in_origin = points @ placed[:3, :3].T + placed[:3, 3]
         key = ("board", index)
-        look.seen.append(Seen(f"board {index}", key, picture, in_origin, pixels, root, placed[:3, 2], placed[:3, 3]))
+        content.seen.append(Seen(f"board {index}", key, picture, in_origin, pixels, root, placed[:3, 2], placed[:3, 3]))
 
 
 def _root_of(each: Measured) -> Array:
@@ -185,18 +193,18 @@ def _seen_marker(each: Measured, origin_from_marker: Array, size: float, picture
     )
 
 
-def _missing(layout: Layout, looks: Sequence[_Look]) -> str:
+def _missing(layout: Layout, contents: Sequence[_ImageContent]) -> str:
     """Return a message that no target was visible, and what was visible instead."""
     wanted = [f"marker {marker.marker_id}" for marker in layout.markers[:8]]
     wanted += [f"a board of {board.columns} × {board.rows} squares" for board in layout.boards]
-    unclear = sorted({number for look in looks for number in look.unclear})
-    others = sorted({number for look in looks for number in look.strangers})
+    unclear = sorted({number for content in contents for number in content.unclear})
+    others = sorted({number for content in contents for number in content.strangers})
     if unclear:
         return (
             f"Marker {', '.join(map(str, unclear))} was recognized, but its edges cannot be measured. Check "
             "that it is large enough in the image, flat and not covered."
         )
-    if any(look.pieces for look in looks):
+    if any(content.pieces for content in contents):
         return (
             f"Too little is seen of {' and '.join(wanted)}: only some of its markers. Move the camera "
             "nearer, and uncover it."
