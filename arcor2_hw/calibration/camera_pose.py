@@ -168,7 +168,9 @@ def _check_known(found: Found, position: float, options: PoseOptions) -> None:
         return
     only = len({each.key for each in found.seen} - found.left_out) == 1
     first = found.seen[0]
-    what = f"Only {first.name} is seen, from nearly straight ahead or far away" if only else "The markers are far away"
+    what = (
+        f"Only {first.name} is visible, from nearly straight ahead or far away" if only else "The markers are far away"
+    )
     raise CalibrationRefused(
         f"{what}: the camera's position would be known to {position * 1000:.0f} mm only. What helps: a second marker, "
         "a larger one, a view from the side or from nearer, the direction of gravity, or where the camera roughly is.",
@@ -197,16 +199,16 @@ def _verdict(
     for name in sorted({e.name for e in errors if not e.used}):
         worst = max((e for e in errors if e.name == name), key=lambda e: e.residual)
         text += (
-            f" {name.capitalize()} was left out: it stands some "
-            f"{worst.residual * worst.distance / f * 1000:.0f} mm from where it is said to."
+            f" {name.capitalize()} was not used: it is about "
+            f"{worst.residual * worst.distance / f * 1000:.0f} mm from its configured pose."
         )
         grade = Grade.USABLE
     if len(places) == 1 and markers == 1:
-        text += " One marker alone: nothing checks where it stands."
+        text += " With only one marker, its pose cannot be checked."
         grade = Grade.USABLE
     elif residual > 0.5:
         off = max(e.residual * e.distance / f for e in errors if e.used)
-        text += f" The markers' places do not quite agree with each other, by some {off * 1000:.1f} mm."
+        text += f" The poses of the markers differ from each other by about {off * 1000:.1f} mm."
         grade = Grade.USABLE
     return grade, text
 

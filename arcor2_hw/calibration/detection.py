@@ -209,7 +209,7 @@ def _missing(layout: Layout, contents: Sequence[_ImageContent]) -> str:
             f"Too little is seen of {' and '.join(wanted)}: only some of its markers. Move the camera "
             "nearer, and uncover it."
         )
-    text = f"None of what is configured is in sight: {', '.join(wanted)}."
+    text = f"No configured marker or board is visible: {', '.join(wanted)}."
     if others:
-        text += f" There are markers that are not configured: {', '.join(map(str, others[:8]))}."
+        text += f" The image has markers that are not configured: {', '.join(map(str, others[:8]))}."
     return text

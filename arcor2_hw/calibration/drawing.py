@@ -97,9 +97,9 @@ def error_picture(
             arrow(field, corner * scale, corner * scale + np.clip(error * larger, -200, 200), colour)
     cv2.rectangle(canvas, (0, _HEAD), (_WIDTH - 1, _HEAD + height - 1), FRAME, 1)
     write(canvas, title, (10, 26), size=0.6)
-    write(canvas, f"Arrows: errors, {larger:.0f} times as long as they are. Grey: left out.", (10, 50))
+    write(canvas, f"Arrows: errors, enlarged {larger:.0f} times. Grey: not used.", (10, 50))
     _bars(canvas[_HEAD:, _WIDTH:], views)
-    write(canvas, "r.m.s. error per picture, px", (_WIDTH + 12, 50))
+    write(canvas, "rms error per picture, px", (_WIDTH + 12, 50))
     return png_of(canvas)
 
 

@@ -93,7 +93,7 @@ def find_hand_eye(
                 stations.append(Station(index, hand, seen))
                 eyes.append(found.pose)
             else:
-                problems[index] = "the target is too far away, or seen from the front"
+                problems[index] = "the target is too far away, or seen only from the front"
         if progress is not None:
             progress(index + 1, len(samples))
     assert lens is not None
@@ -102,7 +102,7 @@ def find_hand_eye(
     best, methods = _solve(lens, stations, eyes, options)
     while (worst := _outlier(best)) is not None and len(stations) > max(FEWEST, len(samples) // 2):
         problems[stations[worst].index] = (
-            f"it contradicts the others by {_root_mean_square(best.errors[worst]):.1f} px: did the arm still move?"
+            f"it contradicts the others by {_root_mean_square(best.errors[worst]):.1f} px: was the arm still moving?"
         )
         stations = [each for i, each in enumerate(stations) if i != worst]
         eyes = [each for i, each in enumerate(eyes) if i != worst]
@@ -245,12 +245,12 @@ def _result(
     where = "on the flange" if mounting == "eye_in_hand" else "beside the robot"
     count = len(stations)
     verdict = (
-        f"The camera's place {where} is known to {position * 1000:.1f} mm and its direction to "
+        f"The camera's position {where} is known to {position * 1000:.1f} mm and its direction to "
         f"{math.degrees(orientation):.2f}° (standard deviations; {count} pictures, residual {residual:.2f} px)."
     )
     grade = Grade.GOOD if position <= _GOOD and count >= 8 else Grade.USABLE
     if count < 8:
-        verdict += " Ten pictures or more would make it better."
+        verdict += " Ten pictures or more improve the result."
     if problems:
         verdict += f" {len(problems)} of {count + len(problems)} pictures could not be used."
     views = [(f"sample {s.index}", s.pixels, e, True) for s, e in zip(stations, best.errors, strict=True)]

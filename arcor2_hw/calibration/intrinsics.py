@@ -117,10 +117,12 @@ def _check_enough(
     """
     if len(views) < options.fewest_views:
         if not views:
-            reason, text = Reason.NO_MARKER, "The board is in none of the pictures: is it the one that was described?"
+            reason, text = Reason.NO_MARKER, "The board is in none of the pictures. Check its description."
         else:
             reason = Reason.TOO_FEW_POINTS
-            text = f"The board is seen well in {len(views)} pictures only; {options.fewest_views} are the least."
+            text = (
+                f"The board is well visible in {len(views)} pictures only; at least {options.fewest_views} are needed."
+            )
         first = next((f"picture {index}: {problem}" for index, problem in problems.items()), "")
         raise CalibrationRefused(text, first, reason)
     covered = coverage_of([view.pixels for view in views], size)
@@ -257,16 +259,16 @@ def _verdict(
 ) -> tuple[Grade, str]:
     """Return how good intrinsics are, and what would improve them."""
     text = (
-        f"The focal length is known to {focal_px:.1f} px and the middle of the picture to {centre:.1f} px (standard "
+        f"The focal length is known to {focal_px:.1f} px and the principal point to {centre:.1f} px (standard "
         f"deviations, {used} of {pictures} pictures, residual {residual:.2f} px, corners in {covered:.0%} of it)."
     )
     grade = Grade.GOOD
     if focal > _GOOD:
-        text += " More pictures of a tilted board would make it better."
+        text += " More pictures of a tilted board improve the result."
         grade = Grade.USABLE
     if covered < 0.7:
-        text += " Some of the picture's edge was never covered; there the lens is guessed."
+        text += " Parts of the picture's edge were never covered; the lens is extrapolated there."
         grade = Grade.USABLE
     if used < pictures:
-        text += f" {pictures - used} {'pictures were' if pictures - used > 1 else 'picture was'} left out."
+        text += f" {pictures - used} {'pictures were' if pictures - used > 1 else 'picture was'} not used."
     return grade, text

@@ -102,7 +102,7 @@ def solve(problem: PoseProblem, options: PoseOptions) -> Solution:
         found = sorted((each for each in again if each), key=lambda each: each.cost)
     allowed = [each for each in found if _allowed(each.pose, options)]
     if not allowed:
-        what = "lies below where it can be" if found else "could not be found"
+        what = "is below its minimum height" if found else "could not be found"
         raise CalibrationRefused(
             f"The position of the camera according to the picture is impossible: it {what}.",
             "" if not found else f"z = {inverted(found[0].pose)[2, 3]:.3f} m, at least {options.lowest} m",

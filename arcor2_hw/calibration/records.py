@@ -38,12 +38,12 @@ def check_against(
     if not (math.isfinite(distance) and math.isfinite(angle)):
         raise InvalidData("The measured pose is not finite.")
     passed = distance <= distance_limit and angle <= angle_limit
-    figures = f"{distance * 1e3:.1f} mm and {math.degrees(angle):.2f}°"
+    difference = f"{distance * 1e3:.1f} mm and {math.degrees(angle):.2f}°"
     limits = f"{distance_limit * 1e3:.1f} mm and {math.degrees(angle_limit):.2f}°"
     verdict = (
-        f"{record.object_name} still stands as calibrated on {record.date[:10]}: {figures} off, allowed are {limits}."
+        f"{record.object_name} is still as calibrated on {record.date[:10]}: {difference} off, within {limits}."
         if passed
-        else f"{record.object_name} is {figures} away from the calibration of {record.date[:10]}, allowed are {limits}:"
-        " calibrate it again, or find out what was moved."
+        else f"{record.object_name} differs by {difference} from the calibration of {record.date[:10]}, "
+        f"more than {limits}: calibrate it again, or check what was moved."
     )
     return CalibrationCheck(record.id, now(), distance, angle, distance_limit, angle_limit, passed, verdict)

@@ -203,12 +203,12 @@ def _refuse_ambiguous(surface: RobotSurface, ends: list[End]) -> None:
 
 def _verdict(name: str, found: Compared, deviations: tuple[float, ...], moved: float, turned: float) -> str:
     sentence = (
-        f"{name} stands {moved * 1e3:.0f} mm and {math.degrees(turned):.1f}° from where it was taken to; this is known"
+        f"{name} is {moved * 1e3:.0f} mm and {math.degrees(turned):.1f}° from its assumed pose, known"
         f" to {deviations[0] * 1e3:.1f} mm and {math.degrees(deviations[1]):.2f}°."
         f" The picture confirms {found.confirmed:.0%} of what should be seen."
     )
     if found.uneven > UNEVEN[0]:
-        sentence += f" Parts of it are {found.uneven * 1e3:.0f} mm off: are the joints and the model the robot's?"
+        sentence += f" Parts of it are {found.uneven * 1e3:.0f} mm off: check its joints and its model."
     if found.occluded > 0.2:
-        sentence += f" {found.occluded:.0%} is hidden by something else."
+        sentence += f" {found.occluded:.0%} is hidden."
     return sentence

@@ -73,7 +73,7 @@ def frame_by_axes(origin: Position, on_x: Position, in_plane: Sequence[Position]
     base_from_frame[:3, :3] = np.column_stack([x, np.cross(normal, x), normal])
     base_from_frame[:3, 3] = points[0] - heights[0] * normal
     residuals = np.abs(heights) if checked else np.zeros(len(points))
-    _refuse_misfit(residuals, points, "The points do not lie in one plane")
+    _refuse_misfit(residuals, points, "The points are not in one plane")
     deviation = 0.0
     if checked:
         deviation = float(np.sqrt((heights @ heights) / (len(points) - 3)) / spread[1])
@@ -110,7 +110,7 @@ def frame_by_points(known: Sequence[Position], touched: Sequence[Position]) -> T
     rotation = u @ np.diag([1.0, 1.0, math.copysign(1.0, float(np.linalg.det(u @ vt)))]) @ vt
     errors = b - a @ rotation.T
     residuals = np.linalg.norm(errors, axis=1)
-    _refuse_misfit(residuals, ours, "What was touched has another shape than the known points")
+    _refuse_misfit(residuals, ours, "The touched points have another shape than the known points")
     base_from_frame = np.eye(4)
     base_from_frame[:3, :3] = rotation
     base_from_frame[:3, 3] = theirs.mean(axis=0) - rotation @ ours.mean(axis=0)
@@ -165,7 +165,7 @@ def tip_by_touches(flange: Sequence[Pose]) -> TouchedTip:
         f"The tip is known to {deviation * 1e3:.2f} mm; the {count} touches agree to {residual * 1e3:.2f} mm."
         if good
         else f"The tip is known to {deviation * 1e3:.2f} mm only: the {count} touches agree to {residual * 1e3:.2f} mm,"
-        f" touch {worst + 1} is worst. More touches, or orientations that differ more, make it better."
+        f" touch {worst + 1} is worst. More touches, or orientations that differ more, improve the result."
     )
     return TouchedTip(
         position=_position(solution[:3]),
@@ -209,7 +209,7 @@ def orientation_by_alignment(flange: Sequence[Orientation], reference: Orientati
     if checked:
         verdict = f"The {len(tools)} alignments agree to {math.degrees(residual):.2f}°."
     else:
-        verdict = "The tool's orientation follows from one alignment, which nothing checks: align it once more."
+        verdict = "The orientation follows from one alignment and cannot be checked. Align the tool once more."
     return TouchedOrientation(
         mean, Grade.GOOD if good else Grade.USABLE, verdict, residuals.tolist(), residual, worst, checked
     )
@@ -242,8 +242,8 @@ def orientation_by_points(flange: Orientation, tip: Position, along_z: Position,
     x /= np.linalg.norm(x)
     base_from_tool = Orientation.from_matrix(np.column_stack([x, np.cross(z, x), z]))
     verdict = (
-        f"The tool's z is as moved, x was {math.degrees(off):.1f}° off square to it and was made square;"
-        " nothing else checks them."
+        f"The tool's z is the direction of the move. Its x was {math.degrees(off):.1f}° off a right "
+        "angle and was corrected. Nothing else checks them."
     )
     return TouchedOrientation(flange.inverted() * base_from_tool, Grade.USABLE, verdict, [off], off, 0, False)
 
@@ -291,7 +291,7 @@ def _frame(matrix: Floats, residuals: Floats, checked: bool, deviation: float, a
     residual, worst = _rms(residuals), int(np.argmax(residuals))
     good = checked and residual <= FITS
     if not checked:
-        verdict = f"The three points determine the frame; nothing checks them. {advice}"
+        verdict = f"The three points determine the frame, but cannot be checked. {advice}"
     elif good:
         verdict = f"The {len(residuals)} points agree to {residual * 1e3:.2f} mm."
     else:

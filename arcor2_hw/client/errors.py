@@ -91,7 +91,9 @@ class AnswerUnknown(ConnectionLost):
     code = "answer_unknown"
 
     def __init__(self, request: str, url: str) -> None:
-        super().__init__(f"The connection to {url} broke before {request} was answered: it may or may not be done.")
+        super().__init__(
+            f"The connection to {url} broke before {request} was answered: it may or may not have been executed."
+        )
         self.request = request
 
 
@@ -121,7 +123,7 @@ class EventsMissed(Arcor2Error):
     def __init__(
         self, dropped: int = 0, *, rejoined: bool = False, seconds: float = 0.0, not_resumed: tuple[str, ...] = ()
     ) -> None:
-        what = [f"{dropped} events were not taken in time or could not be read"] if dropped else []
+        what = [f"{dropped} events were not read in time or were invalid"] if dropped else []
         what += [f"the connection was lost for {seconds:.1f} s"] if rejoined else []
         super().__init__(f"Events are missing: {' and '.join(what)}.")
         self.dropped = dropped

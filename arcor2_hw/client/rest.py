@@ -343,5 +343,5 @@ def _refusal(request: str, status: int, content: bytes) -> RequestFailed:
     try:
         text = str(msgspec.json.decode(content, type=dict[str, Any])["message"])
     except (msgspec.MsgspecError, KeyError):
-        text = f"{request} is answered {status}."
+        text = f"{request} was answered with status {status}."
     return STATUSES.get(status, RequestFailed)(request, [text], reason=str(status))

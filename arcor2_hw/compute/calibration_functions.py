@@ -15,7 +15,7 @@ def camera_pose(task: t.FindCameraPose, state: WorkerState) -> CameraPose:
     """Find the pose of a camera in the frame of the origin."""
     from arcor2_hw.calibration.camera_pose import find_camera_pose
 
-    state.progress(0.0, "looking for markers")
+    state.progress(0.0, "searching for markers")
     return find_camera_pose(task.pictures, task.parameters, task.layout, task.options)
 
 
@@ -71,7 +71,7 @@ def robot_pose(task: t.FindRobotPose, state: WorkerState) -> RobotPose:
 
     if not task.depth:
         raise InvalidData("The pose of a robot needs at least one depth image. Take one, then try again.")
-    state.progress(0.0, "reading the depth pictures")
+    state.progress(0.0, "reading the depth images")
     depth = [read_depth(picture) for picture in task.depth]
     if len({picture.shape for picture in depth}) > 1:
         raise InvalidData("The depth images have different sizes. Take all of them with the same camera settings.")
@@ -79,7 +79,7 @@ def robot_pose(task: t.FindRobotPose, state: WorkerState) -> RobotPose:
     surface = surface_of(state.robot(task.robot), task.joints)
     if task.robot.called:
         surface = replace(surface, name=task.robot.called)
-    state.progress(0.3, "looking for the robot")
+    state.progress(0.3, "searching for the robot")
     options = RobotPoseOptions(within=task.distance, angle_within=task.angle)
     return find_robot_pose(surface, np.stack(depth), task.parameters, task.camera_pose, task.robot.base, options)
 

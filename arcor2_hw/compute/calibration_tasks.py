@@ -45,7 +45,7 @@ class DrawCameraPose(Task[bytes], frozen=True):
     result_type: ClassVar = bytes
     function: ClassVar = f"{_FUNCTIONS}:drawn_camera_pose"
     worker: ClassVar = WorkerKind.CALIBRATION
-    label: ClassVar = "the picture of a camera's pose"
+    label: ClassVar = "the image of a camera's pose"
 
     picture: bytes
     parameters: CameraParameters

@@ -161,7 +161,7 @@ class PlaceInLink(Task[Pose], frozen=True):
     result_type: ClassVar = Pose
     function: ClassVar = f"{_FUNCTIONS}:placed_in_link"
     worker: ClassVar = WorkerKind.KINEMATICS
-    label: ClassVar = "where a held object is"
+    label: ClassVar = "the pose of a gripped part"
 
     model: RobotSource
     joints: list[Joint]

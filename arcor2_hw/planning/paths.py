@@ -97,12 +97,12 @@ class _Line:
         return not self._turns or at.orientation.angle_to(wanted.orientation) <= OFF_TURN
 
     def _why(self, q: Array, share: float, after: Array | None) -> str:
-        where = f"{self._name} cannot go straight: {share * self._length:.3f} m on its way "
+        where = f"{self._name} cannot go straight: {share * self._length:.3f} m along its line "
         if near := self._arm.near_limits(q):
             return where + f"{', '.join(near)} would leave {'its limit' if len(near) == 1 else 'their limits'}."
         if self._arm.smallest(q) < NEAR_SINGULAR:
-            return where + "it comes to a singularity, where joints would have to turn over."
-        return where + ("its line leaves the reach." if after is None else "joints would have to turn over.")
+            return where + "it reaches a singularity, where joints would have to flip."
+        return where + ("the line is out of reach." if after is None else "joints would have to flip.")
 
 
 def free_line(sweep: Sweep, start: Array, target: Array, name: str = "") -> list[Array]:
@@ -133,7 +133,7 @@ def require_free(sweep: Sweep, way: Sequence[Array], name: str) -> None:
     """
     if (hit := sweep.first_hit(way)) is not None:
         length = float(np.linalg.norm(sweep.arm.forward(way[-1])[:3, 3] - sweep.arm.forward(way[0])[:3, 3]))
-        where = f"{hit.share * length:.3f} m on its way"
+        where = f"{hit.share * length:.3f} m along its line"
         raise MotionInCollision(f"{name} cannot go straight: {where} it is in collision: {hit.what}.")
 
 

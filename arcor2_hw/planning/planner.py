@@ -110,7 +110,7 @@ class Planner:
         """
         self._check(goal, "to", 1e-4)
         if hit := self.sweep.hit(goal):
-            raise GoalInCollision(f"{self.name} would be in collision there: {hit}.")
+            raise GoalInCollision(f"{self.name} would be in collision at the goal: {hit}.")
         return self.to_any(start, [goal], within=within, seed=seed, stopped=stopped)
 
     def to_any(
@@ -125,7 +125,7 @@ class Planner:
         """Plan a path to the nearest possible of several collision-free goals; see `to_joints`."""
         self._check(start, "from", BEYOND)
         if hit := self.sweep.hit(start):
-            raise StartInCollision(f"{self.name} is in collision where it stands: {hit}.")
+            raise StartInCollision(f"{self.name} is in collision at the start: {hit}.")
         goals = sorted(goals, key=lambda q: self._length([start, q]))[:MOST_GOALS]
         for goal in goals:
             if self.sweep.is_free_between(start, goal):
@@ -140,8 +140,8 @@ class Planner:
             if all(self.sweep.is_free_between(a, b) for a, b in itertools.pairwise(way)):
                 return way
         between = self.sweep.first_hit([start, goals[0]])
-        hit = f"; straight there it meets {between.what}" if between is not None else ""
-        raise NoPath(f"{self.name} found no way free of collision within {within:g} s{hit}.")
+        hit = f"; the direct path meets {between.what}" if between is not None else ""
+        raise NoPath(f"{self.name} found no collision-free path within {within:g} s{hit}.")
 
     def _check(self, q: Array, which: str, slack: float) -> None:
         if q.shape != (self.arm.dof,) or not np.isfinite(q).all():

@@ -149,7 +149,7 @@ def test_a_marker_that_was_moved_is_left_out_and_named() -> None:
     assert off(found, ASLANT)[0] < 1.0
     assert [error.name for error in found.markers if not error.used] == ["marker 42"]
     assert found.grade == Grade.USABLE
-    assert "Marker 42 was left out" in found.verdict
+    assert "Marker 42 was not used" in found.verdict
     stated = float(found.verdict.split("some ")[1].split(" mm")[0])
     assert 6 <= stated <= 14
 

@@ -98,7 +98,7 @@ def test_views_and_picture_are_told() -> None:
     assert not result.views[0].used
     assert "not visible" in result.views[0].problem
     assert all(view.corners >= 6 and view.residual < 0.3 for view in result.views[1:])
-    assert "1 picture was left out" in result.verdict
+    assert "1 picture was not used" in result.verdict
     assert cv2.imdecode(np.frombuffer(result.picture, np.uint8), cv2.IMREAD_COLOR).std() > 5
 
 

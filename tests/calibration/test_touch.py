@@ -44,7 +44,7 @@ def test_three_points_determine_the_frame_and_are_said_to_be_unchecked(
     found = touch.frame_by_axes(frame.position, on_x, [aside])
     assert off(found.pose, frame) == pytest.approx((0, 0), abs=1e-6)
     assert (found.checked, found.grade) == (False, Grade.USABLE)
-    assert "nothing checks" in found.verdict
+    assert "cannot be checked" in found.verdict
 
 
 def test_further_points_of_the_plane_average_out_and_tell_how_good_it_is() -> None:

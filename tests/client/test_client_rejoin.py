@@ -36,7 +36,7 @@ INFO = {"version": "1", "api_version": "1"}
 async def test_an_edit_whose_answer_is_lost_is_not_sent_again() -> None:
     async with scripted() as server, Client(server.url, "ann") as client:
         server.script["AddActionPoint"] = [cut]
-        with pytest.raises(AnswerUnknown, match="may or may not be done") as unknown:
+        with pytest.raises(AnswerUnknown, match="may or may not have been executed") as unknown:
             await client.add_action_point(name="a", position=Position(0.0, 0.0, 0.0))
         assert unknown.value.request == "AddActionPoint"
         await client.save_project()  # waits until it is back

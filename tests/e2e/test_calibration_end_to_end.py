@@ -185,7 +185,7 @@ async def test_a_worker_that_is_killed_costs_the_calibration_that_it_was_at(worl
         await client.calibrate_robot(world.ids["arm"], move_to_calibration_pose=False)
         while True:
             event = await client.next_event("TaskState", timeout=60.0)
-            if event.data.message == "looking for the robot":
+            if event.data.message == "searching for the robot":
                 break
         for worker in world.workers():
             os.kill(worker.pid, signal.SIGKILL)

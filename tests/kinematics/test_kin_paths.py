@@ -64,9 +64,9 @@ def test_a_line_out_of_reach_or_through_a_singularity_is_refused_where_it_breaks
         straight_line(arm, READY, moved(here, 1.5, 0.0, 0.0).matrix())
     # Past the axis of the foot, where there is no room for a tool that points down.
     near = Pose(Position(-0.45, 0.12, here.position.z), here.orientation)
-    with pytest.raises(NoStraightLine, match=r"arm cannot go straight: 0\.\d+ m on its way"):
+    with pytest.raises(NoStraightLine, match=r"arm cannot go straight: 0\.\d+ m along its line"):
         straight_line(arm, READY, near.matrix(), "arm")
-    # Through the axis of the shoulder: the base would have to turn over.
+    # Through the axis of the shoulder: the base would have to flip.
     start = np.array((0.0, -2.2, 2.2, -1.57, -1.57, 0.0))
     over = arm.pose(start)
     beyond = Pose(Position(-over.position.x, -over.position.y, over.position.z), over.orientation)
@@ -95,7 +95,7 @@ def test_a_line_into_something_is_refused_and_told_where() -> None:
     there = moved(here, 0.0, 0.3, 0.0)
     assert len(free_line(sweep, READY, there.matrix())) > 2
     world.put("post", Box(0.02, 0.02, 0.3), Pose(here.position + Position(0.0, 0.2, 0.0)))
-    with pytest.raises(MotionInCollision, match=r"arm cannot go straight: 0\.1\d\d m on its way .*post"):
+    with pytest.raises(MotionInCollision, match=r"arm cannot go straight: 0\.1\d\d m along its line .*post"):
         free_line(sweep, READY, there.matrix(), "arm")
 
 

@@ -126,7 +126,7 @@ def test_no_way_is_refused_and_names_what_is_in_the_way() -> None:
     world = world_of(RobotModel.load(kin_robots.TWO_AXIS), fence=((0.17, 0.0, 0.0), (0.26, 0.006, 0.1)))
     start, goal = np.array((-1.2, 0.3)), np.array((1.2, -0.3))
     began = time.monotonic()
-    with pytest.raises(NoPath, match=r"within 0\.3 s; straight there it meets arm/link_\d and fence"):
+    with pytest.raises(NoPath, match=r"within 0\.3 s; the direct path meets arm/link_\d and fence"):
         Planner(Sweep(world, "arm", world.robot("arm").model.arm("tcp"), 0.004), "mini").to_joints(
             start, goal, within=0.3
         )

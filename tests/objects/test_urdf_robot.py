@@ -153,7 +153,7 @@ def test_down_to_a_table_that_it_stands_on_nearly(arm: Any, around: Around) -> N
 def test_refused_naming_why(arm: Any, around: Around) -> None:
     tip = BASE.inverted() * arm.forward_kinematics("tcp", joints(ACROSS))
     around.box("crate", tip.position, 0.1, 0.1, 0.1)
-    with pytest.raises(arm.KinematicsException, match="in collision there: plain/wrist_3_link and crate"):
+    with pytest.raises(arm.KinematicsException, match="in collision at the goal: plain/wrist_3_link and crate"):
         arm.move_to_joints(joints(ACROSS), 0.5)
     around.unknown = "second"
     with pytest.raises(Refused, match="The position of second is unknown"):
@@ -287,7 +287,7 @@ def test_no_way_is_a_refusal(arm: Any, around: Around, monkeypatch: pytest.Monke
     monkeypatch.setattr(safe_moves, "WITHIN", 0.3)
     fences(around)
     arm.now = joints(BEFORE)
-    with pytest.raises(arm.KinematicsException, match=r"plain found no way .* within 0\.3 s; .* and fence"):
+    with pytest.raises(arm.KinematicsException, match=r"plain found no .* within 0\.3 s; .* and fence"):
         arm.move_to_joints(joints(BEHIND), 0.5)
     assert arm.ways == []
 

@@ -95,7 +95,7 @@ def test_a_line_into_something_is_refused_and_nothing_moves(ready: UR5e, around:
     here = ready.get_end_effector_pose("tcp")
     there = Pose(here.position + Position(0.0, 0.25, 0.0), here.orientation)
     around.boxes["post"] = here.position + Position(0.0, 0.17, 0.05), (0.03, 0.03, 0.3)
-    with pytest.raises(ready.KinematicsException, match=r"ur cannot go straight: 0\.\d+ m on its way .* and post"):
+    with pytest.raises(ready.KinematicsException, match=r"ur cannot go straight: 0\.\d+ m along its line .* and post"):
         ready.move_to_pose("tcp", there, 1.0)
     assert np.allclose(fake.truth()["q"], HOME, atol=1e-6)
     del around.boxes["post"]

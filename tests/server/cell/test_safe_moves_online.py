@@ -71,7 +71,7 @@ async def test_around_a_mesh_or_refused(server: Server) -> None:
     assert (await move(server, inside, safe=False))["move_event_type"] == "end"
     stuck = await move(server, READY)
     assert stuck["move_event_type"] == "failed"
-    assert "where it stands" in str(stuck["message"])
+    assert "at the start" in str(stuck["message"])
 
 
 # ---------------------------------------------------------------------------------------------------- the same world

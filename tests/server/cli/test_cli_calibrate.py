@@ -205,7 +205,7 @@ def test_a_running_server_is_told_and_asked(files: Path, tmp_path: Path, calibra
             near.write_text("position: {x: 0.2515}")
             far.write_text("position: {x: 0.26}")
             ran = calibrate("online", "check", "cam", "--pose", near, *url)
-            assert (ran.status, "cam still stands as calibrated" in ran.out, "1.5 mm" in ran.out) == (0, True, True)
+            assert (ran.status, "cam is still as calibrated" in ran.out, "1.5 mm" in ran.out) == (0, True, True)
             ran = calibrate("online", "check", "cam", "--pose", far, "--record", kept["id"], *url)
             assert (ran.status, ran.out) == (ExitStatus.DIFFERENT, "")
             assert "cam is 10.0 mm" in ran.err
