@@ -94,7 +94,7 @@ def test_types_and_actions_are_shown_as_the_class_says(library: Library) -> None
     assert shown == {"heat": ("Heat", "grill"), "open": ("Door", "door-open"), "close": (UNSET, UNSET)}
     (close,) = [action for action in oven.actions if action.name == "close"]
     assert close.disabled
-    assert "'Door Open' is no icon" in str(close.problem)
+    assert "'Door Open' is not a valid icon" in str(close.problem)
     robot = library.analyse("Robot").meta
     assert (robot.category, robot.icon) == ("Robots", "robot")
 
