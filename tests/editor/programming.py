@@ -78,7 +78,7 @@ class Work:
         self.taps = 0
 
     async def _open_id(self) -> str:
-        """The id of the open project, as a client that connects now is told."""
+        """Return the id of the open project, as the server sends it to a new client."""
         async with Client(self.cell.url, "observer", reconnect=False) as observer:
             event = await observer.next_event("OpenProject", "OpenScene", "ShowMainScreen", timeout=10)
             return str(event.data.project.id) if event.event == "OpenProject" else ""

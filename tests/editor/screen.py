@@ -209,7 +209,7 @@ async def screen_of(
             with contextlib.suppress(Error):
                 await screen.picture("failed")
             raise
-        assert not (told := screen.unexpected()), f"the page told errors: {told}"
+        assert not (errors := screen.unexpected()), f"the page logged errors: {errors}"
     finally:
         with contextlib.suppress(Error):  # the browser has crashed; the test fails already
             await context.close()

@@ -207,9 +207,9 @@ async def test_camera_and_robot_are_calibrated_from_pictures(
         assert millimetres < 2.0
         assert degrees < 0.2
         change = panel.get_by_role("group", name="Before and after")
-        told = re.search(r"It stands ([\d.]+) mm and [\d.]+° from", await change.inner_text())
-        assert told is not None
-        assert abs(float(told[1]) - off(before, CAMERA)[0]) < 2.0
+        moved = re.search(r"It stands ([\d.]+) mm and [\d.]+° from", await change.inner_text())
+        assert moved is not None
+        assert abs(float(moved[1]) - off(before, CAMERA)[0]) < 2.0
         assert await screen.faults() == []
         await screen.picture("calibrated camera")
         # Undo the calibration, and repeat it.

@@ -73,8 +73,8 @@ async def test_crosshair_selects_near_and_hidden_objects(place: Place, browser: 
         await page.evaluate("([from, to]) => __engine.view.set(from, to)", below)
         await bar.get_by_role("button", name="Select feeder", exact=True).wait_for()
         # Other users are notified of the target before anything is selected.
-        told = await _presence(client, lambda told: told.aimed == point.id)
-        assert list(told.selected) == []
+        presence = await _presence(client, lambda presence: presence.aimed == point.id)
+        assert list(presence.selected) == []
         assert await page.evaluate(_UNDER_THE_MIDDLE) != point.id, "nothing is in front"
 
         # Two keys select the next best target; taps do the same.
@@ -85,7 +85,7 @@ async def test_crosshair_selects_near_and_hidden_objects(place: Place, browser: 
         assert second != "feeder"
         await page.keyboard.press("Enter")
         await _headed(screen, second)
-        selected = (await _presence(client, lambda told: len(told.selected) == 1)).selected[0]
+        selected = (await _presence(client, lambda presence: len(presence.selected) == 1)).selected[0]
         assert (await screen.item(selected))["name"] == second
         await page.keyboard.press("Shift+N")
         await bar.get_by_role("button", name="Select feeder", exact=True).click()
@@ -114,9 +114,9 @@ async def test_crosshair_selects_near_and_hidden_objects(place: Place, browser: 
 
 async def _presence(client: Client, fits: Callable[[Any], bool]) -> Any:
     """Return the next presence of a user that fits."""
-    while not ((told := (await client.next_event("UserPresence", timeout=10)).data.presence) and fits(told)):
+    while not ((presence := (await client.next_event("UserPresence", timeout=10)).data.presence) and fits(presence)):
         pass
-    return told
+    return presence
 
 
 _UNDER_THE_MIDDLE = """() => {

@@ -110,13 +110,13 @@ async def test_diagnosis_file_is_saved(server: ServerProcess, browser: Browser) 
         saved = await downloading.value
         assert re.fullmatch(r"diagnosis-[\dT-]+\.zip", saved.suggested_filename)
         with zipfile.ZipFile(await saved.path()) as files:
-            told = json.loads(files.read("client.json"))
+            client = json.loads(files.read("client.json"))
             assert {"README.txt", "about.json", "types.json", "log.jsonl"} <= set(files.namelist())
             assert all(key.encode() not in files.read(name) for name in files.namelist())
-        assert (told["user"], told["status"]) == ("Dora", "ready")
+        assert (client["user"], client["status"]) == ("Dora", "ready")
         # The log of the page: the connection and the first event.
         assert {"event ShowMainScreen", "connection open"} <= {
-            f"{e['what']} {e['text'].split()[0]}" for e in told["seen"]
+            f"{e['what']} {e['text'].split()[0]}" for e in client["seen"]
         }
         assert await screen.barriers() == []
 
@@ -142,13 +142,13 @@ async def test_invitation_shows_the_fingerprint_of_the_tls_certificate(
             about = screen.page.get_by_role("dialog", name="About")
             invitation = about.get_by_role("region", name="How others join")
             shown = (await invitation.locator(".fingerprint code").inner_text()).replace(":", "")
-            told = await _joining(screen)
+            invited = await _joining(screen)
             code = invitation.get_by_role("img")
-            if told["addresses"]:  # the machine is on a network
+            if invited["addresses"]:  # the machine is on a network
                 picture = cv2.imdecode(np.frombuffer(await code.screenshot(), np.uint8), cv2.IMREAD_COLOR)
                 assert picture is not None
                 read, _, _ = cv2.QRCodeDetector().detectAndDecode(picture)
-                assert read == told["addresses"][0]
+                assert read == invited["addresses"][0]
                 assert read.startswith("https://")
             else:
                 await invitation.get_by_text("Only this machine reaches the server").wait_for()

@@ -226,9 +226,9 @@ async def test_orientations_are_added_rotated_and_checked_for_reachability(place
     step = page.get_by_role("complementary").locator(".steps li", has_text="go_there")
     await expect(step.locator(".reach")).to_contain_text("out of reach")
     await step.get_by_text("go_there", exact=True).click()
-    told = page.locator(".reach-of-action")
-    await expect(told).to_contain_text("robot: out of reach")
-    assert len((await told.locator(".small").inner_text()).split()) > 3, "and why"
+    reach = page.locator(".reach-of-action")
+    await expect(reach).to_contain_text("robot: out of reach")
+    assert len((await reach.locator(".small").inner_text()).split()) > 3, "and why"
     assert (await place.screen.item(action))["badge"] == "out of reach"
     await place.screen.picture("points action out of reach")
 

@@ -193,8 +193,8 @@ async def test_choices_come_from_the_device_and_stay_when_it_is_offline(work: Wo
     await work.told("ActionChanged", lambda event: event.data.name == "fetch_one")
     await board.select_option(label="lower board 2")
     await work.told("ActionChanged", lambda event: event.data.name == "fetch_one")
-    told = await work.parameters(fetch)
-    assert (told["shelf"].value, told["board"].value) == ('"lower"', '"lower board 2"')
+    stored = await work.parameters(fetch)
+    assert (stored["shelf"].value, stored["board"].value) == ('"lower"', '"lower board 2"')
     await go_offline(work)
     await expect(work.panel.get_by_text("as the device told last")).to_have_count(2)
     assert await board.locator("option").all_inner_texts() == [f"lower board {number}" for number in range(4)]

@@ -115,9 +115,9 @@ async def test_concurrent_edits_converge(cell: Cell, browser: Browser) -> None:
         async def opened() -> Project:
             """Return the open project as a new client receives it."""
             async with Client(cell.url, "late", reconnect=False) as late:
-                told = (await late.next_event("OpenProject", timeout=10)).data.project
-                assert isinstance(told, Project)
-                return told
+                shown = (await late.next_event("OpenProject", timeout=10)).data.project
+                assert isinstance(shown, Project)
+                return shown
 
         async def agree() -> bool:
             now = places(scene, await opened())
