@@ -1,7 +1,6 @@
 """Bring the workplace that all editor tests of a worker share back to its initial state."""
 
 import contextlib
-from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
@@ -37,9 +36,9 @@ async def reset(cell: Cell) -> None:
     await cell.tell("robot", "place", q=START)
 
 
-async def place_robot(cell: Cell, screen: Screen, robot: str, q: Sequence[float] = START) -> None:
-    """Put the simulated robot at these joints, and wait until the screen shows it there."""
-    await cell.tell("robot", "place", q=q)
+async def place_robot(cell: Cell, screen: Screen, robot: str) -> None:
+    """Put the simulated robot at its start position, and wait until the screen shows it there."""
+    await cell.tell("robot", "place", q=START)
     joints = (await cell.tell("robot", "truth"))["q"]
     shown = """([robot, wanted]) => Object.values(window.__engine?.item(robot)?.joints ?? {})
         .filter((value, index) => Math.abs(value - wanted[index]) < 1e-3).length === wanted.length"""

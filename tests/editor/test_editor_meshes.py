@@ -149,7 +149,7 @@ async def test_broken_meshes_are_replaced_with_the_reason(browser: Browser, plac
         await screen.join("Eva")
         for name, words, badge in (
             ("Broken", "The mesh broken.stl has no triangles", "its mesh cannot be shown"),
-            ("Ruin", "ruin.zip is no zip archive", "cannot be shown as it looks"),
+            ("Ruin", "ruin.zip is not a zip archive", "cannot be shown as it looks"),
         ):
             await screen.until("id => window.__engine?.item(id)?.problem", place.ids[name])
             item = await screen.item(place.ids[name])

@@ -20,7 +20,7 @@ from arcor2_hw.data.project import ActionParameter, ActionPoint, Flow, FlowTypes
 from arcor2_hw.data.scene import Scene
 from tests.e2e.harness import Cell, scene_state, until
 from tests.editor import texts
-from tests.editor.reset import START, place_robot
+from tests.editor.reset import place_robot
 from tests.editor.screen import Screen, screen_of
 
 pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(180)]
@@ -300,10 +300,10 @@ async def test_note_on_a_point_is_shared(place: Place) -> None:
 
 async def test_robot_is_previewed_and_moved_to_a_taught_orientation(place: Place) -> None:
     page, screen = place.screen.page, place.screen
-    await place_robot(place.cell, screen, place.robot, (START[0], START[1] + 0.1, *START[2:]))
-    at = (await screen.item(place.robot))["endEffectors"][0]["position"]
-    down_and_yawed = Orientation(math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)
-    point = await place.add_point("taught", Position(**at), down_and_yawed)
+    tool = (await screen.item(place.robot))["endEffectors"][0]
+    now = Orientation(**tool["orientation"])
+    turned = Orientation.from_rotation_vector(0.0, 0.0, 0.4) * now
+    point = await place.add_point("taught", Position(**tool["position"]), turned)
     down = point.orientations[0].id
     await place.select("taught")
     await page.get_by_role("button", name=re.compile("^down")).first.click()
@@ -338,7 +338,7 @@ async def test_robot_is_previewed_and_moved_to_a_taught_orientation(place: Place
     await until(rests, "the arm rests")
     # The tool is rotated to another orientation at the same position.
     await place.client.call("WriteLock", rpc.WriteLockArgs(down))
-    yawed = Orientation(math.cos(0.5), math.sin(0.5), 0.0, 0.0)
+    yawed = Orientation.from_rotation_vector(0.0, 0.0, 0.8) * now
     await place.client.call("UpdateActionPointOrientation", rpc.UpdateActionPointOrientationArgs(down, yawed))
     await place.client.call("WriteUnlock", rpc.WriteUnlockArgs(down))
     await screen.until(f"(ids) => ({as_taught})(ids).turned > 0.1", [place.robot, down])
