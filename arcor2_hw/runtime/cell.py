@@ -16,9 +16,10 @@ from arcor2_hw.data.secret import ObjectSecrets
 from arcor2_hw.exceptions import Arcor2Error, NotConnected, NotFound, ProgramStopped, Refused
 from arcor2_hw.objects import Camera, Generic, Robot
 from arcor2_hw.runtime.creation import Recipe, load_type, recipe
-from arcor2_hw.runtime.device import CLOSE_DEADLINE, Device, describe, overrides, until
+from arcor2_hw.runtime.device import CLOSE_DEADLINE, Device, describe, until
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.messages import OpenScene
+from arcor2_hw.runtime.methods import overrides
 from arcor2_hw.runtime.stopping import SentStop, send_stop
 from arcor2_hw.runtime.surroundings import SceneSurroundings
 from arcor2_hw.runtime.told import Told

@@ -15,20 +15,20 @@ from arcor2_hw.exceptions import (
     InvalidData,
     NotConnected,
 )
-from arcor2_hw.objects import Axis, CollisionObject, Generic, HoldsParts, MultiArmRobot, Robot
+from arcor2_hw.objects import CollisionObject, Generic, HoldsParts, Robot
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.observing import Observing, listening
 from arcor2_hw.objects.surroundings import Surroundings
 from arcor2_hw.runtime.creation import Recipe
 from arcor2_hw.runtime.lane import Job, Lane
+from arcor2_hw.runtime.methods import OBSERVING, overrides, stop_of
+from arcor2_hw.runtime.own_process.process import STARTS_WITHIN, DeviceProcess
 from arcor2_hw.runtime.values import decode_arguments
 
 CONSTRUCTION_DEADLINE: Final = 10.0
 """Seconds beyond the connect timeout for a constructor that, by the older convention, opens the device itself."""
 STOP_DEADLINE: Final = 2.0
 """Seconds a `stop` may take before it is reported as failed."""
-NO_STOP: Final = (Robot.stop, MultiArmRobot.stop)
-"""The hooks that only raise the not-implemented error."""
 OVERTAKES_WITHIN: Final = 0.1
 """Seconds from the begin of a call within which its command to the device may still be on its way."""
 STOP_GRACE: Final = 2.0
@@ -36,44 +36,12 @@ STOP_GRACE: Final = 2.0
 CLOSE_DEADLINE: Final = 1.2
 """Seconds `disconnect` has (objects promise 1 s)."""
 
-OBSERVING: Final = frozenset(
-    {
-        "alarms",
-        "connection",
-        "control_owner",
-        "forward_kinematics",
-        "get_arm_ids",
-        "get_end_effector_pose",
-        "get_end_effectors_ids",
-        "get_hand_teaching_mode",
-        "grippers",
-        "health",
-        "joint_limits",
-        "max_tcp_speed",
-        "move_in_progress",
-        "robot_joints",
-        "state",
-        "suctions",
-    }
-)
-"""What is asked on the watch lane of a robot, so that it is answered while an action runs."""
-
-PLAIN: Final = frozenset(
-    {"id", "name", "settings", "pose", "collision_model", "enabled", "connection", "health", "move_in_progress"}
-)
-"""Properties of the bases that are memory, not I/O: read where one is, without a lane."""
-
 
 def connect_timeout(cls: type[Generic]) -> float:
     """Give the seconds that an object type allows itself to connect: the default of `timeout`."""
     parameter = inspect.signature(cls.connect).parameters.get("timeout")
     default = None if parameter is None else parameter.default
     return float(default) if isinstance(default, int | float) else DEFAULT_CONNECT_TIMEOUT
-
-
-def overrides(cls: type[Generic], name: str) -> bool:
-    """Tell whether an object type brings its own `name`, instead of the one of Generic."""
-    return getattr(cls, name, None) is not getattr(Generic, name)
 
 
 class Device:
@@ -107,6 +75,8 @@ class Device:
         self._opening: Job | None = None
         self.closed_by: Job | None = None
         """What closes it after it failed."""
+        self._process: DeviceProcess | None = None
+        """The process of an object type that asks for its own."""
         self.failure: Arcor2Error | None = None
         """Why it did not come up, in a scene that goes on without it."""
 
@@ -115,6 +85,7 @@ class Device:
         """Begin to create and connect the instance; gives the call and its deadline."""
         cls = self.recipe.cls
         deadline = connect_timeout(cls) + (1.0 if overrides(cls, "connect") else CONSTRUCTION_DEADLINE)
+        deadline += STARTS_WITHIN if cls.own_process else 0.0
         job = self._opening = Job("connect", self._open, notify=notify)
         self.lane.submit(job)
         return job, deadline
@@ -127,8 +98,7 @@ class Device:
 
     def _open(self) -> None:
         with listening(self._life_changed):
-            instance = self.recipe.make()
-            self.instance = instance
+            self.instance = instance = self._make()
             if isinstance(instance, CollisionObject):
                 instance.tell_enabled(lambda: self._changed(self))
             if self._find is not None:
@@ -143,6 +113,19 @@ class Device:
         if self.closing:  # came up too late: nobody waits any more
             self.instance = None
             instance.cleanup()
+            self._end_process()
+
+    def _make(self) -> Generic:
+        """Make the instance, in a process of its own if its type asks for one."""
+        recipe = self.recipe
+        if not recipe.cls.own_process:
+            return recipe.make()
+        self._process = DeviceProcess(recipe.cls, self.name, lambda: self._changed(self))
+        return self._process.make(recipe.arguments, recipe.keywords)
+
+    def _end_process(self) -> None:
+        if self._process is not None:
+            self._process.end()
 
     def _life_changed(self, life: Observing) -> None:
         if life not in self._lives:
@@ -186,7 +169,8 @@ class Device:
         return job
 
     def release_lanes(self) -> None:
-        """End the threads."""
+        """End the threads, and the process of the device if it has one."""
+        self._end_process()
         for lane in (self.lane, self.stop_lane, self._watch_lane):
             if lane is not None:
                 lane.close()
@@ -248,11 +232,7 @@ class Device:
     @property
     def stop_method(self) -> Callable[[], Any] | None:
         """Give what stops this device, None when nothing does."""
-        instance = self.instance
-        if isinstance(instance, Axis):
-            return instance.halt
-        found = getattr(instance, "stop", None)
-        return found if callable(found) and getattr(found, "__func__", None) not in NO_STOP else None
+        return stop_of(self.instance)
 
     def cancelled_by(self, action: str) -> str:
         """Name the method that cancels an action; InvalidData when nothing does."""
@@ -324,7 +304,9 @@ def describe(device: Device, error: BaseException) -> Arcor2Error:
     if isinstance(error, Arcor2Error):
         if not prefix and not suffix:
             return error
-        named = type(error)(f"{prefix}{text}{suffix}", error.detail)
+        named = type(error).__new__(type(error))  # its constructor may want other arguments
+        named.args = (f"{prefix}{text}{suffix}",)
+        vars(named).update(vars(error))
         named.__cause__ = error
         return named
     kind = "" if text == type(error).__name__ else f"{type(error).__name__}: "

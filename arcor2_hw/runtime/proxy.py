@@ -9,8 +9,9 @@ from arcor2_hw.actions import deadline_of, metadata_of
 from arcor2_hw.actions.decorator import with_present_names
 from arcor2_hw.exceptions import InvalidData, ProgramFinished, ProgramStopped
 from arcor2_hw.objects import Generic
-from arcor2_hw.runtime.device import PLAIN, STOP_DEADLINE, Device
+from arcor2_hw.runtime.device import STOP_DEADLINE, Device
 from arcor2_hw.runtime.lane import on_any_lane
+from arcor2_hw.runtime.methods import PLAIN
 from arcor2_hw.runtime.program import Program
 
 _DEVICE = "_arcor2_device"

@@ -10,13 +10,14 @@ from arcor2_hw.objects import CollisionObject, Robot
 from arcor2_hw.objects.surroundings import Attachment, Obstacle
 from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.messages import PutIn
+from arcor2_hw.runtime.own_process.pickling import ByReference
 from arcor2_hw.runtime.told import Told
 
 JOINTS_WITHIN: Final = 0.5
 """Seconds in which another robot has to tell its joints: what moves does not stay there longer anyway."""
 
 
-class SceneSurroundings:
+class SceneSurroundings(ByReference):
     """The things around one robot of a scene.
 
     Collision objects that count now, each with the model of its type, where it stands now; what was put in besides, in

@@ -10,9 +10,10 @@ from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.exceptions import DeviceTimeout
 from arcor2_hw.objects import CollisionObject, Generic, Robot
 from arcor2_hw.runtime.cell import Cell
-from arcor2_hw.runtime.device import Device, overrides
+from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.messages import DeviceChanged, HeldPart
+from arcor2_hw.runtime.methods import overrides
 
 OBSERVE_PERIOD: Final = 0.25
 """Seconds between two looks at a device's connection and health (memory, by contract)."""
@@ -108,7 +109,7 @@ class Watch:
                 return
             self._known[device.id] = found
             self._tell(found)
-        if connection is Connection.LOST and was is not Connection.LOST:
+        if connection is not was and (connection is Connection.LOST or (connection is Connection.FAILED and device.up)):
             self._lost(device, reason)
 
 
