@@ -74,7 +74,8 @@ class DeviceServer(Peer):
         self._instance: Generic | None = None
         self._names: list[str] = []
         self._connected = False
-        self._disconnected = False
+        self._closing = False
+        """Disconnecting was requested."""
         self._epoch = 0
         """Number of stops that have arrived: a call from before one that has not started is cancelled."""
         self._calls = _Calls()
@@ -88,6 +89,8 @@ class DeviceServer(Peer):
         if self._is_stop(message.header):
             self._epoch += 1
         message.epoch = self._epoch
+        if self._is_own(message.header) and message.header.name in ("cleanup", "connect", "disconnect"):
+            self._closing = message.header.name != "connect"
 
     def _is_stop(self, header: Header) -> bool:
         stops = header.name == ("halt" if isinstance(self._instance, Axis) else "stop")
@@ -116,7 +119,6 @@ class DeviceServer(Peer):
                 with listening(self._connection_changed):
                     value = self.perform(message)
         self._connected = self._connected or header.name == "connect"
-        self._disconnected = self._disconnected or header.name in ("cleanup", "disconnect")
         return value
 
     def _make(self, payload: bytes) -> tuple[int, frozenset[str]]:
@@ -189,9 +191,10 @@ class DeviceServer(Peer):
 
     # -------------------------------------------------------------------------------- end
     def leave(self) -> None:
-        """Stop and disconnect the device, unless that was done, in bounded time."""
+        """Stop and disconnect the device, unless the cell host has done so, in bounded time."""
         instance = self._instance
-        if instance is None or self._disconnected:
+        if instance is None or self._closing:
+            self._calls.wait(STOPS_WITHIN / 2)
             return
         if (stop := stop_of(instance)) is not None:
             _within(STOPS_WITHIN, stop)

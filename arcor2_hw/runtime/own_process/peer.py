@@ -7,6 +7,7 @@ one lane are served in order by one thread, calls of different lanes by differen
 
 import enum
 import itertools
+import logging
 import socket
 import threading
 from queue import Empty, SimpleQueue
@@ -25,6 +26,8 @@ COPIED: Final = 1 << 16
 """Bytes of a payload from which it is sent apart from its header, to spare a copy."""
 IDLE: Final = 60.0
 """Seconds after which a thread that serves calls ends when no call came."""
+
+log = logging.getLogger(__name__)
 
 
 class Kind(enum.IntEnum):
@@ -181,8 +184,10 @@ class Peer:
                     case _:
                         self.arrived(message)
                         self._dispatch(message)
-        except (OSError, ValueError, msgspec.MsgspecError):
+        except OSError:
             pass
+        except Exception:
+            log.exception("The connection to another process is out of step and counts as lost.")
         with self._lock:
             self._closed = True
             waiting = [*self._boxes.values(), *self._workers.values()]
