@@ -27,7 +27,7 @@ RENEWED_WITHIN: Final = 2.0
 
 
 JUST_AFTER: Final = 0.001
-"""Seconds from the end of a lease to the look whether it was renewed."""
+"""Seconds from the end of a lease to the check whether it was renewed."""
 
 
 class _Hold:
@@ -61,16 +61,16 @@ class Holds:
         self._lock = threading.Lock()
         self._held: dict[str, _Hold] = {}
         self._ended: dict[str, int] = {}
-        """By device, the number of the last hold that has ended: it and those before never begin again."""
+        """Number of the last hold that has ended, by device: it and earlier ones never start again."""
 
     @property
     def any(self) -> bool:
-        """Tell whether anything is held."""
+        """Return whether any device is held."""
         return bool(self._held)
 
     # -------------------------------------------------------------------------------- leases
     def lease(self, message: m.Lease) -> None:
-        """Begin, renew or end a hold; CallDone (with the scale of a jog) or CallFailed answers it."""
+        """Start, renew or end a hold; CallDone (with the scale of a jog) or CallFailed answers it."""
         try:
             hold = self._taken(message)
         except Arcor2Error as error:
@@ -117,7 +117,7 @@ class Holds:
 
     # -------------------------------------------------------------------------------- acting
     def _act(self, hold: _Hold) -> None:
-        """Have the driver told of the newest lease, unless it is being told; then it is told again at the end."""
+        """Pass the newest lease to the driver; if it is busy with one, after that."""
         with self._lock:
             if hold.ending or hold.job is not None or not hold.unanswered:
                 return
@@ -156,7 +156,7 @@ class Holds:
         return 1.0
 
     def _told(self, hold: _Hold, job: Job, numbers: list[int]) -> None:
-        """Answer the leases that the driver was told of."""
+        """Answer the leases that were passed to the driver."""
         device = hold.device
         if job.error is not None:
             error = (hold.error if hold.ending else None) or describe(device, job.error)
@@ -196,7 +196,7 @@ class Holds:
         self._post(m.HandTeachingEnded(device.id, error_data(error, device.id), arm.get("arm_id")))
 
     def end(self, hold: _Hold, error: Arcor2Error | None) -> None:
-        """Bring the robot to rest, then tell; `error` says why, None when it was let go."""
+        """Stop the robot, then report it; `error` is the reason, None when the button was released."""
         with self._lock:
             if hold.ending:
                 return

@@ -40,15 +40,15 @@ from arcor2_hw.runtime.teaching import TEACHING_PERIOD, Teaching
 from arcor2_hw.runtime.watch import OBSERVE_PERIOD, Watch
 
 GONE_WITHIN: Final = 1.8
-"""Seconds from the loss of the server to the end of this process, whatever hangs."""
+"""Seconds from the loss of the server to the end of this process, even if a call hangs."""
 NUDGE_PERIOD: Final = 0.1
 """Seconds between two interruptions of a script that does not end although it is stopped."""
 LOST_WITHIN: Final = 5.0
-"""Seconds that a script gets to end when it is stopped because a device is lost, as when somebody stops it."""
+"""Seconds that a script has to end when it is stopped because a device is lost."""
 ROOM_WITHIN: Final = 1.0
-"""Seconds that an event of the program waits for a server that does not keep up."""
+"""Seconds that an event of the program waits for a slow server."""
 AHEAD: Final = -5
-"""Niceness that is asked for: who keeps devices alive goes before who shows them."""
+"""Requested niceness: processes that own devices run before those of user interfaces."""
 FLUSH: Final = 0.3
 """Seconds for the last messages."""
 
@@ -89,12 +89,12 @@ class Host:
         self._wake, wake_up = socket.socketpair()
         wake_up.setblocking(False)
         signal.set_wakeup_fd(wake_up.detach(), warn_on_full_buffer=False)
-        signal.signal(signal.SIGTERM, lambda *_: None)  # told through the wake-up socket: the reader acts
+        signal.signal(signal.SIGTERM, lambda *_: None)  # arrives on the wake-up socket: the reader acts
         signal.signal(signal.SIGUSR1, self._interrupted)
 
     # -------------------------------------------------------------------------------- main thread
     def run(self) -> int:
-        """Serve until the scene or the program is over; gives the exit status."""
+        """Serve until the scene is closed or the program has ended; return the exit status."""
         logging.basicConfig(level=logging.INFO, format="%(name)s: %(message)s", handlers=[_LogHandler(self.link)])
         logging.getLogger("httpx").setLevel(logging.WARNING)  # it logs every request, and drivers poll
         self.clock.every(m.HEARTBEAT_PERIOD, lambda: self.link.post(m.Heartbeat()))
@@ -125,7 +125,7 @@ class Host:
         return status
 
     def _open_scene(self, message: m.OpenScene) -> bool:
-        """Bring the scene up; False when the host has to go."""
+        """Open the scene; return False when the host has to exit."""
         fault: SceneFault | None = None
         self._scene = message
         self._cell.assets = message.assets
@@ -152,12 +152,12 @@ class Host:
         return True
 
     def _missing(self, fault: SceneFault) -> None:
-        """Go on without an object."""
+        """Continue without an object."""
         self._cell.lack(fault)
         self._watch.tell(fault.object_id, Connection.FAILED, str(fault.error))
 
     def _retry(self, message: m.RetryObject) -> None:
-        """Make and connect an object anew. On a thread of its own: loading its type may last."""
+        """Create and connect an object again. On its own thread, because loading its type may take long."""
         object_id = message.object_id
         try:
             assert self._scene is not None
@@ -240,11 +240,11 @@ class Host:
         self.link.post(m.ProgramEvent(name, encoded, number, action, time))
 
     def changed(self, state: str) -> None:
-        """Tell that the program is running or paused now."""
+        """Report that the program is running or paused."""
         self.link.post(m.ProgramChanged(state))
 
     def action_over(self, number: int, duration: float, error: str) -> None:
-        """Tell that an action has ended where no event says so."""
+        """Report the end of an action that has no event."""
         self.link.post(m.ActionFailed(number, duration, error))
 
     # -------------------------------------------------------------------------------- reader thread
@@ -300,7 +300,7 @@ class Host:
         self._holds.stopping(device)
 
     def _leave(self) -> None:
-        """The server is gone, or wants us gone: stop motion, disconnect, exit, in bounded time."""
+        """Stop motion, disconnect and exit in bounded time, because the server has ended or requested it."""
         watchdog = threading.Timer(GONE_WITHIN, os._exit, (3,))
         watchdog.daemon = True
         watchdog.start()
@@ -343,7 +343,7 @@ class Host:
 
     # -------------------------------------------------------------------------------- signal handler
     def _interrupted(self, number: int, frame: types.FrameType | None) -> None:  # noqa: ARG002
-        """Raise ProgramStopped in the script; never inside our own code, which looks by itself."""
+        """Raise ProgramStopped in the script; never inside our own code, which checks by itself."""
         program = self.program
         if program is not None and program.stop_requested and not program.inside and not program.ended:
             raise ProgramStopped

@@ -1,4 +1,4 @@
-"""What is told of devices without being asked: connection, health, alarms, control."""
+"""Changes of devices that are reported without a request: connection, health, alarms, control."""
 
 import threading
 import time
@@ -16,17 +16,17 @@ from arcor2_hw.runtime.messages import DeviceChanged, HeldPart
 from arcor2_hw.runtime.methods import overrides
 
 OBSERVE_PERIOD: Final = 0.25
-"""Seconds between two looks at a device's connection and health (memory, by contract)."""
+"""Seconds between two checks of a device's connection and health (memory, by contract)."""
 INQUIRY_PERIOD: Final = 1.0
-"""Seconds between two looks at alarms and control, for which a driver may have to ask."""
+"""Seconds between two checks of alarms and control, for which a driver may query the device."""
 
 _WITH_REASON: Final = (Connection.LOST, Connection.FAILED)
 
 
 class Watch:
-    """Compares what devices say of their condition with what they said last, and tells changes.
+    """Compares the condition of devices with that at the last check, and reports changes.
 
-    A connection that changes is told at once, each loss and each return once. `lost` is called after a loss was told.
+    A change of a connection is reported at once, each loss and each return once. `lost` is called after that.
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class Watch:
         self._inquired: dict[str, float] = {}
 
     def look(self) -> None:
-        """Begin to look at every device that has something to say."""
+        """Start to check every device whose condition can change."""
         for device in self._cell:
             cls = device.recipe.cls
             if device.instance is None or device.closing:
@@ -64,13 +64,13 @@ class Watch:
                 job.finish(None, error)
 
     def glance(self, device: Device) -> None:
-        """Look at the connection alone, which is memory. On the thread that keeps it."""
+        """Check the connection only, which is memory. On the thread that observes it."""
         instance = device.instance
         if instance is not None and not device.closing:
             self._compare(device, instance, None)
 
     def tell(self, object_id: str, connection: Connection, reason: str = "") -> None:
-        """Tell of an object of which there is no instance that could be looked at."""
+        """Report the connection of an object that has no instance."""
         health = Health.FAILURE if connection is Connection.FAILED else Health.NORMAL
         with self._turn:
             found = DeviceChanged(object_id, connection, health, [], None, reason)
@@ -91,7 +91,7 @@ class Watch:
         self._compare(device, instance, (health, alarms, owner))
 
     def _compare(self, device: Device, instance: Generic, asked: tuple[Health, list[Alarm], str | None] | None) -> None:
-        with self._turn:  # the connection is read in here, so that what is told last is what was so last
+        with self._turn:  # the connection is read in here, so that the last report is the last state
             before = self._known.get(device.id)
             if asked is None:
                 asked = (Health.NORMAL, [], None)
@@ -101,7 +101,7 @@ class Watch:
             reason = _told(device.connection_reason, "") if connection in _WITH_REASON else ""
             was = Connection.OFFLINE if before is None else before.connection
             if before is not None and connection is was:
-                reason = before.reason  # that of the loss: what further attempts meet is no news
+                reason = before.reason  # that of the loss, not those of further attempts
             in_the_way = _told(lambda: not isinstance(instance, CollisionObject) or instance.enabled, True)
             held = _told(lambda: _held_parts(instance), [])
             found = DeviceChanged(device.id, connection, *asked, reason, in_the_way, held)
@@ -123,8 +123,8 @@ def _held_parts(instance: Generic) -> list[HeldPart]:
 
 
 def _told(ask: Callable[[], Any], otherwise: Any) -> Any:
-    """Ask; a device that cannot say keeps what was known."""
+    """Return the result of a query, or the value known before if the device cannot answer."""
     try:
         return ask()
-    except Exception:  # noqa: BLE001 - a driver may raise anything; the next look asks again
+    except Exception:  # noqa: BLE001 - a driver may raise anything; the next check queries it again
         return otherwise
