@@ -22,7 +22,7 @@ from arcor2_hw.runtime.messages import OpenScene
 from arcor2_hw.runtime.methods import overrides
 from arcor2_hw.runtime.stopping import SentStop, send_stop
 from arcor2_hw.runtime.surroundings import SceneSurroundings
-from arcor2_hw.runtime.told import Told
+from arcor2_hw.runtime.world_updates import WorldUpdates
 
 CONTROL_DEADLINE: Final = 10.0
 """Seconds for taking control: a controller may have to load and start its control program."""
@@ -118,7 +118,7 @@ class Cell:
         self._abandoned = False
         self.assets: Mapping[str, str] = {}
         """Files of meshes and of robots' models that were uploaded, by the asset's id."""
-        self.told = Told()
+        self.updates = WorldUpdates()
         """Bodies and calibrations that the server has sent."""
         self.changed: Callable[[Device], None] = lambda _: None
         """Called when the connection of a device changes, on the thread that observes it."""
@@ -196,12 +196,12 @@ class Cell:
             failed(fault)
 
     def _make(self, how: Recipe) -> Device:
-        surroundings = SceneSurroundings(how.scene_object.id, self, self.assets, self.told)
+        surroundings = SceneSurroundings(how.scene_object.id, self, self.assets, self.updates)
         device = Device(how, lambda device: self.changed(device), self.find, surroundings, self.find_robot)
         self._devices[device.id] = device
         return device
 
-    def lack(self, fault: SceneFault) -> None:
+    def mark_absent(self, fault: SceneFault) -> None:
         """Record an object that could not be prepared, with the error that its callers get."""
         self._absent[fault.object_id] = fault.error
 

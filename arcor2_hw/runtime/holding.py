@@ -81,7 +81,7 @@ class Holds:
         elif message.until == 0.0:
             self.end(hold, None)
         else:
-            self._clock.after(message.until - time.monotonic() + JUST_AFTER, lambda: self._look(hold))
+            self._clock.after(message.until - time.monotonic() + JUST_AFTER, lambda: self._check_expired(hold))
             self._act(hold)
 
     def _taken(self, message: m.Lease) -> _Hold | None:
@@ -109,7 +109,7 @@ class Holds:
             hold.unanswered.append(message.id)
             return hold
 
-    def _look(self, hold: _Hold) -> None:
+    def _check_expired(self, hold: _Hold) -> None:
         """End a hold that has run out. On the clock's thread, when a lease ends."""
         if hold.newest.until <= time.monotonic():
             what = "jog" if hold.kind is HoldKind.JOG else "hold"
@@ -124,8 +124,8 @@ class Holds:
             numbers, hold.unanswered = hold.unanswered, []
             job = hold.job = Job(
                 "jog" if hold.kind is HoldKind.JOG else SET_MODE,
-                lambda: self._tell_driver(hold),
-                notify=lambda done: self._told(hold, done, numbers),
+                lambda: self._pass_to_driver(hold),
+                notify=lambda done: self._answer_leases(hold, done, numbers),
             )
             within = RENEWED_WITHIN + (0.0 if hold.begun else CONTROL_DEADLINE)
         lane = hold.device.lane
@@ -136,7 +136,7 @@ class Holds:
             return
         self._clock.after(within, lambda: lane.expire(job, within))
 
-    def _tell_driver(self, hold: _Hold) -> float:
+    def _pass_to_driver(self, hold: _Hold) -> float:
         """Call the driver, on the device's lane; gives the scale of the velocity."""
         device, robot = hold.device, hold.device.require()
         assert isinstance(robot, Robot)
@@ -155,7 +155,7 @@ class Holds:
             robot.set_hand_teaching_mode(True, **hold.arm)
         return 1.0
 
-    def _told(self, hold: _Hold, job: Job, numbers: list[int]) -> None:
+    def _answer_leases(self, hold: _Hold, job: Job, numbers: list[int]) -> None:
         """Answer the leases that were passed to the driver."""
         device = hold.device
         if job.error is not None:

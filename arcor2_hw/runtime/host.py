@@ -72,7 +72,7 @@ class Host:
         self.clock = Clock()
         self.program: Program | None = None
         self._cell = Cell()
-        self._told = self._cell.told
+        self._updates = self._cell.updates
         self._work: SimpleQueue[m.HostBound] = SimpleQueue()
         self._subscribed: dict[str, m.Subscribe] = {}
         self._teaching = Teaching(lambda *ended: self._holds.teaching_ended(*ended))
@@ -98,9 +98,9 @@ class Host:
         logging.basicConfig(level=logging.INFO, format="%(name)s: %(message)s", handlers=[_LogHandler(self.link)])
         logging.getLogger("httpx").setLevel(logging.WARNING)  # it logs every request, and drivers poll
         self.clock.every(m.HEARTBEAT_PERIOD, lambda: self.link.post(m.Heartbeat()))
-        self.clock.every(OBSERVE_PERIOD, lambda: self._watch.look())
+        self.clock.every(OBSERVE_PERIOD, lambda: self._watch.check_all())
         self.clock.every(NUDGE_PERIOD, self._nudge)
-        self.clock.every(TEACHING_PERIOD, self._teaching.look)
+        self.clock.every(TEACHING_PERIOD, self._teaching.check_all)
         self.clock.start()
         self.link.post(m.Ready(os.getpid()))
         threading.Thread(target=self._read, name="from server", daemon=True).start()
@@ -146,15 +146,15 @@ class Host:
             self.link.post(m.SceneFailed(error_data(fault.error, fault.object_id)))
             return False
         for device in self._cell:  # clients know how each device is when they learn that the scene is online
-            self._watch.glance(device)
+            self._watch.check_connection(device)
         self.link.post(m.SceneOpened())
         self.clock.every(message.streaming_period if message.streaming_period > 0 else 0.1, self._stream_subscribed)
         return True
 
     def _missing(self, fault: SceneFault) -> None:
         """Continue without an object."""
-        self._cell.lack(fault)
-        self._watch.tell(fault.object_id, Connection.FAILED, str(fault.error))
+        self._cell.mark_absent(fault)
+        self._watch.report(fault.object_id, Connection.FAILED, str(fault.error))
 
     def _retry(self, message: m.RetryObject) -> None:
         """Create and connect an object again. On its own thread, because loading its type may take long."""
@@ -165,7 +165,7 @@ class Host:
             if not self._retrying.acquire(blocking=False):
                 raise Refused("another object is being retried: wait for that")
             try:
-                self._watch.tell(object_id, Connection.CONNECTING)
+                self._watch.report(object_id, Connection.CONNECTING)
                 (recipe,) = scene_recipes(self._scene, only=object_id)
                 self._cell.retry(recipe)
             except SceneFault as fault:
@@ -176,7 +176,7 @@ class Host:
         except Exception as error:  # noqa: BLE001 - whatever a type does when it is loaded
             self.link.post(m.CallFailed(message.id, error_data(error, object_id)))
             return
-        self._watch.glance(self._cell[object_id])
+        self._watch.check_connection(self._cell[object_id])
         self.link.post(m.CallDone(message.id))
 
     def _close_scene(self) -> None:
@@ -200,7 +200,7 @@ class Host:
             secrets=message.secrets,
         )
         self._cell = program.cell
-        self._cell.assets, self._cell.told = message.assets, self._told
+        self._cell.assets, self._cell.updates = message.assets, self._updates
         self._watch = Watch(program.cell, self.link.post, self._lost)
         program.inside = True
         self.program = program
@@ -260,16 +260,16 @@ class Host:
         match message:
             case m.OpenScene() | m.RunPackage():
                 for body in message.bodies:  # at once: what follows may change them
-                    self._told.put(body)
+                    self._updates.put(body)
                 for object_id, calibration in message.calibrations.items():
-                    self._told.calibrate(object_id, calibration)
+                    self._updates.calibrate(object_id, calibration)
                 self._work.put(message)
             case m.PutBody():
-                self._told.put(message.body)
+                self._updates.put(message.body)
             case m.RemoveBodies():
-                self._told.remove(message.ids)
+                self._updates.remove(message.ids)
             case m.Calibrate():
-                self._told.calibrate(message.object_id, message.calibration)
+                self._updates.calibrate(message.object_id, message.calibration)
             case m.CloseScene():
                 self._cell.abandon()
                 self._work.put(message)

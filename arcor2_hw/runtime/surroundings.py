@@ -11,7 +11,7 @@ from arcor2_hw.objects.surroundings import Attachment, Obstacle
 from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.messages import PutIn
 from arcor2_hw.runtime.own_process.pickling import ByReference
-from arcor2_hw.runtime.told import Told
+from arcor2_hw.runtime.world_updates import WorldUpdates
 
 JOINTS_WITHIN: Final = 0.5
 """Seconds in which another robot has to return its joints; older values would be of no use while it moves."""
@@ -25,12 +25,12 @@ class SceneSurroundings(ByReference):
     never came up, and what is held by a robot that is not in the scene.
     """
 
-    def __init__(self, robot: str, devices: Iterable[Device], assets: Mapping[str, str], told: Told) -> None:
-        self._robot, self._devices, self._assets, self._told = robot, devices, assets, told
+    def __init__(self, robot: str, devices: Iterable[Device], assets: Mapping[str, str], updates: WorldUpdates) -> None:
+        self._robot, self._devices, self._assets, self._updates = robot, devices, assets, updates
 
     def obstacles(self) -> list[Obstacle]:
         """Return the obstacles for robots."""
-        found, bodies, names = [], self._told.bodies(), {}
+        found, bodies, names = [], self._updates.bodies(), {}
         for device in self._devices:
             names[device.id] = device.name
             instance = device.instance
@@ -73,7 +73,7 @@ class SceneSurroundings(ByReference):
 
     def calibration(self, robot_id: str) -> KinematicCalibration | None:
         """Return the kinematic calibration of a robot; None when its kinematics are nominal."""
-        return self._told.calibration(robot_id)
+        return self._updates.calibration(robot_id)
 
 
 def _put_in(body: PutIn, name: str, robot: str | None) -> Obstacle:

@@ -36,7 +36,7 @@ class Teaching:
             else:
                 self._arms.pop(_key(device, arm), None)
 
-    def look(self) -> None:
+    def check_all(self) -> None:
         """Start to check every arm. On the clock's thread."""
         with self._lock:
             arms = dict(self._arms)

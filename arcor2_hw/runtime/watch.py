@@ -32,19 +32,19 @@ class Watch:
     def __init__(
         self,
         cell: Cell,
-        tell: Callable[[DeviceChanged], None],
+        post: Callable[[DeviceChanged], None],
         lost: Callable[[Device, str], None] = lambda *_: None,
     ) -> None:
         self._cell = cell
-        self._tell = tell
+        self._post = post
         self._lost = lost
         self._turn = threading.Lock()
-        cell.changed = self.glance
+        cell.changed = self.check_connection
         self._pending: dict[str, Job] = {}
         self._known: dict[str, DeviceChanged] = {}
         self._inquired: dict[str, float] = {}
 
-    def look(self) -> None:
+    def check_all(self) -> None:
         """Start to check every device whose condition can change."""
         for device in self._cell:
             cls = device.recipe.cls
@@ -63,20 +63,20 @@ class Watch:
             except DeviceTimeout as error:
                 job.finish(None, error)
 
-    def glance(self, device: Device) -> None:
+    def check_connection(self, device: Device) -> None:
         """Check the connection only, which is memory. On the thread that observes it."""
         instance = device.instance
         if instance is not None and not device.closing:
             self._compare(device, instance, None)
 
-    def tell(self, object_id: str, connection: Connection, reason: str = "") -> None:
+    def report(self, object_id: str, connection: Connection, reason: str = "") -> None:
         """Report the connection of an object that has no instance."""
         health = Health.FAILURE if connection is Connection.FAILED else Health.NORMAL
         with self._turn:
             found = DeviceChanged(object_id, connection, health, [], None, reason)
             if found != self._known.get(object_id):
                 self._known[object_id] = found
-                self._tell(found)
+                self._post(found)
 
     def _observe(self, device: Device, instance: Generic) -> None:
         before = self._known.get(device.id)
@@ -85,30 +85,32 @@ class Watch:
         moment = time.monotonic()
         if moment - self._inquired.get(device.id, -INQUIRY_PERIOD) >= INQUIRY_PERIOD:
             self._inquired[device.id] = moment
-            alarms = _told(instance.alarms, alarms)
-            owner = _told(instance.control_owner, owner)
-        health = _told(lambda: instance.health, Health.FAILURE)
+            alarms = _value_or(instance.alarms, alarms)
+            owner = _value_or(instance.control_owner, owner)
+        health = _value_or(lambda: instance.health, Health.FAILURE)
         self._compare(device, instance, (health, alarms, owner))
 
-    def _compare(self, device: Device, instance: Generic, asked: tuple[Health, list[Alarm], str | None] | None) -> None:
+    def _compare(
+        self, device: Device, instance: Generic, queried: tuple[Health, list[Alarm], str | None] | None
+    ) -> None:
         with self._turn:  # the connection is read in here, so that the last report is the last state
             before = self._known.get(device.id)
-            if asked is None:
-                asked = (Health.NORMAL, [], None)
+            if queried is None:
+                queried = (Health.NORMAL, [], None)
                 if before is not None:
-                    asked = (before.health, before.alarms, before.control_owner)
-            connection = _told(lambda: instance.connection, Connection.FAILED)
-            reason = _told(device.connection_reason, "") if connection in _WITH_REASON else ""
+                    queried = (before.health, before.alarms, before.control_owner)
+            connection = _value_or(lambda: instance.connection, Connection.FAILED)
+            reason = _value_or(device.connection_reason, "") if connection in _WITH_REASON else ""
             was = Connection.OFFLINE if before is None else before.connection
             if before is not None and connection is was:
                 reason = before.reason  # that of the loss, not those of further attempts
-            in_the_way = _told(lambda: not isinstance(instance, CollisionObject) or instance.enabled, True)
-            held = _told(lambda: _held_parts(instance), [])
-            found = DeviceChanged(device.id, connection, *asked, reason, in_the_way, held)
+            in_the_way = _value_or(lambda: not isinstance(instance, CollisionObject) or instance.enabled, True)
+            held = _value_or(lambda: _held_parts(instance), [])
+            found = DeviceChanged(device.id, connection, *queried, reason, in_the_way, held)
             if found == before:
                 return
             self._known[device.id] = found
-            self._tell(found)
+            self._post(found)
         if connection is not was and (connection is Connection.LOST or (connection is Connection.FAILED and device.up)):
             self._lost(device, reason)
 
@@ -122,9 +124,9 @@ def _held_parts(instance: Generic) -> list[HeldPart]:
     ]
 
 
-def _told(ask: Callable[[], Any], otherwise: Any) -> Any:
+def _value_or(query: Callable[[], Any], otherwise: Any) -> Any:
     """Return the result of a query, or the value known before if the device cannot answer."""
     try:
-        return ask()
+        return query()
     except Exception:  # noqa: BLE001 - a driver may raise anything; the next check queries it again
         return otherwise

@@ -7,7 +7,7 @@ from arcor2_hw.data.robot import KinematicCalibration
 from arcor2_hw.runtime.messages import PutIn
 
 
-class Told:
+class WorldUpdates:
     """Written on the reader's thread, read on the threads of robots."""
 
     def __init__(self) -> None:
