@@ -21,7 +21,7 @@ from arcor2_hw.objects.observing import Observing, listening
 from arcor2_hw.objects.surroundings import Surroundings
 from arcor2_hw.runtime.creation import Recipe
 from arcor2_hw.runtime.lane import Job, Lane
-from arcor2_hw.runtime.methods import OBSERVING, overrides, stop_of
+from arcor2_hw.runtime.methods import OBSERVING, OVERTAKES_WITHIN, overrides, stop_of
 from arcor2_hw.runtime.own_process.process import STARTS_WITHIN, DeviceProcess
 from arcor2_hw.runtime.values import decode_arguments
 
@@ -29,8 +29,6 @@ CONSTRUCTION_DEADLINE: Final = 10.0
 """Seconds beyond the connect timeout for a constructor that, by the older convention, opens the device itself."""
 STOP_DEADLINE: Final = 2.0
 """Seconds a `stop` may take before it is reported as failed."""
-OVERTAKES_WITHIN: Final = 0.1
-"""Seconds after the start of a call in which its command may not have reached the device yet."""
 STOP_GRACE: Final = 2.0
 """Seconds that a stopped call has to return before it is reported as cancelled."""
 CLOSE_DEADLINE: Final = 1.2

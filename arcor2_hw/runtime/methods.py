@@ -5,6 +5,9 @@ from typing import Any, Final
 
 from arcor2_hw.objects import Axis, Generic, MultiArmRobot, Robot
 
+OVERTAKES_WITHIN: Final = 0.1
+"""Seconds after the start of a call in which its command may not have reached the device yet."""
+
 NO_STOP: Final = (Robot.stop, MultiArmRobot.stop)
 """Hooks that only raise the not-implemented error."""
 

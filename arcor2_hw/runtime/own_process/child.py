@@ -21,8 +21,7 @@ from arcor2_hw.exceptions import Cancelled, InvalidData
 from arcor2_hw.objects import Axis, Generic
 from arcor2_hw.objects.observing import Observing, listening
 from arcor2_hw.runtime.creation import prepare_for_sources
-from arcor2_hw.runtime.device import OVERTAKES_WITHIN
-from arcor2_hw.runtime.methods import OBSERVING, stop_of
+from arcor2_hw.runtime.methods import OBSERVING, OVERTAKES_WITHIN, stop_of
 from arcor2_hw.runtime.own_process import state
 from arcor2_hw.runtime.own_process.peer import Header, Kind, Message, Peer
 
