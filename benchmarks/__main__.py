@@ -1,8 +1,8 @@
-"""`make bench`: all figures, as JSON lines on standard output and a table on standard error.
+"""Measure all metrics: JSON lines on standard output, a table on standard error (`make bench`).
 
-`python -m benchmarks [--long] [ROOM ...]`: all rooms, or those named. `--long` is for recovery (50 cycles, not 3), for
-stops (500 for each driver in a busy process, not 100), for demo (5 runs, not 1), for calibration (2,000 pictures of
-each kind, not 200) and for robot_pose (300 views, not 30).
+`python -m benchmarks [--long] [GROUP ...]` measures the named groups, or all. `--long` increases the number of samples:
+recovery 50 cycles (3 without it), stops 500 for each driver in a busy process (100), demo 5 runs (1), calibration
+2,000 pictures of each kind (200), robot_pose 300 views (30).
 """
 
 import asyncio
@@ -22,7 +22,6 @@ from benchmarks import (
     computing,
     demo,
     documents,
-    hung,
     kinematics,
     listeners,
     meshes,
@@ -34,11 +33,12 @@ from benchmarks import (
     robot_pose,
     running,
     stops,
+    unresponsive_devices,
 )
-from benchmarks.figures import Report
+from benchmarks.metrics import Report
 
 LONG: Final = "--long"
-ROOMS: Final[dict[str, Callable[[Report, Path], Awaitable[None]]]] = {
+GROUPS: Final[dict[str, Callable[[Report, Path], Awaitable[None]]]] = {
     "requests": requests.run,
     "documents": documents.run,
     "restart": restart.run,
@@ -54,7 +54,7 @@ ROOMS: Final[dict[str, Callable[[Report, Path], Awaitable[None]]]] = {
     "robot_pose": lambda report, _: asyncio.to_thread(robot_pose.run, report, LONG in sys.argv),
     "computing": lambda report, _: computing.run(report),
     "meshes": lambda report, _: meshes.run(report),
-    "hung": hung.run,
+    "unresponsive_devices": unresponsive_devices.run,
     "kinematics": lambda report, _: kinematics.run(report),
     "stops": lambda report, _: stops.run(report, LONG in sys.argv),
     "demo": lambda report, folder: demo.run(report, folder, LONG in sys.argv),
@@ -62,24 +62,24 @@ ROOMS: Final[dict[str, Callable[[Report, Path], Awaitable[None]]]] = {
 }
 
 
-async def main(rooms: list[str]) -> int:
-    """Measure the named rooms, or all; give how many could not be measured to the end."""
+async def main(groups: list[str]) -> int:
+    """Measure the named groups, or all; return the number of groups that failed."""
     report = Report()
     broken = 0
     with tempfile.TemporaryDirectory(prefix="arcor2-hw-bench-", ignore_cleanup_errors=True) as name:
-        for room, measure in ROOMS.items():
-            if not rooms or room in rooms:
+        for group, measure in GROUPS.items():
+            if not groups or group in groups:
                 try:
                     await measure(report, Path(name))
-                except Exception:  # noqa: BLE001 - the other rooms are measured all the same
+                except Exception:  # noqa: BLE001 - a failed group must not stop the others
                     broken += 1
-                    sys.stderr.write(f"the room {room} could not be measured:\n{traceback.format_exc()}")
+                    sys.stderr.write(f"Measuring group {group} failed:\n{traceback.format_exc()}")
     report.table()
     return broken
 
 
 if __name__ == "__main__":
     named = [argument for argument in sys.argv[1:] if argument != LONG]
-    if unknown := set(named) - set(ROOMS):
-        sys.exit(f"no room {', '.join(sorted(unknown))}; there are {', '.join(ROOMS)}")
+    if unknown := set(named) - set(GROUPS):
+        sys.exit(f"Unknown group: {', '.join(sorted(unknown))}. Choose from: {', '.join(GROUPS)}.")
     sys.exit(1 if asyncio.run(main(named)) else 0)

@@ -10,7 +10,7 @@ from typing import Final
 
 import msgspec
 
-from benchmarks.figures import Figure, Report, median
+from benchmarks.metrics import Metric, Report, median
 
 SAMPLES: Final = 9
 OLDER: Final = Path(__file__).resolve().parents[1] / "tests" / "runtime" / "older_sources.py"
@@ -43,4 +43,4 @@ async def analyse(report: Report) -> None:
         samples.append(msgspec.json.decode(output, type=tuple[float, float]))
     cpu = median([each[1] for each in samples])
     note = f"{cpu:.1f} ms of it on a core; fastest {min(each[0] for each in samples):.1f} ms"
-    report.add(Figure("analyse_11_ms", median([each[0] for each in samples]), SAMPLES, note))
+    report.add(Metric("analyse_11_ms", median([each[0] for each in samples]), SAMPLES, note))

@@ -31,7 +31,7 @@ from arcor2_server.build.service import BuildService, Ingredients
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import AssetStore, Storage
-from benchmarks.figures import Figure, Report, median
+from benchmarks.metrics import Metric, Report, median
 
 SIZES: Final = (250, 500, 1000, 2000, 10_000)
 ROUNDS: Final = 9
@@ -113,9 +113,9 @@ async def build(report: Report) -> None:
             await storage.close()
     medians = {size: median(samples) for size, samples in times.items()}
     note = ", ".join(f"{size} actions {value:.0f} ms" for size, value in medians.items())
-    report.add(Figure("build_1000_ms", medians[1000], ROUNDS, note))
-    report.add(Figure("build_10000_ms", medians[10_000], ROUNDS))
-    report.add(Figure("read_script_1000_ms", median(reading), ROUNDS))
+    report.add(Metric("build_1000_ms", medians[1000], ROUNDS, note))
+    report.add(Metric("build_10000_ms", medians[10_000], ROUNDS))
+    report.add(Metric("read_script_1000_ms", median(reading), ROUNDS))
 
 
 def _read_back(made_of: Ingredients, types: ObjectTypes) -> float:
@@ -131,6 +131,6 @@ def _read_back(made_of: Ingredients, types: ObjectTypes) -> float:
 
 
 if __name__ == "__main__":
-    figures = Report()
-    asyncio.run(build(figures))
-    figures.table()
+    metrics = Report()
+    asyncio.run(build(metrics))
+    metrics.table()

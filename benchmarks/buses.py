@@ -18,7 +18,7 @@ from arcor2_drivers.two_axis_robot.registers import PRESENT_POSITION, STATE, Reg
 from arcor2_fakes.control import BlockingControlClient
 from arcor2_hw.exceptions import DeviceTimeout
 from arcor2_server.demo.processes import Child, python_module
-from benchmarks.figures import Figure, Report, median
+from benchmarks.metrics import Metric, Report, median
 
 SERVOS = (1, 2, 3, 4, 5, 6)
 PDO_SECONDS = 20.0
@@ -32,7 +32,7 @@ def seconds_each(call: Callable[[], object], n: int) -> float:
     return (time.perf_counter() - began) / n
 
 
-def modbus_reads(address: str, rounds: int = 150, n: int = 100) -> Figure:
+def modbus_reads(address: str, rounds: int = 150, n: int = 100) -> Metric:
     """Read one point by the driver, and what it reads for that by the bare library, in turns on one fake.
 
     Each has its own connection; the driver observes the block meanwhile, as it always does. What a round measures
@@ -57,10 +57,10 @@ def modbus_reads(address: str, rounds: int = 150, n: int = 100) -> Figure:
         bare.close()
     library, driver = (1.0 / median(each) for each in samples)
     note = f"driver {driver:.0f}/s, library {library:.0f}/s"
-    return Figure("modbus_read_ratio", driver / library, 2 * rounds * n, note)
+    return Metric("modbus_read_ratio", driver / library, 2 * rounds * n, note)
 
 
-def dynamixel_reads(port: str, n: int = 1000) -> Figure:
+def dynamixel_reads(port: str, n: int = 1000) -> Metric:
     """Read the positions of six servos at once, through the driver's bus; the pty has no bit rate."""
     bus = Bus("servos", port, 1_000_000)
     unanswered = 0
@@ -83,10 +83,10 @@ def dynamixel_reads(port: str, n: int = 1000) -> Figure:
         f"worst {max(samples) * 1e3:.2f} ms, {unanswered} unanswered; "
         f"all that changes ({STATE.size} bytes each) {median(whole) * 1e3:.2f} ms"
     )
-    return Figure("dynamixel_sync_read_6_ms", median(samples) * 1e3, n, note)
+    return Metric("dynamixel_sync_read_6_ms", median(samples) * 1e3, n, note)
 
 
-def pdos(address: str, control: str) -> Figure:
+def pdos(address: str, control: str) -> Metric:
     """Let the belt run and the drive tell its state by two PDOs each 10 ms; compare what it sent with what came.
 
     Both count from the first one on, which is sent only when control was taken.
@@ -109,13 +109,13 @@ def pdos(address: str, control: str) -> Figure:
             belt.halt()
         finally:
             belt.disconnect()
-    return Figure("can_pdo_lost", lost, sent, f"two PDOs, {rate / 2.0:.1f} Hz each; slcan over TCP")
+    return Metric("can_pdo_lost", lost, sent, f"two PDOs, {rate / 2.0:.1f} Hz each; slcan over TCP")
 
 
 async def run(report: Report, directory: Path) -> None:
-    """Measure everything in this room."""
+    """Measure everything in this group."""
 
-    async def on_fake(name: str, keys: tuple[str, ...], measure: Callable[..., Figure], *arguments: str) -> None:
+    async def on_fake(name: str, keys: tuple[str, ...], measure: Callable[..., Metric], *arguments: str) -> None:
         fake = Child(name, python_module(f"arcor2_fakes.{name}", *arguments), directory / f"{name}.log")
         try:
             addresses = await fake.start_json()

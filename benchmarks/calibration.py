@@ -22,7 +22,7 @@ from arcor2_hw.calibration.refusals import CalibrationRefused
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Pose
 from benchmarks import rendering
-from benchmarks.figures import Figure, Report, median, percentile
+from benchmarks.metrics import Metric, Report, median, percentile
 from benchmarks.rendering import Array, Exposure, Lens, Plate
 
 SEED: Final = 20261121
@@ -154,7 +154,7 @@ def errors_of(pose: Pose, world_from_camera: Array) -> tuple[float, float]:
     return math.hypot(*off.position) * 1e3, math.degrees(off.orientation.angle_to(Pose().orientation))
 
 
-# ------------------------------------------------------------------------------------------------ figures
+# ------------------------------------------------------------------------------------------------ metrics
 def measure(
     make: Callable[[np.random.Generator, Plate], View], pictures: int, limit: float, options: PoseOptions, factor: float
 ) -> Tally:
@@ -211,13 +211,13 @@ async def run(report: Report, long: bool) -> None:
     for name, make, limit in kinds:
         tally = measure(make, pictures, limit, options, 1.0)
         prefix, count = f"camera_pose_{name}", len(tally.position)
-        report.add(Figure(f"{prefix}_mm", median(tally.position), count, tally.note()))
+        report.add(Metric(f"{prefix}_mm", median(tally.position), count, tally.note()))
         report.add(
-            Figure(f"{prefix}_p99_mm", percentile(tally.position, 99), count, f"worst {max(tally.position):.2f}")
+            Metric(f"{prefix}_p99_mm", percentile(tally.position, 99), count, f"worst {max(tally.position):.2f}")
         )
         far = f"99th percentile {percentile(tally.orientation, 99):.3f}"
-        report.add(Figure(f"{prefix}_deg", median(tally.orientation), count, far))
+        report.add(Metric(f"{prefix}_deg", median(tally.orientation), count, far))
         slow = f"99th percentile {percentile(tally.seconds, 99) * 1e3:.1f}; with the decoding of a JPEG file"
-        report.add(Figure(f"{prefix}_ms", median(tally.seconds) * 1e3, len(tally.seconds), slow))
-        report.add(Figure(f"{prefix}_wrong", 100 * tally.wrong / pictures, pictures))
-        report.add(Figure(f"{prefix}_refused", 100 * len(tally.refused) / pictures, pictures))
+        report.add(Metric(f"{prefix}_ms", median(tally.seconds) * 1e3, len(tally.seconds), slow))
+        report.add(Metric(f"{prefix}_wrong", 100 * tally.wrong / pictures, pictures))
+        report.add(Metric(f"{prefix}_refused", 100 * len(tally.refused) / pictures, pictures))

@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 
 from arcor2_server.demo.processes import Child, python_module
-from benchmarks.figures import Figure, Report
+from benchmarks.metrics import Metric, Report
 
 SECONDS = 20.0
 
@@ -18,9 +18,8 @@ async def run(report: Report, directory: Path) -> None:
     fake = Child("camera", command, directory / "camera.log")
     try:
         addresses = await fake.start_json()
-        process = await asyncio.create_subprocess_exec(
-            sys.executable, "-m", "benchmarks.watch", addresses["stream"], str(SECONDS), stdout=asyncio.subprocess.PIPE
-        )
+        command = (sys.executable, "-m", "benchmarks.receive_pictures", addresses["stream"], str(SECONDS))
+        process = await asyncio.create_subprocess_exec(*command, stdout=asyncio.subprocess.PIPE)
         assert process.stdout is not None
         result = msgspec.json.decode(await process.stdout.read())
         await process.wait()
@@ -28,4 +27,4 @@ async def run(report: Report, directory: Path) -> None:
         await fake.stop()
     seconds = result["seconds"]
     note = f"{result['frames'] / seconds:.1f} frames/s, a picture is {result['age'] * 1e3:.1f} ms old when it is here"
-    report.add(Figure("oak_core_percent", 100.0 * result["cpu"] / seconds, result["frames"], note))
+    report.add(Metric("oak_core_percent", 100.0 * result["cpu"] / seconds, result["frames"], note))

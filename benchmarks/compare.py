@@ -1,6 +1,6 @@
 """`make bench-compare`: measure this checkout and another revision in turns, and print both side by side.
 
-`python -m benchmarks.compare REVISION [--rounds N] [ROOM ...]`: each round measures every named room (default: all)
+`python -m benchmarks.compare REVISION [--rounds N] [GROUP ...]`: each round measures every named group (default: all)
 first in one, then in the other; the order alternates. The table shows medians over the rounds and their ratio.
 """
 
@@ -17,8 +17,8 @@ import msgspec
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.__main__ import ROOMS
-from benchmarks.figures import GOALS
+from benchmarks.__main__ import GROUPS
+from benchmarks.metrics import GOALS
 
 ROOT = Path(__file__).parents[1]
 FOLDERS = (".", "drivers", "fakes", "server")
@@ -39,11 +39,11 @@ def write_metadata(checkout: Path) -> None:
     (info / "entry_points.txt").write_text("\n".join(lines) + "\n")
 
 
-def measure(checkout: Path, room: str) -> dict[str, float]:
-    """Measure one room with the code of a checkout; return its results by name."""
+def measure(checkout: Path, group: str) -> dict[str, float]:
+    """Measure one group with the code of a checkout; return its results by name."""
     path = os.pathsep.join(str(checkout / folder) for folder in FOLDERS)
     ended = subprocess.run(
-        [sys.executable, "-m", "benchmarks", room],
+        [sys.executable, "-m", "benchmarks", group],
         cwd=checkout,
         env=os.environ | {"PYTHONPATH": path},
         stdout=subprocess.PIPE,
@@ -53,13 +53,13 @@ def measure(checkout: Path, room: str) -> dict[str, float]:
     return {result["name"]: result["value"] for result in results}
 
 
-def compare(other: Path, rooms: list[str], rounds: int) -> None:
+def compare(other: Path, groups: list[str], rounds: int) -> None:
     """Measure both checkouts in turns and print the table."""
     found: dict[str, dict[Path, list[float]]] = {}
     for number in range(rounds):
-        for room in rooms:
+        for group in groups:
             for checkout in (other, ROOT) if number % 2 == 0 else (ROOT, other):
-                for name, value in measure(checkout, room).items():
+                for name, value in measure(checkout, group).items():
                     found.setdefault(name, {other: [], ROOT: []})[checkout].append(value)
     table = Table("metric", "before", "after", "after / before", "unit", "goal")
     for name, values in found.items():
@@ -74,7 +74,7 @@ def main() -> None:
     """Read the command line, check the other revision out, and compare."""
     parser = argparse.ArgumentParser(prog="benchmarks.compare")
     parser.add_argument("revision", help="commit to compare with")
-    parser.add_argument("rooms", nargs="*", help="rooms to measure; all when none is named")
+    parser.add_argument("groups", nargs="*", help="groups to measure; all when none is named")
     parser.add_argument("--rounds", type=int, default=3)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="arcor2-hw-compare-") as folder:
@@ -83,7 +83,7 @@ def main() -> None:
         subprocess.run([*git, "add", "--quiet", "--detach", str(other), arguments.revision], check=True)
         try:
             write_metadata(other)
-            compare(other, arguments.rooms or list(ROOMS), arguments.rounds)
+            compare(other, arguments.groups or list(GROUPS), arguments.rounds)
         finally:
             subprocess.run([*git, "remove", "--force", str(other)], check=True)
 

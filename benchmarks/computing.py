@@ -13,7 +13,7 @@ from arcor2_hw.data.robot import Joint
 from arcor2_hw.kinematics import primitives
 from arcor2_server.compute.workers import Compute
 from arcor2_server.workspace.collisions import Placed, first_hit
-from benchmarks.figures import Figure, Report, median, percentile
+from benchmarks.metrics import Metric, Report, median, percentile
 
 UR5E: Final = Path(next(iter(arcor2_drivers.__path__))) / "universal_robots" / "urdf" / "ur5e"
 BODIES: Final = 1000
@@ -22,11 +22,11 @@ ROUNDS: Final = 100
 
 async def run(report: Report) -> None:
     """Measure all of them."""
-    for figure in (lines(), *await questions(), await reachability()):
-        report.add(figure)
+    for metric in (lines(), *await questions(), await reachability()):
+        report.add(metric)
 
 
-def lines() -> Figure:
+def lines() -> Metric:
     """Time the safety of a line among a thousand boxes, which the server itself tells."""
     placed = {
         f"b{n}": Placed(Box(f"b{n}", 0.2, 0.2, 0.2), Pose(Position(n % 10, n // 10 % 10, n // 100)))
@@ -38,10 +38,10 @@ def lines() -> Figure:
         began = time.perf_counter()
         first_hit(start, end, placed.items(), 0.01)
         taken.append(1e3 * (time.perf_counter() - began))
-    return Figure("computing_line_1000_ms", median(taken), len(taken), f"p99 {percentile(taken, 99):.2f} ms")
+    return Metric("computing_line_1000_ms", median(taken), len(taken), f"p99 {percentile(taken, 99):.2f} ms")
 
 
-async def questions() -> list[Figure]:
+async def questions() -> list[Metric]:
     """Time the start of a worker with its first answer, one question, and one after one of many bodies moved."""
     model = RobotSource(StoredFile(str(UR5E), "ur5e"))
     compute = Compute(idle=60.0)
@@ -65,13 +65,13 @@ async def questions() -> list[Figure]:
     finally:
         await compute.close()
     return [
-        Figure("computing_start_ms", start, 1),
-        Figure("computing_question_ms", median(question), len(question), f"p99 {percentile(question, 99):.2f} ms"),
-        Figure("computing_world_1000_ms", median(world), len(world), f"p99 {percentile(world, 99):.2f} ms"),
+        Metric("computing_start_ms", start, 1),
+        Metric("computing_question_ms", median(question), len(question), f"p99 {percentile(question, 99):.2f} ms"),
+        Metric("computing_world_1000_ms", median(world), len(world), f"p99 {percentile(world, 99):.2f} ms"),
     ]
 
 
-async def reachability() -> Figure:
+async def reachability() -> Metric:
     """Time 1,000 points in three orientations each, asked in pieces as the server does."""
     robot = WorldRobot("arm", RobotSource(StoredFile(str(UR5E), "ur5e")))
     turns = [Orientation(1, 0, 0, 0), Orientation(0, 0.5**0.5, 0, 0.5**0.5), Orientation(0.5**0.5, 0, 0, 0.5**0.5)]
@@ -87,7 +87,7 @@ async def reachability() -> Figure:
         taken = time.perf_counter() - began
     finally:
         await compute.close()
-    return Figure("computing_reach_3000_s", taken, len(poses))
+    return Metric("computing_reach_3000_s", taken, len(poses))
 
 
 def box(number: int, aside: float = 0.0) -> WorldBody:

@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 from typing import Final
 
-from benchmarks.figures import Figure, Report
+from benchmarks.metrics import Metric, Report
 
 BUSY: Final = 8
 """Processes that compute without a pause."""
@@ -43,7 +43,7 @@ async def _demo(folder: Path) -> str:
 
 
 async def run(report: Report, folder: Path, long: bool) -> None:
-    """Measure everything in this room."""
+    """Measure everything in this group."""
     runs = LONG_RUNS if long else RUNS
     busy = [
         await asyncio.create_subprocess_exec(sys.executable, "-c", "while True: pass", start_new_session=True)
@@ -56,4 +56,4 @@ async def run(report: Report, folder: Path, long: bool) -> None:
             process.kill()
             await process.wait()
     ended = [problem for problem in problems if problem]
-    report.add(Figure("busy_demo_completed", 100.0 * (runs - len(ended)) / runs, runs, "; ".join(ended)))
+    report.add(Metric("busy_demo_completed", 100.0 * (runs - len(ended)) / runs, runs, "; ".join(ended)))

@@ -9,8 +9,8 @@ from typing import Any
 
 from websockets.asyncio.client import ClientConnection
 
-from benchmarks import serving
-from benchmarks.figures import Figure, Report, median
+from benchmarks import server_process
+from benchmarks.metrics import Metric, Report, median
 from benchmarks.requests import fdatasync_time
 
 IN_FLIGHT = 128
@@ -30,7 +30,7 @@ class Author:
         self.object = ""
 
     async def ask(self, name: str, /, **args: Any) -> Any:
-        answer = json.loads(await serving.answer(self.socket, request(name, **args)))
+        answer = json.loads(await server_process.answer(self.socket, request(name, **args)))
         assert answer["result"], answer
         return answer.get("data")
 
@@ -38,7 +38,7 @@ class Author:
         """Give how long the answer took, s."""
         text = request(name, **args)
         begin = time.perf_counter()
-        answer = await serving.answer(self.socket, text)
+        answer = await server_process.answer(self.socket, text)
         spent = time.perf_counter() - begin
         assert json.loads(answer)["result"], answer
         return spent
@@ -118,13 +118,13 @@ class Floor:
         self._syncs: list[float] = []
 
     async def sample(self) -> None:
-        self._echoes += await serving.round_trips(self._echo, "x" * 300, 10)
+        self._echoes += await server_process.round_trips(self._echo, "x" * 300, 10)
         self._syncs.append(fdatasync_time(self._directory, 10))
 
-    def figure(self, name: str, samples: list[float]) -> Figure:
+    def metric(self, name: str, samples: list[float]) -> Metric:
         echo, sync = median(self._echoes), median(self._syncs)
         note = f"answer {median(samples) * 1e3:.3f} ms, echo {echo * 1e3:.3f} ms, fdatasync {sync * 1e3:.3f} ms"
-        return Figure(name, (median(samples) - echo - sync) * 1e3, len(samples), note)
+        return Metric(name, (median(samples) - echo - sync) * 1e3, len(samples), note)
 
 
 async def edits(report: Report, author: Author, scene: str, echo: ClientConnection, directory: Path) -> None:
@@ -137,7 +137,7 @@ async def edits(report: Report, author: Author, scene: str, echo: ClientConnecti
         samples.append(await author.timed("AddAction", **author.dice(point, number)))
         if number % 10 == 0:
             await floor.sample()
-    report.add(floor.figure("add_action_10000_ms", samples))
+    report.add(floor.metric("add_action_10000_ms", samples))
     await author.ask("CloseProject", force=True)
 
 
@@ -163,7 +163,7 @@ async def logic(report: Report, author: Author, scene: str, echo: ClientConnecti
     await author.ask("CloseProject", force=True)
 
 
-async def _close(report: Report, author: Author, figure: str, start: str, end: str, floor: Floor) -> None:
+async def _close(report: Report, author: Author, metric: str, start: str, end: str, floor: Floor) -> None:
     samples = []
     for number in range(50):
         text = request("AddLogicItem", start=start, end=end)
@@ -180,7 +180,7 @@ async def _close(report: Report, author: Author, figure: str, start: str, end: s
         await author.ask("RemoveLogicItem", logic_item_id=item)
         if number % 10 == 0:
             await floor.sample()
-    report.add(floor.figure(figure, samples))
+    report.add(floor.metric(metric, samples))
 
 
 async def opening(report: Report, author: Author, scene: str, directory: Path) -> None:
@@ -196,9 +196,9 @@ async def opening(report: Report, author: Author, scene: str, directory: Path) -
         syncs.append(fdatasync_time(directory, 5, size))
         await author.ask("CloseProject")
         opened.append(await author.timed("OpenProject", id=project))
-    report.add(Figure("open_project_1000_ms", median(opened) * 1e3, len(opened), "to the answer"))
+    report.add(Metric("open_project_1000_ms", median(opened) * 1e3, len(opened), "to the answer"))
     note = f"with its flush; {size} bytes and fdatasync alone take {median(syncs) * 1e3:.1f} ms"
-    report.add(Figure("save_project_1000_ms", median(saved) * 1e3, len(saved), note))
+    report.add(Metric("save_project_1000_ms", median(saved) * 1e3, len(saved), note))
     await author.ask("CloseProject")
 
 
@@ -212,21 +212,21 @@ async def listing(report: Report, author: Author, scene: str) -> None:
         await author.ask("CopyProject", source_id=project, target_name=f"copy {number}")
     assert len(await author.ask("ListProjects")) == 200
     again = [await author.timed("ListProjects") for _ in range(50)]
-    report.add(Figure("list_projects_200_ms", median(again) * 1e3, len(again)))
+    report.add(Metric("list_projects_200_ms", median(again) * 1e3, len(again)))
     changed = []
     for number in range(10):
         await author.ask("UpdateProjectDescription", project_id=project, new_description=str(number))
         changed.append(await author.timed("ListProjects"))
-    report.add(Figure("list_projects_200_changed_ms", median(changed) * 1e3, len(changed), "one of them saved before"))
+    report.add(Metric("list_projects_200_changed_ms", median(changed) * 1e3, len(changed), "one of them saved before"))
 
 
 async def run(report: Report, directory: Path) -> None:
-    """Measure everything in this room."""
+    """Measure everything in this group."""
     async with (
-        serving.server(directory / "documents") as (url, _),
-        serving.echo(directory, 60) as echo_url,
-        serving.socket(url) as socket,
-        serving.socket(echo_url) as echo,
+        server_process.server(directory / "documents") as (url, _),
+        server_process.echo(directory, 60) as echo_url,
+        server_process.socket(url) as socket,
+        server_process.socket(echo_url) as echo,
     ):
         author = Author(socket)
         scene = await author.scene()

@@ -1,6 +1,6 @@
 """`make bench-editor`: the editor in headless Chromium with software rendering at `q=low`, real server, fakes.
 
-What is measured is told where it is measured; the goals are those of `benchmarks/figures.py`. A page that reports an
+What is measured is told where it is measured; the goals are those of `benchmarks/metrics.py`. A page that reports an
 error measures nothing.
 """
 
@@ -24,7 +24,7 @@ from arcor2_hw.data.events import SceneStateEnum
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.project import Project
 from arcor2_server.web.editor import FILES
-from benchmarks.figures import Figure, Report, median, percentile
+from benchmarks.metrics import Metric, Report, median, percentile
 from tests.e2e.harness import Cell, running_cell, scene_state, until
 from tests.editor.screen import Screen, running_browser, screen_of
 from tests.editor.test_editor_size import needed
@@ -47,7 +47,7 @@ def size(report: Report) -> None:
     manifest = json.loads((FILES / ".vite" / "manifest.json").read_text())
     files = needed(manifest, "index.html", "src/engine/engine.ts")
     total = sum((FILES / f"{name}.gz").stat().st_size for name in files)
-    report.add(Figure("editor_size_kb", total / 1e3, len(files), "files of shell and 3D"))
+    report.add(Metric("editor_size_kb", total / 1e3, len(files), "files of shell and 3D"))
 
 
 async def _inside(screen: Screen) -> dict[str, Any]:
@@ -71,7 +71,7 @@ async def loading(report: Report, browser: Browser, cell: Cell) -> None:
             robots.append(seen["robot"])
     for name, samples in (("paint", paints), ("usable", items), ("robot", robots)):
         note = f"from the address to it; worst {max(samples):.0f} ms"
-        report.add(Figure(f"editor_{name}_s", median(samples) / 1e3, len(samples), note))
+        report.add(Metric(f"editor_{name}_s", median(samples) / 1e3, len(samples), note))
 
 
 async def _move(client: Client, robot: str, height: float) -> None:
@@ -109,9 +109,9 @@ async def drawing(report: Report, screen: Screen, client: Client, cell: Cell, ro
     else:
         raise AssertionError("it did not move all the time: the robot's watchdog ends motions on a busy machine")
     joints = (await _inside(screen))["joints"]
-    report.add(Figure("editor_frames_per_s", rate, round(rate * MOVING_S), f"one robot moves, {POINTS} points"))
+    report.add(Metric("editor_frames_per_s", rate, round(rate * MOVING_S), f"one robot moves, {POINTS} points"))
     note = f"p50 {median(joints):.0f} ms, {len(joints) / MOVING_S:.0f} events/s"
-    report.add(Figure("editor_event_to_pixels_ms", percentile(joints, 95), len(joints), f"p95; {note}"))
+    report.add(Metric("editor_event_to_pixels_ms", percentile(joints, 95), len(joints), f"p95; {note}"))
     await client.call("StopRobot", rpc.StopRobotArgs(robot))
     await until(lambda: _at_rest(cell), "it rests")
 
@@ -143,7 +143,7 @@ async def stopping(report: Report, screen: Screen, client: Client, cell: Cell, r
         tapped = await screen.page.evaluate("() => window.__tap") / 1e3
         took.append((truth["last_stop"]["t"] + offset - tapped) * 1e3)
     note = f"median {median(took):.0f} ms; at the controller, past server and driver"
-    report.add(Figure("editor_stop_ms", max(took), len(took), f"worst; {note}"))
+    report.add(Metric("editor_stop_ms", max(took), len(took), f"worst; {note}"))
 
 
 async def editing(report: Report, browser: Browser, one: Screen, cell: Cell, project: Project) -> None:
@@ -177,12 +177,12 @@ async def editing(report: Report, browser: Browser, one: Screen, cell: Cell, pro
 
         took = await heard("edits", "enters", type_it)
         note = f"p50 {median(took):.0f} ms; with its lock, kept in the journal"
-        report.add(Figure("editor_edit_ms", percentile(took, 95), len(took), f"p95; {note}"))
+        report.add(Metric("editor_edit_ms", percentile(took, 95), len(took), f"p95; {note}"))
         edits = len((await _inside(two))["edits"])
         took = await heard("previews", "taps", step)
         await two.until("edits => window.__bench.edits.length > edits", edits)
         note = f"p50 {median(took):.0f} ms; the edit itself follows when no further step does"
-        report.add(Figure("editor_step_ms", percentile(took, 95), len(took), f"p95; {note}"))
+        report.add(Metric("editor_step_ms", percentile(took, 95), len(took), f"p95; {note}"))
 
 
 async def returning(report: Report, screen: Screen, cell: Cell) -> None:
@@ -199,7 +199,7 @@ async def returning(report: Report, screen: Screen, cell: Cell) -> None:
         await screen.until("() => !document.querySelector('.lost')")
         took.append(time.perf_counter() - begin)
     note = f"worst; median {median(took):.2f} s after it is ready"
-    report.add(Figure("editor_back_s", max(took), len(took), note))
+    report.add(Metric("editor_back_s", max(took), len(took), note))
 
 
 async def measure(report: Report, directory: Path) -> None:
@@ -226,7 +226,7 @@ async def measure(report: Report, directory: Path) -> None:
             await drawing(report, screen, client, cell, robot)
             online = await _idle(screen)
             note = f"in {IDLE_S:g} s each: offline {offline}, online with the arm at rest {online}"
-            report.add(Figure("editor_idle_frames", offline + online, 2, note))
+            report.add(Metric("editor_idle_frames", offline + online, 2, note))
             await stopping(report, screen, client, cell, robot)
             await editing(report, browser, screen, cell, project)
             await returning(report, screen, cell)

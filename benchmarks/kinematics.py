@@ -21,7 +21,7 @@ from arcor2_hw.kinematics.model import RobotModel
 from arcor2_hw.kinematics.shapes import Array, Box
 from arcor2_hw.planning.reachability import Reach, Reachability
 from benchmarks import planning, safe_moves
-from benchmarks.figures import Figure, Report, median, percentile
+from benchmarks.metrics import Metric, Report, median, percentile
 
 UR5E: Final = Path(next(iter(arcor2_drivers.__path__))) / "universal_robots" / "urdf" / "ur5e"
 SEED: Final = 20
@@ -38,10 +38,10 @@ async def run(report: Report) -> None:
     model = RobotModel.load(UR5E)
     chance = np.random.default_rng(SEED)
     report.add(forward(model, chance))
-    for figure in (*inverse(model, chance), *checks(model, chance), *reachability(model, chance)):
-        report.add(figure)
-    for figure in (*planning.figures(model), *safe_moves.figures()):
-        report.add(figure)
+    for metric in (*inverse(model, chance), *checks(model, chance), *reachability(model, chance)):
+        report.add(metric)
+    for metric in (*planning.metrics(model), *safe_moves.metrics()):
+        report.add(metric)
 
 
 def each(call: Callable[[Array], object], values: Array, rounds: int) -> float:
@@ -59,14 +59,14 @@ def each(call: Callable[[Array], object], values: Array, rounds: int) -> float:
     return median(taken)
 
 
-def forward(model: RobotModel, chance: np.random.Generator) -> Figure:
+def forward(model: RobotModel, chance: np.random.Generator) -> Metric:
     """Time one call that gives the tip's matrix."""
     arm = model.arm("tcp")
     taken = each(arm.forward, chance.uniform(-np.pi, np.pi, (2000, 6)), 51)
-    return Figure("kinematics_forward_us", taken * 1e6, 51 * 2000, f"load {os.getloadavg()[0]:.1f}, seed {SEED}")
+    return Metric("kinematics_forward_us", taken * 1e6, 51 * 2000, f"load {os.getloadavg()[0]:.1f}, seed {SEED}")
 
 
-def inverse(model: RobotModel, chance: np.random.Generator) -> list[Figure]:
+def inverse(model: RobotModel, chance: np.random.Generator) -> list[Metric]:
     """Ask for joints of poses that random joints lead to, from a random seed within a turn."""
     arm = model.arm("tcp")
     solver = InverseKinematics(arm)
@@ -83,14 +83,14 @@ def inverse(model: RobotModel, chance: np.random.Generator) -> list[Figure]:
         missed += not np.allclose(arm.forward(found), target, atol=1e-5)
     note = f"p99 {percentile(times, 99) * 1e3:.2f} ms, the longest {max(times) * 1e3:.1f} ms"
     return [
-        Figure("kinematics_inverse_reached", 100.0 * (1.0 - missed / POSES), POSES, f"{missed} not reached"),
-        Figure("kinematics_inverse_ms", median(times) * 1e3, len(times), note),
+        Metric("kinematics_inverse_reached", 100.0 * (1.0 - missed / POSES), POSES, f"{missed} not reached"),
+        Metric("kinematics_inverse_ms", median(times) * 1e3, len(times), note),
     ]
 
 
-def checks(model: RobotModel, chance: np.random.Generator) -> list[Figure]:
+def checks(model: RobotModel, chance: np.random.Generator) -> list[Metric]:
     """Look whether configurations are free, among 20 boxes in reach, and among 1,000."""
-    figures = []
+    metrics = []
     for count in (20, 1000):
         world = _cluttered(model, count, chance)
         # Of configurations that are free: what collides is found sooner.
@@ -98,11 +98,11 @@ def checks(model: RobotModel, chance: np.random.Generator) -> list[Figure]:
         free = np.array([q for q in tried if world.is_free("arm", q)])[:500]
         taken = each(lambda q, world=world: world.is_free("arm", q), free, 11)  # type: ignore[misc]
         name = f"kinematics_check_{count}_us"
-        figures.append(Figure(name, taken * 1e6, 11 * len(free), f"{len(free)} free configurations"))
-    return figures
+        metrics.append(Metric(name, taken * 1e6, 11 * len(free), f"{len(free)} free configurations"))
+    return metrics
 
 
-def reachability(model: RobotModel, chance: np.random.Generator) -> list[Figure]:
+def reachability(model: RobotModel, chance: np.random.Generator) -> list[Metric]:
     """Judge 1,000 points with 3 orientations each, and again after one of the 20 boxes was moved."""
     world = _cluttered(model, 20, chance)
     reach = Reachability(world, "arm", model.arm("tcp"))
@@ -124,8 +124,8 @@ def reachability(model: RobotModel, chance: np.random.Generator) -> list[Figure]
         reach.judge(poses)
         moved.append(time.perf_counter() - began)
     return [
-        Figure("kinematics_reach_3000_s", median(times), len(times), note),
-        Figure("kinematics_reach_moved_ms", median(moved) * 1e3, len(moved)),
+        Metric("kinematics_reach_3000_s", median(times), len(times), note),
+        Metric("kinematics_reach_moved_ms", median(moved) * 1e3, len(moved)),
     ]
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from websockets.asyncio.client import ClientConnection
 
-from benchmarks import serving
-from benchmarks.figures import Figure, Report, median, percentile
+from benchmarks import server_process
+from benchmarks.metrics import Metric, Report, median, percentile
 
 CLIENTS = 50
 DEAF = 10
@@ -31,11 +31,11 @@ LOCK, UNLOCK = _lock("WriteLock"), _lock("WriteUnlock")
 async def _crowd(url: str, count: int) -> AsyncIterator[list[ClientConnection]]:
     """Clients of the websockets library; the first is logged in."""
     async with contextlib.AsyncExitStack() as stack:
-        crowd = [await stack.enter_async_context(serving.socket(url)) for _ in range(count)]
+        crowd = [await stack.enter_async_context(server_process.socket(url)) for _ in range(count)]
         for each in crowd:
             await each.recv()  # what it is greeted with
         login = {"id": 1, "request": "RegisterUser", "args": {"user_name": "bench"}}
-        await serving.answer(crowd[0], json.dumps(login))
+        await server_process.answer(crowd[0], json.dumps(login))
         yield crowd
 
 
@@ -85,14 +85,14 @@ async def _deaf(url: str) -> socket.socket:
 
 
 async def run(report: Report, directory: Path) -> None:
-    """Measure everything in this room."""
-    async with serving.server(directory / "listeners") as (url, process):
+    """Measure everything in this group."""
+    async with server_process.server(directory / "listeners") as (url, process):
         async with _crowd(url, CLIENTS) as crowd:
             samples = await _to_the_last(crowd)
             note = f"with the request; p95 {percentile(samples, 95) * 1e3:.2f} ms"
-            report.add(Figure("event_last_of_50_ms", median(samples) * 1e3, len(samples), note))
+            report.add(Metric("event_last_of_50_ms", median(samples) * 1e3, len(samples), note))
             rates = [await _deliveries(crowd) for _ in range(3)]
-            report.add(Figure("deliveries_per_s", max(rates), 3 * 2 * BURST * CLIENTS, "best of three"))
+            report.add(Metric("deliveries_per_s", max(rates), 3 * 2 * BURST * CLIENTS, "best of three"))
         async with _crowd(url, CLIENTS - DEAF) as crowd:
             before = process.memory_full_info().pss
             alone = median(await _to_the_last(crowd))
@@ -105,6 +105,6 @@ async def run(report: Report, directory: Path) -> None:
                 for each in deaf:
                     each.close()
             note = f"after {2 * BURST + ROUNDS} events to each; {rate:.0f} deliveries/s to the others meanwhile"
-            report.add(Figure("deaf_clients_mib", cost, DEAF, note))
+            report.add(Metric("deaf_clients_mib", cost, DEAF, note))
             note = f"{beside * 1e3:.2f} ms to the last of {len(crowd)} against {alone * 1e3:.2f} ms without them"
-            report.add(Figure("deaf_clients_delay_ms", (beside - alone) * 1e3, ROUNDS, note))
+            report.add(Metric("deaf_clients_delay_ms", (beside - alone) * 1e3, ROUNDS, note))

@@ -16,7 +16,7 @@ from arcor2_hw.compute.mesh_tasks import PrepareAsset
 from arcor2_server.app import running_services
 from arcor2_server.compute.workers import Compute
 from arcor2_server.settings import ServerSettings
-from benchmarks.figures import Figure, Report, median
+from benchmarks.metrics import Metric, Report, median
 
 LINKS: Final = 7
 ROUNDS: Final = 5
@@ -26,8 +26,8 @@ AGAIN: Final = 100
 async def run(report: Report) -> None:
     """Measure all of them."""
     with TemporaryDirectory() as folder:
-        for figure in await preparing(Path(folder)):
-            report.add(figure)
+        for metric in await preparing(Path(folder)):
+            report.add(metric)
         report.add(await again(Path(folder)))
 
 
@@ -56,7 +56,7 @@ def robot() -> tuple[bytes, int, int]:
     return packed.getvalue(), size, triangles
 
 
-async def preparing(folder: Path) -> list[Figure]:
+async def preparing(folder: Path) -> list[Metric]:
     """Time the making, by a worker that runs."""
     content, size, triangles = robot()
     (folder / "arm.zip").write_bytes(content)
@@ -75,13 +75,13 @@ async def preparing(folder: Path) -> list[Figure]:
     assert made.before == triangles
     note = f"{LINKS} meshes, {triangles} triangles, {size / 1e6:.1f} MB"
     return [
-        Figure("meshes_robot_triangles", made.triangles, 1, note),
-        Figure("meshes_robot_mb", len(made.content) / 1e6, 1, note),
-        Figure("meshes_robot_s", median(taken), len(taken), note),
+        Metric("meshes_robot_triangles", made.triangles, 1, note),
+        Metric("meshes_robot_mb", len(made.content) / 1e6, 1, note),
+        Metric("meshes_robot_s", median(taken), len(taken), note),
     ]
 
 
-async def again(folder: Path) -> Figure:
+async def again(folder: Path) -> Metric:
     """Time what is asked for the second time, from the disk."""
     taken = []
     (folder / "data").mkdir()
@@ -97,4 +97,4 @@ async def again(folder: Path) -> Figure:
             shown = await services.prepared.get("arm.zip")
             (shown.packed or shown.plain).read_bytes()
             taken.append(1e3 * (time.perf_counter() - began))
-    return Figure("meshes_again_ms", median(taken), len(taken), "the compressed file, read")
+    return Metric("meshes_again_ms", median(taken), len(taken), "the compressed file, read")

@@ -12,8 +12,8 @@ from arcor2_hw.data import rpc
 from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.project import Flow
-from benchmarks import serving
-from benchmarks.figures import Figure, Report, median
+from benchmarks import server_process
+from benchmarks.metrics import Metric, Report, median
 
 SLOW = '''"""A device that takes its time to connect."""
 
@@ -115,7 +115,7 @@ async def start_of_scene(report: Report, url: str, rounds: int = 5) -> None:
             await client.call("StopScene")
             await scene_state(client, "stopped")
         await client.call("CloseScene", rpc.CloseSceneArgs(force=True))
-    report.add(Figure("scene_start_20_s", median(samples), rounds, f"worst {max(samples):.3f} s"))
+    report.add(Metric("scene_start_20_s", median(samples), rounds, f"worst {max(samples):.3f} s"))
 
 
 async def programs(report: Report, url: str, directory: Path, rounds: int = 5, calls: int = 5000) -> None:
@@ -144,9 +144,9 @@ async def programs(report: Report, url: str, directory: Path, rounds: int = 5, c
             first.append(time.perf_counter() - begin)
             await ended(client)
             periods.append(float(file.read_text()))
-    report.add(Figure("run_first_action_ms", median(first) * 1e3, rounds, f"worst {max(first) * 1e3:.0f} ms"))
+    report.add(Metric("run_first_action_ms", median(first) * 1e3, rounds, f"worst {max(first) * 1e3:.0f} ms"))
     note = "script, device's executor, deadline, both events; a client follows them"
-    report.add(Figure("action_overhead_ms", median(periods) * 1e3, rounds * calls, note))
+    report.add(Metric("action_overhead_ms", median(periods) * 1e3, rounds * calls, note))
 
 
 async def ended(client: Client) -> None:
@@ -160,8 +160,8 @@ async def ended(client: Client) -> None:
 
 
 async def run(report: Report, directory: Path) -> None:
-    """Measure everything in this room."""
-    async with serving.server(directory / "operation") as (url, _):
+    """Measure everything in this group."""
+    async with server_process.server(directory / "operation") as (url, _):
         await add_type(url, "Slow", SLOW)
         await add_type(url, "Probe", PROBE)
         await start_of_scene(report, url)

@@ -20,7 +20,7 @@ from arcor2_hw.exceptions import KinematicsError
 from arcor2_hw.kinematics.model import RobotModel
 from arcor2_hw.kinematics.shapes import Array, Box
 from arcor2_hw.planning.planner import Planner
-from benchmarks.figures import Figure, median, percentile
+from benchmarks.metrics import Metric, median, percentile
 
 PLANS: Final = 20
 SEED: Final = 20
@@ -31,7 +31,7 @@ FINE: Final = 0.003
 Problem = tuple[Array, Array]
 
 
-def figures(model: RobotModel) -> list[Figure]:
+def metrics(model: RobotModel) -> list[Metric]:
     """Plan from joints to joints, straight between which something is in the way."""
     world, problems = cell(model)
     arm = model.arm("tcp")
@@ -55,8 +55,8 @@ def figures(model: RobotModel) -> list[Figure]:
         f"{median(ratios):.2f} times the straight way; {other}; {load}"
     )
     return [
-        Figure("kinematics_plans_found", float(found), len(problems), f"of {len(problems)}; each looked at again"),
-        Figure("kinematics_plan_ms", median(times) * 1e3, len(times), note),
+        Metric("kinematics_plans_found", float(found), len(problems), f"of {len(problems)}; each looked at again"),
+        Metric("kinematics_plan_ms", median(times) * 1e3, len(times), note),
     ]
 
 

@@ -1,7 +1,7 @@
 """Recovery: every transport lost and whole again, all drivers at once in one process.
 
-A thread per line loses it; another goes on asking the driver all the time, as a program would. A line is back when the
-driver says that it is online, or back, and has given a fresh reading; the time counts from just before the line is made
+A thread per link loses it; another goes on asking the driver all the time, as a program would. A link is back when the
+driver says that it is online, or back, and has given a fresh reading; the time counts from just before the link is made
 whole. After each cycle everybody is silent, and what the process holds is counted.
 """
 
@@ -26,9 +26,9 @@ from rich.table import Table
 
 from arcor2_hw.data.device import Connection
 from arcor2_hw.exceptions import DeviceError
-from benchmarks import lines
-from benchmarks.figures import Figure, Report, percentile
-from benchmarks.lines import KINDS, Fresh, Kind, Line
+from benchmarks import device_links
+from benchmarks.device_links import KINDS, Fresh, Kind, Link
+from benchmarks.metrics import Metric, Report, percentile
 
 CYCLES: Final = 3
 LONG_CYCLES: Final = 50
@@ -38,7 +38,7 @@ CASES: Final = tuple((kind, seconds) for kind in KINDS for seconds in OUTAGES)
 CONNECTS_WITHIN: Final = 20.0
 """s; the camera's first picture needs Open3D loaded."""
 GIVEN_UP: Final = 20.0
-"""s after which a driver counts as not back; the figure then has this time."""
+"""s after which a driver counts as not back; the metric then has this time."""
 ASKED_EACH: Final = 0.02
 STEADY: Final = 1.0
 """s, and up to another half by chance, between being back and being lost again."""
@@ -50,10 +50,10 @@ ONLINE: Final = (Connection.ONLINE, Connection.BACK)
 
 
 class Asking:
-    """Asks the driver of a line all the time, except while it is held."""
+    """Asks the driver of a link all the time, except while it is held."""
 
-    def __init__(self, line: Line) -> None:
-        self._line = line
+    def __init__(self, link: Link) -> None:
+        self._line = link
         self._turn = threading.Lock()
         self._ending = threading.Event()
         self._fresh: Fresh | None = None
@@ -62,7 +62,7 @@ class Asking:
         """Readings refused by a typed error."""
         self.mistakes: list[str] = []
         """Errors that are none of a device's."""
-        self._thread = threading.Thread(target=self._run, name=f"asking {line.name}", daemon=True)
+        self._thread = threading.Thread(target=self._run, name=f"asking {link.name}", daemon=True)
         self._thread.start()
 
     def expect(self, fresh: Fresh) -> None:
@@ -106,23 +106,23 @@ class Asking:
 
 
 class Trial:
-    """One line through all its cases, cycle by cycle."""
+    """One link through all its cases, cycle by cycle."""
 
-    def __init__(self, line: Line) -> None:
-        self.line = line
+    def __init__(self, link: Link) -> None:
+        self.link = link
         self.samples: dict[tuple[Kind, float], list[float]] = {case: [] for case in CASES}
         self.lost_for_good: list[str] = []
         self._marks = 0
-        for each in line.objects:
+        for each in link.objects:
             each.connect(CONNECTS_WITHIN)
-        self.asking = Asking(line)
+        self.asking = Asking(link)
         if not self._seen_anew():
-            raise RuntimeError(f"{line.name} gives no fresh reading before anything was lost")
+            raise RuntimeError(f"{link.name} gives no fresh reading before anything was lost")
 
     def _seen_anew(self) -> bool:
         """Give the device another state; tell whether the driver tells it in time."""
         self._marks += 1
-        self.asking.expect(self.line.mark(self._marks))
+        self.asking.expect(self.link.mark(self._marks))
         return self.asking.back_by(time.monotonic() + GIVEN_UP)
 
     def cycle(self) -> None:
@@ -131,33 +131,33 @@ class Trial:
             self._lose(kind, seconds)
 
     def _lose(self, kind: Kind, seconds: float) -> None:
-        line = self.line
+        link = self.link
         failed = self.asking.failed
-        line.lose(kind)
+        link.lose(kind)
         time.sleep(seconds)
         failed = self.asking.failed - failed
         began = time.monotonic()
-        line.heal(kind)
+        link.heal(kind)
         back = self._seen_anew()
         self.samples[kind, seconds].append(time.monotonic() - began if back else GIVEN_UP)
         if seconds == max(OUTAGES) and not failed:
-            raise RuntimeError(f"{line.name} gave readings through {seconds:g} s of {kind}: the line was not lost")
+            raise RuntimeError(f"{link.name} gave readings through {seconds:g} s of {kind}: the link was not lost")
         if not back:
             self.lost_for_good.append(f"{kind} of {seconds:g} s")
             self._anew()
 
     def _anew(self) -> None:
         with self.asking.held():
-            for each in reversed(self.line.objects):
+            for each in reversed(self.link.objects):
                 each.disconnect()
-            for each in self.line.objects:
+            for each in self.link.objects:
                 each.connect(CONNECTS_WITHIN)
         if not self._seen_anew():
-            raise RuntimeError(f"{self.line.name} is not there when it is connected anew either")
+            raise RuntimeError(f"{self.link.name} is not there when it is connected anew either")
 
     def end(self) -> None:
         self.asking.end()
-        for each in reversed(self.line.objects):
+        for each in reversed(self.link.objects):
             each.disconnect()
 
     def all_samples(self) -> list[float]:
@@ -183,7 +183,7 @@ def held() -> Held:
 def settled(trials: list[Trial]) -> Held:
     """Give what is held most of the time in a few seconds in which every driver is online.
 
-    Not the least: a line that a busy machine lets be lost and opened anew just then holds less.
+    Not the least: a link that a busy machine lets be lost and opened anew just then holds less.
     """
     for _ in range(QUIET_TRIES):
         found: list[Held] = []
@@ -192,7 +192,7 @@ def settled(trials: list[Trial]) -> Held:
         while time.monotonic() < until:
             gc.collect()
             found.append(held())
-            online = online and all(trial.line.device.connection in ONLINE for trial in trials)
+            online = online and all(trial.link.device.connection in ONLINE for trial in trials)
             time.sleep(0.1)
         if online:
             break
@@ -231,40 +231,40 @@ def grown(first: Held, last: Held) -> tuple[int, str]:
 
 
 def table(trials: list[Trial]) -> None:
-    """Print on standard error how long each line took, worst first."""
+    """Print on standard error how long each link took, worst first."""
     console = Console(stderr=True, width=None if sys.stderr.isatty() else 180)
-    shown = Table("line", "p95", *(f"{kind} {seconds:g} s" for kind, seconds in CASES), title="back after, s: worst")
+    shown = Table("link", "p95", *(f"{kind} {seconds:g} s" for kind, seconds in CASES), title="back after, s: worst")
     for trial in sorted(trials, key=lambda each: -percentile(each.all_samples(), 95)):
         worst = (f"{max(trial.samples[case]):.2f}" for case in CASES)
-        shown.add_row(trial.line.name, f"{percentile(trial.all_samples(), 95):.2f}", *worst)
+        shown.add_row(trial.link.name, f"{percentile(trial.all_samples(), 95):.2f}", *worst)
     console.print(shown)
 
 
-def measure(cycles: int) -> list[Figure]:
+def measure(cycles: int) -> list[Metric]:
     """Measure on this thread."""
-    with lines.started() as all_lines, contextlib.ExitStack() as stack:
+    with device_links.started() as links, contextlib.ExitStack() as stack:
         trials = []
-        for line in all_lines:
-            trials.append(Trial(line))
+        for link in links:
+            trials.append(Trial(link))
             stack.callback(trials[-1].end)
         first, last, memory = through(trials, cycles)
     table(trials)
-    mistakes = [f"{trial.line.name}: {text}" for trial in trials for text in trial.asking.mistakes]
+    mistakes = [f"{trial.link.name}: {text}" for trial in trials for text in trial.asking.mistakes]
     if mistakes:
         raise RuntimeError(f"errors that are none of a device's: {'; '.join(mistakes[:5])}")
     worst = max(trials, key=lambda trial: percentile(trial.all_samples(), 95))
     every = [sample for trial in trials for sample in trial.all_samples()]
-    never = [f"{trial.line.name} never back from {case}" for trial in trials for case in trial.lost_for_good]
-    parts = (f"worst of {len(trials)} lines: {worst.line.name}", f"of all {percentile(every, 95):.2f} s", *never)
+    never = [f"{trial.link.name} never back from {case}" for trial in trials for case in trial.lost_for_good]
+    parts = (f"worst of {len(trials)} links: {worst.link.name}", f"of all {percentile(every, 95):.2f} s", *never)
     growth, what = grown(first, last)
     return [
-        Figure("recovery_p95_s", percentile(worst.all_samples(), 95), len(every), "; ".join(parts)),
-        Figure("recovery_growth", growth, cycles, f"{what}; {memory}"),
+        Metric("recovery_p95_s", percentile(worst.all_samples(), 95), len(every), "; ".join(parts)),
+        Metric("recovery_growth", growth, cycles, f"{what}; {memory}"),
     ]
 
 
 async def run(report: Report, long: bool = False) -> None:
-    """Measure everything in this room."""
+    """Measure everything in this group."""
     logging.getLogger("arcor2_hw").setLevel(logging.ERROR)  # each loss is told once, as it should; not here
-    for figure in await asyncio.to_thread(measure, LONG_CYCLES if long else CYCLES):
-        report.add(figure)
+    for metric in await asyncio.to_thread(measure, LONG_CYCLES if long else CYCLES):
+        report.add(metric)

@@ -11,8 +11,8 @@ from pathlib import Path
 from arcor2_hw.client import Client
 from arcor2_hw.data import rpc
 from arcor2_hw.data.geometry import Position
-from benchmarks import serving
-from benchmarks.figures import Figure, Report, median
+from benchmarks import server_process
+from benchmarks.metrics import Metric, Report, median
 
 ROUNDS = 20
 PER_ROUND = 100
@@ -21,20 +21,20 @@ PER_ROUND = 100
 async def ratio(report: Report, url: str, directory: Path, name: str, request: str) -> None:
     """Interleave rounds of the request and of an echo of its answer's size, so that noise meets both."""
     text = json.dumps({"id": 1, "request": request})
-    async with serving.socket(url) as real:
-        size = len(await serving.answer(real, text))
-        async with serving.echo(directory, size) as echo_url, serving.socket(echo_url) as echo:
-            await serving.round_trips(real, text, PER_ROUND)
-            await serving.round_trips(echo, text, PER_ROUND)
+    async with server_process.socket(url) as real:
+        size = len(await server_process.answer(real, text))
+        async with server_process.echo(directory, size) as echo_url, server_process.socket(echo_url) as echo:
+            await server_process.round_trips(real, text, PER_ROUND)
+            await server_process.round_trips(echo, text, PER_ROUND)
             ratios, reals, echoes = [], [], []
             for _ in range(ROUNDS):
-                ours = median(await serving.round_trips(real, text, PER_ROUND))
-                theirs = median(await serving.round_trips(echo, text, PER_ROUND))
+                ours = median(await server_process.round_trips(real, text, PER_ROUND))
+                theirs = median(await server_process.round_trips(echo, text, PER_ROUND))
                 ratios.append(ours / theirs)
                 reals.append(ours)
                 echoes.append(theirs)
     note = f"{median(reals) * 1e6:.0f} us against {median(echoes) * 1e6:.0f} us, answer of {size} bytes"
-    report.add(Figure(name, median(ratios), ROUNDS * PER_ROUND, note))
+    report.add(Metric(name, median(ratios), ROUNDS * PER_ROUND, note))
 
 
 def fdatasync_time(directory: Path, n: int = 200, size: int = 4096) -> float:
@@ -72,9 +72,11 @@ async def edits(report: Report, url: str, directory: Path) -> None:
             "flows": [{"type": "default", "outputs": []}],
         },
     }
-    async with serving.socket(url) as real:
+    async with server_process.socket(url) as real:
         await real.send(json.dumps({"id": 1, "request": "RegisterUser", "args": {"user_name": "bench"}}))
-        await serving.answer(real, json.dumps({"id": 2, "request": "RegisterUser", "args": {"user_name": "bench"}}))
+        await server_process.answer(
+            real, json.dumps({"id": 2, "request": "RegisterUser", "args": {"user_name": "bench"}})
+        )
         count = 0
 
         async def add(n: int) -> list[float]:
@@ -85,25 +87,25 @@ async def edits(report: Report, url: str, directory: Path) -> None:
                 count += 1
                 text = json.dumps(request)
                 begin = time.perf_counter()
-                answer = await serving.answer(real, text)
+                answer = await server_process.answer(real, text)
                 samples.append(time.perf_counter() - begin)
                 assert json.loads(answer)["result"], answer
             return samples
 
-        async with serving.echo(directory, 50) as echo_url, serving.socket(echo_url) as echo:
+        async with server_process.echo(directory, 50) as echo_url, server_process.socket(echo_url) as echo:
             for size in (10, 1000):
                 await add(max(0, size - count))
                 syncs, echoes, adds = [], [], []
                 for _ in range(10):
                     adds += await add(10)
-                    echoes += await serving.round_trips(echo, json.dumps(request), 20)
+                    echoes += await server_process.round_trips(echo, json.dumps(request), 20)
                     syncs.append(fdatasync_time(directory, 20))
                 beyond = statistics.median(adds) - statistics.median(echoes) - statistics.median(syncs)
                 note = (
                     f"AddAction {median(adds) * 1e3:.3f} ms, echo {median(echoes) * 1e3:.3f} ms,"
                     f" fdatasync {median(syncs) * 1e3:.3f} ms"
                 )
-                report.add(Figure(f"add_action_{size}_ms", beyond * 1e3, len(adds), note))
+                report.add(Metric(f"add_action_{size}_ms", beyond * 1e3, len(adds), note))
 
 
 async def start(report: Report, directory: Path) -> None:
@@ -113,32 +115,32 @@ async def start(report: Report, directory: Path) -> None:
     hosts = 0.0
     for _ in range(6):
         begin = time.perf_counter()
-        async with serving.server(directory / "data") as (url, process):
-            async with serving.socket(url) as opened:
-                await serving.answer(opened, '{"id": 1, "request": "SystemInfo"}')
+        async with server_process.server(directory / "data") as (url, process):
+            async with server_process.socket(url) as opened:
+                await server_process.answer(opened, '{"id": 1, "request": "SystemInfo"}')
             samples.append(time.perf_counter() - begin)
             if len(samples) == 6:
                 await _settled(url)
                 memory = process.memory_full_info().pss / 2**20
                 hosts = sum(child.memory_full_info().pss for child in process.children()) / 2**20
     # The first start makes the database and fills the file cache.
-    report.add(Figure("cold_start_s", median(samples[1:]), 5, f"first on empty data {samples[0]:.2f} s"))
+    report.add(Metric("cold_start_s", median(samples[1:]), 5, f"first on empty data {samples[0]:.2f} s"))
     report.add(
-        Figure("idle_memory_mib", memory, 1, f"PSS of the server; the spare cell host beside it {hosts:.0f} MiB")
+        Metric("idle_memory_mib", memory, 1, f"PSS of the server; the spare cell host beside it {hosts:.0f} MiB")
     )
 
 
 async def _settled(url: str) -> None:
-    async with serving.socket(url) as opened:
+    async with server_process.socket(url) as opened:
         for request in ("ListScenes", "GetObjectTypes", "ListProjects"):
-            await serving.answer(opened, json.dumps({"id": 1, "request": request}))
+            await server_process.answer(opened, json.dumps({"id": 1, "request": request}))
     await asyncio.sleep(3)  # the spare cell host does its imports meanwhile
 
 
 async def run(report: Report, directory: Path) -> None:
-    """Measure everything in this room."""
+    """Measure everything in this group."""
     await start(report, directory)
-    async with serving.server(directory / "data") as (url, _):
+    async with server_process.server(directory / "data") as (url, _):
         async with Client(url, "filler") as client:
             for number in range(30):
                 await client.call("NewScene", rpc.NewSceneArgs(f"scene {number}", "one of many"))
@@ -147,5 +149,5 @@ async def run(report: Report, directory: Path) -> None:
         await ratio(report, url, directory, "rpc_ratio_system_info", "SystemInfo")
         await ratio(report, url, directory, "rpc_ratio_list_scenes", "ListScenes")
         await ratio(report, url, directory, "rpc_ratio_object_types", "GetObjectTypes")
-    async with serving.server(directory / "edits") as (url, _):
+    async with server_process.server(directory / "edits") as (url, _):
         await edits(report, url, directory)

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from benchmarks import serving
+from benchmarks import server_process
 from benchmarks.documents import Author
-from benchmarks.figures import Figure, Report, median, percentile
+from benchmarks.metrics import Metric, Report, median, percentile
 
 ACTIONS: Final = 1000
 """Actions in the project that is open when the server is killed."""
@@ -40,7 +40,7 @@ def busy(processes: int) -> Iterator[None]:
 
 async def fill(directory: Path) -> None:
     """Save many projects, and leave a large one open with unsaved edits."""
-    async with serving.server(directory) as (url, _), serving.socket(url) as socket:
+    async with server_process.server(directory) as (url, _), server_process.socket(url) as socket:
         author = Author(socket)
         scene = await author.scene()
         await author.ask("CloseScene")
@@ -59,8 +59,8 @@ async def fill(directory: Path) -> None:
 async def killed(directory: Path) -> float:
     """Return the time from starting the server until a client has the open project, s; then kill the server."""
     begin = time.perf_counter()
-    async with serving.server(directory) as (url, process):
-        async with serving.socket(url) as socket:
+    async with server_process.server(directory) as (url, process):
+        async with server_process.socket(url) as socket:
             await socket.send(json.dumps({"id": 1, "request": "RegisterUser", "args": {"user_name": "bench"}}))
             while '"OpenProject"' not in str(await socket.recv())[:200]:
                 pass
@@ -70,19 +70,19 @@ async def killed(directory: Path) -> float:
 
 
 async def run(report: Report, directory: Path) -> None:
-    """Measure everything in this room."""
+    """Measure everything in this group."""
     data = directory / "restart"
     await fill(data)
     for processes in BUSY:
         with busy(processes):
             samples = [await killed(data) for _ in range(ROUNDS)]
         note = f"median {median(samples):.2f} s, worst {max(samples):.2f} s"
-        report.add(Figure(f"restart_{processes}_busy_p95_s", percentile(samples, 95), ROUNDS, note))
+        report.add(Metric(f"restart_{processes}_busy_p95_s", percentile(samples, 95), ROUNDS, note))
     first, again = [], []
     for _ in range(5):
-        async with serving.server(data) as (url, _process), serving.socket(url) as socket:
+        async with server_process.server(data) as (url, _process), server_process.socket(url) as socket:
             author = Author(socket)
             first.append(await author.timed("ListProjects"))
             again.append(await author.timed("ListProjects"))
     note = f"again {median(again) * 1e3:.2f} ms"
-    report.add(Figure("list_projects_200_first_ms", median(first) * 1e3, len(first), note))
+    report.add(Metric("list_projects_200_first_ms", median(first) * 1e3, len(first), note))

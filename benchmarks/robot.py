@@ -16,8 +16,8 @@ from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.robot import Joint
 from arcor2_server.demo.fakes import free_loopback_address
 from arcor2_server.demo.processes import Child, python_module
-from benchmarks import held, serving
-from benchmarks.figures import Figure, Report, median, percentile
+from benchmarks import hold_to_run, server_process
+from benchmarks.metrics import Metric, Report, median, percentile
 from benchmarks.operation import scene_state
 
 STREAM_SECONDS = 60.0
@@ -48,7 +48,7 @@ async def moved(client: Client, robot: str, target: list[Joint]) -> None:
 
 async def stop_latency(report: Report, directory: Path, host: str, control: str, n: int = 200) -> None:
     """Measure from sending StopAll to the stop's frame at the controller and to the answer, at random phases."""
-    async with serving.server(directory / "robot") as (url, _), Client(url, "bench") as client:
+    async with server_process.server(directory / "robot") as (url, _), Client(url, "bench") as client:
         await client.call("NewScene", rpc.NewSceneArgs("robot"))
         settings = [Parameter("host", "string", f'"{host}"'), Parameter("payload_mass", "double", "0.5")]
         await client.call("AddObjectToScene", rpc.AddObjectToSceneArgs("robot", "UR5e", Pose(), settings))
@@ -95,24 +95,23 @@ async def stop_latency(report: Report, directory: Path, host: str, control: str,
     note = f"median {median(samples) * 1e3:.1f} ms, worst {max(samples) * 1e3:.1f} ms"
     note += f"; answered when it stood, after {median(answered) * 1e3:.0f} ms (median)"
     note += f"; {trips - before} motions ended by the watchdog before, not counted" if trips > before else ""
-    report.add(Figure("stop_latency_p99_ms", percentile(samples, 99) * 1e3, n, note))
+    report.add(Metric("stop_latency_p99_ms", percentile(samples, 99) * 1e3, n, note))
 
 
 async def stream(report: Report, host: str) -> None:
     """Take the state for a minute in a process of its own, as the cell host does."""
-    process = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", "benchmarks.stream", host, str(STREAM_SECONDS), stdout=asyncio.subprocess.PIPE
-    )
+    command = (sys.executable, "-m", "benchmarks.receive_robot_states", host, str(STREAM_SECONDS))
+    process = await asyncio.create_subprocess_exec(*command, stdout=asyncio.subprocess.PIPE)
     assert process.stdout is not None
     result = msgspec.json.decode(await process.stdout.read())
     await process.wait()
     received, missed = result["received"], result["missed"]
-    report.add(Figure("ur_stream_lost", 100.0 * missed / (received + missed), received + missed, "by timestamps"))
-    report.add(Figure("ur_stream_core_percent", 100.0 * result["cpu"] / result["seconds"], 1, "of the whole process"))
+    report.add(Metric("ur_stream_lost", 100.0 * missed / (received + missed), received + missed, "by timestamps"))
+    report.add(Metric("ur_stream_core_percent", 100.0 * result["cpu"] / result["seconds"], 1, "of the whole process"))
 
 
 async def run(report: Report, directory: Path) -> None:
-    """Measure everything in this room."""
+    """Measure everything in this group."""
     host = free_loopback_address()
     command = python_module("arcor2_fakes.ur", "--host", host, "--control", "127.0.0.1:0")
     fake = Child("robot", command, directory / "robot.log")
@@ -120,6 +119,6 @@ async def run(report: Report, directory: Path) -> None:
         addresses = await fake.start_json()
         await stop_latency(report, directory, host, addresses["control"])
         await stream(report, host)
-        await held.held(report, directory, host, addresses["control"])
+        await hold_to_run.run(report, directory, host, addresses["control"])
     finally:
         await fake.stop()

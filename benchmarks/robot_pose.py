@@ -18,7 +18,7 @@ from arcor2_hw.calibration.refusals import CalibrationRefused
 from arcor2_hw.calibration.results import RobotPose
 from arcor2_hw.calibration.robot_pose import find_robot_pose
 from arcor2_hw.data.geometry import Pose
-from benchmarks.figures import Figure, Report, median, percentile
+from benchmarks.metrics import Metric, Report, median, percentile
 from tests.calibration.depth_sensor import Block, Capsule, Sensor, arm, looking, shift, tool
 from tests.calibration.workplace import LARGE, View, drawn, joints_above_the_table, surface_of_arm, told
 
@@ -52,11 +52,11 @@ def run(report: Report, long: bool) -> None:
         told_off = distance > TELLS * found.position_deviation or angle > TELLS * found.orientation_deviation
         wrong += told_off or distance > USELESS
     note = f"p99 {percentile(distances, 99):.2f} mm, {percentile(angles, 99):.3f}°, seed {SEED}"
-    report.add(Figure("robot_pose_mm", median(distances), len(distances), note))
-    report.add(Figure("robot_pose_deg", median(angles), len(angles)))
-    report.add(Figure("robot_pose_s", median(seconds), len(seconds), f"longest {max(seconds):.1f} s"))
-    report.add(Figure("robot_pose_refused", 100.0 * refused / count, count))
-    report.add(Figure("robot_pose_wrong", 100.0 * wrong / count, count, f"beyond {TELLS:g} own deviations, or 5 mm"))
+    report.add(Metric("robot_pose_mm", median(distances), len(distances), note))
+    report.add(Metric("robot_pose_deg", median(angles), len(angles)))
+    report.add(Metric("robot_pose_s", median(seconds), len(seconds), f"longest {max(seconds):.1f} s"))
+    report.add(Metric("robot_pose_refused", 100.0 * refused / count, count))
+    report.add(Metric("robot_pose_wrong", 100.0 * wrong / count, count, f"beyond {TELLS:g} own deviations, or 5 mm"))
     given, asked = 0, 0
     for view in _impostors(max(12, count // 3)):
         asked += 1
@@ -66,7 +66,7 @@ def run(report: Report, long: bool) -> None:
             continue
         given += view.error(found.pose)[0] > USELESS
     note = "no robot, a cupboard in its place, a joint 12° and more off, 0.3 m and more away"
-    report.add(Figure("robot_pose_impostors", 100.0 * given / asked, asked, note))
+    report.add(Metric("robot_pose_impostors", 100.0 * given / asked, asked, note))
 
 
 def _solve(view: View) -> RobotPose:

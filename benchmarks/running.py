@@ -10,8 +10,8 @@ import httpx
 
 from arcor2_hw.client import Client
 from arcor2_hw.data import rpc
-from benchmarks import serving
-from benchmarks.figures import Figure, Report, median, percentile
+from benchmarks import server_process
+from benchmarks.metrics import Metric, Report, median, percentile
 from benchmarks.operation import PROBE, add_type, ended
 
 NAPPER = '''"""A device whose work takes its time."""
@@ -130,7 +130,7 @@ async def commands(report: Report, url: str) -> None:
             await ended(client)
     for name, values in samples.items():
         note = f"median {median(values) * 1e3:.2f} ms, worst {max(values) * 1e3:.1f} ms"
-        report.add(Figure(f"{name}_ms", percentile(values, 95) * 1e3, len(values), note))
+        report.add(Metric(f"{name}_ms", percentile(values, 95) * 1e3, len(values), note))
 
 
 async def stopped(report: Report, url: str) -> None:
@@ -146,7 +146,7 @@ async def stopped(report: Report, url: str) -> None:
             samples.append(await timed(client, "StopPackage", "PackageState", "stopped"))
             await client.next_event("ShowMainScreen")
     note = f"median {median(samples) * 1e3:.1f} ms"
-    report.add(Figure("stopped_ms", percentile(samples, 95) * 1e3, len(samples), note))
+    report.add(Metric("stopped_ms", percentile(samples, 95) * 1e3, len(samples), note))
 
 
 async def until_paused(client: Client) -> None:
@@ -171,12 +171,12 @@ async def distinct(report: Report, url: str, rounds: int = 3) -> None:
         runs = (await client.call("ListRuns", rpc.ListRunsArgs(limit=1))).runs
         assert runs[0].actions == DISTINCT + 1, runs[0]
     note = f"first action after {median(first) * 1e3:.0f} ms"
-    report.add(Figure("run_1000_distinct_s", median(samples), rounds, note))
+    report.add(Metric("run_1000_distinct_s", median(samples), rounds, note))
 
 
 async def run(report: Report, directory: Path) -> None:
-    """Measure everything in this room."""
-    async with serving.server(directory / "running") as (url, _):
+    """Measure everything in this group."""
+    async with server_process.server(directory / "running") as (url, _):
         await prepare(url, directory)
         await commands(report, url)
         await stopped(report, url)

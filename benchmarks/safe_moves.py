@@ -13,7 +13,7 @@ from arcor2_hw.exceptions import Cancelled, PathBlocked
 from arcor2_hw.objects.safe_moves import Way
 from arcor2_hw.objects.surroundings import Nothing, Obstacle
 from arcor2_hw.objects.urdf_robot import UrdfRobot
-from benchmarks.figures import Figure, median, percentile
+from benchmarks.metrics import Metric, median, percentile
 
 UR5E: Final = Path(next(iter(arcor2_drivers.__path__))) / "universal_robots" / "urdf" / "ur5e" / "ur5e.urdf"
 MOVES: Final = 100
@@ -72,7 +72,7 @@ class InstantArm(UrdfRobot):
         self.stopped.set()
 
 
-def figures() -> list[Figure]:
+def metrics() -> list[Metric]:
     """Measure moves whose motion takes no time, and stops before a box that appears."""
     arm, around = InstantArm(), Around()
     arm.surround(around)
@@ -81,7 +81,7 @@ def figures() -> list[Figure]:
         began = time.perf_counter()
         arm.move_to_joints(_joints(READY if number % 2 else ACROSS), 0.5)
         times.append(time.perf_counter() - began)
-    found = [Figure("safe_move_overhead_ms", median(times[2:]) * 1e3, MOVES - 2, "20 boxes, none in the way")]
+    found = [Metric("safe_move_overhead_ms", median(times[2:]) * 1e3, MOVES - 2, "20 boxes, none in the way")]
     arm.waits, late = True, []
     for _ in range(STOPS):
         arm.now = _joints(READY)
@@ -97,7 +97,7 @@ def figures() -> list[Figure]:
         late.append(arm.stopped_at - began)
         del around.boxes["crate"]
     note = f"95th percentile {percentile(late, 95) * 1e3:.0f} ms; from the change to the call of stop"
-    return [*found, Figure("safe_move_stop_after_change_ms", median(late) * 1e3, STOPS, note)]
+    return [*found, Metric("safe_move_stop_after_change_ms", median(late) * 1e3, STOPS, note)]
 
 
 def _blocked(arm: InstantArm) -> None:

@@ -18,7 +18,7 @@ from typing import Any, Final
 from arcor2_hw.exceptions import Cancelled
 from arcor2_hw.objects import Generic
 from arcor2_hw.testing.bench import Bench
-from benchmarks.figures import Figure, Report, median, percentile
+from benchmarks.metrics import Metric, Report, median, percentile
 from tests.drivers.benches.abb_yumi_bench import YuMiBench
 from tests.drivers.benches.conveyor_bench import ConveyorBench
 from tests.drivers.benches.dobot_magician_bench import DobotMagicianBench
@@ -184,7 +184,7 @@ def _stop_all(count: int) -> tuple[dict[type[Bench], list[float]], list[str]]:
     return {kind: late for kind, (late, _) in zip(BENCHES, results, strict=True)}, wrong
 
 
-def measure_busy(count: int) -> list[Figure]:
+def measure_busy(count: int) -> list[Metric]:
     """Measure in a busy process, on this thread."""
     with busy():
         found, wrong = _stop_all(count)
@@ -192,12 +192,12 @@ def measure_busy(count: int) -> list[Figure]:
     notes = ", ".join(f"{kind.type_name()} {percentile(found[kind], 99) * 1e3:.0f}" for kind in found if found[kind])
     done = count * len(BENCHES)
     return [
-        Figure("busy_stops_lost", len(wrong), done, "; ".join(wrong[:5])),
-        Figure("busy_stop_p99_ms", percentile(late, 99) * 1e3, len(late), f"p99 of each: {notes}"),
+        Metric("busy_stops_lost", len(wrong), done, "; ".join(wrong[:5])),
+        Metric("busy_stop_p99_ms", percentile(late, 99) * 1e3, len(late), f"p99 of each: {notes}"),
     ]
 
 
-def measure() -> Figure:
+def measure() -> Metric:
     """Measure on this thread."""
     found, wrong = _stop_all(STOPS)
     if wrong:
@@ -205,12 +205,12 @@ def measure() -> Figure:
     p99 = {kind.type_name(): percentile(samples, 99) * 1e3 for kind, samples in found.items()}
     notes = [f"{kind.type_name()} {p99[kind.type_name()]:.1f} ({median(found[kind]) * 1e3:.1f})" for kind in found]
     note = f"p99 (median) of each: {', '.join(notes)}; {STOPS} stops each"
-    return Figure("driver_stop_p99_ms", max(p99.values()), STOPS * len(BENCHES), note)
+    return Metric("driver_stop_p99_ms", max(p99.values()), STOPS * len(BENCHES), note)
 
 
 async def run(report: Report, long: bool) -> None:
-    """Measure everything in this room."""
+    """Measure everything in this group."""
     logging.getLogger("arcor2_hw").setLevel(logging.ERROR)
     report.add(await asyncio.to_thread(measure))
-    for figure in await asyncio.to_thread(measure_busy, LONG_STOPS if long else STOPS):
-        report.add(figure)
+    for metric in await asyncio.to_thread(measure_busy, LONG_STOPS if long else STOPS):
+        report.add(metric)

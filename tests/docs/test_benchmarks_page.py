@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.__main__ import ROOMS
-from benchmarks.figures import GOALS
+from benchmarks.__main__ import GROUPS
+from benchmarks.metrics import GOALS
 
 PAGE = (Path(__file__).parents[2] / "docs" / "benchmarks.md").read_text()
 ROWS = dict(re.findall(r"^\| `(\w+)` \| .*? \| ([^|]*) \| [^|]* \|$", PAGE, re.MULTILINE))
@@ -28,4 +28,4 @@ def test_the_page_has_the_goal(name: str) -> None:
 
 
 def test_the_page_has_every_room() -> None:
-    assert set(re.findall(r"^## Room `(\w+)`", PAGE, re.MULTILINE)) == set(ROOMS)
+    assert set(re.findall(r"^## Group `(\w+)`", PAGE, re.MULTILINE)) == set(GROUPS)

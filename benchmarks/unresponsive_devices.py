@@ -7,8 +7,8 @@ from pathlib import Path
 from arcor2_hw.client import Client
 from arcor2_hw.data import rpc
 from arcor2_hw.data.geometry import Pose
-from benchmarks import serving
-from benchmarks.figures import Figure, Report, percentile
+from benchmarks import server_process
+from benchmarks.metrics import Metric, Report, percentile
 from benchmarks.operation import add_type, scene_state
 
 HUNG = 8
@@ -58,7 +58,7 @@ async def calls_beside(client: Client, robot: str, calls: int) -> list[float]:
 
 async def run(report: Report, directory: Path) -> None:
     """Measure a prompt robot's calls while eight others hang."""
-    async with serving.server(directory / "hung") as (url, _), Client(url, "bench") as client:
+    async with server_process.server(directory / "hung") as (url, _), Client(url, "bench") as client:
         await add_type(url, "HungRobot", ROBOT.format(name="HungRobot", seconds=600.0))
         await add_type(url, "PromptRobot", ROBOT.format(name="PromptRobot", seconds=0.0))
         await client.call("NewScene", rpc.NewSceneArgs("hung"))
@@ -79,4 +79,4 @@ async def run(report: Report, directory: Path) -> None:
     if under_way != HUNG:
         raise RuntimeError(f"only {under_way} of {HUNG} devices hung to the end")
     note = f"alone {percentile(alone, 99) * 1e3:.1f} ms; all {HUNG} hung to the end"
-    report.add(Figure("hung_beside_p99_ms", percentile(samples, 99) * 1e3, len(samples), note))
+    report.add(Metric("hung_beside_p99_ms", percentile(samples, 99) * 1e3, len(samples), note))

@@ -1,7 +1,7 @@
-"""Lines between a driver and its fake, one for each transport: how each is lost, made whole, and seen to be whole.
+"""Links between a driver and its fake, one for each transport: how each is lost, made whole, and seen to be whole.
 
 The drivers have the settings they are delivered with. A reading counts as fresh when it tells what the device was made
-only after the line was whole again, or was taken after that.
+only after the link was whole again, or was taken after that.
 """
 
 import contextlib
@@ -52,7 +52,7 @@ from tests.fakes.conftest import FakeProcess
 Kind = Literal["reset", "silence", "half-open"]
 KINDS: Final[tuple[Kind, ...]] = ("reset", "silence", "half-open")
 Fresh = Callable[[Any], bool]
-"""Tells whether what was read is of after the line was made whole."""
+"""Tells whether what was read is of after the link was made whole."""
 
 UR_PORTS: Final = (29999, 30003, 30004)
 YUMI_PORTS: Final = (8080, 6101, 6102, 6111, 6112)
@@ -62,11 +62,11 @@ LEVEL: Final = "level=AI ns=2;s=Cell.Level"
 
 
 @dataclass
-class Line:
+class Link:
     """A driver on its fake.
 
     read: takes a reading. mark: makes the device another than before and gives what tells so; `n` is another number
-    each time. serial: the line is a port that can be pulled out. beside: what else has to be connected.
+    each time. serial: the link is a port that can be pulled out. beside: what else has to be connected.
     """
 
     name: str
@@ -122,13 +122,13 @@ def _since_now() -> Fresh:
     return lambda taken: bool(taken > now)
 
 
-class Lines:
+class Links:
     """Starts fakes and makes drivers for them; nothing is connected."""
 
     def __init__(self, stack: contextlib.ExitStack, folder: Path) -> None:
         self._stack, self._folder = stack, folder
 
-    def all(self) -> Iterator[Line]:
+    def all(self) -> Iterator[Link]:
         yield self._tester()
         yield self._block("Modbus TCP")
         yield self._block("Modbus RTU", "--serial", "--link", str(self._folder / "tty_block"))
@@ -158,7 +158,7 @@ class Lines:
         """Start a fake on a pty whose path stays when it is plugged anew."""
         return self._start(module, "--link", str(self._folder / f"tty_{module}"), *arguments)
 
-    def _tester(self) -> Line:
+    def _tester(self) -> Link:
         fake = self._start("functional_tester", "--seed", "1", "--time-scale", "10")
         fake.control.do("push_door", opening=True)
         fake.control.wait_until(lambda truth: truth["door"] == "open")
@@ -172,7 +172,7 @@ class Lines:
                 fake.control.do("take_board")
             return _is(_odd(n))
 
-        return Line("FunctionalTester, Modbus TCP", fake, device, device.board_present, mark)
+        return Link("FunctionalTester, Modbus TCP", fake, device, device.board_present, mark)
 
     def _remote_io(self, name: str, fake: FakeProcess, points: str) -> RemoteIO:
         address = str(fake.ready["modbus"])
@@ -190,21 +190,21 @@ class Lines:
 
         return mark
 
-    def _block(self, transport: str, *arguments: str) -> Line:
+    def _block(self, transport: str, *arguments: str) -> Link:
         fake = self._start("remote_io", *arguments)
         block = self._remote_io("block", fake, "part=DI0")
         name = f"RemoteIO, {transport}"
-        return Line(name, fake, block, lambda: block.read("part").value, self._input(fake), bool(arguments))
+        return Link(name, fake, block, lambda: block.read("part").value, self._input(fake), bool(arguments))
 
-    def _suction(self) -> Line:
+    def _suction(self) -> Link:
         fake = self._start("remote_io")
         block = self._remote_io("valves", fake, "part=DI0; vacuum=DO0 on_loss=hold; blow=DO1")
         gripper = SuctionGripper("suction", "suction", VacuumGripperSettings("valves", "vacuum", "blow", "part"))
         gripper.attach(lambda _: block)
         name = "SuctionGripper, Modbus TCP of its block"
-        return Line(name, fake, gripper, gripper.part_held, self._input(fake), beside=(block,))
+        return Link(name, fake, gripper, gripper.part_held, self._input(fake), beside=(block,))
 
-    def _robotiq(self, transport: str) -> Line:
+    def _robotiq(self, transport: str) -> Link:
         fake = self._start("robotiq_2f", "--link", str(self._folder / f"tty_2f_{transport[:3]}"))
         serial = transport != "ASCII"
         if serial:
@@ -218,11 +218,11 @@ class Lines:
             fake.control.do("fault", code=8 if _odd(n) else 0)
             return _is(["8"] if _odd(n) else [])
 
-        return Line(
+        return Link(
             f"Robotiq2F, {transport}", fake, gripper, lambda: [alarm.code for alarm in gripper.alarms()], mark, serial
         )
 
-    def _conveyor(self, interface: str) -> Line:
+    def _conveyor(self, interface: str) -> Link:
         fake = self._start("conveyor")
         if interface == "slcan":
             settings = ConveyorSettings(f"socket://{fake.ready['can']}")
@@ -230,9 +230,9 @@ class Lines:
             channel = f"socket://{fake.ready['socketcand']}/can0"
             settings = ConveyorSettings(channel, CanInterface.SOCKETCAND)
         belt = Conveyor("belt", f"belt_{interface}", settings)
-        return Line(f"Conveyor, {interface}", fake, belt, lambda: belt.position().monotonic, lambda _: _since_now())
+        return Link(f"Conveyor, {interface}", fake, belt, lambda: belt.position().monotonic, lambda _: _since_now())
 
-    def _ur(self) -> Line:
+    def _ur(self) -> Link:
         host = free_loopback_address(UR_PORTS)
         fake = self._start("ur", "--host", host, "--control", "127.0.0.1:0")
         arm = UR5e("ur", "ur", Pose(), UrSettings(host, payload_mass=1.0))
@@ -242,9 +242,9 @@ class Lines:
             fake.control.do("place", q=[base, *UR_HOME[1:]])
             return _near(base, 0.01)
 
-        return Line("UR5e, RTDE", fake, arm, lambda: arm.robot_joints()[0].value, mark)
+        return Link("UR5e, RTDE", fake, arm, lambda: arm.robot_joints()[0].value, mark)
 
-    def _yumi(self) -> Line:
+    def _yumi(self) -> Link:
         host = free_loopback_address(YUMI_PORTS)
         fake = self._start("abb_yumi", "--host", host)
         robot = YuMi("yumi", "yumi", Pose(), YumiSettings(host, rws_port=YUMI_PORTS[0], left_mass=0.2, right_mass=0.2))
@@ -254,9 +254,9 @@ class Lines:
             fake.control.do("place", arm="left", joints=[*YUMI_HOME[:5], degrees, YUMI_HOME[6]])
             return _near(degrees / 57.3, 0.01)
 
-        return Line("YuMi, RWS", fake, robot, lambda: robot.robot_joints(arm_id="left")[5].value, mark)
+        return Link("YuMi, RWS", fake, robot, lambda: robot.robot_joints(arm_id="left")[5].value, mark)
 
-    def _dobot(self) -> Line:
+    def _dobot(self) -> Link:
         fake = self._linked("dobot_magician")
         arm = DobotMagician("dobot", "dobot", Pose(), DobotMagicianSettings(fake.ready["port"]))
 
@@ -264,9 +264,9 @@ class Lines:
             fake.control.do("drive", turn=5.0 if _odd(n) else -5.0, percent=100.0)
             return _near(5.0 / 57.3 if _odd(n) else 0.0, 0.02)
 
-        return Line("DobotMagician, serial", fake, arm, lambda: arm.robot_joints()[0].value, mark, serial=True)
+        return Link("DobotMagician, serial", fake, arm, lambda: arm.robot_joints()[0].value, mark, serial=True)
 
-    def _two_axis(self) -> Line:
+    def _two_axis(self) -> Link:
         fake = self._linked("two_axis_robot")
         arm = TwoAxisRobot("two_axis", "two_axis", Pose(), TwoAxisRobotSettings(fake.ready["port"]))
 
@@ -274,9 +274,9 @@ class Lines:
             fake.control.do("place", servo=1, ticks=2500 if _odd(n) else 1600)
             return lambda angle: bool((angle > 0.0) == _odd(n))
 
-        return Line("TwoAxisRobot, Dynamixel", fake, arm, lambda: arm.robot_joints()[0].value, mark, serial=True)
+        return Link("TwoAxisRobot, Dynamixel", fake, arm, lambda: arm.robot_joints()[0].value, mark, serial=True)
 
-    def _scale(self) -> Line:
+    def _scale(self) -> Link:
         fake = self._linked("scale", "--settling", "0.05")
         scale = MtSicsScale("scale", "scale", settings=MtSicsScaleSettings(fake.ready["port"]))
 
@@ -285,9 +285,9 @@ class Lines:
             fake.control.do("put", kg=kg)
             return _near(kg, 1e-3)
 
-        return Line("MtSicsScale, serial", fake, scale, lambda: scale.weigh().value, mark, serial=True)
+        return Link("MtSicsScale, serial", fake, scale, lambda: scale.weigh().value, mark, serial=True)
 
-    def _printer(self) -> Line:
+    def _printer(self) -> Link:
         fake = self._start("label_printer", "--tcp", "127.0.0.1:0")
         printer = ZplPrinter("printer", "printer", settings=ZplPrinterSettings(fake.ready["port"]))
 
@@ -295,9 +295,9 @@ class Lines:
             fake.control.do("pause", on=_odd(n))
             return _is("paused" if _odd(n) else "ready")
 
-        return Line("ZplPrinter, socket://", fake, printer, printer.status, mark)
+        return Link("ZplPrinter, socket://", fake, printer, printer.status, mark)
 
-    def _reader(self) -> Line:
+    def _reader(self) -> Link:
         fake = self._linked("barcode_reader")
         reader = BarcodeReader("reader", "reader", settings=BarcodeReaderSettings(fake.ready["port"]))
 
@@ -308,9 +308,9 @@ class Lines:
         def read() -> str:
             return getattr(reader.trigger(0.5), "text", "")
 
-        return Line("BarcodeReader, serial", fake, reader, read, mark, serial=True)
+        return Link("BarcodeReader, serial", fake, reader, read, mark, serial=True)
 
-    def _erp(self) -> Line:
+    def _erp(self) -> Link:
         fake = self._start("erp")
         erp = ErpService("erp", "erp", ErpSettings(fake.ready["url"], outbox=str(self._folder / "outbox")))
 
@@ -324,9 +324,9 @@ class Lines:
                 erp.close_order(order, "read")
             return order
 
-        return Line("ErpService, HTTP", fake, erp, read, mark)
+        return Link("ErpService, HTTP", fake, erp, read, mark)
 
-    def _plc(self) -> Line:
+    def _plc(self) -> Link:
         fake = self._start("opcua_plc")
         plc = OpcUaPlc("plc", "plc", OpcUaPlcSettings(fake.ready["url"], LEVEL))
 
@@ -334,18 +334,18 @@ class Lines:
             fake.control.do("set", name="Level", value=n)
             return _is(n)
 
-        return Line("OpcUaPlc, OPC UA", fake, plc, lambda: plc.read("level").value, mark)
+        return Link("OpcUaPlc, OPC UA", fake, plc, lambda: plc.read("level").value, mark)
 
-    def _camera(self) -> Line:
+    def _camera(self) -> Link:
         fake = self._start("oak_d", "--width", "320", "--height", "180")
         pose = Pose(Position(0.0, 0.0, 0.8), Orientation(1.0, 0.0, 0.0, 0.0))
         camera = OakD("camera", "camera", pose, None, OakDSettings(fake.ready["stream"]))
-        return Line("OakD, stream", fake, camera, lambda: camera.capture().monotonic, lambda _: _since_now())
+        return Link("OakD, stream", fake, camera, lambda: camera.capture().monotonic, lambda _: _since_now())
 
 
 @contextlib.contextmanager
-def started() -> Iterator[list[Line]]:
-    """Start every fake; give the lines, not connected. At the end all are disconnected and the fakes ended."""
+def started() -> Iterator[list[Link]]:
+    """Start every fake; give the links, not connected. At the end all are disconnected and the fakes ended."""
     with contextlib.ExitStack() as stack:
-        folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="arcor2-hw-lines-", ignore_cleanup_errors=True))
-        yield list(Lines(stack, Path(folder)).all())
+        folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="arcor2-hw-links-", ignore_cleanup_errors=True))
+        yield list(Links(stack, Path(folder)).all())

@@ -8,7 +8,7 @@ import msgspec
 from arcor2_drivers.oak_d.oak_d import OakD
 from arcor2_drivers.oak_d.settings import OakDSettings
 from arcor2_hw.data.geometry import Pose
-from benchmarks.figures import median
+from benchmarks.metrics import median
 
 camera = OakD("obj_bench", "camera", Pose(), None, OakDSettings(sys.argv[1]))
 camera.connect(20.0)

@@ -32,7 +32,7 @@ async def server(directory: Path) -> AsyncIterator[tuple[str, psutil.Process]]:
 @contextlib.asynccontextmanager
 async def echo(directory: Path, size: int) -> AsyncIterator[str]:
     """Run an answerer of `size` bytes on the same stack in a process of its own; gives its address."""
-    child = Child("echo", [sys.executable, "-m", "benchmarks.echo", str(size)], directory / f"echo-{size}.log")
+    child = Child("echo", [sys.executable, "-m", "benchmarks.echo_server", str(size)], directory / f"echo-{size}.log")
     try:
         yield await child.start()
     finally:

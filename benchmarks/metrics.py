@@ -1,4 +1,4 @@
-"""A figure, how it is printed, and the goals."""
+"""A metric, how it is printed, and the goals."""
 
 import statistics
 import sys
@@ -119,7 +119,7 @@ GOALS: Final[dict[str, tuple[str, str]]] = {
 
 
 @dataclass(frozen=True)
-class Figure:
+class Metric:
     """One measured value; `n` is the number of samples behind it, `note` what else was seen."""
 
     name: str
@@ -136,22 +136,22 @@ class Figure:
 
 
 class Report:
-    """Prints each figure as a JSON line on standard output, and all as a table on standard error at the end."""
+    """Prints each metric as a JSON line on standard output, and all as a table on standard error at the end."""
 
     def __init__(self) -> None:
-        self._figures: list[Figure] = []
+        self._figures: list[Metric] = []
 
-    def add(self, figure: Figure) -> None:
-        """Print a figure."""
-        unit, goal = GOALS.get(figure.name, ("", ""))
-        self._figures.append(figure)
-        line = {"name": figure.name, "value": round(figure.value, 4), "unit": unit, "n": figure.n, "goal": goal}
+    def add(self, metric: Metric) -> None:
+        """Print a metric."""
+        unit, goal = GOALS.get(metric.name, ("", ""))
+        self._figures.append(metric)
+        line = {"name": metric.name, "value": round(metric.value, 4), "unit": unit, "n": metric.n, "goal": goal}
         sys.stdout.write(msgspec.json.encode(line).decode() + "\n")
         sys.stdout.flush()
 
     def table(self) -> None:
         """Print the table."""
-        table = Table("figure", "value", "unit", "n", "goal", "", "note")
+        table = Table("metric", "value", "unit", "n", "goal", "", "note")
         for f in self._figures:
             unit, goal = GOALS.get(f.name, ("", ""))
             mark = {True: "[green]reached", False: "[red]missed", None: ""}[f.reached()]

@@ -11,8 +11,8 @@ from arcor2_hw.client import Client
 from arcor2_hw.data import rpc
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.parameter import Parameter
-from benchmarks import serving
-from benchmarks.figures import Figure, Report, median, percentile
+from benchmarks import server_process
+from benchmarks.metrics import Metric, Report, median, percentile
 from benchmarks.operation import scene_state
 
 HOLDS: Final = 100
@@ -88,10 +88,10 @@ class Holder:
         return sum(isinstance(outcome, BaseException) for outcome in outcomes)
 
 
-async def held(report: Report, directory: Path, host: str, control: str) -> None:
+async def run(report: Report, directory: Path, host: str, control: str) -> None:
     """Measure holds that are not renewed any more, half of them upwards."""
     fake = await Fake.open(control)
-    async with serving.server(directory / "held") as (url, _), Client(url, "bench") as client:
+    async with server_process.server(directory / "held") as (url, _), Client(url, "bench") as client:
         await client.call("NewScene", rpc.NewSceneArgs("robot"))
         settings = [Parameter("host", "string", f'"{host}"'), Parameter("payload_mass", "double", "0.5")]
         await client.call("AddObjectToScene", rpc.AddObjectToSceneArgs("robot", "UR5e", Pose(), settings))
@@ -128,7 +128,7 @@ async def held(report: Report, directory: Path, host: str, control: str) -> None
     note = f"median {median(ms):.0f} ms, worst {max(ms):.0f} ms, of which {VALID_MS} ms are the lease"
     if skipped:
         note += f"; {skipped} holds ended before by themselves, {refused} renewals late: the machine was busy"
-    report.add(Figure("jog_missed_to_rest_p99_ms", percentile(ms, 99), len(ms), note))
+    report.add(Metric("jog_missed_to_rest_p99_ms", percentile(ms, 99), len(ms), note))
     renewals = [renewal * 1e3 for renewal in holder.renewals]
     note = f"99th percentile {percentile(renewals, 99):.1f} ms"
-    report.add(Figure("jog_renewal_ms", median(renewals), len(renewals), note))
+    report.add(Metric("jog_renewal_ms", median(renewals), len(renewals), note))
