@@ -138,6 +138,8 @@ class Line:
         """
         limit = timeout or self.answer_timeout
         with self.held():
+            if (loss := self.loss_again()) is not None:
+                raise loss
             self.waiting()
             self.send(question)
             deadline, came = time.monotonic() + limit, b""

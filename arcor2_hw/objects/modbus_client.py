@@ -21,6 +21,8 @@ LONGEST_FRAME: Final = 4096
 """Bytes taken at once; a frame has 260 at most."""
 GRAIN: Final = 0.002
 """s by which a TCP answer may come too late: the kernel's limit is set anew only when it is wrong by more than this."""
+WAKE_WITHIN: Final = 0.05
+"""Time within which a thread that waits on a serial port notices that it is being closed, s."""
 BITS_OF_A_CHARACTER: Final = 11
 """Modbus over serial line 1.02, 2.5.1: start, eight, parity or a second stop bit, stop."""
 SILENCE: Final = 3.5
@@ -145,6 +147,7 @@ class SerialClient(_Exchange, ModbusSerialClient):
         )
         self._silence = max(SILENCE * BITS_OF_A_CHARACTER / baudrate, SHORTEST_SILENCE)
         self._last_byte = 0.0
+        self._ended = False
         self.know()
 
     def send(self, request: bytes, addr: tuple[str, int] | None = None) -> int:
@@ -163,9 +166,11 @@ class SerialClient(_Exchange, ModbusSerialClient):
             waiting.register(port.fileno(), select.POLLIN)
         except (AttributeError, io.UnsupportedOperation):  # a port that is no file
             return bytes(super().recv(size))
-        left = self.deadline - time.monotonic()
-        if left <= 0.0 or not waiting.poll(1e3 * left):
-            return b""
+        while not waiting.poll(1e3 * min(max(self.deadline - time.monotonic(), 0.0), WAKE_WITHIN)):
+            if self._ended:
+                raise ConnectionException("closed meanwhile")
+            if time.monotonic() >= self.deadline:
+                return b""
         # A port that was unplugged is readable and has nothing: pyserial tells so.
         data = bytes(port.read(port.in_waiting or 1))
         self._last_byte = time.monotonic()
@@ -173,7 +178,8 @@ class SerialClient(_Exchange, ModbusSerialClient):
         return data
 
     def wake(self) -> None:
-        """Let a thread that waits for an answer go on waiting: a serial port has no other end that could go."""
+        """Let a thread that waits for an answer fail."""
+        self._ended = True
 
 
 def _timeval(seconds: float) -> bytes:

@@ -8,6 +8,7 @@ from arcor2_hw.actions import action
 from arcor2_hw.data.device import Quality, Reading
 from arcor2_hw.exceptions import DeviceFault, OutOfRange, Refused
 from arcor2_hw.objects.edges import Edge, EdgeListeners
+from arcor2_hw.objects.settings import within
 from arcor2_hw.objects.small import IOPoint, PointKind
 
 LONGEST_WAIT: Final = 600.0
@@ -38,12 +39,12 @@ class PointActions(abc.ABC):
         if point is None:
             raise OutOfRange(f"{self.who} has no point {name!r}; there are {', '.join(self.io_points)}")
         if kind not in (None, point.kind):
-            raise Refused(f"{self.who}: {name} is {self.address_of(name)}; this needs a point that is {kind}")
+            raise Refused(f"{self.who}: {name} is {self.point_label(name)}; this needs a point of the other kind")
         return point
 
-    def address_of(self, name: str) -> str:
-        """Return where a point is in the device, for errors."""
-        return name
+    def point_label(self, name: str) -> str:
+        """Return what a point is, for errors: its kind, or its terminal."""
+        return "digital" if self.io_points[name].kind is PointKind.DIGITAL else "analogue"
 
     @abc.abstractmethod
     def read(self, name: str) -> Reading[bool | float]:
@@ -74,7 +75,7 @@ class PointActions(abc.ABC):
         :param name: name of the point
         """
         self.require_point(name, PointKind.DIGITAL)
-        return bool(self.read(name).value)
+        return bool(self._good_value(name))
 
     @action
     def read_analog(self, name: str, *, an: str | None = None) -> float:
@@ -83,14 +84,17 @@ class PointActions(abc.ABC):
         :param name: name of the point
         """
         self.require_point(name, PointKind.ANALOG)
+        return float(self._good_value(name))
+
+    def _good_value(self, name: str) -> bool | float:
         reading = self.read(name)
         if reading.quality is Quality.BAD:
             raise self.bad_reading(name)
-        return float(reading.value)
+        return reading.value
 
     def bad_reading(self, name: str) -> DeviceFault:
         """Return the error for a point whose value is bad."""
-        return DeviceFault(f"{self.who}: {name} ({self.address_of(name)}) is bad", fault_code="bad")
+        return DeviceFault(f"{self.who}: {name} ({self.point_label(name)}) is bad", fault_code="bad")
 
     @action
     def write_digital(self, name: str, value: bool, *, an: str | None = None) -> None:
@@ -122,5 +126,6 @@ class PointActions(abc.ABC):
         """
         assert 0.0 <= timeout <= 600.0
 
+        within(f"{self.who}: timeout", timeout, 0.0, LONGEST_WAIT, "s")
         self.require_point(name, PointKind.DIGITAL)
         self.await_point(name, value, timeout)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from typing import Final, Protocol, TypeVar
 
 from arcor2_hw.data.device import Health
-from arcor2_hw.exceptions import DeviceError, NotInControl, Refused
+from arcor2_hw.exceptions import DeviceError, DeviceFault, NotInControl, Refused
 from arcor2_hw.objects.connected import Connected
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.observing import GoOn
@@ -162,6 +162,13 @@ class PolledControl(Connected, typing.Generic[T]):
             yield self.begin(what)
         finally:
             self._acting.release()
+
+    def finish(self, what: str, timeout: float, go_on: GoOn) -> T:
+        """Wait until the device does not work any more. Raises DeviceFault when it reports a fault then."""
+        end = self.wait(lambda state: not self.is_busy(state), timeout, what, go_on)
+        if fault := self.fault_of(end):
+            raise DeviceFault(f"{self.who}: {what} failed", fault_code=fault)
+        return end
 
     def stop_waiting(self) -> None:
         """End with Cancelled the work that has started."""

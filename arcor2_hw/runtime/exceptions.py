@@ -10,7 +10,7 @@ from arcor2_hw.runtime.program import current
 
 
 def print_exception(error: BaseException) -> None:
-    """Report the exception that ended the script to the server, or on standard output."""
+    """Tell the server, or whoever reads the standard output, of the exception that ended the script."""
     program = current()
     if program is not None:
         program.exception(error)

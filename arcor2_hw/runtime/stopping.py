@@ -1,4 +1,4 @@
-"""Stops that were sent to devices, and their outcomes."""
+"""Stops that were sent to devices, and what became of them."""
 
 import time
 from typing import Final, NamedTuple

@@ -1,0 +1,65 @@
+"""HttpLink: a device that is asked over HTTP, one request at a time."""
+
+import threading
+from typing import Any
+
+import httpx
+
+from arcor2_hw.exceptions import ConnectionLost, DeviceFault, DeviceTimeout, NotConnected, Refused
+
+
+class HttpLink:
+    """A connection for PolledControl.
+
+    Args:
+        who: Name and address of the device, for errors.
+        url: Address of the device, as http://192.168.0.7.
+        timeout: Time the device has to answer one request, s.
+    """
+
+    def __init__(self, who: str, url: str, timeout: float = 0.3) -> None:
+        self.who = who
+        self._url, self._timeout = url, timeout
+        self._one_request = threading.Lock()
+        self._client: httpx.Client | None = None
+
+    def open(self, timeout: float) -> None:
+        """Prepare for requests; nothing is sent: connecting is part of the first request."""
+        self.close()
+        self._client = httpx.Client(base_url=self._url, timeout=self._timeout, trust_env=False)
+
+    def close(self) -> None:
+        """Close; does nothing when closed."""
+        client, self._client = self._client, None
+        if client is not None:
+            with self._one_request:
+                client.close()
+
+    def request(self, method: str, path: str, body: Any = None) -> Any:
+        """Send a request once and return the JSON of its answer.
+
+        Raises:
+            NotConnected: The device cannot be reached.
+            DeviceTimeout: It did not answer in time.
+            ConnectionLost: The connection broke.
+            DeviceFault: The answer is not JSON.
+            Refused: The device answered with an error.
+        """
+        with self._one_request:
+            if self._client is None:
+                raise ConnectionLost(f"{self.who}: the connection is closed")
+            try:
+                answer = self._client.request(method, path, json=body)
+                content = answer.json()
+            except httpx.TimeoutException as e:
+                raise DeviceTimeout(f"{self.who} did not answer within {self._timeout:g} s", str(e)) from e
+            except httpx.ConnectError as e:
+                raise NotConnected(f"{self.who} cannot be reached", str(e)) from e
+            except httpx.HTTPError as e:
+                raise ConnectionLost(f"{self.who}: the connection was lost", str(e)) from e
+            except ValueError as e:
+                raise DeviceFault(f"{self.who} sent what it never sends", str(e)) from e
+        if answer.is_error:
+            why = content.get("error", answer.status_code) if isinstance(content, dict) else answer.status_code
+            raise Refused(f"{self.who} refuses: {why}")
+        return content

@@ -1,0 +1,87 @@
+"""FakeBench: a bench whose device is a fake of `arcor2_fakes.registers`, in a process of its own."""
+
+import contextlib
+import json
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from typing import Any, ClassVar
+
+from arcor2_hw.testing.bench import Bench
+
+ANSWERS_WITHIN = 5.0
+"""Time the control channel has to answer, s."""
+
+
+class FakeBench(Bench):
+    """Starts the fake, and passes faults and commands to it over its control channel."""
+
+    fake: ClassVar[str]
+    """Module of the fake, as in `python -m`."""
+
+    def start(self) -> None:
+        """Start the fake, which prints its addresses when it is ready."""
+        command = [sys.executable, "-m", self.fake]
+        self._process = subprocess.Popen(command, stdout=subprocess.PIPE)  # noqa: S603 - the fake of the driver
+        assert self._process.stdout is not None
+        ready = json.loads(self._process.stdout.readline().removeprefix(b"ready "))
+        self._address = str(ready["address"])
+        host, _, port = ready["control"].rpartition(":")
+        self._control = socket.create_connection((host, int(port)), ANSWERS_WITHIN)
+        self._answers = self._control.makefile("rb")
+
+    def end(self) -> None:
+        """End the fake."""
+        self._answers.close()
+        self._control.close()
+        self._process.terminate()
+        self._process.wait(ANSWERS_WITHIN)
+        assert self._process.stdout is not None
+        self._process.stdout.close()
+
+    def do(self, command: str, **arguments: Any) -> Any:
+        """Call a command of the control channel and return its result."""
+        self._control.sendall(json.dumps({"id": 1, "do": command, **arguments}).encode() + b"\n")
+        answer = json.loads(self._answers.readline())
+        assert answer["ok"], answer
+        return answer["data"]
+
+    @property
+    def address(self) -> str:
+        """Return the address of the fake."""
+        return self._address
+
+    def reset(self) -> None:
+        """Bring the fake to its state after power on."""
+        self.do("heal")
+        self.do("rest")
+
+    def writes(self) -> Any:
+        """Return everything that was ever written."""
+        return self.do("truth")["written"]
+
+    def cut(self) -> None:
+        """Make the wire silent."""
+        self.do("silence")
+
+    def heal(self) -> None:
+        """End the faults of the wire."""
+        self.do("heal")
+
+    def reset_link(self) -> None:
+        """Reset the connection."""
+        self.do("reset")
+
+    def half_frame(self) -> None:
+        """Let the next answer break off."""
+        self.do("half_frame")
+
+    @contextlib.contextmanager
+    def foreign(self) -> Iterator[None]:
+        """Give control to the operator panel meanwhile."""
+        self.do("panel", on=True)
+        try:
+            yield
+        finally:
+            self.do("panel", on=False)
